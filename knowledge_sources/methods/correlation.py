@@ -1,0 +1,215 @@
+"""Template correlation (§1.2, §5): where in this image is the patch that was seen there?
+
+Normalised cross-correlation finds the place to a pixel and says how sure and how unique it is; a least-squares alignment
+(gain and brightness free) finishes to a few hundredths of a pixel and gives a covariance, large along an edge.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.correlation_align import align, gradients
+from knowledge_sources.methods.images import grey_float, noise_sigma
+
+_MARGIN_PX = 4
+_LOBE_PX = 2.5
+"""Nearer than this to the best place, another local maximum is the same place."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Template:
+    """A square patch of an image, with what is around it.
+
+    Attributes:
+        pixels: (p, p) float32, the patch with a margin.
+        centre: (2,) (u, v) of the template's centre in `pixels`, not whole in general [px].
+        half_px: the patch reaches from -half_px to +half_px round its centre, at the scale at which it was seen.
+        noise: standard deviation of the pixel noise of its image [grey levels].
+    """
+
+    pixels: NDArray[np.float32]
+    centre: NDArray[np.float64]
+    half_px: int
+    noise: float
+
+    def patch(self, scale: float = 1.0, border: int = 0) -> NDArray[np.float32]:
+        """(2 half + 1 + 2 border) squared float32, enlarged by `scale`, its middle cell exactly at the centre."""
+        height, width = self.pixels.shape
+        places = np.arange(-self.half_px - border, self.half_px + border + 1) / scale + self.centre[:, None]
+        inside = np.minimum(np.maximum(places, 0.0), np.array([[width - 1.0], [height - 1.0]]))
+        columns, rows = _interpolation(inside, max(width, height), scale)
+        return np.asarray(rows[:, :height] @ self.pixels @ columns[:, :width].T, np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Correlation:
+    """Where a template was found.
+
+    Attributes:
+        position_px: (2,) the template's centre (u, v) [px].
+        covariance_px: (2, 2) of the position [px^2]; large along an edge.
+        sigma_px: root of the covariance's mean diagonal [px].
+        peak: normalised correlation at the best place, -1 to 1.
+        second_peak: the best at another place in the window, -1 where there is none.
+        at_border: the best place lies at the window's border, so the true place may be outside.
+        moved_px: (2,) position minus prediction [px].
+    """
+
+    position_px: NDArray[np.float64]
+    covariance_px: NDArray[np.float64]
+    peak: float
+    second_peak: float
+    at_border: bool
+    moved_px: NDArray[np.float64]
+
+    @property
+    def sigma_px(self) -> float:
+        return math.sqrt(float(np.trace(self.covariance_px)) / 2.0)
+
+    @property
+    def distinctiveness(self) -> float:
+        """Margin of the best place over the second best, 0 (ambiguous) to 2."""
+        return self.peak - self.second_peak
+
+
+def extract_template(image: Any, centre_px: Any, half_px: int = 12) -> Template:
+    """The patch (2 half_px + 1 squared) of an image (h, w) round a centre (u, v) [px], which need not be whole.
+
+    Raises:
+        ValueError: the patch does not lie in the image, or half_px < 2.
+    """
+    pixels = grey_float(image)
+    centre = np.asarray(centre_px, float).reshape(-1)
+    height, width = pixels.shape
+    if half_px < 2 or centre.shape != (2,):
+        raise ValueError(f"expected a centre (u, v) and half_px >= 2, got {centre_px!r} and {half_px}")
+    if not fits(pixels.shape, centre, half_px):
+        raise ValueError(f"expected a patch of half-width {half_px} inside {width} x {height} px, got centre {centre}")
+    reach = 2 * half_px + _MARGIN_PX  # enough for a template that shrinks to half
+    u, v = (math.floor(c) for c in centre)
+    left, top = max(u - reach, 0), max(v - reach, 0)
+    window = pixels[top : v + reach + 2, left : u + reach + 2].copy()
+    return Template(window, centre - (left, top), int(half_px), noise_sigma(window))
+
+
+def fits(shape: tuple[int, ...], centre_px: Any, half_px: float) -> bool:
+    """Whether a patch of that half-width round a centre (u, v) lies inside an image of that shape (h, w)."""
+    u, v = (float(c) for c in np.asarray(centre_px, float))
+    return bool(half_px <= u <= shape[1] - 1 - half_px and half_px <= v <= shape[0] - 1 - half_px)
+
+
+def correlate(
+    template: Template, image: Any, predicted_px: Any, search_px: float, *, scale: float = 1.0
+) -> Correlation | None:
+    """Find a template within `search_px` of a prediction (u, v) [px] in each direction.
+
+    Args:
+        scale: how much larger the patch is expected here than where it was taken (old depth / new depth).
+
+    Returns:
+        None where no place of the window holds the whole template inside the image.
+
+    Raises:
+        ValueError: scale outside 0.5 to 4, or search_px not positive.
+    """
+    if not 0.5 <= scale <= 4.0:
+        raise ValueError(f"expected a scale from 0.5 to 4, got {scale}")
+    if not search_px > 0:
+        raise ValueError(f"expected a positive search_px, got {search_px}")
+    pixels = np.asarray(image)
+    if pixels.ndim != 2:
+        raise ValueError(f"expected a grey image of shape (h, w), got shape {pixels.shape}")
+    predicted = np.asarray(predicted_px, float)
+    window = _window(pixels.shape, predicted, search_px, template.half_px)
+    if window is None:
+        return None
+    u0, u1, v0, v1 = window
+    half = template.half_px
+    patch = template.patch(scale, border=1)
+    view = np.ascontiguousarray(pixels[v0 - half : v1 + half + 1, u0 - half : u1 + half + 1], np.float32)
+    score = np.asarray(cv2.matchTemplate(view, np.ascontiguousarray(patch[1:-1, 1:-1]), cv2.TM_CCOEFF_NORMED), np.float32)
+    score[~np.isfinite(score)] = -1.0
+    row, column = divmod(int(np.argmax(score)), score.shape[1])
+    start = np.array([column, row], float) + _quadratic_peak(score, row, column)
+    at_border = not (0 < row < score.shape[0] - 1 and 0 < column < score.shape[1] - 1)
+    place, covariance = align(patch, view, start, template.noise, search_px)
+    position = place + (u0, v0)
+    return Correlation(
+        position, covariance, float(score[row, column]), _second(score, row, column, half), at_border, position - predicted
+    )
+
+
+def corner_strength(image: Any, centre_px: Any, half_px: int = 12) -> float:
+    """Root of the smaller eigenvalue of the mean squared gradient [grey levels / px]: 0 on a wall or along an edge."""
+    gradient = gradients(extract_template(image, centre_px, half_px).patch(border=1))
+    least = float(np.linalg.eigvalsh((gradient @ gradient.T).astype(np.float64))[0])
+    return math.sqrt(max(least, 0.0) / gradient.shape[1])
+
+
+def self_correlation(image: Any, centre_px: Any, half_px: int, search_px: float) -> Correlation:
+    """How a patch would be found again in its own image: its `distinctiveness` and `covariance_px` rate it as a landmark.
+
+    Raises:
+        ValueError: the patch does not lie in the image.
+    """
+    template = extract_template(image, centre_px, half_px)
+    found = correlate(template, image, np.rint(np.asarray(centre_px, float)), search_px)
+    if found is None:
+        raise ValueError(f"expected a patch of half-width {half_px} inside the image, got centre {centre_px!r}")
+    return found
+
+
+def _interpolation(places: NDArray[np.float64], size: int, scale: float) -> NDArray[np.float32]:
+    """(..., size) weights of cubic interpolation at places (...) from 0 to size - 1, widened where the template shrinks.
+
+    Source: R. Keys, Cubic convolution interpolation, 1981, with a = -1/2: exact for polynomials to the second degree.
+    """
+    distance = np.abs((places[..., None] - np.arange(size)).astype(np.float32))
+    if scale < 1.0:
+        distance *= np.float32(scale)
+    near = ((1.5 * distance - 2.5) * distance * distance + 1.0) * (distance <= 1.0)
+    far = (((2.5 - 0.5 * distance) * distance - 4.0) * distance + 2.0) * ((distance > 1.0) & (distance < 2.0))
+    weights = near + far
+    return np.asarray(weights / weights.sum(axis=-1, keepdims=True), np.float32)
+
+
+def _window(
+    shape: tuple[int, ...], predicted: NDArray[np.float64], search: float, half: int
+) -> tuple[int, int, int, int] | None:
+    """First and last column and row of the centres searched, all of whose patches lie in the image."""
+    if predicted.shape != (2,) or not np.all(np.isfinite(predicted)):
+        raise ValueError(f"expected a finite prediction (u, v), got {predicted}")
+    u0, u1 = max(math.floor(predicted[0] - search), half), min(math.ceil(predicted[0] + search), shape[1] - 1 - half)
+    v0, v1 = max(math.floor(predicted[1] - search), half), min(math.ceil(predicted[1] + search), shape[0] - 1 - half)
+    return (u0, u1, v0, v1) if u0 <= u1 and v0 <= v1 else None
+
+
+def _quadratic_peak(score: NDArray[np.float32], row: int, column: int) -> NDArray[np.float64]:
+    """Offset (u, v) of the top of the quadric through the 3 x 3 scores round a peak, at most half a cell."""
+    if not (0 < row < score.shape[0] - 1 and 0 < column < score.shape[1] - 1):
+        return np.zeros(2)
+    s = score[row - 1 : row + 2, column - 1 : column + 2].astype(float)
+    slope = np.array([(s[:, 2] - s[:, 0]).sum(), (s[2] - s[0]).sum()]) / 6.0
+    xx = (s[:, 0] - 2.0 * s[:, 1] + s[:, 2]).sum() / 3.0
+    yy = (s[0] - 2.0 * s[1] + s[2]).sum() / 3.0
+    xy = (s[2, 2] - s[2, 0] - s[0, 2] + s[0, 0]) / 4.0
+    det = xx * yy - xy * xy
+    if not (xx < 0 and det > 1e-12):
+        return np.zeros(2)
+    step = -np.array([yy * slope[0] - xy * slope[1], xx * slope[1] - xy * slope[0]]) / det
+    return np.asarray(np.clip(step, -0.5, 0.5))
+
+
+def _second(score: NDArray[np.float32], row: int, column: int, half: int) -> float:
+    """The best score at another place: a local maximum beyond the main lobe, or anything a template's half-width away."""
+    rows, columns = np.ogrid[: score.shape[0], : score.shape[1]]
+    away = (rows - row) ** 2 + (columns - column) ** 2
+    summit = score >= cv2.dilate(score, np.ones((3, 3), np.uint8))
+    other = (summit & (away > _LOBE_PX**2)) | (away > half**2)
+    return float(np.max(score, initial=-1.0, where=other))

@@ -1,0 +1,129 @@
+"""Straight edges of an image, to a small part of a pixel, each with its standard deviations (§1.2, §6.1).
+
+Without a prediction the whole image is searched (LSD, of the gradient-orientation family that Burns began); with one,
+only bands round the predicted lines: perception as a blind man uses his cane (Figure 1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.images import grey_float, noise_sigma
+from knowledge_sources.methods.lines_focus import find_in_bands
+from knowledge_sources.methods.lines_refine import Refined, refine
+
+LSD_OFFSET_PX = -0.123
+"""LSD's segments lie this far off, in u and in v [px]: half a pixel of its 0.8 scaling. Measured on rendered edges."""
+
+_LEAST_SUPPORT = 0.5
+"""Share of a segment's length that must lie on its refined line."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LineSegments:
+    """Segments found in an image.
+
+    Without predictions ends are ordered so that the brighter side is on the right of end 0 -> end 1 as seen in the
+    picture; with predictions they run the way of the prediction, and the contrast is negative where the left is brighter.
+
+    Attributes:
+        segments_px: (n, 2, 2) ends (u, v) [px].
+        sigma_offset_px: (n,) standard deviation of the middle's offset across the segment [px].
+        sigma_angle_rad: (n,) standard deviation of the direction [rad].
+        contrast: (n,) brightness step from the left to the right side [grey levels].
+        predicted: (n,) index of the prediction in whose band a segment was found; -1 without predictions.
+    """
+
+    segments_px: NDArray[np.float64]
+    sigma_offset_px: NDArray[np.float64]
+    sigma_angle_rad: NDArray[np.float64]
+    contrast: NDArray[np.float64]
+    predicted: NDArray[np.intp]
+
+    def __len__(self) -> int:
+        return len(self.segments_px)
+
+    @property
+    def lengths_px(self) -> NDArray[np.float64]:
+        """(n,) lengths [px]."""
+        return np.asarray(np.linalg.norm(self.segments_px[:, 1] - self.segments_px[:, 0], axis=1))
+
+    def take(self, index: Any) -> LineSegments:
+        """Those that an index array or a mask chooses."""
+        return LineSegments(
+            self.segments_px[index],
+            self.sigma_offset_px[index],
+            self.sigma_angle_rad[index],
+            self.contrast[index],
+            self.predicted[index],
+        )
+
+
+def find_lines(
+    image: Any,
+    predicted_px: Any = None,
+    *,
+    band_px: float = 12.0,
+    min_length_px: float = 8.0,
+    min_contrast: float = 2.0,
+    max_turn_rad: float = 0.3,
+) -> LineSegments:
+    """Straight edges of an image.
+
+    Args:
+        image: (h, w) grey levels, uint8 or float on the same scale of 0 to 255.
+        predicted_px: None, or (m, 2, 2) lines expected [px]; NaN rows (not visible) find nothing.
+        band_px: half-width of the band searched round a prediction, and how far past its ends [px].
+        min_length_px: shorter segments are dropped [px].
+        min_contrast: fainter segments are dropped [grey levels].
+        max_turn_rad: segments turned further from their prediction are dropped [rad].
+
+    Raises:
+        ValueError: the image is not (h, w), the predictions are not (m, 2, 2), or a limit is not positive.
+
+    Source: §1.2 [21, 6], §6.1.4; R. Grompone von Gioi et al., LSD, IPOL 2012.
+    """
+    pixels = grey_float(image)
+    if not (band_px > 0 and min_length_px > 0):
+        raise ValueError(f"expected positive band_px and min_length_px, got {band_px} and {min_length_px}")
+    noise = noise_sigma(pixels)
+    if predicted_px is None:
+        rough = _whole_image(image, pixels)
+        fit = refine(pixels, rough, np.ones(len(rough)), noise, (2, 2))
+        return _checked(fit, np.full(len(rough), -1, np.intp), min_length_px, min_contrast)
+    near = find_in_bands(pixels, _predictions(predicted_px), noise, band_px, min_length_px, max_turn_rad)
+    fit = refine(pixels, near.segments_px, near.sign, noise, (2,))
+    return _checked(fit, near.predicted, min_length_px, min_contrast)
+
+
+def _predictions(predicted_px: Any) -> NDArray[np.float64]:
+    predicted = np.asarray(predicted_px, float)
+    if predicted.size == 0:
+        return np.zeros((0, 2, 2))
+    if predicted.ndim != 3 or predicted.shape[1:] != (2, 2):
+        raise ValueError(f"expected predicted lines of shape (m, 2, 2), got {predicted.shape}")
+    return predicted
+
+
+def _whole_image(image: Any, pixels: NDArray[np.float32]) -> NDArray[np.float64]:
+    """LSD's segments (n, 2, 2) [px], brighter side on the right, its constant offset removed, those under 5 px dropped."""
+    eight_bit = np.asarray(image)
+    if eight_bit.dtype != np.uint8:
+        eight_bit = np.clip(np.rint(pixels), 0, 255).astype(np.uint8)
+    detector = cv2.createLineSegmentDetector(cv2.LSD_REFINE_NONE)
+    lines = detector.detect(np.ascontiguousarray(eight_bit))[0]
+    if lines is None:
+        return np.zeros((0, 2, 2))
+    segments = np.asarray(lines, float).reshape(-1, 2, 2)[:, ::-1] - LSD_OFFSET_PX  # LSD has it on the left
+    return np.asarray(segments[np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1) >= 5.0])
+
+
+def _checked(fit: Refined, owner: NDArray[np.intp], min_length: float, min_contrast: float) -> LineSegments:
+    found = LineSegments(fit.segments_px, fit.sigma_offset_px, fit.sigma_angle_rad, fit.contrast, owner)
+    keep = (found.lengths_px >= min_length) & (np.abs(fit.contrast) >= min_contrast) & (fit.support >= _LEAST_SUPPORT)
+    return found.take(keep)

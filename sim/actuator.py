@@ -1,0 +1,133 @@
+"""What the wheels really do (§3.2, Table 1): TURN skitters; MOVE drifts along an arc and falls short.
+
+Sizes: Table 1's unservoed run ends 2.1 in off a 20 ft line and "other runs resulted in as much as a foot", so a run's
+curvature c, with c (5.8 m)^2 / 2 between 2 and 12 in, is 0.003 to 0.018 per metre. It falls short by a constant factor,
+228.3 / 240 = 0.951.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from world_models.frames import Pose2
+
+STEP_M = 0.02
+"""Motion is integrated in steps of at most this."""
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorParameters:
+    """Errors of the wheels.
+
+    Attributes:
+        turn_scale_sigma: standard deviation of a turn's error as a part of the turn.
+        turn_sigma_rad: standard deviation of a turn's error that does not depend on the turn.
+        skitter_sigma_m: standard deviation, along x and y, of the sideways motion of a turn of 90 degrees or more.
+        curvature_low_per_m, curvature_high_per_m: bounds of a run's curvature; its sign is drawn too.
+        curvature_sigma_per_m: standard deviation of the curvature of one move round the run's.
+        shortfall_low, shortfall_high: bounds of the part by which a run's moves fall short.
+        distance_sigma: standard deviation of one move's length, as a part of it.
+        encoder_step_m, encoder_step_rad: what the wheel encoders resolve.
+        speed_m_per_s, turn_speed_rad_per_s: how fast it goes.
+        command_s: time that every command takes besides.
+    """
+
+    turn_scale_sigma: float = 0.01
+    turn_sigma_rad: float = math.radians(0.1)
+    skitter_sigma_m: float = 0.003
+    curvature_low_per_m: float = 0.0045
+    curvature_high_per_m: float = 0.0145
+    curvature_sigma_per_m: float = 0.0015
+    shortfall_low: float = 0.04
+    shortfall_high: float = 0.06
+    distance_sigma: float = 0.003
+    encoder_step_m: float = 0.001
+    encoder_step_rad: float = math.radians(0.05)
+    speed_m_per_s: float = 0.4
+    turn_speed_rad_per_s: float = math.radians(45.0)
+    command_s: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"expected {name} >= 0, got {getattr(self, name)}")
+        if not (self.curvature_low_per_m <= self.curvature_high_per_m and self.shortfall_low <= self.shortfall_high < 1):
+            raise ValueError("expected low <= high bounds of curvature and shortfall, and a shortfall below 1, got "
+                             f"{self.curvature_low_per_m}..{self.curvature_high_per_m} and "
+                             f"{self.shortfall_low}..{self.shortfall_high}")
+        if not (self.speed_m_per_s > 0 and self.turn_speed_rad_per_s > 0):
+            raise ValueError(f"expected speeds > 0, got {self.speed_m_per_s} m/s, {self.turn_speed_rad_per_s} rad/s")
+
+
+@dataclass(frozen=True, slots=True)
+class Wheels:
+    """One run's wheels: the parameters, and this run's share of what they leave open.
+
+    Attributes:
+        length_factor: metres really gone per metre commanded.
+        curvature_per_m: the run's curvature; positive drifts to the left.
+    """
+
+    parameters: ActuatorParameters
+    length_factor: float
+    curvature_per_m: float
+
+    @staticmethod
+    def drawn(parameters: ActuatorParameters, rng: np.random.Generator) -> Wheels:
+        """A run's wheels; always three draws from ``rng``."""
+        shortfall = rng.uniform(parameters.shortfall_low, parameters.shortfall_high)
+        curvature = rng.uniform(parameters.curvature_low_per_m, parameters.curvature_high_per_m)
+        return Wheels(parameters, 1.0 - float(shortfall), float(curvature) * (1.0 if rng.random() < 0.5 else -1.0))
+
+    def turned(self, turn_rad: float, rng: np.random.Generator) -> Pose2:
+        """What a TURN does, as a displacement in the robot's frame; nothing is commanded, nothing happens."""
+        scale, offset, x, y = rng.standard_normal(4)
+        if turn_rad == 0.0:
+            return Pose2(0.0, 0.0, 0.0)
+        p = self.parameters
+        skitter = p.skitter_sigma_m * min(1.0, math.sqrt(abs(turn_rad) / (math.pi / 2.0)))
+        error = float(scale) * p.turn_scale_sigma * turn_rad + float(offset) * p.turn_sigma_rad
+        return Pose2(skitter * float(x), skitter * float(y), turn_rad + error)
+
+    def arc(self, move_m: float, rng: np.random.Generator) -> tuple[float, float]:
+        """What a MOVE does: (signed length [m], curvature [1/m]) of an arc that is tangent to the robot's x axis."""
+        stretch, bend = rng.standard_normal(2)
+        p = self.parameters
+        length = move_m * self.length_factor * (1.0 + p.distance_sigma * float(stretch))
+        return length, self.curvature_per_m + p.curvature_sigma_per_m * float(bend)
+
+    def claimed(self, turn_rad: float, move_m: float) -> tuple[float, float]:
+        """What the encoders say of a motion that the wheels, knowing no better, made as commanded."""
+        p = self.parameters
+        return _rounded(turn_rad, p.encoder_step_rad), _rounded(move_m, p.encoder_step_m)
+
+    def turn_s(self, turn_rad: float) -> float:
+        """Time that a turn takes."""
+        return abs(turn_rad) / self.parameters.turn_speed_rad_per_s
+
+    def move_s(self, move_m: float) -> float:
+        """Time that a move takes."""
+        return abs(move_m) / self.parameters.speed_m_per_s
+
+
+def arc_steps(length_m: float, curvature_per_m: float) -> Iterator[Pose2]:
+    """The arc as equal displacements of at most ``STEP_M``, each in the frame that the one before it ends in."""
+    count = math.ceil(abs(length_m) / STEP_M)
+    for _ in range(count):
+        yield arc_displacement(length_m / count, curvature_per_m)
+
+
+def arc_displacement(length_m: float, curvature_per_m: float) -> Pose2:
+    """Along an arc tangent to x at its start; positive curvature bends to the left of forward motion."""
+    turn = length_m * curvature_per_m
+    if abs(turn) < 1e-9:
+        return Pose2(length_m, 0.5 * length_m * turn, turn)
+    return Pose2(math.sin(turn) / curvature_per_m, (1.0 - math.cos(turn)) / curvature_per_m, turn)
+
+
+def _rounded(value: float, step: float) -> float:
+    return round(value / step) * step if step > 0 else value

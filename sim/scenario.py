@@ -1,0 +1,271 @@
+"""Scenarios: a mission, the body that tries it and what goes wrong, written in TOML."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sim.actuator import ActuatorParameters
+from sim.faults import Displacement, Fault, LightsOff, Moment
+from sim.places import Place, places
+from sim.rasterizer import sample_offsets
+from sim.sensor import SensorParameters
+from sim.settings import known_keys, merged, near, parsed, read_settings
+from world_models.camera import Camera, CameraMount
+from world_models.toml_source import Node, Source, WorldError
+
+ROOT = Path(__file__).resolve().parent.parent
+SCENARIOS = ROOT / "sim" / "scenarios"
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be read: names the file, the line or key, what was expected and what came."""
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """How the robot is put down: heading in the first locale's frame, and how badly it is placed."""
+
+    heading_rad: float = 0.0
+    put_down_sigma_m: float = 0.0
+    put_down_sigma_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """The heading wanted at the goal, in the last locale's frame; NaN for any."""
+
+    heading_rad: float = math.nan
+
+    @property
+    def matters(self) -> bool:
+        return not math.isnan(self.heading_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSettings:
+    """The camera and how it is mounted."""
+
+    width_px: int = 512
+    height_px: int = 512
+    field_of_view_rad: float = math.radians(65.0)
+    mount_height_m: float = 1.0
+    mount_forward_m: float = 0.1
+    mount_tilt_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.05 <= self.field_of_view_rad <= 2.6 or not (16 <= self.width_px <= 4096 and 16 <= self.height_px <= 4096):
+            raise ValueError("expected a field of view of 3 to 149 degrees and 16 to 4096 px, got "
+                             f"{math.degrees(self.field_of_view_rad):g} degrees, {self.width_px} x {self.height_px} px")
+
+    @property
+    def camera(self) -> Camera:
+        return Camera.from_field_of_view(self.field_of_view_rad, self.width_px, self.height_px)
+
+    @property
+    def mount(self) -> CameraMount:
+        return CameraMount(self.mount_height_m, self.mount_forward_m, self.mount_tilt_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class Render:
+    """Samples a pixel: 1, 4, 8 or 16."""
+
+    samples: int = 8
+
+    def __post_init__(self) -> None:
+        sample_offsets(self.samples)
+
+
+@dataclass(frozen=True, slots=True)
+class Servo:
+    """Which levels of perceptual servoing (Figure 2) are on."""
+
+    action: bool = True
+    plan: bool = True
+    goal: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """When to give up."""
+
+    max_time_s: float = 3600.0
+    max_cycles: int = 20000
+    max_path_m: float = 150.0
+    max_collisions: int = 3
+
+    def __post_init__(self) -> None:
+        if min(self.max_time_s, self.max_cycles, self.max_path_m) <= 0 or self.max_collisions < 0:
+            raise ValueError(f"expected limits above 0, got {self}")
+
+
+SECTIONS: Mapping[str, type[Any]] = {
+    "start": Start,
+    "arrival": Arrival,
+    "camera": CameraSettings,
+    "render": Render,
+    "actuator": ActuatorParameters,
+    "sensor": SensorParameters,
+    "servo": Servo,
+    "limits": Limits,
+}
+TEXTS = ("description", "world", "goal")
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """One mission; the tables of the file are the attributes of the same name.
+
+    Attributes:
+        name: the file's, without its ending.
+        world: the world file that the robot believes in; details: the files of what only the building has.
+        goal: in conceptual-dependency form, coordinates in feet.
+        faults: what goes wrong, in the order of the file.
+        folder, data: where the file is, and its tables as read, for :func:`with_settings`.
+    """
+
+    name: str
+    description: str
+    world: Path
+    details: tuple[Path, ...]
+    goal: str
+    start: Start
+    arrival: Arrival
+    camera: CameraSettings
+    render: Render
+    actuator: ActuatorParameters
+    sensor: SensorParameters
+    servo: Servo
+    limits: Limits
+    faults: tuple[Fault, ...] = ()
+    folder: Path = SCENARIOS
+    data: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+
+def list_scenarios() -> tuple[str, ...]:
+    """The names of the scenarios that come with the project."""
+    return tuple(sorted(path.stem for path in SCENARIOS.glob("*.toml")))
+
+
+def load_scenario(path_or_name: str | Path) -> Scenario:
+    """Read a scenario by its name or from a file.
+
+    Raises:
+        ScenarioError: there is none, or it is malformed.
+    """
+    path = Path(path_or_name)
+    if path.suffix != ".toml":
+        path = SCENARIOS / f"{path_or_name}.toml"
+        if str(path_or_name) not in list_scenarios():
+            raise ScenarioError(f"expected a scenario: {near(str(path_or_name), list_scenarios())}, got {path_or_name!r}")
+    try:
+        return _scenario(Source.read(path), path.stem, path.parent)
+    except WorldError as error:
+        raise ScenarioError(str(error)) from None
+
+
+def parse_scenario(text: str, name: str = "scenario", folder: Path = SCENARIOS) -> Scenario:
+    """Read a scenario from text; file names in it are relative to ``folder``. Raises ScenarioError."""
+    try:
+        return _scenario(Source.parse(text, name), name, folder)
+    except WorldError as error:
+        raise ScenarioError(str(error)) from None
+
+
+def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
+    """The scenario with some settings replaced, as ``{"servo.action": "off", "start.heading_deg": 90}``.
+
+    Raises:
+        ScenarioError: a key is unknown (near ones are listed) or a value is of the wrong kind.
+    """
+    for key, value in settings.items():
+        scenario = _with_setting(scenario, key, parsed(value) if isinstance(value, str) else value)
+    return scenario
+
+
+def setting_keys() -> tuple[str, ...]:
+    """Every key that :func:`with_settings` understands."""
+    return (*TEXTS, *(f"{name}.{key}" for name, kind in SECTIONS.items() for key in known_keys(kind)))
+
+
+def _with_setting(scenario: Scenario, key: str, value: Any) -> Scenario:
+    if key not in setting_keys():
+        raise ScenarioError(f"--set {key}: expected {near(key, setting_keys())}, got {key!r}")
+    path = tuple(key.split("."))
+    data = scenario.data
+    if len(path) == 2:
+        same = known_keys(SECTIONS[path[0]])
+        kept = {k: v for k, v in data.get(path[0], {}).items() if same[k][0] != same[path[1]][0]}
+        data = {**data, path[0]: kept}
+    try:
+        return _scenario(Source("--set", merged(data, path, value), {}), scenario.name, scenario.folder)
+    except WorldError as error:
+        raise ScenarioError(f"--set {key}: {str(error).partition(': ')[2]}") from None
+
+
+def _scenario(source: Source, name: str, folder: Path) -> Scenario:
+    node = source.root.table(("world", "goal"), ("description", "details", "faults", *SECTIONS))
+    sections = {key: read_settings(node[key], kind) if key in node else kind() for key, kind in SECTIONS.items()}
+    details = [item.text() for item in node["details"].items()] if "details" in node else []
+    return Scenario(
+        name=name,
+        description=node["description"].text() if "description" in node else "",
+        world=_file(node["world"].text(), ROOT / "world_models" / "worlds", folder),
+        details=tuple(_file(text, ROOT / "sim" / "buildings", folder) for text in details),
+        goal=_goal(node["goal"]),
+        faults=tuple(_fault(item) for item in node["faults"].items()) if "faults" in node else (),
+        folder=folder,
+        data=source.data,
+        **sections,
+    )
+
+
+def _file(text: str, shipped: Path, folder: Path) -> Path:
+    """A file that comes with the project, by its bare name, or any file, relative to the scenario's folder."""
+    return folder / text if text.endswith(".toml") else shipped / f"{text}.toml"
+
+
+def _goal(node: Node) -> str:
+    try:
+        places(node.text())
+    except WorldError:
+        raise
+    except ValueError as error:
+        raise WorldError(f"{node.where}: goal: {error}") from None
+    return node.text()
+
+
+@dataclass(frozen=True, slots=True)
+class _FaultTable:
+    """Every key of a fault; which ones count depends on its kind."""
+
+    kind: str = ""
+    in_locale: str = ""
+    after_m: float = 0.0
+    after_s: float = 0.0
+    forward_m: float = 0.0
+    left_m: float = 0.0
+    turn_rad: float = 0.0
+    distance_m: float = 0.0
+    duration_s: float = 10.0
+    to_locale: str = ""
+    to_x_m: float = 0.0
+    to_y_m: float = 0.0
+    to_heading_rad: float = 0.0
+
+
+def _fault(node: Node) -> Fault:
+    table = read_settings(node, _FaultTable)
+    moment = Moment(table.in_locale, table.after_m, table.after_s)
+    if table.kind == "lights_off":
+        return LightsOff(moment, table.duration_s)
+    if table.kind not in ("bump", "kidnap"):
+        raise node.fail("kind = bump, kidnap or lights_off", repr(table.kind))
+    there = Place(table.to_locale, table.to_x_m, table.to_y_m) if table.to_locale else None
+    return Displacement(
+        table.kind, moment, table.forward_m, table.left_m, table.turn_rad, table.distance_m, there, table.to_heading_rad
+    )

@@ -1,0 +1,92 @@
+"""Typed settings: tables of a scenario file read into frozen dataclasses, with units in the keys.
+
+A field ``height_m`` may be written ``height_m``, ``height_ft`` or ``height_in``; ``tilt_rad`` also ``tilt_deg``.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from typing import Any, TypeVar, get_type_hints
+
+from world_models.toml_source import Node, WorldError
+
+FOOT_M = 0.3048
+T = TypeVar("T")
+
+
+def spellings(field: str) -> dict[str, float]:
+    """The keys under which a field may be written, each with the factor to SI."""
+    out = {field: 1.0}
+    if "_rad" in field:
+        out[field.replace("_rad", "_deg")] = math.pi / 180.0
+    if field.endswith("_m") and not field.endswith("_per_m"):
+        out |= {field[:-1] + "ft": FOOT_M, field[:-1] + "in": FOOT_M / 12.0}
+    return out
+
+
+def known_keys(kind: type[Any]) -> dict[str, tuple[str, float]]:
+    """Every key that a settings class understands: its field and the factor to SI."""
+    return {key: (f.name, factor) for f in fields(kind) for key, factor in spellings(f.name).items()}
+
+
+def read_settings(node: Node, kind: type[T]) -> T:
+    """A table as a settings object; what is not written keeps its default.
+
+    Raises:
+        WorldError: unknown key, wrong type, or values that do not go together.
+    """
+    known = known_keys(kind)
+    hints = get_type_hints(kind)
+    values: dict[str, Any] = {}
+    for key, item in node.entries():
+        if key not in known:
+            raise item.fail(f"{near(key, known)}", f"the key {key!r}")
+        name, factor = known[key]
+        if name in values:
+            raise item.fail(f"{name} only once", f"it again as {key}")
+        values[name] = _value(item, hints[name], factor)
+    try:
+        return kind(**values)
+    except WorldError:
+        raise
+    except (TypeError, ValueError) as error:
+        raise WorldError(f"{node.where}: {'.'.join(map(str, node.key))}: {error}") from None
+
+
+def _value(item: Node, hint: Any, factor: float) -> Any:
+    if hint is bool:
+        return item.flag()
+    if hint is str:
+        return item.text()
+    if hint is int:
+        if isinstance(item.value, bool) or not isinstance(item.value, int) or abs(item.value) > 10**9:
+            raise item.fail("a whole number")
+        return item.value
+    return item.number(-1e9, 1e9) * factor
+
+
+def near(key: str, known: Iterable[str]) -> str:
+    """What to say was expected instead of an unknown key: the most similar ones, or all."""
+    names = list(known)
+    return "one of " + ", ".join(difflib.get_close_matches(key, names, n=4, cutoff=0.5) or names)
+
+
+def parsed(text: str) -> Any:
+    """The value of a ``--set key=value``: on/off, a TOML value, or else the text itself."""
+    if text.lower() in ("on", "off"):
+        return text.lower() == "on"
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        return text
+
+
+def merged(data: Mapping[str, Any], path: tuple[str, ...], value: Any) -> dict[str, Any]:
+    """A copy of nested tables with the value at ``path`` replaced or added."""
+    head, rest = path[0], path[1:]
+    inner = data.get(head, {})
+    return {**data, head: merged(inner if isinstance(inner, Mapping) else {}, rest, value) if rest else value}

@@ -1,0 +1,106 @@
+"""Scenario files and --set."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from sim.faults import Displacement, LightsOff, Moment
+from sim.places import Place, places
+from sim.scenario import ScenarioError, list_scenarios, load_scenario, parse_scenario, with_settings
+
+MINIMAL = 'world = "w"\ngoal = "(ptrans (a (1,2,0)) (b (3.5,-4,0)))"\n'
+
+
+def test_every_shipped_scenario_loads() -> None:
+    assert {"lab-to-allens-office", "hallway-kidnap", "bump", "lights-off", "forty-foot-hallway"} <= set(list_scenarios())
+    assert all(load_scenario(name).description for name in list_scenarios())
+
+
+def test_the_main_mission_is_figure_17s() -> None:
+    scenario = load_scenario("lab-to-allens-office")
+    assert scenario.goal == "(ptrans (robot-laboratory (16,2,0)) (allens-office (13,12,0)))"
+    assert scenario.servo.action and scenario.servo.plan and scenario.servo.goal
+    assert not scenario.arrival.matters
+
+
+def test_places_are_in_feet() -> None:
+    start, goal = places("(ptrans (robot-laboratory (16,2,0)) (allens-office (13,12,0)))")
+    assert start == Place("robot-laboratory", 16 * 0.3048, 2 * 0.3048)
+    assert (goal.locale, goal.y_m) == ("allens-office", 12 * 0.3048)
+
+
+def test_units_are_in_the_keys() -> None:
+    scenario = parse_scenario(MINIMAL + "[start]\nheading_deg = 90\nput_down_sigma_in = 2\n[camera]\nmount_height_ft = 3\n")
+    assert scenario.start.heading_rad == pytest.approx(math.pi / 2)
+    assert scenario.start.put_down_sigma_m == pytest.approx(0.0508)
+    assert scenario.camera.mount.height_m == pytest.approx(0.9144)
+
+
+def test_faults_keep_their_order_and_kind() -> None:
+    scenario = parse_scenario(MINIMAL + """
+[[faults]]
+kind = "lights_off"
+after_s = 3.0
+duration_s = 2.0
+[[faults]]
+kind = "kidnap"
+in_locale = "b"
+to_locale = "a"
+to_x_ft = 10.0
+to_heading_deg = 180.0
+""")
+    lights, kidnap = scenario.faults
+    assert lights == LightsOff(Moment(after_s=3.0), 2.0)
+    assert isinstance(kidnap, Displacement) and kidnap.place == Place("a", 3.048, 0.0)
+    assert kidnap.heading_rad == pytest.approx(math.pi)
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ("", r"s\.toml:1: .*world"),
+    (MINIMAL + "[servo]\nacton = true\n", r"s\.toml:4: servo\.acton: expected one of action.*acton"),
+    (MINIMAL + "[servo]\naction = 1\n", r"s\.toml:4: servo\.action: expected true or false, got 1"),
+    (MINIMAL + "[limits]\nmax_cycles = 2.5\n", r"s\.toml:4: limits\.max_cycles: expected a whole number, got 2\.5"),
+    (MINIMAL + "[start]\nheading_deg = 1\nheading_rad = 1\n", r"s\.toml:5: .*heading_rad only once"),
+    (MINIMAL + '[[faults]]\nkind = "quake"\n', r"s\.toml:3: faults\.0: expected kind = bump, kidnap or lights_off"),
+    (MINIMAL + "[actuator]\nspeed_m_per_s = 0\n", r"s\.toml:3: actuator: expected speeds > 0"),
+    (MINIMAL + "[render]\nsamples = 5\n", r"s\.toml:3: render: expected 1, 4, 8, 16 samples"),
+    ('world = "w"\ngoal = "(go home)"\n', r"s\.toml:2: goal: expected a goal like"),
+    ("world = \n", r"s\.toml:.*expected TOML"),
+])
+def test_a_malformed_scenario_is_pointed_at(text: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        parse_scenario(text, "s.toml")
+
+
+def test_an_unknown_scenario_names_near_ones() -> None:
+    with pytest.raises(ScenarioError, match="lab-to-allens-office"):
+        load_scenario("lab-to-alens-ofice")
+    with pytest.raises(ScenarioError, match="readable file"):
+        load_scenario("nowhere/at-all.toml")
+
+
+def test_settings_are_typed_and_leave_the_original_alone() -> None:
+    scenario = load_scenario("bump")
+    changed = with_settings(scenario, {"servo.action": "off", "start.heading_deg": "-90", "limits.max_cycles": "7",
+                                       "actuator.shortfall_low": 0.05})
+    assert not changed.servo.action and changed.servo.plan and scenario.servo.action
+    assert changed.start.heading_rad == pytest.approx(-math.pi / 2)
+    assert changed.start.put_down_sigma_m == scenario.start.put_down_sigma_m
+    assert (changed.limits.max_cycles, changed.actuator.shortfall_low) == (7, 0.05)
+    assert changed.faults == scenario.faults
+
+
+@pytest.mark.parametrize(("key", "value", "message"), [
+    ("servo.acton", "off", "servo.action"),
+    ("servo.action", "maybe", "expected true or false, got 'maybe'"),
+    ("actuator.shortfall_low", "0.9", "low <= high"),
+    ("limits.max_cycles", "many", "whole number"),
+    ("goal", "home", "expected a goal like"),
+    ("start", "3", "expected one of"),
+])
+def test_a_bad_setting_is_refused(key: str, value: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message) as caught:
+        with_settings(load_scenario("bump"), {key: value})
+    assert str(caught.value).startswith(f"--set {key}: ")

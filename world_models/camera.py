@@ -1,0 +1,186 @@
+"""The sensor model (§3.2): projection, lens distortion, clipping and how the camera is mounted.
+
+Pixels: the centre of the top-left pixel is (0.0, 0.0), u to the right, v down (OpenCV's convention).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.frames import Pose, frozen
+
+NEAR_M = 0.05
+"""Nothing nearer than this to the optical centre is projected [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pinhole camera with OpenCV's distortion model.
+
+    Attributes:
+        fx, fy: focal lengths [px].
+        cx, cy: principal point [px].
+        width, height: image size [px].
+        distortion: ``None`` or (k1, k2, p1, p2[, k3]), OpenCV's order.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+    distortion: Any = None
+
+    def __post_init__(self) -> None:
+        if not (self.fx > 0 and self.fy > 0 and self.width > 0 and self.height > 0):
+            raise ValueError(
+                "expected positive focal lengths and image size, got "
+                f"fx={self.fx}, fy={self.fy}, width={self.width}, height={self.height}"
+            )
+        if self.distortion is not None:
+            k = np.asarray(self.distortion, float).ravel()
+            if k.size not in (4, 5) or not np.all(np.isfinite(k)):
+                raise ValueError(f"expected 4 or 5 finite distortion coefficients, got {self.distortion!r}")
+            object.__setattr__(self, "distortion", frozen(np.pad(k, (0, 5 - k.size))))
+
+    @staticmethod
+    def from_field_of_view(horizontal_rad: float, width: int = 512, height: int = 512) -> Camera:
+        """Square pixels, principal point in the middle, no distortion."""
+        f = width / (2.0 * math.tan(horizontal_rad / 2.0))
+        return Camera(f, f, (width - 1) / 2.0, (height - 1) / 2.0, width, height)
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """(3, 3) intrinsic matrix K."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    def project(self, points_camera: Any) -> NDArray[np.float64]:
+        """Project points (..., 3) [m, camera frame] to pixels (..., 2).
+
+        Points must lie in front of the camera; the caller clips (see :meth:`project_segments`).
+        """
+        p = np.asarray(points_camera, float)
+        xy = self._distorted(p[..., :2] / p[..., 2:3])
+        return xy * (self.fx, self.fy) + (self.cx, self.cy)
+
+    def rays(self, pixels: Any) -> NDArray[np.float64]:
+        """Undistorted directions (..., 3), z = 1, in the camera frame, of pixels (..., 2)."""
+        xy = self._undistorted((np.asarray(pixels, float) - (self.cx, self.cy)) / (self.fx, self.fy))
+        return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
+
+    def undistort(self, pixels: Any) -> NDArray[np.float64]:
+        """Where the same camera without its lens distortion would see pixels (..., 2)."""
+        if self.distortion is None:
+            return np.asarray(pixels, float)
+        return self.rays(pixels)[..., :2] * (self.fx, self.fy) + (self.cx, self.cy)
+
+    def inside(self, pixels: Any, margin_px: float = 0.0) -> NDArray[np.bool_]:
+        """Which pixels (..., 2) lie in the image, at least ``margin_px`` from its border."""
+        p = np.asarray(pixels, float)
+        high = np.array([self.width - 0.5, self.height - 0.5]) - margin_px
+        return np.all((p >= margin_px - 0.5) & (p <= high), axis=-1)
+
+    def project_segments(
+        self, lines_world: Any, camera_from_world: Pose
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Project 3D segments (n, 2, 3), clipped to the near plane and to the image.
+
+        Returns:
+            segments_px (n, 2, 2), NaN where nothing is left, and a mask (n,) of what is left.
+            Clipping to the image is along the straight undistorted line.
+        """
+        lines = np.asarray(lines_world, float).reshape(-1, 2, 3)
+        p = camera_from_world.apply(lines)
+        out = np.full((len(lines), 2, 2), np.nan)
+        if not len(lines):
+            return out, np.zeros(0, bool)
+        # Near plane: move the end that is behind it along the segment.
+        z = p[..., 2]
+        front = z > NEAR_M
+        dz = z[:, 1] - z[:, 0]
+        t = (NEAR_M - z[:, 0]) / np.where(np.abs(dz) < 1e-12, 1.0, dz)
+        cut = p[:, 0] + t[:, None] * (p[:, 1] - p[:, 0])
+        for end in (0, 1):
+            move = ~front[:, end] & front[:, 1 - end]
+            p[move, end] = cut[move]
+        keep = front.any(axis=1)
+        px = np.full_like(out, np.nan)
+        px[keep] = self.project(p[keep])
+        clipped, inside = clip_segments(px[keep], self.width, self.height)
+        out[keep] = clipped
+        mask = np.zeros(len(lines), bool)
+        mask[np.flatnonzero(keep)[inside]] = True
+        out[~mask] = np.nan
+        return out, mask
+
+    def _distorted(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        if self.distortion is None:
+            return xy
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = xy[..., 0], xy[..., 1]
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        return np.stack(
+            [
+                x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+                y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+            ],
+            axis=-1,
+        )
+
+    def _undistorted(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        if self.distortion is None:
+            return xy
+        guess = xy.copy()
+        for _ in range(20):  # fixed point, as OpenCV does; converges for the lenses it models
+            guess = guess - (self._distorted(guess) - xy)
+        return guess
+
+
+@dataclass(frozen=True, slots=True)
+class CameraMount:
+    """How the camera sits on the robot.
+
+    Attributes:
+        height_m: optical centre above the floor [m].
+        forward_m: optical centre ahead of the turning axis [m].
+        tilt_rad: downward tilt of the optical axis [rad].
+    """
+
+    height_m: float
+    forward_m: float = 0.0
+    tilt_rad: float = 0.0
+
+    @property
+    def camera_from_robot(self) -> Pose:
+        c, s = math.cos(self.tilt_rad), math.sin(self.tilt_rad)
+        # Rows are the camera's axes (right, down, forward) in the robot's frame.
+        rotation = np.array([[0.0, -1.0, 0.0], [-s, 0.0, -c], [c, 0.0, -s]])
+        return Pose(rotation, -rotation @ np.array([self.forward_m, 0.0, self.height_m]))
+
+
+def clip_segments(
+    segments_px: NDArray[np.float64], width: int, height: int
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Liang-Barsky clipping of segments (n, 2, 2) [px] to the image; the mask (n,) says what is left."""
+    seg = np.asarray(segments_px, float).reshape(-1, 2, 2)
+    a, d = seg[:, 0], seg[:, 1] - seg[:, 0]
+    t0, t1 = np.zeros(len(seg)), np.ones(len(seg))
+    visible = np.ones(len(seg), bool)
+    for axis, size in ((0, width), (1, height)):
+        for sign, limit in ((-1.0, 0.5), (1.0, size - 0.5)):
+            step, room = sign * d[:, axis], limit - sign * a[:, axis]
+            parallel = np.abs(step) < 1e-12
+            t = room / np.where(parallel, 1.0, step)
+            t0 = np.where(~parallel & (step < 0), np.maximum(t0, t), t0)
+            t1 = np.where(~parallel & (step > 0), np.minimum(t1, t), t1)
+            visible &= ~(parallel & (room < 0))
+    visible &= t0 < t1
+    ends = np.stack([a + t0[:, None] * d, a + t1[:, None] * d], axis=1)
+    return ends, visible

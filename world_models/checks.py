@@ -1,0 +1,115 @@
+"""What can be wrong with a world that could be read: rooms that overlap, leak or cannot be reached, misplaced things."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.locales import distance_to_border, inside_polygon
+
+if TYPE_CHECKING:
+    from world_models.world import World
+
+Finding = tuple[str, str]
+"""(file:line, what is wrong)."""
+
+TOLERANCE_M = 0.01
+
+
+def faults_of(world: World) -> list[Finding]:
+    """All findings, each kind in the order of the file."""
+    return [*_unclosed(world), *_overlapping(world), *_unreachable(world), *_misplaced(world)]
+
+
+def _unclosed(world: World) -> Iterator[Finding]:
+    """Rooms that one can look out of other than through a doorway: surfaces of the room must shut in its middle."""
+    for name in world.rooms:
+        locale = world.locales[name]
+        polygons = [r.polygon_world for f in world.faces if f.locale == name for r in f.front]
+        openings = [f.polygon_world for f in world.faces if f.locale == name and f.kind == "doorway"]
+        if not polygons or not _shut_in(world, name, [*polygons, *openings]):
+            yield locale.source, f"{name}: expected a room closed by floor, ceiling, walls and doors, got a gap"
+
+
+def _shut_in(world: World, name: str, polygons: list[NDArray[np.float64]]) -> bool:
+    """Whether every ray from a point in the room meets the front of one of these polygons."""
+    centre = _inner_point(world.outline(name))
+    base = world.world_from_locale(name).translation[2]
+    eye = np.array([*centre, base + 0.55 * world.locales[name].height_m])
+    rays = _rays()
+    hit = np.zeros(len(rays), bool)
+    for polygon in polygons:
+        hit |= _hit(eye, rays, polygon)
+    return bool(hit.all())
+
+
+def _rays() -> NDArray[np.float64]:
+    turn, lift = np.meshgrid(np.linspace(0.0, 2 * np.pi, 47, endpoint=False) + 0.01, np.linspace(-1.4, 1.4, 9))
+    return np.stack([np.cos(turn) * np.cos(lift), np.sin(turn) * np.cos(lift), np.sin(lift)], axis=-1).reshape(-1, 3)
+
+
+def _hit(eye: NDArray[np.float64], rays: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) which rays (n, 3) from ``eye`` meet the front of a convex polygon (k, 3), its border included."""
+    spokes = polygon - eye
+    return np.asarray(np.all(rays @ np.cross(spokes, np.roll(spokes, -1, axis=0)).T <= 1e-9, axis=1))
+
+
+def _inner_point(outline: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A point well inside a simple polygon (k, 2): the best of a grid."""
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    xs, ys = (np.linspace(low[i], high[i], 12)[1:-1] for i in (0, 1))
+    points = [np.array([x, y]) for x in xs for y in ys]
+    return max(points, key=lambda p: _clearance(p, outline))
+
+
+def _clearance(point: NDArray[np.float64], outline: NDArray[np.float64]) -> float:
+    away = distance_to_border(point, outline)
+    return away if inside_polygon(point, outline) else -away
+
+
+def _overlapping(world: World) -> Iterator[Finding]:
+    for a, b in combinations(world.rooms, 2):
+        if _overlap(world.outline(a), world.outline(b)):
+            yield world.locales[b].source, f"{b}: expected a room apart from others, got one that overlaps {a}"
+
+
+def _overlap(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Whether two simple polygons share more than a border: sides cross, or one lies in the other."""
+    inner_one, inner_other = _inner_point(one), _inner_point(other)
+    if inside_polygon(inner_one, other) or inside_polygon(inner_other, one):
+        return True
+    sides = [list(zip(p, np.roll(p, -1, axis=0), strict=True)) for p in (one, other)]
+    return any(_cross(*a, *b) for a in sides[0] for b in sides[1])
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]) -> bool:
+    def side(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> float:
+        u, v = q - p, r - p
+        return float(u[0] * v[1] - u[1] * v[0]) / float(np.linalg.norm(u))
+
+    apart = [side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b)]
+    return min(abs(x) for x in apart) > TOLERANCE_M and apart[0] * apart[1] < 0 and apart[2] * apart[3] < 0
+
+
+def _unreachable(world: World) -> Iterator[Finding]:
+    if not world.rooms:
+        return
+    reached = nx.node_connected_component(world.passages, world.rooms[0])
+    for name in world.rooms:
+        if name not in reached:
+            yield world.locales[name].source, f"{name}: expected open doorways from {world.rooms[0]}, got none"
+
+
+def _misplaced(world: World) -> Iterator[Finding]:
+    for thing in world.things:
+        outline, locale = world.outline(thing.locale), world.locales[thing.locale]
+        if not all(inside_polygon(corner, outline, TOLERANCE_M) for corner in thing.footprint_world):
+            yield thing.source, f"{thing.name}: expected it inside {thing.locale}, got a corner outside"
+        if thing.low_m < -TOLERANCE_M or thing.high_m > locale.height_m + TOLERANCE_M:
+            yield thing.source, (f"{thing.name}: expected it between floor and ceiling (0 .. {locale.height_m:.2f} m), "
+                                 f"got {thing.low_m:.2f} .. {thing.high_m:.2f} m")

@@ -1,0 +1,126 @@
+"""Locales (§3.4): parcels of space with their own frames in a contained-by hierarchy, and the doorways between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.frames import Pose, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class Locale:
+    """A parcel of space with its own frame (§3.4, Figure 5).
+
+    Attributes:
+        name: unique in the world.
+        kind: laboratory, hallway, office, floor, building, ...
+        parent: the locale that contains it; ``None`` for the root.
+        frame: parent_from_locale.
+        outline: (k, 2) its free extent on the floor, counter-clockwise, in its own frame [m].
+        height_m: from its floor to its ceiling.
+        properties: what else the world file says of it.
+        source: file:line where it is described.
+    """
+
+    name: str
+    kind: str
+    parent: str | None
+    frame: Pose
+    outline: NDArray[np.float64]
+    height_m: float
+    properties: Mapping[str, Any] = field(default_factory=dict)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "outline", frozen(self.outline, (None, 2)))
+
+    def contains(self, point: Any, margin_m: float = 0.0) -> bool:
+        """Whether a point (2,) or (3,) of its own frame lies in it (its border belongs to it).
+
+        ``margin_m`` lets points count that lie at most so far outside.
+        """
+        p = np.asarray(point, float)
+        if p.size == 3 and not -margin_m - 1e-9 <= p[2] <= self.height_m + margin_m + 1e-9:
+            return False
+        return inside_polygon(p[:2], self.outline, margin_m)
+
+
+@dataclass(frozen=True, eq=False)
+class Doorway:
+    """An opening through the wall between two locales.
+
+    Attributes:
+        name: unique in the world.
+        between: the two locales.
+        thresholds_world: (2, 2, 2) [m]; ``thresholds_world[i]`` are the feet of the two jambs on the outline of
+            ``between[i]``, left jamb first as seen from inside that locale.
+        height_m: of the opening.
+        source: file:line where it is described.
+    """
+
+    name: str
+    between: tuple[str, str]
+    thresholds_world: NDArray[np.float64]
+    height_m: float
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "thresholds_world", frozen(self.thresholds_world, (2, 2, 2)))
+
+    @property
+    def width_m(self) -> float:
+        return float(np.linalg.norm(self.thresholds_world[0, 1] - self.thresholds_world[0, 0]))
+
+    @property
+    def depth_m(self) -> float:
+        """Thickness of the wall that it goes through."""
+        ends = self.thresholds_world.mean(axis=1)
+        return float(np.linalg.norm(ends[1] - ends[0]))
+
+    @property
+    def centre_world(self) -> NDArray[np.float64]:
+        """(2,) the middle of the opening, half-way through the wall [m]."""
+        return np.asarray(self.thresholds_world.mean(axis=(0, 1)))
+
+    def other(self, locale: str) -> str:
+        """The locale on the other side."""
+        return self.between[1 - self._side(locale)]
+
+    def threshold_of(self, locale: str) -> NDArray[np.float64]:
+        """(2, 2) the feet of its jambs on the outline of ``locale`` [m, world]."""
+        return np.asarray(self.thresholds_world[self._side(locale)])
+
+    def outward_from(self, locale: str) -> NDArray[np.float64]:
+        """(2,) unit direction on the floor that leaves ``locale`` through the doorway [world]."""
+        left, right = self.threshold_of(locale)
+        along = (right - left) / np.linalg.norm(right - left)
+        return np.array([-along[1], along[0]])
+
+    def _side(self, locale: str) -> int:
+        if locale not in self.between:
+            raise ValueError(f"expected one of {self.between}, got {locale!r}")
+        return self.between.index(locale)
+
+
+def inside_polygon(point: NDArray[np.float64], polygon: NDArray[np.float64], margin_m: float = 0.0) -> bool:
+    """Whether a point (2,) lies in a simple polygon (k, 2) or at most ``margin_m`` from its border."""
+    if distance_to_border(point, polygon) <= margin_m + 1e-9:
+        return True
+    a, b = polygon, np.roll(polygon, -1, axis=0)
+    crosses = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
+    a, b = a[crosses], b[crosses]
+    x = a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+    return bool(np.count_nonzero(x > point[0]) % 2)
+
+
+def distance_to_border(point: NDArray[np.float64], polygon: NDArray[np.float64]) -> float:
+    """Distance [m] of a point (2,) from the nearest side of a polygon (k, 2)."""
+    a, b = polygon, np.roll(polygon, -1, axis=0)
+    d = b - a
+    t = np.clip(np.sum((point - a) * d, axis=1) / np.maximum(np.sum(d * d, axis=1), 1e-18), 0.0, 1.0)
+    return float(np.min(np.linalg.norm(a + t[:, None] * d - point, axis=1)))

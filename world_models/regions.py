@@ -1,0 +1,67 @@
+"""Regions (§3.4, Figure 7): flat convex areas of one appearance, and what the model believes of light."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.frames import frozen
+
+TEXTURES = ("plain", "speckle", "wood", "brick", "tiles", "carpet", "stripes", "poster")
+
+LUMA = np.array([0.299, 0.587, 0.114])
+"""Weights of red, green and blue in a grey image."""
+
+AMBIENT = 0.6
+LAMP = np.array([0.12, 0.04, 0.18])
+"""The building's light comes from above and a little from the east: enough to tell which creases show."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """How a surface looks: colour (red, green, blue) in 0..1, one of :data:`TEXTURES` and the size of its cells."""
+
+    colour: tuple[float, float, float]
+    texture: str = "plain"
+    texture_scale_m: float = 0.1
+
+    @property
+    def luma(self) -> float:
+        return float(np.dot(LUMA, self.colour))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Region:
+    """An area of a face with uniform appearance.
+
+    Attributes:
+        name: unique in the world.
+        polygon_world: (k, 3) convex and flat, counter-clockwise from its visible side [m].
+        colour: (red, green, blue) in 0..1.
+        texture: one of :data:`TEXTURES`.
+        texture_scale_m: size of the texture's cells.
+        seed: of the texture; follows from the name.
+    """
+
+    name: str
+    polygon_world: NDArray[np.float64]
+    colour: tuple[float, float, float]
+    texture: str
+    texture_scale_m: float
+    seed: int
+
+
+def region(name: str, polygon_world: Any, finish: Finish) -> Region:
+    """A region with this finish; its seed follows from its name."""
+    polygon = frozen(polygon_world, (None, 3))
+    seed = zlib.crc32(name.encode()) & 0xFFFF
+    return Region(name, polygon, finish.colour, finish.texture, finish.texture_scale_m, seed)
+
+
+def level(finish: Finish, normal_world: Any) -> float:
+    """The brightness, 0..1, that the model expects of a surface with this normal (3,)."""
+    return float(finish.luma * (AMBIENT + 0.25 * np.dot(LAMP / np.linalg.norm(LAMP), normal_world)))

@@ -1,0 +1,250 @@
+"""TOML with the line of every value, so that a fault in a world file can be pointed at."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+Key = tuple[str | int, ...]
+"""The way to a value: table names, keys and positions in arrays, from the top of the file."""
+
+
+class WorldError(ValueError):
+    """A world file that cannot be read: names the file, the line, what was expected and what came."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """One TOML file: its name for messages, its data and the line on which each value starts."""
+
+    name: str
+    data: Mapping[str, Any]
+    lines: Mapping[Key, int]
+
+    @staticmethod
+    def read(path: Path) -> Source:
+        """Raises WorldError where the file is missing, not text or not TOML."""
+        try:
+            return Source.parse(path.read_bytes().decode("utf-8").replace("\r\n", "\n"), path.name)
+        except OSError as error:
+            raise WorldError(f"{path}: expected a readable file, got: {error.strerror}") from None
+        except UnicodeDecodeError as error:
+            raise WorldError(f"{path.name}: expected UTF-8 text, got byte {error.object[error.start]:#04x} "
+                             f"at offset {error.start}") from None
+
+    @staticmethod
+    def parse(text: str, name: str = "world") -> Source:
+        """Raises WorldError where the text is not TOML."""
+        try:
+            data = tomllib.loads(text)
+        except RecursionError:
+            raise WorldError(f"{name}: expected at most a few nested arrays, got too many to read") from None
+        except ValueError as error:
+            line = re.search(r"line (\d+)", str(error))
+            raise WorldError(f"{name}:{line.group(1) if line else '?'}: expected TOML, got: {error}") from None
+        return Source(name, data, line_numbers(text))
+
+    @property
+    def root(self) -> Node:
+        return Node(self.data, (), self)
+
+    def where(self, key: Key) -> str:
+        """``file:line`` of the value, or of the nearest table that holds it."""
+        while key and key not in self.lines:
+            key = key[:-1]
+        return f"{self.name}:{self.lines.get(key, 1)}"
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A value of the file that knows where it stands; every reader raises WorldError with that place."""
+
+    value: Any
+    key: Key
+    source: Source
+
+    @property
+    def where(self) -> str:
+        return self.source.where(self.key)
+
+    def fail(self, expected: str, got: str | None = None) -> WorldError:
+        """The error to raise when this value is not what was expected."""
+        shown = _shortened(repr(self.value)) if got is None else got
+        path = ".".join(str(part) for part in self.key) or "the file"
+        return WorldError(f"{self.where}: {path}: expected {expected}, got {shown}")
+
+    def table(self, required: tuple[str, ...] = (), optional: tuple[str, ...] = ()) -> Node:
+        """This node, after checking that it is a table with the required keys and none but these."""
+        if not isinstance(self.value, dict):
+            raise self.fail("a table")
+        missing = [key for key in required if key not in self.value]
+        if missing:
+            raise self.fail(f"the key {missing[0]!r}", f"keys {', '.join(self.value) or 'none'}")
+        known = (*required, *optional)
+        for key in self.value:
+            if key not in known:
+                raise self[key].fail(f"one of the keys {', '.join(known)}", repr(key))
+        return self
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.value
+
+    def __getitem__(self, key: str | int) -> Node:
+        return Node(self.value[key], (*self.key, key), self.source)
+
+    def get(self, key: str) -> Node | None:
+        return self[key] if key in self.value else None
+
+    def entries(self) -> Iterator[tuple[str, Node]]:
+        """The (name, node) pairs of a table, in the order of the file."""
+        if not isinstance(self.value, dict):
+            raise self.fail("a table")
+        return ((key, self[key]) for key in self.value)
+
+    def items(self, least: int = 0) -> list[Node]:
+        """The elements of an array of at least this length."""
+        if not isinstance(self.value, list) or len(self.value) < least:
+            raise self.fail(f"an array of at least {least} elements" if least else "an array")
+        return [self[index] for index in range(len(self.value))]
+
+    def text(self) -> str:
+        if not isinstance(self.value, str) or not self.value:
+            raise self.fail("a non-empty text")
+        return self.value
+
+    def choice(self, *choices: str) -> str:
+        if self.value not in choices:
+            raise self.fail(f"one of {', '.join(choices)}")
+        return str(self.value)
+
+    def flag(self) -> bool:
+        if not isinstance(self.value, bool):
+            raise self.fail("true or false")
+        return self.value
+
+    def number(self, low: float, high: float) -> float:
+        """A number from ``low`` to ``high``."""
+        value = self.value
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            raise self.fail(f"a number from {low:g} to {high:g}")
+        return float(value)
+
+    def numbers(self, counts: tuple[int, ...], low: float, high: float) -> tuple[float, ...]:
+        """An array of as many numbers as one of ``counts``."""
+        if not isinstance(self.value, list) or len(self.value) not in counts:
+            raise self.fail(f"an array of {' or '.join(str(count) for count in counts)} numbers")
+        return tuple(item.number(low, high) for item in self.items())
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def line_numbers(text: str) -> dict[Key, int]:
+    """The line (from 1) on which each value of a valid TOML text starts."""
+    return _Scanner(text).scan()
+
+
+@dataclass
+class _Scanner:
+    """Walks over TOML that ``tomllib`` has accepted, noting where values start."""
+
+    text: str
+    at: int = 0
+    lines: dict[Key, int] = field(default_factory=dict)
+    counts: dict[Key, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._newlines = [match.start() for match in re.finditer("\n", self.text)]
+
+    def scan(self) -> dict[Key, int]:
+        table: Key = ()
+        while self._skip(r"(?:\s|#[^\n]*)*"):
+            if self.text.startswith("[", self.at):
+                table = self._header()
+            else:
+                self._pair(table)
+        return self.lines
+
+    def _skip(self, pattern: str) -> bool:
+        """Move past the pattern; says whether text is left."""
+        match = re.compile(pattern).match(self.text, self.at)
+        self.at = match.end() if match else self.at
+        return self.at < len(self.text)
+
+    def _note(self, key: Key) -> None:
+        self.lines.setdefault(key, bisect_right(self._newlines, self.at - 1) + 1)
+
+    def _header(self) -> Key:
+        double = self.text.startswith("[[", self.at)
+        start, self.at = self.at, self.at + (2 if double else 1)
+        path: Key = ()
+        names = self._dotted()
+        for depth, name in enumerate(names):
+            path = (*path, name)
+            if double and depth == len(names) - 1:
+                self.counts[path] = self.counts.get(path, -1) + 1
+            if path in self.counts:
+                path = (*path, self.counts[path])
+        end, self.at = self.at, start
+        self._note(path)
+        self.at = end
+        self._skip(r"\s*\]\]?")
+        return path
+
+    def _dotted(self) -> list[str]:
+        names = []
+        while True:
+            self._skip(r"[ \t]*")
+            start = self.at
+            self._skip(_STRING + r"|[A-Za-z0-9_-]+")
+            raw = self.text[start : self.at]
+            names.append(next(iter(tomllib.loads(raw + "=0"))))
+            self._skip(r"[ \t]*")
+            if not self.text.startswith(".", self.at):
+                return names
+            self.at += 1
+
+    def _pair(self, table: Key) -> None:
+        key: Key = (*table, *self._dotted())
+        self._skip(r"[ \t]*=[ \t]*")
+        self._value(key)
+
+    def _value(self, key: Key) -> None:
+        self._note(key)
+        opening = self.text[self.at]
+        if opening == "[":
+            self._array(key)
+        elif opening == "{":
+            self._inline_table(key)
+        elif opening in "\"'":
+            self._skip(_STRING)
+        else:
+            self._skip(r"[^,\]}\n#]*")
+
+    def _array(self, key: Key) -> None:
+        self.at += 1
+        index = 0
+        while self._skip(r"(?:[\s,]|#[^\n]*)*") and self.text[self.at] != "]":
+            self._value((*key, index))
+            index += 1
+        self.at += 1
+
+    def _inline_table(self, key: Key) -> None:
+        self.at += 1
+        while self._skip(r"(?:[\s,]|#[^\n]*)*") and self.text[self.at] != "}":
+            self._pair(key)
+        self.at += 1
+
+
+_STRING = (
+    r'"""(?:[^\\]|\\[\s\S])*?"{3,5}'
+    r"|'''[\s\S]*?'{3,5}"
+    r'|"(?:[^"\\\n]|\\.)*"'
+    r"|'[^'\n]*'"
+)

@@ -1,0 +1,315 @@
+"""Which model lines and corners a camera sees: exact hidden-line removal by shadow volumes.
+
+Seen from the optical centre, a convex one-sided surface hides what lies in its shadow: beyond its plane and within the
+pyramid of its sides. Each of these bounds is linear in a point, so that the hidden part of a segment is an interval that
+can be computed for all pairs of lines and surfaces at once. Locales that no chain of doorways opens to the camera are
+left out beforehand (§3.4: the locale network as a focusing mechanism).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.camera import NEAR_M, Camera
+from world_models.frames import Pose
+from world_models.geometer import left_over
+from world_models.portals import Window, image_window, windows_of
+from world_models.scene import Scene
+
+if TYPE_CHECKING:
+    from world_models.world import World
+
+LIFT_M = 0.004
+"""A point counts as lying on a surface, and is seen, when it is no further than this behind it along the ray."""
+
+SHADOW_DEPTH_M = 1e-9
+SHORTEST_PIECE = 1e-6
+"""Gaps between hidden intervals that are shorter than this part of a line are cracks between surfaces, not views."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class VisibleLines:
+    """The visible pieces of model lines.
+
+    Attributes:
+        segments_px: (n, 2, 2) where they are seen.
+        lines_world: (n, 2, 3) the pieces that are seen [m].
+        landmark, line: (n,) which line (``world.landmarks[landmark].lines_world[line]``).
+        contrast: (n,) the brightness step across it that the model expects, 0..1.
+    """
+
+    segments_px: Floats
+    lines_world: Floats
+    landmark: NDArray[np.int64]
+    line: NDArray[np.int64]
+    contrast: Floats
+
+    def __len__(self) -> int:
+        return len(self.segments_px)
+
+    def __getitem__(self, keep: Any) -> VisibleLines:
+        """Some of them, by mask or index array."""
+        return VisibleLines(self.segments_px[keep], self.lines_world[keep], self.landmark[keep], self.line[keep],
+                            self.contrast[keep])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class VisiblePoints:
+    """The visible corners of landmarks.
+
+    Attributes:
+        points_px: (n, 2) where they are seen.
+        points_world: (n, 3) [m].
+        landmark, point: (n,) which corner (``world.landmarks[landmark].points_world[point]``).
+        contrast: (n,) the second strongest brightness step among the lines that meet there, 0..1.
+    """
+
+    points_px: Floats
+    points_world: Floats
+    landmark: NDArray[np.int64]
+    point: NDArray[np.int64]
+    contrast: Floats
+
+    def __len__(self) -> int:
+        return len(self.points_px)
+
+    def __getitem__(self, keep: Any) -> VisiblePoints:
+        """Some of them, by mask or index array."""
+        return VisiblePoints(self.points_px[keep], self.points_world[keep], self.landmark[keep], self.point[keep],
+                             self.contrast[keep])
+
+
+def visible_lines(
+    world: World,
+    camera: Camera,
+    camera_from_world: Pose,
+    *,
+    locales: Collection[str] | None = None,
+    min_length_px: float = 6.0,
+    min_contrast: float = 0.02,
+    min_separation_px: float = 2.0,
+    max_distance_m: float = 40.0,
+) -> VisibleLines:
+    """The pieces of model lines that the camera sees, hidden lines removed, clipped to the image.
+
+    Args:
+        locales: only lines of landmarks in these (all: ``None``); things elsewhere still hide them.
+        min_length_px: shorter pieces are left out.
+        min_contrast: fainter lines are left out.
+        min_separation_px: of lines that fall together within this in the image only the strongest is kept
+            (0: keep all).
+        max_distance_m: pieces that begin further away are left out.
+    """
+    scene, window, view = world.scene, image_window(camera), _View(world, camera, camera_from_world)
+    contrast = scene.edges.contrasts(camera_from_world.inverse().translation)
+    chosen = view.locales_seen(scene.line_locales) & _named(scene, scene.line_landmark, world, locales)
+    index = np.flatnonzero(chosen & (contrast >= min_contrast))
+    lines = camera_from_world.apply(scene.edges.lines_world[index]).reshape(-1, 2, 3)
+    span = _clip(lines, window)
+    lines, keep = _pieces(lines, span), span[:, 1] - span[:, 0] > SHORTEST_PIECE
+    keep[keep] &= np.linalg.norm(lines[keep], axis=2).min(axis=1) < max_distance_m
+    keep[keep] &= _overlaps(_bounds(lines[keep]), view.windows_for(scene.line_locales[index[keep]]))
+    index, lines = index[keep], lines[keep]
+    owner, span = _visible_spans(lines, view.shadows())
+    index, lines = index[owner], _pieces(lines[owner], span)
+    segments = camera.project(lines)
+    found = VisibleLines(segments, camera_from_world.inverse().apply(lines), scene.line_landmark[index],
+                         scene.line_index[index], contrast[index])
+    found = found[np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1) >= min_length_px]
+    return found[_distinct(found, min_separation_px)] if min_separation_px > 0 else found
+
+
+def visible_points(
+    world: World,
+    camera: Camera,
+    camera_from_world: Pose,
+    *,
+    locales: Collection[str] | None = None,
+    min_contrast: float = 0.02,
+    margin_px: float = 0.0,
+    max_distance_m: float = 40.0,
+) -> VisiblePoints:
+    """The landmark corners that the camera sees, at least ``margin_px`` from the border of the image.
+
+    A corner shows where at least two model lines with ``min_contrast`` meet; see :func:`visible_lines` for the rest.
+    """
+    scene, view = world.scene, _View(world, camera, camera_from_world)
+    centre = camera_from_world.inverse().translation
+    steps = np.append(scene.edges.contrasts(centre), 0.0)[scene.corner_lines]
+    contrast = np.sort(steps, axis=1)[:, -2]
+    chosen = view.locales_seen(scene.corner_locales) & _named(scene, scene.corner_landmark, world, locales)
+    near = np.linalg.norm(scene.corners_world - centre, axis=1) < max_distance_m
+    index = np.flatnonzero(chosen & near & (contrast >= min_contrast))
+    points = camera_from_world.apply(scene.corners_world[index]).reshape(-1, 3)
+    ahead = points[:, 2] > NEAR_M
+    index, points = index[ahead], points[ahead]
+    pixels = camera.project(points)
+    keep = camera.inside(pixels, margin_px)
+    keep[keep] &= ~_hidden_points(points[keep], view.shadows())
+    index = index[keep]
+    return VisiblePoints(pixels[keep], scene.corners_world[index], scene.corner_landmark[index],
+                         scene.corner_index[index], contrast[index])
+
+
+@dataclass(frozen=True, eq=False)
+class _Shadows:
+    """Front-facing surfaces as seen by the camera.
+
+    Attributes:
+        bounds: (m, K + 1, 4) rows (g, h): a point p of the camera frame is in the shadow where all g . p + h >= 0.
+        windows: (m, 4) rectangles at depth 1 that they cannot leave.
+        nearest_m: (m,) depth of their nearest corner.
+    """
+
+    bounds: Floats
+    windows: Floats
+    nearest_m: Floats
+
+
+class _View:
+    """What one camera pose opens to the eye."""
+
+    def __init__(self, world: World, camera: Camera, camera_from_world: Pose) -> None:
+        self.scene: Scene = world.scene
+        self.camera_from_world = camera_from_world
+        seen = windows_of(world, image_window(camera), camera_from_world)
+        nowhere: Window = (np.inf, np.inf, -np.inf, -np.inf)
+        self.windows = np.array([seen.get(name, nowhere) for name in self.scene.locales]).reshape(-1, 4)
+
+    def locales_seen(self, locales: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(n,) whether one of the two locales (n, 2) of each element is in view."""
+        return np.asarray((self.windows[:, 0] < np.inf)[locales].any(axis=1))
+
+    def windows_for(self, locales: NDArray[np.int64]) -> Floats:
+        """(n, 4) the rectangle through which each element, in one or the other of two locales, can be seen."""
+        both = self.windows[locales]
+        return np.concatenate([both[:, :, :2].min(axis=1), both[:, :, 2:].max(axis=1)], axis=1)
+
+    def shadows(self) -> _Shadows:
+        scene, pose = self.scene, self.camera_from_world
+        centre = pose.inverse().translation
+        facing = scene.planes_world[:, :3] @ centre - scene.planes_world[:, 3] > 1e-6
+        index = np.flatnonzero(facing & self.locales_seen(scene.surface_locales))
+        polygons = pose.apply(scene.polygons_world[index])
+        windows = _bounds(polygons)
+        keep = (polygons[..., 2].max(axis=1) > NEAR_M) & _overlaps(
+            windows, self.windows_for(scene.surface_locales[index]))
+        index, polygons, windows = index[keep], polygons[keep], windows[keep]
+        normals = scene.planes_world[index, :3] @ pose.rotation.T
+        offsets = scene.planes_world[index, 3] + normals @ pose.translation
+        sides = -np.cross(polygons, np.roll(polygons, -1, axis=1))
+        bounds = np.zeros((len(index), sides.shape[1] + 1, 4))
+        bounds[:, :-1, :3] = sides
+        bounds[:, -1, :3] = -normals
+        bounds[:, -1, 3] = offsets - SHADOW_DEPTH_M
+        return _Shadows(bounds, windows, polygons[..., 2].min(axis=1))
+
+
+def _named(scene: Scene, landmark: NDArray[np.int64], world: World, locales: Collection[str] | None) -> Any:
+    """(n,) whether each element's landmark is in one of the locales asked for."""
+    if locales is None:
+        return True
+    wanted = np.array([mark.locale in locales or mark.neighbour in locales for mark in world.landmarks], bool)
+    return wanted[landmark]
+
+
+def _clip(lines: Floats, window: Window) -> Floats:
+    """(n, 2) the part of each segment (n, 2, 3) of the camera frame that is in front and within the window."""
+    x0, y0, x1, y1 = window
+    planes = np.array([(0, 0, 1, -NEAR_M), (1, 0, -x0, 0), (-1, 0, x1, 0), (0, 1, -y0, 0), (0, -1, y1, 0)])
+    values = lines @ planes[:, :3].T + planes[:, 3]
+    return _interval(values[:, 0], values[:, 1])
+
+
+def _interval(start: Floats, end: Floats) -> Floats:
+    """(n, 2) where the linear functions with these values (n, k) at 0 and at 1 are all >= 0; empty where low >= high."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = start / (start - end)
+    low = np.where((start < 0) & (end >= 0), root, 0.0).max(axis=1)
+    high = np.where((start >= 0) & (end < 0), root, 1.0).min(axis=1)
+    high = np.where(((start < 0) & (end < 0)).any(axis=1), -1.0, high)
+    return np.stack([low, high], axis=1)
+
+
+def _pieces(lines: Floats, span: Floats) -> Floats:
+    """(n, 2, 3) the parts of segments between two parameters each (n, 2)."""
+    a, d = lines[:, :1], lines[:, 1:] - lines[:, :1]
+    return np.asarray(a + span[:, :, None] * d)
+
+
+def _bounds(points: Floats) -> Floats:
+    """(n, 4) rectangles at depth 1 round n sets of points (n, k, 3); without bounds where one is not in front."""
+    z = points[..., 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        xy = points[..., :2] / z[..., None]
+    rectangles = np.concatenate([xy.min(axis=1), xy.max(axis=1)], axis=1)
+    rectangles[z.min(axis=1) < 0.99 * NEAR_M] = (-np.inf, -np.inf, np.inf, np.inf)
+    return rectangles
+
+
+def _overlaps(one: Floats, other: Floats) -> NDArray[np.bool_]:
+    """Whether rectangles (..., 4) have a point in common."""
+    return np.asarray(np.all(one[..., :2] <= other[..., 2:], axis=-1) & np.all(other[..., :2] <= one[..., 2:], axis=-1))
+
+
+def _lifted(points: Floats) -> tuple[Floats, Floats]:
+    """Points (..., 3) moved towards the camera by LIFT_M, and the factors (...,) by which they were."""
+    factor = 1.0 - LIFT_M / np.linalg.norm(points, axis=-1)
+    return points * factor[..., None], factor
+
+
+def _visible_spans(lines: Floats, shadows: _Shadows) -> tuple[NDArray[np.int64], Floats]:
+    """The visible parts of segments (n, 2, 3): which segment (k,), and from where to where (k, 2)."""
+    lifted, factor = _lifted(lines)
+    near_enough = shadows.nearest_m[None, :] < lines[..., 2].max(axis=1)[:, None]
+    pair = np.nonzero(_overlaps(_bounds(lines)[:, None], shadows.windows[None]) & near_enough)
+    bounds = shadows.bounds[pair[1]]
+    ends = [np.einsum("pkj,pj->pk", bounds[..., :3], lifted[pair[0], end]) + bounds[..., 3] for end in (0, 1)]
+    hidden = _interval(ends[0], ends[1])
+    some = hidden[:, 1] > hidden[:, 0]
+    taken: list[list[tuple[float, float]]] = [[] for _ in lines]
+    for line, low, high in zip(pair[0][some].tolist(), *hidden[some].T.tolist(), strict=True):
+        taken[line].append((low, high))
+    rows = [(line, *piece) for line, parts in enumerate(taken) for piece in left_over((0.0, 1.0), parts, SHORTEST_PIECE)]
+    table = np.array(rows, float).reshape(-1, 3)
+    owner, t = table[:, 0].astype(np.int64), table[:, 1:]
+    # Lifting shifts points along their rays: the same pixel has another parameter on the segment itself.
+    start, end = factor[owner, :1], factor[owner, 1:]
+    return owner, t * end / ((1.0 - t) * start + t * end)
+
+
+def _hidden_points(points: Floats, shadows: _Shadows) -> NDArray[np.bool_]:
+    """(n,) whether points (n, 3) lie in a shadow."""
+    lifted, _ = _lifted(points)
+    near_enough = shadows.nearest_m[None, :] < points[:, 2:]
+    pair = np.nonzero(_overlaps(_bounds(points[:, None])[:, None], shadows.windows[None]) & near_enough)
+    bounds = shadows.bounds[pair[1]]
+    inside = np.all(np.einsum("pkj,pj->pk", bounds[..., :3], lifted[pair[0]]) + bounds[..., 3] >= 0, axis=1)
+    hidden = np.zeros(len(points), bool)
+    hidden[pair[0][inside]] = True
+    return hidden
+
+
+def _distinct(lines: VisibleLines, separation_px: float) -> NDArray[np.int64]:
+    """Which lines to keep, in order: none that lies for half its length within the separation of a stronger one."""
+    order = np.argsort(-lines.contrast, kind="stable")
+    a, b = lines.segments_px[:, 0], lines.segments_px[:, 1]
+    length = np.linalg.norm(b - a, axis=1)
+    along = (b - a) / length[:, None]
+    ends = lines.segments_px[:, None] - a[None, :, None]
+    s = np.einsum("ijek,jk->ije", ends, along)
+    off = np.abs(ends[..., 0] * along[None, :, None, 1] - ends[..., 1] * along[None, :, None, 0])
+    shared = np.minimum(s.max(axis=2), length[None]) - np.maximum(s.min(axis=2), 0.0)
+    covered = (off.max(axis=2) < separation_px) & (shared > 0.5 * length[:, None])
+    kept: list[int] = []
+    for i in order.tolist():
+        if not covered[i, kept].any():
+            kept.append(i)
+    return np.array(sorted(kept), np.int64)
