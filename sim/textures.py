@@ -208,12 +208,12 @@ def _mixed_colour(seen: Any, x: int, y: int, offsets: Any, looks: Any, table: An
 
 @njit(cache=True, error_model="numpy")
 def _find_mixed(seen: Any, mixed: Any) -> None:
-    """Which pixels of a row see more than one patch, or nothing, at their samples (N, width)."""
+    """Which pixels of a row see more than one patch, or nothing, at their samples (N, width): those not set to 0."""
     for x in range(len(mixed)):
-        mixed[x] = seen[0, x] < 0
+        mixed[x] = seen[0, x] & np.int16(-32768)
     for r in range(1, len(seen)):
         for x in range(len(mixed)):
-            mixed[x] |= seen[r, x] != seen[0, x]
+            mixed[x] |= seen[r, x] ^ seen[0, x]
 
 
 @njit(cache=True, error_model="numpy")
@@ -225,12 +225,12 @@ def shade(seen: Any, offsets: Any, looks: Any, table: Any, haze_per_m: float) ->
     """
     height, samples, width = seen.shape
     image = np.empty((height, width, 3), np.float32)
-    mixed = np.empty(width, np.bool_)
+    mixed = np.empty(width, np.int16)
     done = np.empty(samples, np.bool_)
     for y in range(height):
         _find_mixed(seen[y], mixed)
         for x in range(width):
-            if mixed[x]:
+            if mixed[x] != 0:
                 rgb = _mixed_colour(seen[y, :, x], x, y, offsets, looks, table, haze_per_m, done)
             else:
                 rgb = _colour(looks[seen[y, 0, x]], float(x), float(y), table, haze_per_m)

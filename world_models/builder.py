@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -216,28 +217,36 @@ def _thing(spec: ThingSpec, name: str, world_from_part: Pose) -> Thing:
 
 
 def _locales(blueprint: Blueprint, poses: Mapping[str, Pose]) -> dict[str, Locale]:
-    """Root first, then in the order of the file."""
+    """Root first, then in the order of the file; locales without walls of their own reach round those in them."""
     specs = blueprint.locales
-    corners = {name: poses[name].apply(np.column_stack([s.outline, np.zeros(len(s.outline))]))
-               for name, s in specs.items() if s.outline is not None}
-    heights = {name: spec.height_m for name, spec in specs.items()}
-
-    def inside(name: str) -> list[str]:
-        return [c for c, s in specs.items() if s.parent == name]
-
-    def all_corners(name: str) -> NDArray[np.float64]:
-        own = [corners[name]] if name in corners else []
-        return np.concatenate([np.zeros((0, 3)), *own, *(all_corners(child) for child in inside(name))])
-
-    def bounds(name: str) -> NDArray[np.float64]:
-        p = poses[name].inverse().apply(all_corners(name))
-        (x0, y0, _), (x1, y1, _) = p.min(axis=0) - ROOF_M, p.max(axis=0) + ROOF_M
-        return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-
-    root = Locale(blueprint.name, "building", None, Pose.identity(), bounds(blueprint.name), max(heights.values()),
-                  source=blueprint.source)
+    root = _container(blueprint.name, "building", None, Pose.identity(), blueprint, poses, {}, blueprint.source)
     out = {blueprint.name: root}
     for name, s in specs.items():
-        outline = bounds(name) if s.outline is None else s.outline
-        out[name] = Locale(name, s.kind, s.parent, s.frame, outline, s.height_m, s.properties, s.source)
+        if s.outline is None:
+            out[name] = _container(name, s.kind, s.parent, s.frame, blueprint, poses, s.properties, s.source)
+        else:
+            out[name] = Locale(name, s.kind, s.parent, s.frame, s.outline, s.height_m, s.properties, s.source)
     return out
+
+
+def _container(
+    name: str, kind: str, parent: str | None, frame: Pose, blueprint: Blueprint, poses: Mapping[str, Pose],
+    properties: Mapping[str, Any], source: str,
+) -> Locale:
+    corners = poses[name].inverse().apply(_corners_within(name, blueprint.locales, poses))
+    (x0, y0, z0), (x1, y1, z1) = corners.min(axis=0), corners.max(axis=0)
+    x0, y0, x1, y1 = x0 - ROOF_M, y0 - ROOF_M, x1 + ROOF_M, y1 + ROOF_M
+    outline = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    return Locale(name, kind, parent, frame, outline, float(z1) + ROOF_M, properties, source, float(z0))
+
+
+def _corners_within(name: str, specs: Mapping[str, LocaleSpec], poses: Mapping[str, Pose]) -> NDArray[np.float64]:
+    """(n, 3) floor and ceiling corners of all rooms that a locale contains [m, world]."""
+    parts = [np.zeros((0, 3))]
+    for child, spec in specs.items():
+        if spec.parent == name:
+            parts.append(_corners_within(child, specs, poses))
+            if spec.outline is not None:
+                parts += [poses[child].apply(np.column_stack([spec.outline, np.full(len(spec.outline), z)]))
+                          for z in (0.0, spec.height_m)]
+    return np.concatenate(parts)

@@ -22,9 +22,10 @@ class Locale:
         parent: the locale that contains it; ``None`` for the root.
         frame: parent_from_locale.
         outline: (k, 2) its free extent on the floor, counter-clockwise, in its own frame [m].
-        height_m: from its floor to its ceiling.
+        height_m: of its ceiling in its own frame.
         properties: what else the world file says of it.
         source: file:line where it is described.
+        floor_m: height of its floor in its own frame; may differ from 0 only where it contains other locales.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Locale:
     height_m: float
     properties: Mapping[str, Any] = field(default_factory=dict)
     source: str = ""
+    floor_m: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outline", frozen(self.outline, (None, 2)))
@@ -45,7 +47,7 @@ class Locale:
         ``margin_m`` lets points count that lie at most so far outside.
         """
         p = np.asarray(point, float)
-        if p.size == 3 and not -margin_m - 1e-9 <= p[2] <= self.height_m + margin_m + 1e-9:
+        if p.size == 3 and not self.floor_m - margin_m - 1e-9 <= p[2] <= self.height_m + margin_m + 1e-9:
             return False
         return inside_polygon(p[:2], self.outline, margin_m)
 

@@ -9,13 +9,16 @@ from numpy.typing import NDArray
 
 from world_models.camera import NEAR_M, Camera
 from world_models.frames import Pose
-from world_models.locales import Doorway
+from world_models.locales import Doorway, distance_to_border
 
 if TYPE_CHECKING:
     from world_models.world import World
 
 Window = tuple[float, float, float, float]
 """Left, top, right, bottom of a rectangle at depth 1 (x / z and y / z in the camera frame)."""
+
+AT_HAND_M = 0.3
+"""A doorway nearer than this may fill the whole image, parts of it closer than the near plane."""
 
 BORDER = 0.02
 """How much wider than its exact image a doorway is taken to be."""
@@ -61,6 +64,8 @@ def locales_at_camera(world: World, centre_world: NDArray[np.float64]) -> tuple[
 def _through(doorway: Doorway, locale: str, world: World, camera_from_world: Pose) -> Window | None:
     """The rectangle that bounds a doorway as seen from inside ``locale``."""
     feet = doorway.threshold_of(locale)
+    if distance_to_border(camera_from_world.inverse().translation[:2], feet) < AT_HAND_M:
+        return -np.inf, -np.inf, np.inf, np.inf
     base = float(world.world_from_locale(locale).translation[2])
     heights = (base, base + doorway.height_m)
     corners = [(*feet[0], heights[0]), (*feet[1], heights[0]), (*feet[1], heights[1]), (*feet[0], heights[1])]

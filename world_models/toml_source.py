@@ -178,7 +178,10 @@ class _Scanner:
         return self.at < len(self.text)
 
     def _note(self, key: Key) -> None:
-        self.lines.setdefault(key, bisect_right(self._newlines, self.at - 1) + 1)
+        """The value of this key starts here, and those that hold it no later."""
+        line = bisect_right(self._newlines, self.at - 1) + 1
+        for length in range(len(key), 0, -1):
+            self.lines.setdefault(key[:length], line)
 
     def _header(self) -> Key:
         double = self.text.startswith("[[", self.at)

@@ -8,7 +8,7 @@ left out beforehand (§3.4: the locale network as a focusing mechanism).
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,10 +24,9 @@ from world_models.scene import Scene
 if TYPE_CHECKING:
     from world_models.world import World
 
-LIFT_M = 0.004
-"""A point counts as lying on a surface, and is seen, when it is no further than this behind it along the ray."""
+TOUCHING_M = 0.002
+"""What lies no deeper than this below a surface lies on it and is seen; details stand out by twice as much."""
 
-SHADOW_DEPTH_M = 1e-9
 SHORTEST_PIECE = 1e-6
 """Gaps between hidden intervals that are shorter than this part of a line are cracks between surfaces, not views."""
 
@@ -114,6 +113,7 @@ def visible_lines(
     lines = camera_from_world.apply(scene.edges.lines_world[index]).reshape(-1, 2, 3)
     span = _clip(lines, window)
     lines, keep = _pieces(lines, span), span[:, 1] - span[:, 0] > SHORTEST_PIECE
+    keep[keep] &= _lengths(camera.project(lines[keep])) >= min_length_px
     keep[keep] &= np.linalg.norm(lines[keep], axis=2).min(axis=1) < max_distance_m
     keep[keep] &= _overlaps(_bounds(lines[keep]), view.windows_for(scene.line_locales[index[keep]]))
     index, lines = index[keep], lines[keep]
@@ -122,7 +122,7 @@ def visible_lines(
     segments = camera.project(lines)
     found = VisibleLines(segments, camera_from_world.inverse().apply(lines), scene.line_landmark[index],
                          scene.line_index[index], contrast[index])
-    found = found[np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1) >= min_length_px]
+    found = found[_lengths(segments) >= min_length_px]
     return found[_distinct(found, min_separation_px)] if min_separation_px > 0 else found
 
 
@@ -163,7 +163,7 @@ class _Shadows:
     """Front-facing surfaces as seen by the camera.
 
     Attributes:
-        bounds: (m, K + 1, 4) rows (g, h): a point p of the camera frame is in the shadow where all g . p + h >= 0.
+        bounds: (K + 1, m, 4) rows (g, h): a point p of the camera frame is in the shadow where all g . p + h >= 0.
         windows: (m, 4) rectangles at depth 1 that they cannot leave.
         nearest_m: (m,) depth of their nearest corner.
     """
@@ -205,10 +205,10 @@ class _View:
         normals = scene.planes_world[index, :3] @ pose.rotation.T
         offsets = scene.planes_world[index, 3] + normals @ pose.translation
         sides = -np.cross(polygons, np.roll(polygons, -1, axis=1))
-        bounds = np.zeros((len(index), sides.shape[1] + 1, 4))
-        bounds[:, :-1, :3] = sides
-        bounds[:, -1, :3] = -normals
-        bounds[:, -1, 3] = offsets - SHADOW_DEPTH_M
+        bounds = np.zeros((sides.shape[1] + 1, len(index), 4))
+        bounds[:-1, :, :3] = np.moveaxis(sides, 1, 0)
+        bounds[-1, :, :3] = -normals
+        bounds[-1, :, 3] = offsets - TOUCHING_M
         return _Shadows(bounds, windows, polygons[..., 2].min(axis=1))
 
 
@@ -223,18 +223,18 @@ def _named(scene: Scene, landmark: NDArray[np.int64], world: World, locales: Col
 def _clip(lines: Floats, window: Window) -> Floats:
     """(n, 2) the part of each segment (n, 2, 3) of the camera frame that is in front and within the window."""
     x0, y0, x1, y1 = window
-    planes = np.array([(0, 0, 1, -NEAR_M), (1, 0, -x0, 0), (-1, 0, x1, 0), (0, 1, -y0, 0), (0, -1, y1, 0)])
-    values = lines @ planes[:, :3].T + planes[:, 3]
-    return _interval(values[:, 0], values[:, 1])
+    x, y, z = np.moveaxis(lines, 2, 0)
+    return _interval(((v[:, 0], v[:, 1]) for v in (z - NEAR_M, x - x0 * z, x1 * z - x, y - y0 * z, y1 * z - y)), len(lines))
 
 
-def _interval(start: Floats, end: Floats) -> Floats:
-    """(n, 2) where the linear functions with these values (n, k) at 0 and at 1 are all >= 0; empty where low >= high."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = start / (start - end)
-    low = np.where((start < 0) & (end >= 0), root, 0.0).max(axis=1)
-    high = np.where((start >= 0) & (end < 0), root, 1.0).min(axis=1)
-    high = np.where(((start < 0) & (end < 0)).any(axis=1), -1.0, high)
+def _interval(bounds: Iterable[tuple[Floats, Floats]], count: int) -> Floats:
+    """(n, 2) where linear functions are all >= 0, given by their values (n,) at 0 and at 1; empty where low >= high."""
+    low, high = np.zeros(count), np.ones(count)
+    for start, end in bounds:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = start / (start - end)
+        low = np.where(start < 0, np.where(end < 0, 2.0, np.maximum(low, root)), low)
+        high = np.where((start >= 0) & (end < 0), np.minimum(high, root), high)
     return np.stack([low, high], axis=1)
 
 
@@ -242,6 +242,11 @@ def _pieces(lines: Floats, span: Floats) -> Floats:
     """(n, 2, 3) the parts of segments between two parameters each (n, 2)."""
     a, d = lines[:, :1], lines[:, 1:] - lines[:, :1]
     return np.asarray(a + span[:, :, None] * d)
+
+
+def _lengths(segments_px: Floats) -> Floats:
+    """(n,) [px]."""
+    return np.asarray(np.hypot(*(segments_px[:, 1] - segments_px[:, 0]).T))
 
 
 def _bounds(points: Floats) -> Floats:
@@ -256,42 +261,38 @@ def _bounds(points: Floats) -> Floats:
 
 def _overlaps(one: Floats, other: Floats) -> NDArray[np.bool_]:
     """Whether rectangles (..., 4) have a point in common."""
-    return np.asarray(np.all(one[..., :2] <= other[..., 2:], axis=-1) & np.all(other[..., :2] <= one[..., 2:], axis=-1))
-
-
-def _lifted(points: Floats) -> tuple[Floats, Floats]:
-    """Points (..., 3) moved towards the camera by LIFT_M, and the factors (...,) by which they were."""
-    factor = 1.0 - LIFT_M / np.linalg.norm(points, axis=-1)
-    return points * factor[..., None], factor
+    found = (one[..., 0] <= other[..., 2]) & (one[..., 1] <= other[..., 3])
+    found &= (other[..., 0] <= one[..., 2]) & (other[..., 1] <= one[..., 3])
+    return np.asarray(found)
 
 
 def _visible_spans(lines: Floats, shadows: _Shadows) -> tuple[NDArray[np.int64], Floats]:
     """The visible parts of segments (n, 2, 3): which segment (k,), and from where to where (k, 2)."""
-    lifted, factor = _lifted(lines)
     near_enough = shadows.nearest_m[None, :] < lines[..., 2].max(axis=1)[:, None]
     pair = np.nonzero(_overlaps(_bounds(lines)[:, None], shadows.windows[None]) & near_enough)
-    bounds = shadows.bounds[pair[1]]
-    ends = [np.einsum("pkj,pj->pk", bounds[..., :3], lifted[pair[0], end]) + bounds[..., 3] for end in (0, 1)]
-    hidden = _interval(ends[0], ends[1])
+    start, end = lines[pair[0], 0], lines[pair[0], 1]
+    hidden = _interval(((_value(b, start), _value(b, end)) for b in shadows.bounds[:, pair[1]]), len(start))
     some = hidden[:, 1] > hidden[:, 0]
     taken: list[list[tuple[float, float]]] = [[] for _ in lines]
     for line, low, high in zip(pair[0][some].tolist(), *hidden[some].T.tolist(), strict=True):
         taken[line].append((low, high))
     rows = [(line, *piece) for line, parts in enumerate(taken) for piece in left_over((0.0, 1.0), parts, SHORTEST_PIECE)]
     table = np.array(rows, float).reshape(-1, 3)
-    owner, t = table[:, 0].astype(np.int64), table[:, 1:]
-    # Lifting shifts points along their rays: the same pixel has another parameter on the segment itself.
-    start, end = factor[owner, :1], factor[owner, 1:]
-    return owner, t * end / ((1.0 - t) * start + t * end)
+    return table[:, 0].astype(np.int64), table[:, 1:]
+
+
+def _value(bound: Floats, points: Floats) -> Floats:
+    """(n,) g . p + h for bounds (n, 4) and points (n, 3)."""
+    return np.asarray(bound[:, 0] * points[:, 0] + bound[:, 1] * points[:, 1] + bound[:, 2] * points[:, 2] + bound[:, 3])
 
 
 def _hidden_points(points: Floats, shadows: _Shadows) -> NDArray[np.bool_]:
     """(n,) whether points (n, 3) lie in a shadow."""
-    lifted, _ = _lifted(points)
     near_enough = shadows.nearest_m[None, :] < points[:, 2:]
     pair = np.nonzero(_overlaps(_bounds(points[:, None])[:, None], shadows.windows[None]) & near_enough)
-    bounds = shadows.bounds[pair[1]]
-    inside = np.all(np.einsum("pkj,pj->pk", bounds[..., :3], lifted[pair[0]]) + bounds[..., 3] >= 0, axis=1)
+    inside = np.ones(len(pair[0]), bool)
+    for bound in shadows.bounds[:, pair[1]]:
+        inside &= _value(bound, points[pair[0]]) >= 0
     hidden = np.zeros(len(points), bool)
     hidden[pair[0][inside]] = True
     return hidden
@@ -299,15 +300,17 @@ def _hidden_points(points: Floats, shadows: _Shadows) -> NDArray[np.bool_]:
 
 def _distinct(lines: VisibleLines, separation_px: float) -> NDArray[np.int64]:
     """Which lines to keep, in order: none that lies for half its length within the separation of a stronger one."""
+    (ax, ay), (bx, by) = lines.segments_px[:, 0].T, lines.segments_px[:, 1].T
+    length = np.hypot(bx - ax, by - ay)
+    ux, uy = ((bx - ax) / length)[:, None], ((by - ay) / length)[:, None]
+    along, off = [], []
+    for x, y in ((ax, ay), (bx, by)):
+        dx, dy = x - ax[:, None], y - ay[:, None]
+        along.append(dx * ux + dy * uy)
+        off.append(np.abs(dx * uy - dy * ux))
+    shared = np.minimum(np.maximum(*along), length[:, None]) - np.maximum(np.minimum(*along), 0.0)
+    covered = (np.maximum(*off) < separation_px) & (shared > 0.5 * length[:, None])
     order = np.argsort(-lines.contrast, kind="stable")
-    a, b = lines.segments_px[:, 0], lines.segments_px[:, 1]
-    length = np.linalg.norm(b - a, axis=1)
-    along = (b - a) / length[:, None]
-    ends = lines.segments_px[:, None] - a[None, :, None]
-    s = np.einsum("ijek,jk->ije", ends, along)
-    off = np.abs(ends[..., 0] * along[None, :, None, 1] - ends[..., 1] * along[None, :, None, 0])
-    shared = np.minimum(s.max(axis=2), length[None]) - np.maximum(s.min(axis=2), 0.0)
-    covered = (off.max(axis=2) < separation_px) & (shared > 0.5 * length[:, None])
     kept: list[int] = []
     for i in order.tolist():
         if not covered[i, kept].any():

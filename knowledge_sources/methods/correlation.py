@@ -55,7 +55,7 @@ class Correlation:
         position_px: (2,) the template's centre (u, v) [px].
         covariance_px: (2, 2) of the position [px^2]; large along an edge.
         sigma_px: root of the covariance's mean diagonal [px].
-        peak: normalised correlation at the best place, -1 to 1.
+        peak: normalised correlation at the best place, between pixels, -1 to 1.
         second_peak: the best at another place in the window, -1 where there is none.
         at_border: the best place lies at the window's border, so the true place may be outside.
         moved_px: (2,) position minus prediction [px].
@@ -138,11 +138,11 @@ def correlate(
     row, column = divmod(int(np.argmax(score)), score.shape[1])
     start = np.array([column, row], float) + _quadratic_peak(score, row, column)
     at_border = not (0 < row < score.shape[0] - 1 and 0 < column < score.shape[1] - 1)
-    place, covariance = align(patch, view, start, template.noise, search_px)
+    place, covariance, aligned = align(patch, view, start, template.noise, search_px)
     position = place + (u0, v0)
-    return Correlation(
-        position, covariance, float(score[row, column]), _second(score, row, column, half), at_border, position - predicted
-    )
+    peak = max(float(score[row, column]), aligned)
+    second = _second(score, row, column, half)
+    return Correlation(position, covariance, peak, second, at_border, position - predicted)
 
 
 def corner_strength(image: Any, centre_px: Any, half_px: int = 12) -> float:
@@ -207,9 +207,9 @@ def _quadratic_peak(score: NDArray[np.float32], row: int, column: int) -> NDArra
 
 
 def _second(score: NDArray[np.float32], row: int, column: int, half: int) -> float:
-    """The best score at another place: a local maximum beyond the main lobe, or anything a template's half-width away."""
+    """The best score at another place: a local maximum beyond the main lobe, or anything half a half-width away."""
     rows, columns = np.ogrid[: score.shape[0], : score.shape[1]]
     away = (rows - row) ** 2 + (columns - column) ** 2
     summit = score >= cv2.dilate(score, np.ones((3, 3), np.uint8))
-    other = (summit & (away > _LOBE_PX**2)) | (away > half**2)
+    other = (summit & (away > _LOBE_PX**2)) | (away > (half / 2.0) ** 2)
     return float(np.max(score, initial=-1.0, where=other))

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 _STEPS = 3
 
+_DIRECTION_LEAK = 3e-4
+"""Share of an edge's gradient energy that seems to lie along it."""
+
 _FLOOR_PX = 0.02
 """What interpolation and rounding leave in a position [px]."""
 
@@ -25,8 +28,17 @@ def gradients(patch: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def align(
     patch: NDArray[np.float32], view: NDArray[np.float32], start: NDArray[np.float64], noise: float, search: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Least-squares alignment with free gain and brightness; the place (u, v) in the window and its covariance.
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Least-squares alignment with free gain and brightness.
+
+    Args:
+        patch: (s + 2, s + 2) template with a border of one.
+        view: the window searched; `start` (u, v) is a place of the template's top-left cell in it, within a pixel.
+        noise: standard deviation of the pixel noise [grey levels].
+        search: half-width of the window, the most that is ever unknown [px].
+
+    Returns:
+        The place (u, v), its covariance (2, 2) [px^2], and the normalised correlation there.
 
     Source: S. Baker, I. Matthews, Lucas-Kanade 20 years on, IJCV 2004 (inverse composition).
     """
@@ -38,7 +50,7 @@ def align(
     gradient = gradients(patch)
     normal = _Symmetric(*(float(x) for x in (gradient @ gradient.T).ravel()[[0, 1, 3]]))
     if energy <= 0.0 or normal.uu + normal.vv <= 0.0:
-        return start, np.eye(2) * widest
+        return start, np.eye(2) * widest, -1.0
     # All three rows are free of their mean, so the brightness of what is seen needs no removing.
     rows = np.concatenate([normal.damped_inverse() @ gradient, shape[None]])
     still = rows @ shape
@@ -50,9 +62,11 @@ def align(
     if abs(u - start[0]) > 1.0 or abs(v - start[1]) > 1.0:
         u, v = float(start[0]), float(start[1])  # it wandered off: the correlation's own peak stands
     seen = _seen(view, side, u, v)
-    residual = (seen - seen.mean()) / np.float32(max(float(seen @ shape) / energy, 0.05)) - shape
+    seen = seen - seen.mean()
+    correlation = float(seen @ shape) / max(math.sqrt(float(seen @ seen) * energy), 1e-9)
+    residual = seen / np.float32(max(float(seen @ shape) / energy, 0.05)) - shape
     variance = max(float(residual @ residual) / max(residual.size - 4, 1), 2.0 * noise**2)
-    return np.array([u, v]), _covariance(normal, shape.size, variance, noise, widest)
+    return np.array([u, v]), _covariance(normal, shape.size, variance, noise, widest), correlation
 
 
 def _bounded(step: float) -> float:
@@ -87,10 +101,19 @@ class _Symmetric:
 def _covariance(normal: _Symmetric, cells: int, residual: float, noise: float, widest: float) -> NDArray[np.float64]:
     """Covariance of the place: residual variance over the gradients' energy, the noise's share of the latter removed.
 
-    Central differences of noise of variance s^2 have variance s^2 / 2, so a blank wall has gradients but no information.
+    Central differences of noise of variance s^2 have variance s^2 / 2, so a blank wall has gradients but no information;
+    and because their own direction is off by a per cent or two, a strong edge seems to know a little of its length.
     """
     large, small, angle = normal.eigen()
-    blank = 0.5 * cells * noise**2 * (1.0 + math.sqrt(8.0 / cells))
-    a, b = (min(residual / max(value - blank, 1e-9) + _FLOOR_PX**2, widest) for value in (large, small))
+    blank = 0.5 * cells * noise**2
+    scatter = math.sqrt(3.0 / cells) + 0.03
+    known = (_information(value, blank, scatter) for value in (large, small - _DIRECTION_LEAK * large))
+    a, b = (min(residual / max(energy, 1e-9) + _FLOOR_PX**2, widest) for energy in known)
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[a * c * c + b * s * s, (a - b) * c * s], [(a - b) * c * s, a * s * s + b * c * c]])
+
+
+def _information(energy: float, blank: float, scatter: float) -> float:
+    """Gradient energy beyond that of noise; none where it is within noise's own relative scatter."""
+    certainty = min(max((energy / blank - 1.0) / (2.0 * scatter) - 1.0, 0.0), 1.0)
+    return (energy - blank) * certainty

@@ -20,6 +20,9 @@ from knowledge_sources.methods.lines_refine import Refined, refine
 LSD_OFFSET_PX = -0.123
 """LSD's segments lie this far off, in u and in v [px]: half a pixel of its 0.8 scaling. Measured on rendered edges."""
 
+SIGMA_END_PX = 0.7
+"""Standard deviation of an end along its segment [px]: samples are 2 px apart. Measured on rendered corners."""
+
 _LEAST_SUPPORT = 0.5
 """Share of a segment's length that must lie on its refined line."""
 

@@ -34,7 +34,7 @@ _SHIFT_PER_SKEW = (0.205, 0.26, 0.335, 0.51, 0.63)
 _CORRELATION = 2.0
 """Neighbouring peaks share smoothed noise: variance of a mean over that of independent peaks."""
 
-_END_SHARE = 0.25
+_END_SHARE = 0.35
 """A sample is past the end of its edge if its gradient is below this share of the strongest within two samples."""
 
 _SYSTEMATIC_PX = 0.01

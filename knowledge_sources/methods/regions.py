@@ -67,7 +67,7 @@ def segment_regions(
     return Regions(labels, areas, means, deviations)
 
 
-def histogram_valleys(levels: NDArray[np.uint8], least_share: float = 0.04) -> NDArray[np.float64]:
+def histogram_valleys(levels: NDArray[np.uint8], least_share: float = 0.02) -> NDArray[np.float64]:
     """Grey levels that part the modes of a histogram; empty where there is one mode.
 
     A valley counts where it is under 0.6 of the lower of its two peaks, and each side holds `least_share` of the pixels.
@@ -91,14 +91,19 @@ def _minima(smooth: NDArray[np.float64]) -> list[int]:
 
 
 def _sector_labels(levels: NDArray[np.uint8], side: int) -> NDArray[np.int32]:
-    """Connected parts of one histogram mode, each within one sector."""
+    """Connected parts of one histogram mode, each within one sector.
+
+    A sector's histogram is taken a quarter of its side beyond it, lest what only just reaches into it have no mode there.
+    """
+    margin = side // 4
     height, width = levels.shape
     labels = np.zeros((height, width), np.int32)
     used = 0
     for top in range(0, height, side):
         for left in range(0, width, side):
             sector = levels[top : top + side, left : left + side]
-            modes = np.digitize(sector, histogram_valleys(sector))
+            around = levels[max(top - margin, 0) : top + side + margin, max(left - margin, 0) : left + side + margin]
+            modes = np.digitize(sector, histogram_valleys(around))
             for mode in range(int(modes.max()) + 1):
                 count, parts = cv2.connectedComponents((modes == mode).astype(np.uint8), connectivity=4)
                 block = labels[top : top + side, left : left + side]

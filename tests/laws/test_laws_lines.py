@@ -33,7 +33,7 @@ def coverage(point: Any, normal: Any, size: int = SIZE) -> NDArray[np.float64]:
     return np.asarray(np.clip(share, 0.0, 1.0))
 
 
-def step(angle: float, phase: tuple[float, float], dark: float = 60.0, bright: float = 180.0) -> tuple[Any, Any, Any]:
+def step(angle: float, phase: Any, dark: float = 60.0, bright: float = 180.0) -> tuple[Any, Any, Any]:
     """An image with one edge through the middle, a point on it and the unit normal towards the bright side."""
     normal = np.array([np.cos(angle), np.sin(angle)])
     point = np.array([SIZE // 2, SIZE // 2]) + phase

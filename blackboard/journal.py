@@ -1,0 +1,120 @@
+"""Journal: one Decision a cycle, written by the scheduler and by nobody else."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+from blackboard.activation import Activation, Obviated
+from blackboard.change import Change
+from blackboard.entry import Entry
+from blackboard.level import Level
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What one cycle saw, weighed and did.
+
+    Attributes:
+        cycle: its number.
+        seen: the changes that were taken up.
+        observed: those of them that came from outside: commands, camera, odometry.
+        focus: the servo level in focus.
+        activated: new activations.
+        obviated: activations that were dropped, with reasons.
+        chosen, runner_up: the activation that was executed and the next best.
+        pending: how many were left.
+        made: the changes that the act brought about.
+        refused: why an act was not applied (stale, raised, effect of a kind not its own), or "".
+    """
+
+    cycle: int
+    seen: tuple[Change, ...]
+    observed: tuple[Change, ...]
+    focus: Level
+    activated: tuple[Activation, ...]
+    obviated: tuple[Obviated, ...]
+    chosen: Activation | None
+    runner_up: Activation | None
+    pending: int
+    made: tuple[Change, ...] = ()
+    refused: str = ""
+
+
+Sink = Callable[[Decision], None]
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON types: dataclasses and mappings become objects, arrays lists, bytes their length and SHA-256."""
+    if value is None or isinstance(value, bool | int | str):
+        return value.name.lower() if isinstance(value, Enum) else value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else repr(value)
+    if isinstance(value, bytes):
+        return {"bytes": len(value), "sha256": hashlib.sha256(value).hexdigest()}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, dict):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, tuple | list):
+        return [plain(v) for v in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    raise ValueError(f"expected a value of plain data, got a {type(value).__name__}")
+
+
+def entry_record(entry: Entry[Any]) -> dict[str, Any]:
+    """An entry as JSON types."""
+    return {
+        "entry": str(entry.ref),
+        "type": type(entry.value).__name__,
+        "author": entry.author,
+        "because": [str(ref) for ref in entry.because],
+        "value": plain(entry.value),
+    }
+
+
+def change_record(change: Change) -> dict[str, Any]:
+    return {"change": change.kind, **entry_record(change.entry)}
+
+
+def activation_record(a: Activation | None) -> dict[str, Any] | None:
+    if a is None:
+        return None
+    return {
+        "number": a.number,
+        "source": a.source.name,
+        "level": str(a.source.level),
+        "trigger": str(a.trigger.entry.ref),
+        "kind": a.trigger.kind,
+        "rating": a.rating,
+        "since": a.cycle,
+    }
+
+
+def decision_record(d: Decision) -> dict[str, Any]:
+    """A decision as JSON types: every changed entry in full, everything else by name."""
+    return {
+        "cycle": d.cycle,
+        "focus": str(d.focus),
+        "observed": [change_record(c) for c in d.observed],
+        "seen": [str(c.entry.ref) for c in d.seen],
+        "activated": [activation_record(a) for a in d.activated],
+        "obviated": [{**(activation_record(o.activation) or {}), "reason": o.reason} for o in d.obviated],
+        "chosen": activation_record(d.chosen),
+        "runner_up": activation_record(d.runner_up),
+        "pending": d.pending,
+        "made": [change_record(c) for c in d.made],
+        "refused": d.refused,
+    }
+
+
+def decision_line(d: Decision) -> str:
+    """One line of ``journal.jsonl``, without its newline: the same decision gives the same bytes."""
+    return json.dumps(decision_record(d), separators=(",", ":"), allow_nan=False)

@@ -1,0 +1,46 @@
+"""KnowledgeSource: an expert that watches, is asked whether it could act, and acts by asking for effects."""
+
+from __future__ import annotations
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from typing import Any, ClassVar
+
+from blackboard.board import View
+from blackboard.change import Change, Watch
+from blackboard.effect import Effect
+from blackboard.level import Level
+
+
+class KnowledgeSource(ABC):
+    """One expert. It keeps no memory between acts but the board; what it is built with must be immutable.
+
+    Class attributes:
+        level: the servo level (Figure 2) at which it works.
+        closes: the servo loop that it closes, if any: switched off with that level.
+        watches: the changes that trigger it.
+        writes: the types of value that its effects may touch; the scheduler refuses any other.
+    """
+
+    level: ClassVar[Level]
+    closes: ClassVar[Level | None] = None
+    watches: ClassVar[tuple[Watch, ...]]
+    writes: ClassVar[tuple[type[Any], ...]]
+
+    @property
+    def name(self) -> str:
+        """Its class name in snake case, as in the folder listing."""
+        return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(self).__name__).lower()
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        """How well it could answer this trigger, 0..1; None when it could not. Pure."""
+        return 0.5
+
+    def still_valid(self, view: View, trigger: Change) -> bool:
+        """Asked again just before acting: does the trigger still hold? Pure. By default: it is the current revision."""
+        return view.is_current(trigger.entry)
+
+    @abstractmethod
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        """The effects that it asks for: a pure function of the view and the trigger."""

@@ -1,0 +1,101 @@
+"""Levenberg-Marquardt on any state, and rotations from increments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from knowledge_sources.methods.pose.estimate import Array
+
+State = TypeVar("State")
+
+STEP_END = 1e-10
+"""A step whose largest element (rad or m) is below this ends the descent."""
+GAIN_END = 1e-12
+"""A relative gain below this ends the descent."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Normal:
+    """Normal equations at a state: ``cost``, ``hessian`` (k, k) ~ J'J and ``gradient`` (k,) = J'r."""
+
+    cost: float
+    hessian: Array
+    gradient: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Descent(Generic[State]):
+    """Where a descent ended: the state, its normal equations and the steps it took."""
+
+    state: State
+    normal: Normal
+    iterations: int
+
+
+def descend(
+    state: State,
+    linearise: Callable[[State], Normal],
+    retract: Callable[[State, Array], State],
+    iterations: int = 30,
+) -> Descent[State]:
+    """Go down from ``state``; the cost never rises. Source: §6.2.2 (Horn's increments), with damping."""
+    here = linearise(state)
+    damping = 1e-9
+    for done in range(iterations):
+        step = _damped_step(here, damping)
+        trial = retract(state, step)
+        there = linearise(trial)
+        gain = here.cost - there.cost
+        if not gain >= 0.0:
+            damping = max(damping * 30.0, 1e-4)
+            if damping > 1e7:
+                return Descent(state, here, done)
+            continue
+        state, here, damping = trial, there, max(damping * 0.1, 1e-12)
+        if np.abs(step).max() < STEP_END or gain <= GAIN_END * here.cost:
+            return Descent(state, here, done + 1)
+    return Descent(state, here, iterations)
+
+
+def normal_equations(residuals: Array, jacobian: Array) -> Normal:
+    """From whitened residuals (...) and their derivatives (..., k)."""
+    r = residuals.ravel()
+    j = jacobian.reshape(r.size, jacobian.shape[-1])
+    return Normal(float(r @ r), j.T @ j, j.T @ r)
+
+
+def rotations(vectors_rad: Array) -> Array:
+    """Rotation matrices (..., 3, 3) of axis-angle vectors (..., 3), by Rodrigues' formula."""
+    x, y, z = vectors_rad[..., 0], vectors_rad[..., 1], vectors_rad[..., 2]
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*vectors_rad.shape[:-1], 3, 3)
+    angle = np.sqrt(x * x + y * y + z * z)[..., None, None]
+    small = angle < 1e-6
+    safe = np.where(small, 1.0, angle)
+    first = np.where(small, 1.0, np.sin(safe) / safe)
+    second = np.where(small, 0.5, (1.0 - np.cos(safe)) / safe**2)
+    return np.asarray(np.eye(3) + first * cross + second * (cross @ cross))
+
+
+def orthonormal(rotation: Array) -> Array:
+    """The rotation nearest to an almost orthonormal matrix (3, 3)."""
+    u, _, vt = np.linalg.svd(rotation)
+    return np.asarray(u @ vt)
+
+
+def information_inverse(hessian: Array) -> Array:
+    """Inverse of a positive semi-definite matrix; directions without information get a huge but finite variance."""
+    values, vectors = np.linalg.eigh(0.5 * (hessian + hessian.T))
+    floor = max(float(values[-1]) * 1e-15, 1e-12)
+    return np.asarray((vectors / np.maximum(values, floor)) @ vectors.T)
+
+
+def _damped_step(normal: Normal, damping: float) -> Array:
+    diagonal = np.diag(normal.hessian)
+    floor = 1e-12 * max(float(diagonal.max(initial=0.0)), 1e-30)
+    damped = normal.hessian + np.diag(damping * diagonal + floor)
+    return np.asarray(-np.linalg.solve(damped, normal.gradient))

@@ -1,0 +1,81 @@
+"""Distance in pixels of the observed segment ends to the projected infinite model line: the likelihood's residual."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from knowledge_sources.methods.pose.estimate import Array, Mask
+from knowledge_sources.methods.pose.lines import TINY, LineSet
+
+OVERLAP_SLACK_PX = 5.0
+"""How far beside the model line's end an observed segment may lie [px]."""
+
+
+def projection_planes(lines: LineSet, rotation: Array, translation: Array) -> tuple[Array, Array]:
+    """Model directions and moments (..., n, 3) in the camera frame; a moment is the plane's normal.
+
+    ``rotation`` (..., 3, 3) and ``translation`` (..., 3) of ``camera_from_world`` may carry leading batch axes.
+    """
+    turned = np.swapaxes(rotation, -1, -2)
+    directions = lines.directions @ turned
+    return directions, lines.moments @ turned + np.cross(translation[..., None, :], directions)
+
+
+def image_distances(lines: LineSet, rotation: Array, translation: Array) -> Array:
+    """(..., n, 2) signed distances of the observed ends to the projected infinite model lines [px]."""
+    _, planes = projection_planes(lines, rotation, translation)
+    return plane_distances(lines, planes)
+
+
+def plane_distances(lines: LineSet, planes: Array) -> Array:
+    """(..., n, 2) signed distances [px] for the planes' normals (..., n, 3) in the camera frame."""
+    reach = np.hypot(planes[..., 0] / lines.focal_px[0], planes[..., 1] / lines.focal_px[1])
+    along = np.matmul(lines.rays, planes[..., None])[..., 0]
+    return np.asarray(along / np.maximum(reach, TINY)[..., None])
+
+
+def distance_slopes(lines: LineSet, planes: Array) -> tuple[Array, Array]:
+    """Distances (..., n, 2) [px] and their derivatives (..., n, 2, 3) by the plane's normal."""
+    inverse_focal2 = np.array([*(1.0 / lines.focal_px**2), 0.0])
+    tilt = planes * inverse_focal2
+    reach = np.maximum(np.sqrt(np.sum(planes * tilt, axis=-1)), TINY)[..., None]
+    distances = np.matmul(lines.rays, planes[..., None])[..., 0] / reach
+    slopes = (lines.rays - distances[..., None] * (tilt / reach)[..., None, :]) / reach[..., None]
+    return distances, slopes
+
+
+def image_jacobian(lines: LineSet, rotation: Array, translation: Array) -> tuple[Array, Array]:
+    """Distances (..., n, 2) [px] and their derivatives (..., n, 2, 6) by the left perturbation (rotation, translation).
+
+    A turn w moves a plane's normal m by w x m; a shift t by t x d.
+    """
+    directions, planes = projection_planes(lines, rotation, translation)
+    distances, slopes = distance_slopes(lines, planes)
+    turn = np.cross(planes[..., None, :], slopes)
+    shift = np.cross(directions[..., None, :], slopes)
+    return distances, np.concatenate([turn, shift], axis=-1)
+
+
+def depths(lines: LineSet, rotation: Array, translation: Array) -> Array:
+    """(n, 2) depth [m] at which each model line passes the observed ends; negative behind the camera."""
+    directions, planes = projection_planes(lines, rotation, translation)
+    across = np.cross(lines.rays, directions[:, None, :])
+    size = np.maximum(np.sum(across * across, axis=-1), TINY)
+    return np.asarray(np.sum(planes[:, None, :] * across, axis=-1) / size)
+
+
+def in_front(lines: LineSet, rotation: Array, translation: Array) -> Mask:
+    """(n,) which lines pass both observed ends in front of the camera."""
+    return np.asarray(np.all(depths(lines, rotation, translation) > 0.0, axis=1))
+
+
+def overlapping(lines: LineSet, rotation: Array, translation: Array) -> Mask:
+    """(n,) which observed segments overlap their model line's extent (an infinite line does not end; a door does)."""
+    turned = rotation.T
+    directions = lines.directions @ turned
+    start = lines.points[:, 0] @ turned + translation
+    lengths_m = np.linalg.norm(lines.points[:, 1] - lines.points[:, 0], axis=1)
+    seen = lines.rays * depths(lines, rotation, translation)[..., None]
+    along = np.sum((seen - start[:, None, :]) * directions[:, None, :], axis=-1)
+    slack = OVERLAP_SLACK_PX * np.abs(along[:, 1] - along[:, 0]) / np.maximum(lines.lengths_px, 1.0)
+    return np.asarray((along.max(axis=1) > -slack) & (along.min(axis=1) < lengths_m + slack))

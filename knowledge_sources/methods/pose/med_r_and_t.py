@@ -1,0 +1,99 @@
+"""Med R and T: least median of squares over 3-line or 3-landmark subsets (§6.2.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from knowledge_sources.methods.pose.descent import information_inverse
+from knowledge_sources.methods.pose.estimate import Array, Mask, PoseEstimate
+from knowledge_sources.methods.pose.guard import FEW_LINES, NO_SUBSET, estimate_at, guarded, prior_estimate, reasons
+from knowledge_sources.methods.pose.lines import LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.r_and_t import PoseState
+from knowledge_sources.methods.pose.r_and_t_ml import likeliest, r_and_t_ml
+from knowledge_sources.methods.pose.subset_poses import squared_distances, subset_poses
+from knowledge_sources.methods.pose.subsets import group_subsets, padded_rows, subsets_needed
+from world_models.camera import Camera
+from world_models.frames import Pose
+
+MEDIAN_CHI2_2 = 1.386
+"""Median of the chi-squared law with two degrees of freedom: a line has two residuals."""
+SUBSET = 3
+
+
+def med_r_and_t(
+    model_lines_world: Any,
+    segments_px: Any,
+    camera: Camera,
+    prior: Pose,
+    *,
+    landmark_ids: Sequence[Any] | None = None,
+    sigma_px: Any = 1.0,
+    probability: float | None = None,
+    outliers: float = 0.5,
+    rng: np.random.Generator | None = None,
+    cutoff: float = 3.0,
+) -> PoseEstimate:
+    """The pose of the subset with the least median squared error, then the rest without the outliers.
+
+    Source: §6.2.4, E_m, steps 1-4. Each subset is solved by R and T; the errors whose median is taken are measured
+    in the image, in units of ``sigma_px``, where they are alike for near and far lines. Holds to about 45 % outliers.
+
+    Args:
+        landmark_ids: n hashable names: the landmark version (3-landmark subsets). ``None``: the line version.
+        probability: ``None`` tries every subset; else so many are drawn (with ``rng``) that one is free of outliers
+            with this probability when the share ``outliers`` of the groups is wrong.
+        cutoff: lines beyond this many standard deviations, estimated from the median, are outliers.
+    """
+    lines = line_set(model_lines_world, segments_px, camera, sigma_px)
+    candidates = subset_candidates(lines, prior, landmark_ids, probability, outliers, rng)
+    if candidates is None:
+        return r_and_t_ml(model_lines_world, segments_px, camera, prior, sigma_px=sigma_px)
+    turns, shifts = candidates
+    errors = squared_distances(lines, turns, shifts)
+    best = int(np.argmin(np.median(errors, axis=1)))
+    scale = _robust_scale(float(np.median(errors[best])), len(lines))
+    bound = 2.0 * (cutoff * scale) ** 2
+    return refined_on(lines, prior, (turns[best], shifts[best]), errors[best] <= bound, bound)
+
+
+def subset_candidates(
+    lines: LineSet,
+    prior: Pose,
+    landmark_ids: Sequence[Any] | None,
+    probability: float | None,
+    outliers: float,
+    rng: np.random.Generator | None,
+) -> tuple[Array, Array] | None:
+    """Poses (k, 3, 3), (k, 3) of the 3-group subsets, or ``None`` if there are fewer than 4 lines or 3 groups."""
+    groups = landmark_groups(landmark_ids, len(lines))
+    if len(groups) < SUBSET:
+        groups = landmark_groups(None, len(lines))
+    if len(lines) <= SUBSET:
+        return None
+    needed = None if probability is None else subsets_needed(SUBSET, outliers, probability)
+    rows, real = padded_rows(groups, group_subsets(len(groups), SUBSET, needed, rng))
+    return subset_poses(lines, rows, real, prior)
+
+
+def refined_on(lines: LineSet, prior: Pose, start: PoseState, near: Mask, bound: float) -> PoseEstimate:
+    """R and T, with the likelihood's finish, on the lines kept; reasons for the others (§6.2.4, steps 3 and 4)."""
+    near = near & (lines.lengths_px > 1e-9)
+    if int(np.count_nonzero(near)) < SUBSET:
+        return prior_estimate(lines, prior, NO_SUBSET)
+    end, reason = likeliest(lines.take(near), prior, start=start)
+    rotation, translation = end.state
+    errors = squared_distances(lines, rotation, translation)
+    rejected = reasons(lines, rotation, translation, near & (errors <= 2.0 * bound))
+    covariance = information_inverse(end.normal.hessian)
+    estimate = estimate_at(
+        lines, rotation, translation, covariance, rejected, end.normal.cost, end.iterations, reason
+    )
+    return guarded(lines.take(near), prior, estimate)
+
+
+def _robust_scale(median_squared: float, n: int) -> float:
+    """Standard deviation of one residual from the median over n lines, with the small-sample factor."""
+    return (1.0 + 5.0 / max(n - SUBSET, 1)) * float(np.sqrt(median_squared / MEDIAN_CHI2_2))

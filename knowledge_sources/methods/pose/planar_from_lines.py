@@ -1,0 +1,216 @@
+"""Where is the robot on the floor, from matched lines, some of them wrong?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from knowledge_sources.methods.pose.descent import Descent, Normal, descend, information_inverse, normal_equations
+from knowledge_sources.methods.pose.estimate import BEHIND, Array, Mask, PlanarEstimate
+from knowledge_sources.methods.pose.guard import reasons
+from knowledge_sources.methods.pose.image_error import in_front, overlapping
+from knowledge_sources.methods.pose.lines import LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.planar import (
+    FEW,
+    NOT_BETTER,
+    PlanarPrior,
+    added,
+    camera_states,
+    line_jacobian,
+    planar_prior,
+    pose2,
+    prior_pull,
+    with_prior,
+)
+from knowledge_sources.methods.pose.subset_poses import squared_distances
+from world_models.camera import Camera
+from world_models.frames import Pose, Pose2
+
+SUBSET_LINES = 28
+"""Pairs are formed of so many of the longest segments (378 pairs)."""
+FINALISTS = 5
+ROUNDS = 8
+
+
+def planar_from_lines(
+    model_lines_world: Any,
+    segments_px: Any,
+    camera: Camera,
+    camera_from_robot: Pose,
+    prior: Pose2,
+    *,
+    prior_covariance: Any = None,
+    landmark_ids: Sequence[Any] | None = None,
+    sigma_px: Any = 1.0,
+    robust: bool = True,
+    cutoff: float = 3.0,
+) -> PlanarEstimate:
+    """The floor pose under which the observed segment ends are likeliest.
+
+    Source: §6.2.4 with three unknowns: two lines are enough for a candidate, and a truncated loss with known sigma
+    takes the median's place (it holds beyond 50 % outliers). Candidates from pairs of lines, the prior and all
+    lines; the best are polished on their inliers.
+
+    Args:
+        model_lines_world: (n, 2, 3) [m]. segments_px: (n, 2, 2); several segments may share a model line.
+        camera_from_robot: the mount. prior: ``world_from_robot``.
+        prior_covariance: (3, 3) of (x, y, heading): the prior is one more measurement. ``None``: it only decides
+            directions that the lines leave open.
+        landmark_ids: n names; pairs within one landmark are not tried as candidates.
+        sigma_px: of the segment ends across the line, one number or (n,).
+        robust: False takes every line as right.
+        cutoff: a line beyond this many standard deviations is an outlier.
+    """
+    lines = line_set(model_lines_world, segments_px, camera, sigma_px)
+    groups = landmark_groups(landmark_ids, len(lines))
+    belief = planar_prior(prior, prior_covariance)
+    bound = 2.0 * cutoff**2
+    if not len(lines):
+        return _estimate(lines, belief.mean, belief, camera_from_robot, (), bound, FEW)
+    if not robust:
+        end = _descend(lines, belief.mean, belief, camera_from_robot)
+        everything = np.ones(len(lines), bool)
+        return _settled(lines, everything, end.state, belief, camera_from_robot, np.inf)
+    candidates = _candidates(lines, groups, belief, camera_from_robot)
+    costs = _costs(lines, candidates, belief, camera_from_robot, bound)
+    order = np.argsort(costs, kind="stable")[:FINALISTS]
+    polished = [_polished(lines, candidates[i], belief, camera_from_robot, bound) for i in order]
+    state, near, _ = min(polished, key=lambda found: found[2])
+    return _settled(lines, near, state, belief, camera_from_robot, bound)
+
+
+def _candidates(lines: LineSet, groups: list[Any], belief: PlanarPrior, mount: Pose) -> Array:
+    """States (k, 3): the prior, all lines at once, and each pair of long lines of different landmarks."""
+    group_of = np.empty(len(lines), dtype=np.intp)
+    for g, rows in enumerate(groups):
+        group_of[rows] = g
+    longest = np.sort(np.argsort(-lines.lengths_px, kind="stable")[:SUBSET_LINES])
+    pairs = np.array([p for p in combinations(longest, 2) if group_of[p[0]] != group_of[p[1]]], dtype=np.intp)
+    whole = _descend(lines, belief.mean, belief, mount, iterations=8).state
+    base = np.stack([belief.mean, whole])
+    if not len(pairs):
+        return base
+    return np.concatenate([base, _pair_states(lines, pairs, belief, mount)])
+
+
+def _pair_states(lines: LineSet, pairs: Any, belief: PlanarPrior, mount: Pose, iterations: int = 4) -> Array:
+    """Gauss-Newton on each pair (k, 2) with the prior, all at once: (k, 3)."""
+    gathered = lines.take(pairs)
+    states = np.tile(belief.mean, (len(pairs), 1))
+    scale = 1.0 / gathered.sigma_px[..., None]
+    for _ in range(iterations):
+        distances, jacobian = line_jacobian(gathered.points[:, :, 0], gathered.directions, gathered, states, mount)
+        j = (jacobian * scale[..., None]).reshape(len(pairs), 4, 3)
+        r = (distances * scale).reshape(len(pairs), 4, 1)
+        across = np.swapaxes(j, 1, 2)
+        _, pull = prior_pull(states, belief)
+        states = states - np.linalg.solve(across @ j + belief.information, across @ r + pull[..., None])[..., 0]
+    return states
+
+
+def _costs(lines: LineSet, states: Array, belief: PlanarPrior, mount: Pose, bound: float) -> Array:
+    """(k,) truncated squared errors of all lines, plus the prior's share."""
+    errors = squared_distances(lines, *camera_states(states, mount))
+    share, _ = prior_pull(states, belief)
+    return np.asarray(np.minimum(errors, bound).sum(axis=1) + share)
+
+
+def _polished(
+    lines: LineSet, state: Array, belief: PlanarPrior, mount: Pose, bound: float
+) -> tuple[Array, Mask, float]:
+    """Alternate inliers and likelihood until they agree; the state, its inliers and its truncated cost."""
+    near = _near(lines, state, mount, 4.0 * bound)
+    for _ in range(ROUNDS):
+        state = _descend(lines.take(near), state, belief, mount).state
+        again = _near(lines, state, mount, bound)
+        if np.array_equal(again, near):
+            break
+        near = again
+    errors = np.where(near, squared_distances(lines, *camera_states(state, mount)), bound)
+    return state, near, float(np.sum(np.minimum(errors, bound)) + prior_pull(state, belief)[0])
+
+
+def _near(lines: LineSet, state: Array, mount: Pose, bound: float) -> Mask:
+    rotation, translation = camera_states(state, mount)
+    seen = in_front(lines, rotation, translation) & overlapping(lines, rotation, translation)
+    return np.asarray(seen & (squared_distances(lines, rotation, translation) <= bound))
+
+
+def _descend(
+    lines: LineSet, state: Array, belief: PlanarPrior, mount: Pose, iterations: int = 20
+) -> Descent[Array]:
+    """Least squares on the lines given, with the prior."""
+    scale = 1.0 / lines.sigma_px[:, None]
+
+    def linearise(at: Array) -> Normal:
+        distances, jacobian = line_jacobian(lines.points[:, 0], lines.directions, lines, at, mount)
+        return with_prior(normal_equations(distances * scale, jacobian * scale[..., None]), at, belief)
+
+    return descend(state, linearise, added, iterations)
+
+
+def _settled(
+    lines: LineSet, near: Mask, state: Array, belief: PlanarPrior, mount: Pose, bound: float
+) -> PlanarEstimate:
+    """Drop a weak prior where the lines know better, and check against the prior itself."""
+    kept = lines.take(near)
+    reason = None
+    if not belief.given:
+        alone = PlanarPrior(belief.mean, np.zeros((3, 3)), True)
+        hessian = _descend(kept, state, alone, mount, iterations=0).normal.hessian
+        if _decided(hessian, belief):
+            state = _descend(kept, state, alone, mount).state
+        else:
+            reason = FEW
+    rotation, translation = camera_states(state, mount)
+    rejected = reasons(lines, rotation, translation, near)
+    if np.isinf(bound):
+        rejected = tuple(r if r == BEHIND else None for r in rejected)
+    cost_bound = 1e12 if np.isinf(bound) else bound
+    costs = _costs(lines, np.stack([state, belief.mean]), belief, mount, cost_bound)
+    if costs[0] > costs[1] + 1.0:
+        state, reason = belief.mean, NOT_BETTER
+    return _estimate(lines, state, belief, mount, rejected, cost_bound, reason)
+
+
+def _decided(hessian: Array, belief: PlanarPrior) -> bool:
+    """Whether in every direction the lines know more than the weak prior."""
+    scale = 1.0 / np.sqrt(np.diag(belief.information))
+    return bool(np.linalg.eigvalsh(hessian * scale[:, None] * scale)[0] >= 1.0)
+
+
+def _estimate(
+    lines: LineSet,
+    state: Array,
+    belief: PlanarPrior,
+    mount: Pose,
+    rejected: tuple[str | None, ...],
+    bound: float,
+    reason: str | None,
+) -> PlanarEstimate:
+    inliers = np.array([r is None for r in rejected], dtype=bool)
+    kept = lines.take(inliers)
+    normal = _descend(kept, state, belief, mount, iterations=0).normal
+    weak = not belief.given and reason is None
+    hessian = normal.hessian - belief.information if weak else normal.hessian
+    distances, _ = line_jacobian(lines.points[:, 0], lines.directions, lines, state, mount)
+    return PlanarEstimate(
+        world_from_robot=pose2(state),
+        covariance=information_inverse(hessian) * _excess(kept, distances[inliers]),
+        inliers=inliers,
+        residuals_px=distances,
+        rejected=rejected,
+        cost=float(_costs(lines, state[None], belief, mount, bound)[0]),
+        reason=reason,
+    )
+
+
+def _excess(lines: LineSet, distances: Array) -> float:
+    """By how much the inliers scatter more than sigma says (a variance ratio, never below 1)."""
+    freedom = distances.size - 3
+    if freedom < 6:
+        return 1.0
+    return max(1.0, float(np.sum((distances / lines.sigma_px[:, None]) ** 2)) / freedom)

@@ -1,0 +1,133 @@
+"""Where is the robot on the floor, from points that were tracked in the image?"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from knowledge_sources.methods.pose.descent import Descent, Normal, descend, information_inverse
+from knowledge_sources.methods.pose.estimate import BEHIND, Array, Mask, PlanarEstimate
+from knowledge_sources.methods.pose.lines import checked_sigma
+from knowledge_sources.methods.pose.planar import (
+    FEW,
+    PlanarPrior,
+    added,
+    planar_prior,
+    point_jacobian,
+    pose2,
+    with_prior,
+)
+from world_models.camera import NEAR_M, Camera
+from world_models.frames import Pose, Pose2
+
+HUBER = 1.5
+"""Standard deviations beyond which a point pulls with a constant force."""
+TOO_FAR = "too far from the predicted point"
+
+
+def planar_from_points(
+    points_world: Any,
+    points_px: Any,
+    camera: Camera,
+    camera_from_robot: Pose,
+    prior: Pose2,
+    prior_covariance: Any = None,
+    *,
+    sigma_px: Any = 1.0,
+    cutoff: float = 4.0,
+) -> PlanarEstimate:
+    """Robust Gauss-Newton: Huber's loss to get there, then least squares on the points within ``cutoff``.
+
+    Args:
+        points_world: (n, 3) [m]. points_px: (n, 2) observed, as the lens shows them.
+        camera_from_robot: the mount. prior: ``world_from_robot``.
+        prior_covariance: (3, 3) of (x, y, heading); ``None``: a weak one (1 m, 0.3 rad).
+        sigma_px: standard deviation of u and of v, one number or (n,).
+    """
+    world, pixels = _checked(points_world, points_px)
+    sigma = checked_sigma(sigma_px, len(world))
+    belief = planar_prior(prior, prior_covariance)
+    focal = np.array([camera.fx, camera.fy])
+    observed = camera.undistort(pixels) - (camera.cx, camera.cy)
+    problem = _Points(world, observed, sigma, focal, camera_from_robot, belief)
+    state = problem.descend(belief.mean, np.ones(len(world), bool), HUBER).state
+    near = problem.near(state, cutoff)
+    for _ in range(6):
+        state = problem.descend(state, near, HUBER).state
+        again = problem.near(state, cutoff)
+        if np.array_equal(again, near):
+            break
+        near = again
+    return problem.estimate(state, near)
+
+
+class _Points:
+    """The measurements of one call; holds no changing state."""
+
+    def __init__(
+        self, world: Array, observed: Array, sigma: Array, focal: Array, mount: Pose, belief: PlanarPrior
+    ) -> None:
+        self.world, self.observed, self.sigma = world, observed, sigma
+        self.focal, self.mount, self.belief = focal, mount, belief
+
+    def scaled(self, state: Array) -> tuple[Array, Array, Array]:
+        """Depths (n,), residuals (n, 2) and derivatives (n, 2, 3) in standard deviations."""
+        p, pixels, jacobian = point_jacobian(self.world, self.focal, state, self.mount)
+        width = self.sigma[:, None]
+        return p[:, 2], (pixels - self.observed) / width, jacobian / width[..., None]
+
+    def descend(self, state: Array, chosen: Mask, huber: float) -> Descent[Array]:
+        def linearise(at: Array) -> Normal:
+            depth, residuals, jacobian = self.scaled(at)
+            use = chosen & (depth > NEAR_M)
+            return with_prior(_huber_normal(residuals[use], jacobian[use], huber), at, self.belief)
+
+        return descend(state, linearise, added, iterations=20)
+
+    def near(self, state: Array, cutoff: float) -> Mask:
+        depth, residuals, _ = self.scaled(state)
+        return np.asarray((depth > NEAR_M) & (np.sum(residuals**2, axis=1) <= cutoff**2))
+
+    def estimate(self, state: Array, near: Mask) -> PlanarEstimate:
+        depth, residuals, jacobian = self.scaled(state)
+        rejected = tuple(
+            None if n else (BEHIND if d <= NEAR_M else TOO_FAR) for n, d in zip(near, depth, strict=True)
+        )
+        j = jacobian[near].reshape(-1, 3)
+        few = not self.belief.given and int(np.count_nonzero(near)) < 2
+        return PlanarEstimate(
+            world_from_robot=pose2(state),
+            covariance=information_inverse(j.T @ j + self.belief.information) * _excess(residuals[near]),
+            inliers=near,
+            residuals_px=residuals * self.sigma[:, None],
+            rejected=rejected,
+            cost=with_prior(_huber_normal(residuals[near], jacobian[near], HUBER), state, self.belief).cost,
+            reason=FEW if few else None,
+        )
+
+
+def _huber_normal(residuals: Array, jacobian: Array, huber: float) -> Normal:
+    """Normal equations of Huber's loss on each point's distance; residuals (n, 2), derivatives (n, 2, 3)."""
+    size = np.sqrt(np.sum(residuals**2, axis=1))
+    weights = huber / np.maximum(size, huber)
+    cost = float(np.sum(np.where(size <= huber, size**2, 2.0 * huber * size - huber**2)))
+    j = jacobian.reshape(-1, 3)
+    weighted = (jacobian * weights[:, None, None]).reshape(-1, 3)
+    return Normal(cost, weighted.T @ j, weighted.T @ residuals.ravel())
+
+
+def _excess(residuals: Array) -> float:
+    """By how much the inliers scatter more than sigma says (a variance ratio, never below 1)."""
+    freedom = residuals.size - 3
+    return max(1.0, float(np.sum(residuals**2)) / freedom) if freedom >= 6 else 1.0
+
+
+def _checked(points_world: Any, points_px: Any) -> tuple[Array, Array]:
+    world = np.asarray(points_world, float).reshape(-1, 3)
+    pixels = np.asarray(points_px, float).reshape(-1, 2)
+    if len(world) != len(pixels):
+        raise ValueError(f"expected one pixel a point, got {len(world)} points and {len(pixels)} pixels")
+    if not (np.all(np.isfinite(world)) and np.all(np.isfinite(pixels))):
+        raise ValueError("expected finite points, got a value that is not")
+    return world, pixels

@@ -1,0 +1,111 @@
+"""R and T: rotation and translation at once (§6.2.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+from knowledge_sources.methods.pose.descent import Descent, Normal, descend, normal_equations, rotations
+from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
+from knowledge_sources.methods.pose.guard import FEW_LINES, all_kept, estimate_at, guarded
+from knowledge_sources.methods.pose.lines import TINY, LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.plane_error import (
+    Weighting,
+    best_translation,
+    camera_ends,
+    line_weights,
+    plane_distances_m,
+    plane_jacobian,
+    propagated_covariance,
+)
+from world_models.camera import Camera
+from world_models.frames import Pose
+
+PoseState = tuple[Array, Array]
+
+
+def r_and_t(
+    model_lines_world: Any,
+    segments_px: Any,
+    camera: Camera,
+    prior: Pose,
+    *,
+    landmark_ids: Sequence[Any] | None = None,
+    sigma_px: Any = 1.0,
+    objective: Literal["E1", "E2"] = "E1",
+    weighting: Weighting = "unit",
+) -> PoseEstimate:
+    """Least squares of the model ends' distances to the observed projection planes.
+
+    Source: §6.2.2, E1 = sum_i sigma_i (n_i . (R p_i + T))^2, and E2, each term over |R p_i + T|^2. E1 is quadratic
+    in T, which is eliminated: the basin does not depend on the prior's translation.
+
+    Args:
+        model_lines_world: (n, 2, 3) [m].
+        segments_px: (n, 2, 2) observed, as the lens shows them.
+        prior: guess of ``camera_from_world``.
+        landmark_ids: checked, not used: every line counts.
+        sigma_px: of the segment ends across the line, one number or (n,); scales the covariance.
+        objective: "E1", or "E2" (ends weigh alike whatever their depth), started from E1.
+        weighting: the paper's sigma_i: "unit" or by segment "length".
+    """
+    if objective not in ("E1", "E2"):
+        raise ValueError(f'expected objective "E1" or "E2", got {objective!r}')
+    lines = line_set(model_lines_world, segments_px, camera, sigma_px)
+    landmark_groups(landmark_ids, len(lines))
+    weights = line_weights(lines, weighting)
+    end = solve_e1(lines, prior, weights)
+    steps = end.iterations
+    if objective == "E2":
+        end = descend(end.state, _e2_normal(lines, weights), moved)
+        steps += end.iterations
+    rotation, translation = end.state
+    scale = np.ones((len(lines), 2))
+    if objective == "E2":
+        scale = 1.0 / np.maximum(np.sum(camera_ends(lines, rotation, translation) ** 2, axis=-1), TINY)
+    covariance = propagated_covariance(lines, rotation, translation, weights[:, None] * scale)
+    kept = all_kept(lines, rotation, translation)
+    reason = FEW_LINES if len(lines) < 3 else None
+    return guarded(
+        lines, prior, estimate_at(lines, rotation, translation, covariance, kept, end.normal.cost, steps, reason)
+    )
+
+
+def solve_e1(lines: LineSet, start: Pose, weights: Array) -> Descent[PoseState]:
+    """Minimise E1 over R with T eliminated exactly at every step."""
+
+    def linearise(state: PoseState) -> Normal:
+        ends = camera_ends(lines, *state)
+        root = np.sqrt(weights)[:, None]
+        return normal_equations(
+            plane_distances_m(lines, ends) * root, plane_jacobian(lines, ends) * root[..., None]
+        )
+
+    def retract(state: PoseState, step: Array) -> PoseState:
+        turn = rotations(step[:3])
+        rotation = turn @ state[0]
+        return rotation, best_translation(lines, rotation, turn @ state[1] + step[3:], weights)
+
+    first = best_translation(lines, start.rotation, start.translation, weights)
+    return descend((start.rotation, first), linearise, retract)
+
+
+def moved(state: PoseState, step: Array) -> PoseState:
+    """The left perturbation of a pose by (rotation, translation) (6,)."""
+    turn = rotations(step[:3])
+    return turn @ state[0], turn @ state[1] + step[3:]
+
+
+def _e2_normal(lines: LineSet, weights: Array) -> Callable[[PoseState], Normal]:
+    def linearise(state: PoseState) -> Normal:
+        ends = camera_ends(lines, *state)
+        reach = np.maximum(np.linalg.norm(ends, axis=-1), TINY)
+        sines = plane_distances_m(lines, ends) / reach
+        jacobian = plane_jacobian(lines, ends) / reach[..., None]
+        jacobian[..., 3:] -= (sines / reach**2)[..., None] * ends
+        root = np.sqrt(weights)[:, None]
+        return normal_equations(sines * root, jacobian * root[..., None])
+
+    return linearise

@@ -1,0 +1,86 @@
+"""A truncated loss with known sigma over the subsets of Med R and T: beyond 50 % outliers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from knowledge_sources.methods.pose.estimate import Array, Mask, PoseEstimate
+from knowledge_sources.methods.pose.image_error import in_front, overlapping
+from knowledge_sources.methods.pose.lines import LineSet, line_set
+from knowledge_sources.methods.pose.med_r_and_t import SUBSET, refined_on, subset_candidates
+from knowledge_sources.methods.pose.r_and_t import PoseState
+from knowledge_sources.methods.pose.r_and_t_ml import likeliest, r_and_t_ml
+from knowledge_sources.methods.pose.subset_poses import squared_distances
+from world_models.camera import Camera
+from world_models.frames import Pose
+
+FINALISTS = 8
+"""So many of the best subsets are polished before the choice is made."""
+ROUNDS = 6
+
+
+def trunc_r_and_t(
+    model_lines_world: Any,
+    segments_px: Any,
+    camera: Camera,
+    prior: Pose,
+    *,
+    landmark_ids: Sequence[Any] | None = None,
+    sigma_px: Any = 1.0,
+    probability: float | None = None,
+    outliers: float = 0.7,
+    rng: np.random.Generator | None = None,
+    cutoff: float = 3.0,
+) -> PoseEstimate:
+    """The pose with the least sum of squared errors, each line's at most ``2 cutoff^2``; needs a true ``sigma_px``.
+
+    Candidates are those of :func:`med_r_and_t` (arguments as there); the best are polished on their own inliers,
+    and a line that matches only beside its model line's ends, or behind the camera, counts as an outlier.
+    """
+    lines = line_set(model_lines_world, segments_px, camera, sigma_px)
+    candidates = subset_candidates(lines, prior, landmark_ids, probability, outliers, rng)
+    if candidates is None:
+        return r_and_t_ml(model_lines_world, segments_px, camera, prior, sigma_px=sigma_px)
+    bound = 2.0 * cutoff**2
+    turns, shifts = candidates
+    costs = np.minimum(squared_distances(lines, turns, shifts), bound).sum(axis=1)
+    order = np.argsort(costs, kind="stable")[:FINALISTS]
+    polished = [_polished(lines, prior, (turns[i], shifts[i]), bound) for i in order]
+    state, _ = min(polished, key=lambda found: found[1])
+    return refined_on(lines, prior, state, _near(lines, state, bound), bound)
+
+
+def _polished(lines: LineSet, prior: Pose, state: PoseState, bound: float) -> tuple[PoseState, float]:
+    """Alternate inliers and likelihood until they agree; the state and its truncated cost."""
+    near = _near(lines, state, 4.0 * bound)
+    best = (state, _cost(lines, state, bound))
+    for _ in range(ROUNDS):
+        if int(np.count_nonzero(near)) < SUBSET:
+            break
+        end, _ = likeliest(lines.take(near), prior, start=state)
+        state = end.state
+        cost = _cost(lines, state, bound)
+        if cost < best[1]:
+            best = (state, cost)
+        again = _near(lines, state, bound)
+        if np.array_equal(again, near):
+            break
+        near = again
+    return best
+
+
+def _near(lines: LineSet, state: PoseState, bound: float) -> Mask:
+    return np.asarray(_bounded(lines, state, bound) < bound)
+
+
+def _cost(lines: LineSet, state: PoseState, bound: float) -> float:
+    return float(np.sum(_bounded(lines, state, bound)))
+
+
+def _bounded(lines: LineSet, state: PoseState, bound: float) -> Array:
+    """(n,) squared errors, at most ``bound``, which lines behind the camera or beside their model line get."""
+    seen = in_front(lines, *state) & overlapping(lines, *state)
+    return np.where(seen, np.minimum(squared_distances(lines, *state), bound), bound)

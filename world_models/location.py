@@ -1,0 +1,117 @@
+"""Locale-relative location (§3.1, §3.4): in which locale, where in its frame, and how sure."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.frames import Pose, Pose2, flattened
+
+
+class Frames(Protocol):
+    """What is needed of a world: the frames of its locales."""
+
+    def world_from_locale(self, name: str, /) -> Pose: ...
+
+
+Covariance = tuple[tuple[float, float, float], ...]
+"""(3, 3) over (x_m, y_m, heading_rad)."""
+
+
+def covariance_tuple(matrix: Any) -> Covariance:
+    """A symmetric (3, 3) matrix as nested tuples, so that a value that holds it can be compared."""
+    m = np.asarray(matrix, float)
+    m = 0.5 * (m + m.T)
+    a, b, c = ((float(r[0]), float(r[1]), float(r[2])) for r in m)
+    return (a, b, c)
+
+
+def diagonal(sigma_m: float, sigma_rad: float) -> Covariance:
+    """Independent standard deviations of place and heading."""
+    return covariance_tuple(np.diag([sigma_m**2, sigma_m**2, sigma_rad**2]))
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A point of the floor in a locale's own frame [m]; ``heading_rad`` there, None for any."""
+
+    locale: str
+    x_m: float
+    y_m: float
+    heading_rad: float | None = None
+
+    def in_world(self, world: Frames) -> Pose2:
+        """The pose of a robot there, in the world frame; heading 0 of the locale where none is said."""
+        return flattened(world.world_from_locale(self.locale)) @ Pose2(self.x_m, self.y_m, self.heading_rad or 0.0)
+
+    @staticmethod
+    def of_world(world: Frames, locale: str, x_m: float, y_m: float, heading_rad: float | None = None) -> Place:
+        """The place in a locale's frame of a point (and heading) of the world frame."""
+        own = flattened(world.world_from_locale(locale)).inverse() @ Pose2(x_m, y_m, heading_rad or 0.0)
+        return Place(locale, own.x_m, own.y_m, None if heading_rad is None else own.heading_rad)
+
+    def __str__(self) -> str:
+        return f"({self.locale} ({self.x_m:.2f}, {self.y_m:.2f}) m)"
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """Where the robot believes it is.
+
+    Attributes:
+        locale: the deepest locale that contains it.
+        locale_from_robot: its pose in that locale's frame.
+        covariance: over (x, y, heading) in the locale's frame.
+        basis: what it rests on last: command, odometry, tracks, milestone or relocalization.
+        status: held (the one that is acted on), candidate, or doubted.
+        weight: relative belief among candidates.
+    """
+
+    locale: str
+    locale_from_robot: Pose2
+    covariance: Covariance
+    basis: str
+    status: str = "held"
+    weight: float = 1.0
+
+    @property
+    def is_held(self) -> bool:
+        return self.status == "held"
+
+    @property
+    def sigma_m(self) -> float:
+        """Largest standard deviation of the position [m]."""
+        return math.sqrt(max(0.0, float(np.linalg.eigvalsh(np.array(self.covariance)[:2, :2])[-1])))
+
+    @property
+    def sigma_rad(self) -> float:
+        """Standard deviation of the heading [rad]."""
+        return math.sqrt(max(0.0, self.covariance[2][2]))
+
+    def world_from_robot(self, world: Frames) -> Pose2:
+        return flattened(world.world_from_locale(self.locale)) @ self.locale_from_robot
+
+    def covariance_world(self, world: Frames) -> NDArray[np.float64]:
+        """(3, 3) over (x, y, heading) in the world frame."""
+        turn = _turn(flattened(world.world_from_locale(self.locale)).heading_rad)
+        return np.asarray(turn @ np.array(self.covariance) @ turn.T)
+
+    @staticmethod
+    def of_world(
+        world: Frames, locale: str, world_from_robot: Pose2, covariance_world: Any, basis: str,
+        status: str = "held", weight: float = 1.0,
+    ) -> Hypothesis:
+        """From a pose and covariance in the world frame."""
+        locale_from_world = flattened(world.world_from_locale(locale)).inverse()
+        turn = _turn(locale_from_world.heading_rad)
+        own = turn @ np.asarray(covariance_world, float) @ turn.T
+        return Hypothesis(locale, locale_from_world @ world_from_robot, covariance_tuple(own), basis, status, weight)
+
+
+def _turn(angle_rad: float) -> NDArray[np.float64]:
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
