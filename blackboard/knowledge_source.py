@@ -31,7 +31,7 @@ class KnowledgeSource(ABC):
     @property
     def name(self) -> str:
         """Its class name in snake case, as in the folder listing."""
-        return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(self).__name__).lower()
+        return re.sub(r"(?<!^)(?=[A-Z])", "_", type(self).__name__).lower()
 
     def rate(self, view: View, trigger: Change) -> float | None:
         """How well it could answer this trigger, 0..1; None when it could not. Pure."""

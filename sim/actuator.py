@@ -55,7 +55,8 @@ class ActuatorParameters:
         for name in self.__dataclass_fields__:
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"expected {name} >= 0, got {getattr(self, name)}")
-        if not (self.curvature_low_per_m <= self.curvature_high_per_m and self.shortfall_low <= self.shortfall_high < 1):
+        ordered = self.curvature_low_per_m <= self.curvature_high_per_m and self.shortfall_low <= self.shortfall_high
+        if not (ordered and self.shortfall_high < 1):
             raise ValueError("expected low <= high bounds of curvature and shortfall, and a shortfall below 1, got "
                              f"{self.curvature_low_per_m}..{self.curvature_high_per_m} and "
                              f"{self.shortfall_low}..{self.shortfall_high}")

@@ -22,8 +22,8 @@ FRAME_S = 0.1
 class SimulatedBody:
     """A robot with a camera in a building.
 
-    The same arguments and the same calls give the same answers. Wheels, camera, faults and putting down draw from random
-    streams of their own, so that a fault does not change the noise.
+    The same arguments and the same calls give the same answers. Wheels, camera, faults and putting down draw from
+    random streams of their own, so that a fault does not change the noise.
     """
 
     def __init__(
@@ -64,6 +64,11 @@ class SimulatedBody:
         """Every true state so far, one at least every two centimetres of the way. Not for knowledge sources."""
         return tuple(self._track)
 
+    @property
+    def frames(self) -> int:
+        """How many pictures were taken."""
+        return self._frames
+
     def execute(self, command: MotorCommand) -> MotionReport:
         """TURN in place, then MOVE straight ahead, as well as the wheels can; what is returned is the encoders' claim.
 
@@ -77,17 +82,15 @@ class SimulatedBody:
         now_s = self._truth.time_s
         return MotionReport(turn_rad=turn, move_m=move, duration_s=now_s - began_s, sim_time_s=now_s)
 
-    def look(self) -> Frame:
-        """Take a picture: the JPEG bytes that the camera delivers."""
+    def look(self, purpose: str = "") -> Frame:
+        """Take a picture: the JPEG bytes that the camera delivers, for the purpose of the request."""
         self._pass(FRAME_S)
         camera_from_world = self._mount.camera_from_robot @ self._truth.world_from_robot.lifted().inverse()
         radiance = self._building.renderer.radiance(self._camera, camera_from_world)
         image = exposed(radiance, self._sensor, self._pixel_rng, lights_on=self._truth.lights_on)
-        frame = Frame(
-            jpeg=compressed(image, self._sensor.jpeg_quality), number=self._frames, sim_time_s=self._truth.time_s
-        )
         self._frames += 1
-        return frame
+        jpeg = compressed(image, self._sensor.jpeg_quality)
+        return Frame(jpeg=jpeg, number=self._frames - 1, sim_time_s=self._truth.time_s, purpose=purpose)
 
     def _turn(self, turn_rad: float) -> None:
         done = self._wheels.turned(turn_rad, self._wheel_rng)

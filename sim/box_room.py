@@ -63,6 +63,7 @@ def box_room(length_m: float = 6.0, width_m: float = 4.0, height_m: float = 2.6)
         *(walls[i] for i in (0, 2, 3, 5)),
         PatchFace((bricks, poster)),
         PatchFace((floor,)),
-        *box_faces((3.6, 0.3, 0.0), (4.8, 1.0, 0.75), "desk", texture="wood", texture_scale_m=0.03, colour=(0.52, 0.34, 0.2)),
+        *box_faces((3.6, 0.3, 0.0), (4.8, 1.0, 0.75), "desk", texture="wood", texture_scale_m=0.03,
+                   colour=(0.52, 0.34, 0.2)),
         *box_faces((4.6, 3.3, 0.0), (5.4, 3.9, 1.9), "cabinet", colour=(0.35, 0.42, 0.45)),
     )

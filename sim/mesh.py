@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from sim.textures import POSTER, texture_code
 
+MOST = 32767
+"""The rasteriser counts patches in 16 bits."""
+
 COPLANAR_M = 1e-6
 """Regions of a face that lie this near to its plane share it, so that the later one covers the earlier."""
 
@@ -47,8 +50,8 @@ class Mesh:
     """P patches with V vertices in all.
 
     Attributes:
-        vertices_world: (V, 3) [m]; patch i owns rows ``first[i]:first[i + 1]``, counter-clockwise from its visible side.
-        first: (P + 1,) int64.
+        vertices_world: (V, 3) [m], counter-clockwise from the visible side.
+        first: (P + 1,) int64; patch i owns the vertices ``first[i]:first[i + 1]``.
         planes_world: (P, 4) unit normal n and offset d of n . p = d; the visible side is n . p > d.
         axes_world: (P, 2, 3) unit texture axes s, t in the plane; t is as near to "up" as the plane allows.
         origins_m: (P, 2) texture coordinates of the texture's origin.
@@ -79,6 +82,8 @@ def build_mesh(faces: Iterable[FaceLike]) -> Mesh:
         ValueError: a region is not a flat convex polygon of at least three distinct vertices, or is described wrongly.
     """
     patches = [patch for face in faces for side in (face.front, face.back) for patch in _side(side)]
+    if len(patches) > MOST:
+        raise ValueError(f"expected at most {MOST} regions, got {len(patches)}")
     polygons = [polygon for polygon, _, _ in patches]
     planes = np.array([plane for _, plane, _ in patches]).reshape(-1, 4)
     axes = np.array([_texture_axes(plane[:3]) for plane in planes]).reshape(-1, 2, 3)

@@ -1,8 +1,8 @@
 """Hidden-surface removal: which patch is seen at each sample of each pixel.
 
-Every pixel has N samples on N sub-rows, each at another one of N horizontal offsets (N rooks on a chessboard): a vertical
-or horizontal edge, as a level camera sees on every door, is then placed to 1/N px, where a square grid of N samples would
-place it to 1/sqrt(N) px. Projection is written out here on purpose: it is an independent check on the camera model.
+Every pixel has N samples on N sub-rows, each at another one of N horizontal offsets (N rooks on a chessboard): a
+vertical or horizontal edge, as a level camera sees on every door, is then placed to 1/N px, where a square grid of N
+samples would place it to 1/sqrt(N) px.
 
 Jitted functions of this file call only one another, because numba's cache does not follow calls into other files.
 """
@@ -10,7 +10,6 @@ Jitted functions of this file call only one another, because numba's cache does 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sim.mesh import Mesh
+from sim.projection import Lens, View
 
 NEAR_M = 0.02
 """Patches are cut at this depth in front of the optical centre [m]."""
@@ -28,8 +28,8 @@ ROOKS = {
     8: (1, 4, 7, 2, 6, 3, 0, 5),
     16: (3, 8, 15, 12, 2, 7, 5, 10, 14, 1, 6, 11, 4, 0, 13, 9),
 }
-"""The column of the sample on each sub-row, found by search over permutations: the worst direction of an edge has an RMS
-error of 0.29, 0.15, 0.080 and 0.049 px (8 samples in bit-reversed order: 0.107)."""
+"""The column of the sample on each sub-row, found by search over permutations: the worst direction of an edge has an
+RMS error of 0.29, 0.15, 0.080 and 0.049 px (8 samples in bit-reversed order: 0.107)."""
 
 SHORT = 24
 """Spans of fewer samples are filled one by one."""
@@ -41,70 +41,19 @@ NOTHING = -1
 """The identity of the background."""
 
 
-@dataclass(frozen=True, eq=False)
-class Lens:
-    """A pinhole: focal lengths and principal point [px], image size [px]; pixel (0, 0) is the first pixel's centre."""
-
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    width: int
-    height: int
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """The mesh as linear forms of the pixel (u, v, 1), for one pose of the camera.
-
-    Attributes:
-        facing: (P,) which patches turn their visible side to the camera.
-        inverse_depths: (P, 3); 1 / z [1/m] at a pixel is ``inverse_depths @ (u, v, 1)``.
-        textures: (P, 2, 3); a texture coordinate [m] is ``(textures @ (u, v, 1)) / inverse_depth + bases``.
-        bases_m: (P, 2).
-        vertices_camera: (V, 3) [m].
-    """
-
-    facing: NDArray[np.bool_]
-    inverse_depths: NDArray[np.float64]
-    textures: NDArray[np.float64]
-    bases_m: NDArray[np.float64]
-    vertices_camera: NDArray[np.float64]
-
-
-def view_of(mesh: Mesh, lens: Lens, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> View:
-    """The mesh seen by a camera at ``camera_from_world`` = (rotation (3, 3), translation (3,) [m])."""
-    centre = -rotation.T @ translation
-    normals, offsets = mesh.planes_world[:, :3], mesh.planes_world[:, 3]
-    beyond = offsets - normals @ centre
-    facing = beyond < -1e-6
-    reach = np.where(facing, beyond, -1.0)
-    return View(
-        facing=facing,
-        inverse_depths=_pixel_forms(normals @ rotation.T, lens) / reach[:, None],
-        textures=_pixel_forms(mesh.axes_world @ rotation.T, lens),
-        bases_m=mesh.axes_world @ centre - mesh.origins_m,
-        vertices_camera=mesh.vertices_world @ rotation.T + translation,
-    )
-
-
-def _pixel_forms(directions_camera: NDArray[np.float64], lens: Lens) -> NDArray[np.float64]:
-    """Directions d (..., 3) as forms (..., 3): d . ray(u, v) = form @ (u, v, 1)."""
-    x, y, z = directions_camera[..., 0], directions_camera[..., 1], directions_camera[..., 2]
-    return np.stack([x / lens.fx, y / lens.fy, z - x * lens.cx / lens.fx - y * lens.cy / lens.fy], axis=-1)
-
-
 def visible_patches(mesh: Mesh, view: View, lens: Lens, samples: int) -> NDArray[np.int16]:
     """The patch seen at every sample, (height, N, width), ``NOTHING`` where none is."""
     longest = int(np.diff(mesh.first).max(initial=0)) + 2
     boxes, edges, ends = _outlines(
-        view.vertices_camera, mesh.first, view.facing, lens.fx, lens.fy, lens.cx, lens.cy, lens.width, lens.height, longest
+        view.vertices_camera, mesh.first, view.facing, lens.fx, lens.fy, lens.cx, lens.cy, lens.width, lens.height,
+        longest,
     )
     _hide(boxes, _cover_tiles(boxes, edges, ends, view.inverse_depths, lens.width, lens.height))
     rows, row_first = _patches_of_rows(boxes, lens.height)
-    return _fill(
+    seen: NDArray[np.int16] = _fill(
         boxes, edges, ends, view.inverse_depths, rows, row_first, sample_offsets(samples), lens.width, lens.height
     )
+    return seen
 
 
 def sample_offsets(samples: int) -> NDArray[np.float64]:
@@ -139,7 +88,7 @@ def _clip_near(vertices: Any, start: int, end: int, out: Any) -> int:
 
 @njit(cache=True, error_model="numpy")
 def _add_edges(pixels: Any, k: int, down: bool, edges: Any, at: int) -> int:
-    """Append those of a polygon's edges that run down (or up) as (x, y, dx/dy) of their upper ends; returns the new end.
+    """Append those of a polygon's edges that run down (or up) as upper end x, y and dx/dy; returns the new end.
 
     Level edges bound nothing. Two neighbours get the same line from their common edge, to the last bit.
     """
@@ -157,7 +106,9 @@ def _add_edges(pixels: Any, k: int, down: bool, edges: Any, at: int) -> int:
 @njit(cache=True, error_model="numpy")
 def _outlines(vertices: Any, first: Any, facing: Any, fx: float, fy: float, cx: float, cy: float,
               width: int, height: int, longest: int) -> Any:
-    """Outlines in the image: boxes (P, 5) of top, low, left, right [px] and greatest 1/z, empty where unseen; edges (E, 3).
+    """Outlines in the image: edges (E, 3), and boxes (P, 5) of top, low, left, right [px] and greatest 1/z.
+
+    An unseen patch has an empty box.
 
     Patch p's left edges are ``ends[p, 0]:ends[p, 1]``, its right ones ``ends[p, 1]:ends[p, 2]``: a patch is
     counter-clockwise to the eye, so its edges run down on its left and up on its right.
@@ -207,7 +158,8 @@ def _cover_tiles(boxes: Any, edges: Any, ends: Any, inverse_depths: Any, width: 
     for p in range(len(boxes)):
         if boxes[p, 1] - boxes[p, 0] < TILE or boxes[p, 3] - boxes[p, 2] < TILE:
             continue
-        for ty in range(max(0, math.ceil((boxes[p, 0] + 0.5) / TILE)), min(height, math.floor(boxes[p, 1] + 0.5)) // TILE):
+        low = min(height, math.floor(boxes[p, 1] + 0.5)) // TILE
+        for ty in range(max(0, math.ceil((boxes[p, 0] + 0.5) / TILE)), low):
             y = ty * TILE - 0.5
             left, right = _span(edges, ends[p], y, width)
             left_low, right_low = _span(edges, ends[p], y + TILE, width)
@@ -244,7 +196,7 @@ def _tile(at: float, count: int) -> int:
 
 @njit(cache=True, error_model="numpy")
 def _patches_of_rows(boxes: Any, height: int) -> Any:
-    """The patches that reach into each pixel row, in the mesh's order: row y owns ``rows[row_first[y]:row_first[y + 1]]``."""
+    """The patches that reach into row y, ``rows[row_first[y]:row_first[y + 1]]``, in the mesh's order."""
     spans = np.zeros((len(boxes), 2), np.int64)
     row_first = np.zeros(height + 1, np.int64)
     for p in range(len(boxes)):
@@ -269,7 +221,7 @@ def _patches_of_rows(boxes: Any, height: int) -> Any:
 def _fill_long(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest: Any, seen: Any, front: Any) -> None:
     """Put a patch into a span of a sub-row wherever it is not farther than what is there.
 
-    Three plain loops and a mask of all ones or none, because LLVM makes vector code of these and not of one with an "if".
+    Three plain loops and a mask of all ones or none: LLVM makes vector code of these, and not of one with an "if".
     """
     for i in range(len(columns)):
         front[i] = -np.int16(inverse_depth + step * columns[i] >= nearest[i])
@@ -282,8 +234,8 @@ def _fill_long(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest:
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _fill_short(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest: Any, seen: Any, r: int, start: int,
                 end: int) -> None:
-    """The same for columns ``start`` to ``end`` of sub-row r, one by one."""
-    for i in range(start, end):
+    """The same for columns ``start`` to ``end`` of sub-row r, one by one (unsigned: no look for negative indices)."""
+    for i in range(np.uint64(start), np.uint64(end)):
         w = inverse_depth + step * columns[i]
         if w >= nearest[r, i]:
             nearest[r, i] = w
@@ -296,9 +248,9 @@ def _column(x: float, width: int) -> int:
     return width - int(width - min(max(x, 0.0), float(width)))
 
 
-@njit(cache=True, error_model="numpy")
-def _fill_patch(p: int, heights: Any, boxes: Any, edges: Any, ends: Any, inverse_depths: Any, offsets: Any, columns: Any,
-                nearest: Any, seen: Any, front: Any) -> None:
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _fill_patch(p: int, heights: Any, boxes: Any, edges: Any, ends: Any, inverse_depths: Any, offsets: Any,
+                columns: Any, nearest: Any, seen: Any, front: Any) -> None:
     """Put patch p into the sub-rows (N, width) of one pixel row; they lie at ``heights`` (N,) [px]."""
     samples, width = nearest.shape
     patch, step = np.int16(p), np.float32(inverse_depths[p, 0])

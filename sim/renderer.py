@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mesh import FaceLike, Mesh, build_mesh
-from sim.rasterizer import Lens, View, sample_offsets, view_of, visible_patches
+from sim.projection import Lens, View, view_of
+from sim.rasterizer import sample_offsets, visible_patches
 from sim.textures import noise_table, shade
 from world_models.camera import Camera
 from world_models.frames import Pose
@@ -52,7 +53,7 @@ class Renderer:
 
     def radiance(self, camera: Camera, camera_from_world: Pose) -> NDArray[np.float32]:
         """The noiseless image (height, width, 3), RGB in 0..1."""
-        lens = _lens(camera)
+        lens = Lens.of(camera)
         view = view_of(self.mesh, lens, camera_from_world.rotation, camera_from_world.translation)
         seen = visible_patches(self.mesh, view, lens, self.samples)
         image: NDArray[np.float32] = shade(
@@ -69,16 +70,12 @@ class Renderer:
         mesh = self.mesh
         columns = (view.inverse_depths, view.textures.reshape(-1, 6), view.bases_m, 1.0 / mesh.scales_m[:, None],
                    self.light, mesh.textures[:, None], mesh.seeds[:, None])
-        return np.concatenate(columns, axis=1)
+        looks: NDArray[np.float64] = np.concatenate(columns, axis=1)
+        return looks
 
 
 def illumination(normals_world: NDArray[np.float64]) -> NDArray[np.float64]:
     """Light (n,) on surfaces with these normals (n, 3): faces that meet in a crease differ."""
     lit = [strength * np.maximum(0.0, normals_world @ np.array(towards)) for towards, strength in LAMPS]
-    return np.minimum(1.0, AMBIENT + np.sum(lit, axis=0))
-
-
-def _lens(camera: Camera) -> Lens:
-    if camera.distortion is not None:
-        raise ValueError(f"expected a camera without lens distortion, got {camera.distortion}")
-    return Lens(camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
+    total: NDArray[np.float64] = np.minimum(1.0, AMBIENT + np.sum(lit, axis=0))
+    return total

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from sim.actuator import ActuatorParameters
-from sim.faults import Displacement, Fault, LightsOff, Moment
-from sim.places import Place, places
+from sim.fault_table import read_fault
+from sim.faults import Fault
+from sim.places import places
 from sim.rasterizer import sample_offsets
 from sim.sensor import SensorParameters
 from sim.settings import known_keys, merged, near, parsed, read_settings
@@ -57,7 +58,8 @@ class CameraSettings:
     mount_tilt_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.05 <= self.field_of_view_rad <= 2.6 or not (16 <= self.width_px <= 4096 and 16 <= self.height_px <= 4096):
+        small, large = sorted((self.width_px, self.height_px))
+        if not (0.05 <= self.field_of_view_rad <= 2.6 and small >= 16 and large <= 4096):
             raise ValueError("expected a field of view of 3 to 149 degrees and 16 to 4096 px, got "
                              f"{math.degrees(self.field_of_view_rad):g} degrees, {self.width_px} x {self.height_px} px")
 
@@ -161,7 +163,7 @@ def load_scenario(path_or_name: str | Path) -> Scenario:
     if path.suffix != ".toml":
         path = SCENARIOS / f"{path_or_name}.toml"
         if str(path_or_name) not in list_scenarios():
-            raise ScenarioError(f"expected a scenario: {near(str(path_or_name), list_scenarios())}, got {path_or_name!r}")
+            raise ScenarioError(f"scenario: expected {near(str(path_or_name), list_scenarios())}, got {path_or_name!r}")
     try:
         return _scenario(Source.read(path), path.stem, path.parent)
     except WorldError as error:
@@ -217,7 +219,7 @@ def _scenario(source: Source, name: str, folder: Path) -> Scenario:
         world=_file(node["world"].text(), ROOT / "world_models" / "worlds", folder),
         details=tuple(_file(text, ROOT / "sim" / "buildings", folder) for text in details),
         goal=_goal(node["goal"]),
-        faults=tuple(_fault(item) for item in node["faults"].items()) if "faults" in node else (),
+        faults=tuple(read_fault(item) for item in node["faults"].items()) if "faults" in node else (),
         folder=folder,
         data=source.data,
         **sections,
@@ -237,35 +239,3 @@ def _goal(node: Node) -> str:
     except ValueError as error:
         raise WorldError(f"{node.where}: goal: {error}") from None
     return node.text()
-
-
-@dataclass(frozen=True, slots=True)
-class _FaultTable:
-    """Every key of a fault; which ones count depends on its kind."""
-
-    kind: str = ""
-    in_locale: str = ""
-    after_m: float = 0.0
-    after_s: float = 0.0
-    forward_m: float = 0.0
-    left_m: float = 0.0
-    turn_rad: float = 0.0
-    distance_m: float = 0.0
-    duration_s: float = 10.0
-    to_locale: str = ""
-    to_x_m: float = 0.0
-    to_y_m: float = 0.0
-    to_heading_rad: float = 0.0
-
-
-def _fault(node: Node) -> Fault:
-    table = read_settings(node, _FaultTable)
-    moment = Moment(table.in_locale, table.after_m, table.after_s)
-    if table.kind == "lights_off":
-        return LightsOff(moment, table.duration_s)
-    if table.kind not in ("bump", "kidnap"):
-        raise node.fail("kind = bump, kidnap or lights_off", repr(table.kind))
-    there = Place(table.to_locale, table.to_x_m, table.to_y_m) if table.to_locale else None
-    return Displacement(
-        table.kind, moment, table.forward_m, table.left_m, table.turn_rad, table.distance_m, there, table.to_heading_rad
-    )

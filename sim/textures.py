@@ -51,7 +51,8 @@ def _floor(x: float) -> int:
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _cell(table: Any, i: int, j: int, seed: int) -> float:
     """The random number of cell (i, j) of the texture with this seed."""
-    return table[(j + 59 * seed) & 255, (i + 113 * seed) & 255]
+    value: float = table[(j + 59 * seed) & 255, (i + 113 * seed) & 255]
+    return value
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -184,7 +185,7 @@ def _colour(look: Any, u: float, v: float, table: Any, haze_per_m: float) -> Any
 
 @njit(cache=True, error_model="numpy")
 def _mixed_colour(seen: Any, x: int, y: int, offsets: Any, looks: Any, table: Any, haze_per_m: float, done: Any) -> Any:
-    """Colour of a pixel whose samples ``seen`` (N,) differ: each patch is shaded once, amid those samples that see it."""
+    """Colour of a pixel whose samples ``seen`` (N,) differ: each patch is shaded once, amid its own samples."""
     samples = len(offsets)
     red, green, blue = 0.0, 0.0, 0.0
     done[:] = False
@@ -220,8 +221,8 @@ def _find_mixed(seen: Any, mixed: Any) -> None:
 def shade(seen: Any, offsets: Any, looks: Any, table: Any, haze_per_m: float) -> Any:
     """The image (height, width, 3) float32, 0..1, of the patches seen at the samples (height, N, width).
 
-    ``looks`` (P, 17) says of each patch: the forms of 1/z, s z^-1 and t z^-1 (9), the texture's base (2), cells a metre,
-    lit colour (3), texture code and seed.
+    ``looks`` (P, 17) says of each patch: the forms of 1/z, s z^-1 and t z^-1 (9), the texture's base (2), cells a
+    metre, lit colour (3), texture code and seed.
     """
     height, samples, width = seen.shape
     image = np.empty((height, width, 3), np.float32)

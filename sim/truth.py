@@ -77,7 +77,7 @@ def score(track: Sequence[Truth], start_world: Pose2, goal_world: Pose2, *, head
 
 
 def cross_track_m(pose: Pose2, start: Pose2, goal: Pose2) -> float:
-    """Signed distance of a pose from the line from start to goal, positive to its left; from the start if they coincide."""
+    """Signed distance of a pose from the line from start to goal, positive to its left."""
     dx, dy = goal.x_m - start.x_m, goal.y_m - start.y_m
     length = math.hypot(dx, dy)
     if length < 1e-9:

@@ -99,19 +99,20 @@ class _Site:
         across = _coordinate_along(near.name, wall_from_locale, door.along_m)
         half = door.width_m / 2
         neighbours = (*door.between[1:], None) if door.is_open else (None,)
-        holes = [(near.locale, near.name, Opening(door.name, across - half, across + half, door.height_m, neighbours[0]))]
-        if len(door.between) == 2:
-            ends_world = near.world_from_wall.apply([(across - half, 0, 0), (across + half, 0, 0)])
-            holes.append(self._far_hole(door, near, ends_world))
-        for room, wall, opening in holes:
-            _check_fit(self.walls[room][wall], opening)
-        return holes
+        opening = Opening(door.name, across - half, across + half, door.height_m, neighbours[0])
+        _check_fit(near, opening)
+        if len(door.between) == 1:
+            return [(near.locale, near.name, opening)]
+        ends_world = near.world_from_wall.apply([(across - half, 0, 0), (across + half, 0, 0)])
+        far = self._far_hole(door, near, ends_world)
+        _check_fit(self.walls[far[0]][far[1]], far[2])
+        return [(near.locale, near.name, opening), far]
 
     def _far_hole(self, door: DoorSpec, near: Wall, ends_world: NDArray[np.float64]) -> tuple[str, str, Opening]:
         for wall in self.walls[door.between[1]].values():
             ends = wall.world_from_wall.inverse().apply(ends_world)
             faces_back = float(wall.inward_world @ near.inward_world) < -0.999
-            if faces_back and -THICKEST_WALL_M <= ends[0, 1] <= 1e-6 and 0 <= ends[1, 0] and ends[0, 0] <= wall.length_m:
+            if faces_back and -THICKEST_WALL_M <= ends[0, 1] <= 1e-6 and ends[1, 0] >= 0 and ends[0, 0] <= wall.length_m:
                 neighbour = door.between[0] if door.is_open else None
                 opening = Opening(door.name, float(ends[1, 0]), float(ends[0, 0]), door.height_m, neighbour)
                 return wall.locale, wall.name, opening

@@ -10,7 +10,7 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.locales import distance_to_border, inside_polygon
+from world_models.outlines import distance_to_border, inside_polygon
 
 if TYPE_CHECKING:
     from world_models.world import World
@@ -79,21 +79,16 @@ def _overlapping(world: World) -> Iterator[Finding]:
 
 
 def _overlap(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """Whether two simple polygons share more than a border: sides cross, or one lies in the other."""
-    inner_one, inner_other = _inner_point(one), _inner_point(other)
-    if inside_polygon(inner_one, other) or inside_polygon(inner_other, one):
-        return True
-    sides = [list(zip(p, np.roll(p, -1, axis=0), strict=True)) for p in (one, other)]
-    return any(_cross(*a, *b) for a in sides[0] for b in sides[1])
+    """Whether two simple polygons share more than a border, by points just inside the sides and in the middle of each."""
+    return _reaches_into(one, other) or _reaches_into(other, one)
 
 
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]) -> bool:
-    def side(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> float:
-        u, v = q - p, r - p
-        return float(u[0] * v[1] - u[1] * v[0]) / float(np.linalg.norm(u))
-
-    apart = [side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b)]
-    return min(abs(x) for x in apart) > TOLERANCE_M and apart[0] * apart[1] < 0 and apart[2] * apart[3] < 0
+def _reaches_into(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    points = [_inner_point(one)]
+    for a, b in zip(one, np.roll(one, -1, axis=0), strict=True):
+        inward = np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a)
+        points += [a + t * (b - a) + 2 * TOLERANCE_M * inward for t in np.linspace(0.01, 0.99, 25)]
+    return any(_clearance(point, other) > TOLERANCE_M for point in points)
 
 
 def _unreachable(world: World) -> Iterator[Finding]:

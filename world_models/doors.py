@@ -48,15 +48,17 @@ class DoorSide:
     def x(self) -> Range:
         return self.opening.left_m, self.opening.right_m
 
-    def casing(self) -> Solid:
-        """The boards round the opening."""
+    def casing_faces(self) -> list[Face]:
+        """The boards round the opening, but for their inner sides: those are one with jambs and soffit."""
         (a, b), h, y, finish = self.x, self.opening.top_m, (0.0, CASING_PROUD_M), self.spec.frame
         boxes = (
             Box((a - CASING_M, a), y, (0.0, h + CASING_M), finish),
             Box((b, b + CASING_M), y, (0.0, h + CASING_M), finish),
             Box((a, b), y, (h, h + CASING_M), finish),
         )
-        return Solid(f"{self.name}/casing", boxes, self.wall.world_from_wall, self._ground)
+        solid = Solid(f"{self.name}/casing", boxes, self.wall.world_from_wall, self._ground)
+        faces = solid.faces(self.wall.locale, parent=self.wall.face_name, neighbour=self.opening.neighbour)
+        return [face for face in faces if not face.name.endswith(("/0x+", "/1x-", "/2z-"))]
 
     def doorway_face(self) -> Face:
         """The opening itself (§3.4, Figure 6): a face of type doorway, an offspring of the wall."""
@@ -155,7 +157,7 @@ def open_door(near: DoorSide, far: DoorSide) -> tuple[list[Face], Landmark]:
     back = near.depth_m + CASING_PROUD_M
     faces = [near.doorway_face(), far.doorway_face(), *near.lining(back), near.threshold(near.spec.threshold)]
     for side in (near, far):
-        faces += side.casing().faces(side.wall.locale, parent=side.wall.face_name, neighbour=side.opening.neighbour)
+        faces += side.casing_faces()
     edges = [near.lining_edges(back, near.spec.threshold)]
     edges += [part for side in (near, far) for part in (side.casing_edges(), side.threshold_edge())]
     name, (first, second) = near.spec.name, near.spec.between
@@ -165,8 +167,7 @@ def open_door(near: DoorSide, far: DoorSide) -> tuple[list[Face], Landmark]:
 def closed_door(side: DoorSide) -> tuple[list[Face], Landmark]:
     """Faces and the landmark of a closed door, as seen from one room."""
     leaf_faces, leaf_edges = side.leaf()
-    casing = side.casing().faces(side.wall.locale, parent=side.wall.face_name)
-    faces = [*casing, *side.lining(side.depth_m), side.threshold(side.floor), *leaf_faces]
+    faces = [*side.casing_faces(), *side.lining(side.depth_m), side.threshold(side.floor), *leaf_faces]
     edges = Edges.joined([side.casing_edges(), side.lining_edges(side.depth_m, side.floor), leaf_edges])
     return faces, Landmark(side.name, side.wall.locale, "door", edges, source=side.spec.source)
 

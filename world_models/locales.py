@@ -1,4 +1,4 @@
-"""Locales (§3.4): parcels of space with their own frames in a contained-by hierarchy, and the doorways between them."""
+"""Locales (§3.4): parcels of space with their own frames in a contained-by hierarchy, and doorways between them."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.frames import Pose, frozen
+from world_models.outlines import inside_polygon
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,22 +108,3 @@ class Doorway:
         if locale not in self.between:
             raise ValueError(f"expected one of {self.between}, got {locale!r}")
         return self.between.index(locale)
-
-
-def inside_polygon(point: NDArray[np.float64], polygon: NDArray[np.float64], margin_m: float = 0.0) -> bool:
-    """Whether a point (2,) lies in a simple polygon (k, 2) or at most ``margin_m`` from its border."""
-    if distance_to_border(point, polygon) <= margin_m + 1e-9:
-        return True
-    a, b = polygon, np.roll(polygon, -1, axis=0)
-    crosses = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
-    a, b = a[crosses], b[crosses]
-    x = a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
-    return bool(np.count_nonzero(x > point[0]) % 2)
-
-
-def distance_to_border(point: NDArray[np.float64], polygon: NDArray[np.float64]) -> float:
-    """Distance [m] of a point (2,) from the nearest side of a polygon (k, 2)."""
-    a, b = polygon, np.roll(polygon, -1, axis=0)
-    d = b - a
-    t = np.clip(np.sum((point - a) * d, axis=1) / np.maximum(np.sum(d * d, axis=1), 1e-18), 0.0, 1.0)
-    return float(np.min(np.linalg.norm(a + t[:, None] * d - point, axis=1)))

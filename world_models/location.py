@@ -69,6 +69,7 @@ class Hypothesis:
         basis: what it rests on last: command, odometry, tracks, milestone or relocalization.
         status: held (the one that is acted on), candidate, or doubted.
         weight: relative belief among candidates.
+        motion: id of the last motion report that is taken into account, or "".
     """
 
     locale: str
@@ -77,6 +78,7 @@ class Hypothesis:
     basis: str
     status: str = "held"
     weight: float = 1.0
+    motion: str = ""
 
     @property
     def is_held(self) -> bool:
@@ -103,13 +105,13 @@ class Hypothesis:
     @staticmethod
     def of_world(
         world: Frames, locale: str, world_from_robot: Pose2, covariance_world: Any, basis: str,
-        status: str = "held", weight: float = 1.0,
+        *, status: str = "held", weight: float = 1.0, motion: str = "",
     ) -> Hypothesis:
         """From a pose and covariance in the world frame."""
         locale_from_world = flattened(world.world_from_locale(locale)).inverse()
         turn = _turn(locale_from_world.heading_rad)
         own = turn @ np.asarray(covariance_world, float) @ turn.T
-        return Hypothesis(locale, locale_from_world @ world_from_robot, covariance_tuple(own), basis, status, weight)
+        return Hypothesis(locale, locale_from_world @ world_from_robot, covariance_tuple(own), basis, status, weight, motion)
 
 
 def _turn(angle_rad: float) -> NDArray[np.float64]:

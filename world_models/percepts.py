@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.frames import Pose2
+from world_models.location import Covariance
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +40,22 @@ class Track:
 
 
 @dataclass(frozen=True, slots=True)
+class Anchor:
+    """What was believed when templates were cut: what tracks tell is relative to it, and no surer than it was.
+
+    Attributes:
+        frame: id of the frame entry.
+        x_m, y_m: where the robot was [m, world].
+        covariance: over (x, y, heading), world.
+    """
+
+    frame: str
+    x_m: float
+    y_m: float
+    covariance: Covariance
+
+
+@dataclass(frozen=True, slots=True)
 class Tracks:
     """All landmarks that are followed, as of one frame.
 
@@ -46,11 +63,13 @@ class Tracks:
         frame: id of the frame entry.
         half_px: templates are squares of 2 half_px + 1.
         items: the tracks.
+        anchors: one for each frame in which templates of these tracks were cut.
     """
 
     frame: str
     half_px: int
     items: tuple[Track, ...]
+    anchors: tuple[Anchor, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from world_models.camera import NEAR_M, Camera
 from world_models.frames import Pose
-from world_models.locales import Doorway, distance_to_border
+from world_models.locales import Doorway
+from world_models.outlines import distance_to_border
 
 if TYPE_CHECKING:
     from world_models.world import World
@@ -36,7 +37,7 @@ def image_window(camera: Camera) -> Window:
 def windows_of(world: World, window: Window, camera_from_world: Pose) -> dict[str, Window]:
     """The locales in view, each with the rectangle through which it is seen; the camera's own one fills the image."""
     centre = camera_from_world.inverse().translation
-    seen = {name: window for name in locales_at_camera(world, centre)}
+    seen = dict.fromkeys(locales_at_camera(world, centre), window)
     todo = list(seen)
     while todo:
         here = todo.pop(0)

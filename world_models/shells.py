@@ -13,6 +13,7 @@ from world_models.faces import Face
 from world_models.frames import Pose
 from world_models.geometer import SHORTEST_LINE_M, Box, Range, Solid, Surface, left_over, surface_of
 from world_models.landmarks import Edges, Landmark
+from world_models.outlines import convex_pieces
 from world_models.regions import Finish, level, region
 
 CASING_M = 0.10
@@ -121,9 +122,9 @@ class Shell:
     def faces(self) -> list[Face]:
         """Floor, ceiling, walls and trim."""
         faces = [self._flat("floor", self.spec.look.floor), self._flat("ceiling", self.spec.look.ceiling)]
-        for wall in self.walls:
+        for index, wall in enumerate(self.walls):
             faces.append(_wall_face(wall))
-            for solid in self._trim(wall):
+            for solid in self._trim(index):
                 faces.extend(solid.faces(wall.locale, parent=wall.face_name))
         return faces
 
@@ -144,18 +145,31 @@ class Shell:
         outline = self.world_from_locale.apply(flat if up else flat[::-1])
         return Face(name, self.spec.name, outline, front=regions)
 
-    def _trim(self, wall: Wall) -> list[Solid]:
-        """Baseboard and moulding."""
-        look, solids = self.spec.look, []
-        stretches = wall.free_of_openings(CASING_M)
+    def _trim(self, index: int) -> list[Solid]:
+        """Baseboard and moulding of a wall."""
+        wall, look = self.walls[index], self.spec.look
+        solids = []
         if look.baseboard:
-            boxes = [Box(x, (0.0, BASEBOARD_PROUD_M), (0.0, BASEBOARD_M), look.baseboard) for x in stretches]
-            solids.append(Solid(f"{wall.face_name}/baseboard", tuple(boxes), wall.world_from_wall, self.surfaces))
+            stretches = wall.free_of_openings(CASING_M)
+            solids.append(self._strip(index, "baseboard", look.baseboard, stretches, (0.0, BASEBOARD_M), BASEBOARD_PROUD_M))
         if look.moulding:
             z = (wall.height_m - MOULDING_M, wall.height_m)
-            box = Box((0.0, wall.length_m), (0.0, MOULDING_PROUD_M), z, look.moulding)
-            solids.append(Solid(f"{wall.face_name}/moulding", (box,), wall.world_from_wall, self.surfaces))
+            solids.append(self._strip(index, "moulding", look.moulding, [(0.0, wall.length_m)], z, MOULDING_PROUD_M))
         return solids
+
+    def _strip(
+        self, index: int, name: str, finish: Finish, stretches: Sequence[Range], z: Range, proud_m: float
+    ) -> Solid:
+        """Boards along a wall; in an inner corner they end at the front of the next wall's board."""
+        wall, ahead = self.walls[index], self.walls[(index + 1) % len(self.walls)]
+        along, surfaces = wall.world_from_wall.rotation[:, 0], self.surfaces
+        end = wall.length_m
+        if float(along @ ahead.inward_world) < -1e-6:
+            end -= proud_m
+            front = ahead.rectangle((0.0, 1.0), (0.0, 1.0), proud_m)
+            surfaces = (*surfaces, surface_of(front, finish))
+        boxes = [Box((low, min(high, end)), (0.0, proud_m), z, finish) for low, high in stretches if low < end - 1e-3]
+        return Solid(f"{wall.face_name}/{name}", tuple(boxes), wall.world_from_wall, surfaces)
 
     def _wall_edges(self, index: int) -> Edges:
         wall, before = self.walls[index], self.walls[index - 1]
@@ -170,7 +184,7 @@ class Shell:
                 if board is None and x[1] - x[0] >= SHORTEST_LINE_M:
                     rows.append((wall.world_from_wall.apply([(x[0], 0, z), (x[1], 0, z)]),
                                  (wall.inward_world, normal), (wall.level, level(finish, normal), nan)))
-        return Edges.joined([Edges.of(rows), *(solid.edges() for solid in self._trim(wall))])
+        return Edges.joined([Edges.of(rows), *(solid.edges() for solid in self._trim(index))])
 
 
 def trim_heights(look: RoomLook, height_m: float) -> Range:
@@ -186,30 +200,3 @@ def _wall_face(wall: Wall) -> Face:
     name = wall.face_name
     regions = tuple(region(f"{name}/{i}", wall.rectangle(x, z), wall.finish) for i, (x, z) in enumerate(rectangles))
     return Face(name, wall.locale, wall.polygon_world, front=regions)
-
-
-def convex_pieces(outline: NDArray[np.float64]) -> list[list[int]]:
-    """A simple counter-clockwise polygon (k, 2) cut into convex ones, as vertex numbers (by clipping ears)."""
-    left = list(range(len(outline)))
-    if all(_turn(outline, left[i - 2], left[i - 1], left[i]) > 0 for i in left):
-        return [left]
-    pieces = []
-    while len(left) > 3:
-        ear = next((i for i in range(len(left)) if _is_ear(outline, left, i)), 0)
-        pieces.append([left[ear - 1], left[ear], left[(ear + 1) % len(left)]])
-        del left[ear]
-    return [*pieces, left]
-
-
-def _turn(outline: NDArray[np.float64], a: int, b: int, c: int) -> float:
-    d, e = outline[b] - outline[a], outline[c] - outline[a]
-    return float(d[0] * e[1] - d[1] * e[0])
-
-
-def _is_ear(outline: NDArray[np.float64], left: list[int], i: int) -> bool:
-    corners = left[i - 1], left[i], left[(i + 1) % len(left)]
-    if _turn(outline, *corners) <= 1e-9:
-        return False
-    pairs = list(zip(corners, (*corners[1:], corners[0]), strict=True))
-    others = [k for k in left if k not in corners]
-    return not any(all(_turn(outline, a, b, k) > -1e-9 for a, b in pairs) for k in others)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from world_models.blueprint import Blueprint, DoorSpec, LocaleSpec, RoomLook, ThingSpec
 from world_models.builder import build_world
 from world_models.frames import Pose
-from world_models.geometer import Box, Range
-from world_models.locales import distance_to_border
-from world_models.regions import TEXTURES, Finish
+from world_models.outlines import is_simple
+from world_models.regions import Finish
+from world_models.shelf import Shelf
 from world_models.toml_source import Node, Source, WorldError
 from world_models.world import World
 
@@ -26,9 +26,6 @@ __all__ = ["WORLDS", "WorldError", "load_world", "read_world"]
 WORLDS = Path(__file__).parent / "worlds"
 """Where the worlds that come with the project are kept."""
 
-UNITS_M = {"feet": 0.3048, "metres": 1.0}
-FARTHEST_M = 10_000.0
-SMALLEST_M = 0.001
 RECTANGLE_WALLS = ("south", "east", "north", "west")
 FINISH_KEYS = ("walls", "floor", "ceiling", "baseboard", "moulding", "frame", "leaf", "threshold")
 DEFAULT_KEYS = (*FINISH_KEYS, "height", "door_width", "door_height")
@@ -61,10 +58,8 @@ class _Draft:
     """What has been read so far."""
 
     base: Source
-    unit_m: float = 1.0
     name: str = ""
-    finishes: dict[str, Finish] = field(default_factory=dict)
-    parts: dict[str, tuple[Box, ...]] = field(default_factory=dict)
+    shelf: Shelf = field(default_factory=Shelf)
     defaults: dict[str, Node] = field(default_factory=dict)
     locales: dict[str, LocaleSpec] = field(default_factory=dict)
     doors: list[DoorSpec] = field(default_factory=list)
@@ -78,7 +73,7 @@ class _Draft:
     def read_base(self, root: Node) -> None:
         root.table(("name", "units", "locales"), ("finishes", "parts", "defaults", "doors"))
         self.name = root["name"].text()
-        self._read_shared(root)
+        self.shelf.read(root)
         if defaults := root.get("defaults"):
             self.defaults = dict(defaults.table(optional=DEFAULT_KEYS).entries())
         for name, node in root["locales"].entries():
@@ -91,75 +86,12 @@ class _Draft:
 
     def read_details(self, root: Node) -> None:
         root.table(("units", "locales"), ("finishes", "parts"))
-        self._read_shared(root)
+        self.shelf.read(root)
         for name, node in root["locales"].entries():
             node.table(("things",))
             if name not in self.locales:
                 raise node.fail(f"one of the locales {', '.join(self.locales)}", repr(name))
             self._read_things(name, node)
-
-    def _read_shared(self, root: Node) -> None:
-        """Units, finishes and parts; names may not be given twice."""
-        self.unit_m = UNITS_M[root["units"].choice(*UNITS_M)]
-        for name, node in finishes.entries() if (finishes := root.get("finishes")) else ():
-            _only_once(name, node, self.finishes)
-            self.finishes[name] = self._finish(node)
-        for name, node in parts.entries() if (parts := root.get("parts")) else ():
-            _only_once(name, node, self.parts)
-            self.parts[name] = self._boxes(node, None)
-
-    # -- appearances and parts ---------------------------------------------------------------------------------------
-
-    def _finish(self, node: Node) -> Finish:
-        node.table(("colour",), ("texture", "scale"))
-        red, green, blue = node["colour"].numbers((3,), 0.0, 1.0)
-        texture = node["texture"].choice(*TEXTURES) if "texture" in node else "plain"
-        scale = self._length(node["scale"], SMALLEST_M, 100.0) if "scale" in node else 0.1
-        return Finish((red, green, blue), texture, scale)
-
-    def _named_finish(self, node: Node) -> Finish:
-        if node.value not in self.finishes if isinstance(node.value, str) else True:
-            raise node.fail(f"one of the finishes {', '.join(self.finishes) or '(none)'}")
-        return self.finishes[node.value]
-
-    def _boxes(self, node: Node, finish: Finish | None) -> tuple[Box, ...]:
-        return tuple(box for item in node.items(least=1) for box in self._box(item, finish))
-
-    def _box(self, node: Node, finish: Finish | None) -> list[Box]:
-        """One box; five for one with a rim; those again on the other side of x = 0 where ``twin`` is set."""
-        needed = ("x", "y", "z") if finish else ("x", "y", "z", "finish")
-        rimmed = ("rim_width",) if "rim" in node.table(needed, ("finish", "rim", "rim_width", "twin")) else ()
-        node.table((*needed, *rimmed), ("finish", "rim", "twin"))
-        own = self._named_finish(node["finish"]) if "finish" in node else finish
-        assert own is not None
-        box = Box(self._range(node["x"]), self._range(node["y"]), self._range(node["z"]), own)
-        boxes = self._with_rim(box, node) if rimmed else [box]
-        twin = "twin" in node and node["twin"].flag()
-        return boxes + [replace(box, x=(-box.x[1], -box.x[0])) for box in boxes if twin]
-
-    def _with_rim(self, box: Box, node: Node) -> list[Box]:
-        """A board set into a rim that stands out to the full depth of the box."""
-        rim, width = self._named_finish(node["rim"]), self._length(node["rim_width"], SMALLEST_M)
-        (x0, x1), (y0, y1), (z0, z1) = box.ranges
-        if min(x1 - x0, z1 - z0) < 2 * width + SMALLEST_M:
-            raise node["rim_width"].fail("a rim that leaves something of the board")
-        inside = Box((x0 + width, x1 - width), (y0, y0 + 0.4 * (y1 - y0)), (z0 + width, z1 - width), box.finish)
-        rims = [((x0, x1), (z0, z0 + width)), ((x0, x1), (z1 - width, z1)),
-                ((x0, x0 + width), inside.z), ((x1 - width, x1), inside.z)]
-        return [inside, *(Box(x, box.y, z, rim) for x, z in rims)]
-
-    def _range(self, node: Node) -> Range:
-        low, high = (value * self.unit_m for value in node.numbers((2,), -self._far, self._far))
-        if high - low < SMALLEST_M:
-            raise node.fail(f"a range [low, high] of at least {SMALLEST_M / self.unit_m:g}")
-        return low, high
-
-    def _length(self, node: Node, low_m: float, high_m: float = FARTHEST_M) -> float:
-        return node.number(low_m / self.unit_m, high_m / self.unit_m) * self.unit_m
-
-    @property
-    def _far(self) -> float:
-        return FARTHEST_M / self.unit_m
 
     # -- locales -----------------------------------------------------------------------------------------------------
 
@@ -173,7 +105,7 @@ class _Draft:
         return LocaleSpec(
             name, node["kind"].text(), node["in"].text() if "in" in node else self.name,
             self._placed(node, 3), outline, names,
-            self._length(height, 0.1, 1000.0) if height else 2.7,
+            self.shelf.length(height, 0.1, 1000.0) if height else 2.7,
             self._look(node, names), _properties(node.get("properties")), node.where,
         )
 
@@ -181,13 +113,13 @@ class _Draft:
         if "size" in node and "outline" in node:
             raise node["outline"].fail("either size or outline", "both")
         if "size" in node:
-            low = 0.1 / self.unit_m
-            width, depth = (v * self.unit_m for v in node["size"].numbers((2,), low, self._far))
+            low = 0.1 / self.shelf.unit_m
+            width, depth = (v * self.shelf.unit_m for v in node["size"].numbers((2,), low, self.shelf.far))
             return np.array([(0.0, 0.0), (width, 0.0), (width, depth), (0.0, depth)]), RECTANGLE_WALLS
         if "outline" in node:
-            corners = [item.numbers((2,), -self._far, self._far) for item in node["outline"].items(least=3)]
-            outline = np.array(corners) * self.unit_m
-            if not _is_simple(outline):
+            corners = [item.numbers((2,), -self.shelf.far, self.shelf.far) for item in node["outline"].items(least=3)]
+            outline = np.array(corners) * self.shelf.unit_m
+            if not is_simple(outline):
                 raise node["outline"].fail("corners that go round a room counter-clockwise without crossing or doubling")
             return outline, tuple(f"side-{index}" for index in range(len(outline)))
         return None, ()
@@ -196,7 +128,7 @@ class _Draft:
         walls = self._given(node, "walls")
         if walls is not None and isinstance(walls.value, dict):
             walls.table(tuple(wall_names))
-            finishes = {name: self._named_finish(walls[name]) for name in wall_names}
+            finishes = {name: self.shelf.finish(walls[name]) for name in wall_names}
         else:
             finishes = {name: self._finish_or(walls, Finish((0.8, 0.8, 0.76))) for name in wall_names}
         boards = [self._given(node, key) for key in ("baseboard", "moulding")]
@@ -204,7 +136,7 @@ class _Draft:
             finishes,
             self._finish_or(self._given(node, "floor"), Finish((0.5, 0.5, 0.5))),
             self._finish_or(self._given(node, "ceiling"), Finish((0.9, 0.9, 0.9))),
-            *(self._named_finish(board) if board else None for board in boards),
+            *(self.shelf.finish(board) if board else None for board in boards),
         )
 
     def _given(self, node: Node, key: str) -> Node | None:
@@ -212,16 +144,16 @@ class _Draft:
         return node.get(key) or self.defaults.get(key)
 
     def _finish_or(self, node: Node | None, otherwise: Finish) -> Finish:
-        return self._named_finish(node) if node else otherwise
+        return self.shelf.finish(node) if node else otherwise
 
     def _placed(self, node: Node, dimensions: int = 2) -> Pose:
         """The frame given by ``at`` (x, y[, z]) and ``turn`` (degrees, counter-clockwise)."""
         counts = tuple(range(2, dimensions + 1))
-        at = node["at"].numbers(counts, -self._far, self._far) if "at" in node else (0.0, 0.0)
+        at = node["at"].numbers(counts, -self.shelf.far, self.shelf.far) if "at" in node else (0.0, 0.0)
         turn = math.radians(node["turn"].number(-360.0, 360.0)) if "turn" in node else 0.0
         c, s = (round(value, 15) for value in (math.cos(turn), math.sin(turn)))
         x, y, z = (*at, 0.0)[:3]
-        return Pose(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([x, y, z]) * self.unit_m)
+        return Pose(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([x, y, z]) * self.shelf.unit_m)
 
     def _check_hierarchy(self, node: Node) -> None:
         """Every locale lies in a known one, and those without walls contain some that have them."""
@@ -254,9 +186,9 @@ class _Draft:
                                   for key in ("frame", "leaf", "threshold"))
         return DoorSpec(
             name, between, self._wall(node["wall"], between[0]),
-            node["along"].number(-self._far, self._far) * self.unit_m,
-            self._length(width, 0.1, 20.0) if width else 0.9, self._length(height, 0.1, 20.0) if height else 2.0,
-            is_open, frame, leaf, threshold, self._part(node["panel"]) if "panel" in node else (), node.where,
+            self.shelf.coordinate(node["along"]),
+            self.shelf.length(width, 0.1, 20.0) if width else 0.9, self.shelf.length(height, 0.1, 20.0) if height else 2.0,
+            is_open, frame, leaf, threshold, self.shelf.part(node["panel"]) if "panel" in node else (), node.where,
         )
 
     def _room(self, node: Node) -> str:
@@ -265,11 +197,6 @@ class _Draft:
 
     def _wall(self, node: Node, room: str) -> str:
         return node.choice(*self.locales[room].wall_names)
-
-    def _part(self, node: Node) -> tuple[Box, ...]:
-        if not isinstance(node.value, str) or node.value not in self.parts:
-            raise node.fail(f"one of the parts {', '.join(self.parts) or '(none)'}")
-        return self.parts[node.value]
 
     def _read_things(self, locale: str, node: Node) -> None:
         if (things := node.get("things")) is None:
@@ -286,16 +213,16 @@ class _Draft:
         if ("part" in node) == ("boxes" in node):
             raise node.fail("either a part or boxes", "both" if "part" in node else "neither")
         kind = node["part"].text() if "part" in node else "detail"
-        finish = self._named_finish(node["finish"]) if "finish" in node else None
-        boxes = self._part(node["part"]) if "part" in node else self._boxes(node["boxes"], finish)
+        finish = self.shelf.finish(node["finish"]) if "finish" in node else None
+        boxes = self.shelf.part(node["part"]) if "part" in node else self.shelf.boxes(node["boxes"], finish)
         if finish and "part" in node:
             boxes = tuple(replace(box, finish=finish) for box in boxes)
         spec = ThingSpec(self._thing_name(locale, kind, node.get("name")), locale, kind, boxes, node.where)
         if not against:
             return replace(spec, locale_from_part=self._placed(node))
         return replace(
-            spec, wall=self._wall(node["wall"], locale), along_m=node["along"].number(-self._far, self._far) * self.unit_m,
-            up_m=node["up"].number(-self._far, self._far) * self.unit_m if "up" in node else 0.0,
+            spec, wall=self._wall(node["wall"], locale), along_m=self.shelf.coordinate(node["along"]),
+            up_m=self.shelf.coordinate(node["up"]) if "up" in node else 0.0,
         )
 
     def _thing_name(self, locale: str, kind: str, node: Node | None) -> str:
@@ -308,11 +235,6 @@ class _Draft:
         return node.text()
 
 
-def _only_once(name: str, node: Node, known: dict[str, Any]) -> None:
-    if name in known:
-        raise node.fail("a new name", f"{name!r}, which the world file has already")
-
-
 def _properties(node: Node | None) -> dict[str, Any]:
     if node is None:
         return {}
@@ -320,30 +242,3 @@ def _properties(node: Node | None) -> dict[str, Any]:
         if not isinstance(item.value, str | bool | int | float):
             raise item.fail("a text, a number, true or false")
     return dict(node.value)
-
-
-def _is_simple(outline: NDArray[np.float64]) -> bool:
-    """Whether a polygon (k, 2) is counter-clockwise, with sides of 1 cm and more that meet only in their corners."""
-    ahead = np.roll(outline, -1, axis=0)
-    area = 0.5 * float(np.sum(outline[:, 0] * ahead[:, 1] - outline[:, 1] * ahead[:, 0]))
-    if area < 1e-4 or np.linalg.norm(ahead - outline, axis=1).min() < 0.01:
-        return False
-    k = len(outline)
-    for i in range(k):
-        for j in range(i + 1, k):
-            apart = j - i > 1 and (i, j) != (0, k - 1)
-            if apart and _touch(outline[i], ahead[i], outline[j], ahead[j]):
-                return False
-    return all(distance_to_border(outline[i], np.stack([outline[i - 2], outline[i - 1]])) > 1e-3 for i in range(k))
-
-
-def _touch(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]) -> bool:
-    """Whether two segments come nearer than 1 mm."""
-    def side(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> float:
-        u, v = q - p, r - p
-        return float(u[0] * v[1] - u[1] * v[0])
-
-    if side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0:
-        return True
-    pairs = ((a, c, d), (b, c, d), (c, a, b), (d, a, b))
-    return min(distance_to_border(p, np.stack([q, r])) for p, q, r in pairs) < 1e-3

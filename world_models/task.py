@@ -111,6 +111,7 @@ class Leg:
         sketch: id of the sketch entry; index: which of its subgoals.
         x0_m, y0_m, x1_m, y1_m: from where to where [m, world].
         tolerance_m: how near is near enough.
+        heading_rad: the heading wanted at the end [rad, world]; None for any.
         increments: motor commands so far.
         status: moving, arrived or halted.
     """
@@ -122,6 +123,7 @@ class Leg:
     x1_m: float
     y1_m: float
     tolerance_m: float
+    heading_rad: float | None = None
     increments: int = 0
     status: str = "moving"
 
@@ -163,6 +165,7 @@ class Certificate:
 
     Attributes:
         milestone: id of the milestone entry.
+        fix: id of the pose fix that it rests on, or "".
         verdict: verified, refuted or not testable.
         reason: in words.
         expected, matched, inliers: numbers of model lines.
@@ -174,6 +177,7 @@ class Certificate:
     """
 
     milestone: str
+    fix: str
     verdict: str
     reason: str
     expected: int

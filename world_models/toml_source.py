@@ -45,8 +45,9 @@ class Source:
         except RecursionError:
             raise WorldError(f"{name}: expected at most a few nested arrays, got too many to read") from None
         except ValueError as error:
-            line = re.search(r"line (\d+)", str(error))
-            raise WorldError(f"{name}:{line.group(1) if line else '?'}: expected TOML, got: {error}") from None
+            told = re.search(r"at line (\d+)", str(error))
+            line = told.group(1) if told else text.count("\n") + 1
+            raise WorldError(f"{name}:{line}: expected TOML, got: {error}") from None
         return Source(name, data, line_numbers(text))
 
     @property

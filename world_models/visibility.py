@@ -1,14 +1,14 @@
 """Which model lines and corners a camera sees: exact hidden-line removal by shadow volumes.
 
 Seen from the optical centre, a convex one-sided surface hides what lies in its shadow: beyond its plane and within the
-pyramid of its sides. Each of these bounds is linear in a point, so that the hidden part of a segment is an interval that
-can be computed for all pairs of lines and surfaces at once. Locales that no chain of doorways opens to the camera are
+pyramid of its sides. Each of these bounds is linear in a point, so that the hidden part of a segment is an interval,
+computed for all pairs of lines and surfaces at once (:mod:`world_models.shadows`). Locales that no chain of doorways opens to the camera are
 left out beforehand (§3.4: the locale network as a focusing mechanism).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -17,18 +17,23 @@ from numpy.typing import NDArray
 
 from world_models.camera import NEAR_M, Camera
 from world_models.frames import Pose
-from world_models.geometer import left_over
 from world_models.portals import Window, image_window, windows_of
 from world_models.scene import Scene
+from world_models.shadows import (
+    SHORTEST_PIECE,
+    Shadows,
+    clipped_spans,
+    hidden_points,
+    lengths_px,
+    overlap,
+    pieces,
+    rectangles,
+    shadows_of,
+    visible_spans,
+)
 
 if TYPE_CHECKING:
     from world_models.world import World
-
-TOUCHING_M = 0.002
-"""What lies no deeper than this below a surface lies on it and is seen; details stand out by twice as much."""
-
-SHORTEST_PIECE = 1e-6
-"""Gaps between hidden intervals that are shorter than this part of a line are cracks between surfaces, not views."""
 
 Floats = NDArray[np.float64]
 
@@ -111,18 +116,18 @@ def visible_lines(
     chosen = view.locales_seen(scene.line_locales) & _named(scene, scene.line_landmark, world, locales)
     index = np.flatnonzero(chosen & (contrast >= min_contrast))
     lines = camera_from_world.apply(scene.edges.lines_world[index]).reshape(-1, 2, 3)
-    span = _clip(lines, window)
-    lines, keep = _pieces(lines, span), span[:, 1] - span[:, 0] > SHORTEST_PIECE
-    keep[keep] &= _lengths(camera.project(lines[keep])) >= min_length_px
+    span = clipped_spans(lines, window)
+    lines, keep = pieces(lines, span), span[:, 1] - span[:, 0] > SHORTEST_PIECE
+    keep[keep] &= lengths_px(camera.project(lines[keep])) >= min_length_px
     keep[keep] &= np.linalg.norm(lines[keep], axis=2).min(axis=1) < max_distance_m
-    keep[keep] &= _overlaps(_bounds(lines[keep]), view.windows_for(scene.line_locales[index[keep]]))
+    keep[keep] &= overlap(rectangles(lines[keep]), view.windows_for(scene.line_locales[index[keep]]))
     index, lines = index[keep], lines[keep]
-    owner, span = _visible_spans(lines, view.shadows())
-    index, lines = index[owner], _pieces(lines[owner], span)
+    owner, span = visible_spans(lines, view.shadows())
+    index, lines = index[owner], pieces(lines[owner], span)
     segments = camera.project(lines)
     found = VisibleLines(segments, camera_from_world.inverse().apply(lines), scene.line_landmark[index],
                          scene.line_index[index], contrast[index])
-    found = found[_lengths(segments) >= min_length_px]
+    found = found[lengths_px(segments) >= min_length_px]
     return found[_distinct(found, min_separation_px)] if min_separation_px > 0 else found
 
 
@@ -152,25 +157,10 @@ def visible_points(
     index, points = index[ahead], points[ahead]
     pixels = camera.project(points)
     keep = camera.inside(pixels, margin_px)
-    keep[keep] &= ~_hidden_points(points[keep], view.shadows())
+    keep[keep] &= ~hidden_points(points[keep], view.shadows())
     index = index[keep]
     return VisiblePoints(pixels[keep], scene.corners_world[index], scene.corner_landmark[index],
                          scene.corner_index[index], contrast[index])
-
-
-@dataclass(frozen=True, eq=False)
-class _Shadows:
-    """Front-facing surfaces as seen by the camera.
-
-    Attributes:
-        bounds: (K + 1, m, 4) rows (g, h): a point p of the camera frame is in the shadow where all g . p + h >= 0.
-        windows: (m, 4) rectangles at depth 1 that they cannot leave.
-        nearest_m: (m,) depth of their nearest corner.
-    """
-
-    bounds: Floats
-    windows: Floats
-    nearest_m: Floats
 
 
 class _View:
@@ -192,24 +182,19 @@ class _View:
         both = self.windows[locales]
         return np.concatenate([both[:, :, :2].min(axis=1), both[:, :, 2:].max(axis=1)], axis=1)
 
-    def shadows(self) -> _Shadows:
+    def shadows(self) -> Shadows:
         scene, pose = self.scene, self.camera_from_world
         centre = pose.inverse().translation
         facing = scene.planes_world[:, :3] @ centre - scene.planes_world[:, 3] > 1e-6
         index = np.flatnonzero(facing & self.locales_seen(scene.surface_locales))
         polygons = pose.apply(scene.polygons_world[index])
-        windows = _bounds(polygons)
-        keep = (polygons[..., 2].max(axis=1) > NEAR_M) & _overlaps(
+        windows = rectangles(polygons)
+        keep = (polygons[..., 2].max(axis=1) > NEAR_M) & overlap(
             windows, self.windows_for(scene.surface_locales[index]))
         index, polygons, windows = index[keep], polygons[keep], windows[keep]
-        normals = scene.planes_world[index, :3] @ pose.rotation.T
-        offsets = scene.planes_world[index, 3] + normals @ pose.translation
-        sides = -np.cross(polygons, np.roll(polygons, -1, axis=1))
-        bounds = np.zeros((sides.shape[1] + 1, len(index), 4))
-        bounds[:-1, :, :3] = np.moveaxis(sides, 1, 0)
-        bounds[-1, :, :3] = -normals
-        bounds[-1, :, 3] = offsets - TOUCHING_M
-        return _Shadows(bounds, windows, polygons[..., 2].min(axis=1))
+        planes = np.column_stack([scene.planes_world[index, :3] @ pose.rotation.T, scene.planes_world[index, 3]])
+        planes[:, 3] += planes[:, :3] @ pose.translation
+        return shadows_of(polygons, planes, windows)
 
 
 def _named(scene: Scene, landmark: NDArray[np.int64], world: World, locales: Collection[str] | None) -> Any:
@@ -218,84 +203,6 @@ def _named(scene: Scene, landmark: NDArray[np.int64], world: World, locales: Col
         return True
     wanted = np.array([mark.locale in locales or mark.neighbour in locales for mark in world.landmarks], bool)
     return wanted[landmark]
-
-
-def _clip(lines: Floats, window: Window) -> Floats:
-    """(n, 2) the part of each segment (n, 2, 3) of the camera frame that is in front and within the window."""
-    x0, y0, x1, y1 = window
-    x, y, z = np.moveaxis(lines, 2, 0)
-    return _interval(((v[:, 0], v[:, 1]) for v in (z - NEAR_M, x - x0 * z, x1 * z - x, y - y0 * z, y1 * z - y)), len(lines))
-
-
-def _interval(bounds: Iterable[tuple[Floats, Floats]], count: int) -> Floats:
-    """(n, 2) where linear functions are all >= 0, given by their values (n,) at 0 and at 1; empty where low >= high."""
-    low, high = np.zeros(count), np.ones(count)
-    for start, end in bounds:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            root = start / (start - end)
-        low = np.where(start < 0, np.where(end < 0, 2.0, np.maximum(low, root)), low)
-        high = np.where((start >= 0) & (end < 0), np.minimum(high, root), high)
-    return np.stack([low, high], axis=1)
-
-
-def _pieces(lines: Floats, span: Floats) -> Floats:
-    """(n, 2, 3) the parts of segments between two parameters each (n, 2)."""
-    a, d = lines[:, :1], lines[:, 1:] - lines[:, :1]
-    return np.asarray(a + span[:, :, None] * d)
-
-
-def _lengths(segments_px: Floats) -> Floats:
-    """(n,) [px]."""
-    return np.asarray(np.hypot(*(segments_px[:, 1] - segments_px[:, 0]).T))
-
-
-def _bounds(points: Floats) -> Floats:
-    """(n, 4) rectangles at depth 1 round n sets of points (n, k, 3); without bounds where one is not in front."""
-    z = points[..., 2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        xy = points[..., :2] / z[..., None]
-    rectangles = np.concatenate([xy.min(axis=1), xy.max(axis=1)], axis=1)
-    rectangles[z.min(axis=1) < 0.99 * NEAR_M] = (-np.inf, -np.inf, np.inf, np.inf)
-    return rectangles
-
-
-def _overlaps(one: Floats, other: Floats) -> NDArray[np.bool_]:
-    """Whether rectangles (..., 4) have a point in common."""
-    found = (one[..., 0] <= other[..., 2]) & (one[..., 1] <= other[..., 3])
-    found &= (other[..., 0] <= one[..., 2]) & (other[..., 1] <= one[..., 3])
-    return np.asarray(found)
-
-
-def _visible_spans(lines: Floats, shadows: _Shadows) -> tuple[NDArray[np.int64], Floats]:
-    """The visible parts of segments (n, 2, 3): which segment (k,), and from where to where (k, 2)."""
-    near_enough = shadows.nearest_m[None, :] < lines[..., 2].max(axis=1)[:, None]
-    pair = np.nonzero(_overlaps(_bounds(lines)[:, None], shadows.windows[None]) & near_enough)
-    start, end = lines[pair[0], 0], lines[pair[0], 1]
-    hidden = _interval(((_value(b, start), _value(b, end)) for b in shadows.bounds[:, pair[1]]), len(start))
-    some = hidden[:, 1] > hidden[:, 0]
-    taken: list[list[tuple[float, float]]] = [[] for _ in lines]
-    for line, low, high in zip(pair[0][some].tolist(), *hidden[some].T.tolist(), strict=True):
-        taken[line].append((low, high))
-    rows = [(line, *piece) for line, parts in enumerate(taken) for piece in left_over((0.0, 1.0), parts, SHORTEST_PIECE)]
-    table = np.array(rows, float).reshape(-1, 3)
-    return table[:, 0].astype(np.int64), table[:, 1:]
-
-
-def _value(bound: Floats, points: Floats) -> Floats:
-    """(n,) g . p + h for bounds (n, 4) and points (n, 3)."""
-    return np.asarray(bound[:, 0] * points[:, 0] + bound[:, 1] * points[:, 1] + bound[:, 2] * points[:, 2] + bound[:, 3])
-
-
-def _hidden_points(points: Floats, shadows: _Shadows) -> NDArray[np.bool_]:
-    """(n,) whether points (n, 3) lie in a shadow."""
-    near_enough = shadows.nearest_m[None, :] < points[:, 2:]
-    pair = np.nonzero(_overlaps(_bounds(points[:, None])[:, None], shadows.windows[None]) & near_enough)
-    inside = np.ones(len(pair[0]), bool)
-    for bound in shadows.bounds[:, pair[1]]:
-        inside &= _value(bound, points[pair[0]]) >= 0
-    hidden = np.zeros(len(points), bool)
-    hidden[pair[0][inside]] = True
-    return hidden
 
 
 def _distinct(lines: VisibleLines, separation_px: float) -> NDArray[np.int64]:
@@ -309,10 +216,9 @@ def _distinct(lines: VisibleLines, separation_px: float) -> NDArray[np.int64]:
         along.append(dx * ux + dy * uy)
         off.append(np.abs(dx * uy - dy * ux))
     shared = np.minimum(np.maximum(*along), length[:, None]) - np.maximum(np.minimum(*along), 0.0)
-    covered = (np.maximum(*off) < separation_px) & (shared > 0.5 * length[:, None])
-    order = np.argsort(-lines.contrast, kind="stable")
+    covers = (np.maximum(*off) < separation_px) & (shared > 0.5 * length)
     kept: list[int] = []
-    for i in order.tolist():
-        if not covered[i, kept].any():
+    for i in np.argsort(-lines.contrast, kind="stable").tolist():
+        if not covers[kept, i].any():
             kept.append(i)
     return np.array(sorted(kept), np.int64)

@@ -1,4 +1,4 @@
-"""The world (§3.4): locales in a contained-by hierarchy, the doorways, faces and landmarks in them, and questions on it."""
+"""The world (§3.4): locales in a contained-by hierarchy, their doorways, faces and landmarks, and questions on them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Template correlation (§1.2, §5): where in this image is the patch that was seen there?
 
-Normalised cross-correlation finds the place to a pixel and says how sure and how unique it is; a least-squares alignment
-(gain and brightness free) finishes to a few hundredths of a pixel and gives a covariance, large along an edge.
+Normalised cross-correlation finds the place to a pixel and says how sure and how unique it is; a least-squares
+alignment (gain and brightness free) finishes to a few hundredths of a pixel and gives a covariance, large along edges.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from knowledge_sources.methods.correlation_align import align, gradients
 from knowledge_sources.methods.images import grey_float, noise_sigma
 
 _MARGIN_PX = 4
-_LOBE_PX = 2.5
-"""Nearer than this to the best place, another local maximum is the same place."""
+_LOBE_PX = 2
+"""Up to here from the best place, another local maximum is the same place."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +54,6 @@ class Correlation:
     Attributes:
         position_px: (2,) the template's centre (u, v) [px].
         covariance_px: (2, 2) of the position [px^2]; large along an edge.
-        sigma_px: root of the covariance's mean diagonal [px].
         peak: normalised correlation at the best place, between pixels, -1 to 1.
         second_peak: the best at another place in the window, -1 where there is none.
         at_border: the best place lies at the window's border, so the true place may be outside.
@@ -70,6 +69,7 @@ class Correlation:
 
     @property
     def sigma_px(self) -> float:
+        """Root of the covariance's mean diagonal [px]."""
         return math.sqrt(float(np.trace(self.covariance_px)) / 2.0)
 
     @property
@@ -133,13 +133,15 @@ def correlate(
     half = template.half_px
     patch = template.patch(scale, border=1)
     view = np.ascontiguousarray(pixels[v0 - half : v1 + half + 1, u0 - half : u1 + half + 1], np.float32)
-    score = np.asarray(cv2.matchTemplate(view, np.ascontiguousarray(patch[1:-1, 1:-1]), cv2.TM_CCOEFF_NORMED), np.float32)
-    score[~np.isfinite(score)] = -1.0
+    score = _scores(patch, view)
     row, column = divmod(int(np.argmax(score)), score.shape[1])
     start = np.array([column, row], float) + _quadratic_peak(score, row, column)
-    at_border = not (0 < row < score.shape[0] - 1 and 0 < column < score.shape[1] - 1)
     place, covariance, aligned = align(patch, view, start, template.noise, search_px)
-    position = place + (u0, v0)
+    last = np.array(score.shape[::-1]) - 1
+    at_border = row in (0, last[1]) or column in (0, last[0]) or bool(np.any((place < 0) | (place > last)))
+    if at_border:  # what lies beyond the window has not been looked at
+        place, aligned = start, -1.0
+    position = place + np.array([u0, v0])
     peak = max(float(score[row, column]), aligned)
     second = _second(score, row, column, half)
     return Correlation(position, covariance, peak, second, at_border, position - predicted)
@@ -153,7 +155,7 @@ def corner_strength(image: Any, centre_px: Any, half_px: int = 12) -> float:
 
 
 def self_correlation(image: Any, centre_px: Any, half_px: int, search_px: float) -> Correlation:
-    """How a patch would be found again in its own image: its `distinctiveness` and `covariance_px` rate it as a landmark.
+    """How a patch would be found in its own image: its `distinctiveness` and `covariance_px` rate it as a landmark.
 
     Raises:
         ValueError: the patch does not lie in the image.
@@ -166,7 +168,7 @@ def self_correlation(image: Any, centre_px: Any, half_px: int, search_px: float)
 
 
 def _interpolation(places: NDArray[np.float64], size: int, scale: float) -> NDArray[np.float32]:
-    """(..., size) weights of cubic interpolation at places (...) from 0 to size - 1, widened where the template shrinks.
+    """(..., size) weights of cubic interpolation at places (...) in 0 .. size - 1, widened where the template shrinks.
 
     Source: R. Keys, Cubic convolution interpolation, 1981, with a = -1/2: exact for polynomials to the second degree.
     """
@@ -190,6 +192,14 @@ def _window(
     return (u0, u1, v0, v1) if u0 <= u1 and v0 <= v1 else None
 
 
+def _scores(patch: NDArray[np.float32], view: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Normalised correlation of a patch (without its border of one) at every place of a window; -1 on what is plain."""
+    inner = np.ascontiguousarray(patch[1:-1, 1:-1])
+    score = np.asarray(cv2.matchTemplate(view, inner, cv2.TM_CCOEFF_NORMED), np.float32)
+    score[~np.isfinite(score)] = -1.0
+    return score
+
+
 def _quadratic_peak(score: NDArray[np.float32], row: int, column: int) -> NDArray[np.float64]:
     """Offset (u, v) of the top of the quadric through the 3 x 3 scores round a peak, at most half a cell."""
     if not (0 < row < score.shape[0] - 1 and 0 < column < score.shape[1] - 1):
@@ -208,8 +218,11 @@ def _quadratic_peak(score: NDArray[np.float32], row: int, column: int) -> NDArra
 
 def _second(score: NDArray[np.float32], row: int, column: int, half: int) -> float:
     """The best score at another place: a local maximum beyond the main lobe, or anything half a half-width away."""
-    rows, columns = np.ogrid[: score.shape[0], : score.shape[1]]
-    away = (rows - row) ** 2 + (columns - column) ** 2
-    summit = score >= cv2.dilate(score, np.ones((3, 3), np.uint8))
-    other = (summit & (away > _LOBE_PX**2)) | (away > (half / 2.0) ** 2)
-    return float(np.max(score, initial=-1.0, where=other))
+    summits = np.where(score >= cv2.dilate(score, np.ones((3, 3), np.uint8)), score, np.float32(-1.0))
+    return max(_best_beyond(summits, row, column, _LOBE_PX), _best_beyond(score.copy(), row, column, half // 2))
+
+
+def _best_beyond(score: NDArray[np.float32], row: int, column: int, reach: int) -> float:
+    """The best score outside a square round a place, which is overwritten; -1 where there is none."""
+    score[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) : column + reach + 1] = -1.0
+    return float(score.max())

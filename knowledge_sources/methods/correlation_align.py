@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-_STEPS = 3
+_STEPS = 2
 
 _DIRECTION_LEAK = 3e-4
 """Share of an edge's gradient energy that seems to lie along it."""
@@ -101,7 +101,7 @@ class _Symmetric:
 def _covariance(normal: _Symmetric, cells: int, residual: float, noise: float, widest: float) -> NDArray[np.float64]:
     """Covariance of the place: residual variance over the gradients' energy, the noise's share of the latter removed.
 
-    Central differences of noise of variance s^2 have variance s^2 / 2, so a blank wall has gradients but no information;
+    Central differences of noise of variance s^2 have variance s^2 / 2, so a blank wall has gradients, no information;
     and because their own direction is off by a per cent or two, a strong edge seems to know a little of its length.
     """
     large, small, angle = normal.eigen()

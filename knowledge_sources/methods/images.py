@@ -42,7 +42,7 @@ def grey_float(image: Any) -> NDArray[np.float32]:
 def noise_sigma(image: NDArray[np.float32]) -> float:
     """Standard deviation of the pixel noise [grey levels], at least that of rounding to whole grey levels.
 
-    The median response to a mask that is blind to constant, linear and straight-edge structure, on at most about 64 rows.
+    The median response to a mask that is blind to plain, linear and straight-edge structure, on at most about 64 rows.
     Source: J. Immerkaer, Fast noise variance estimation, CVIU 64(2), 1996, with the median in place of the mean.
     """
     if min(image.shape) < 3:

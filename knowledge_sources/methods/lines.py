@@ -32,7 +32,7 @@ class LineSegments:
     """Segments found in an image.
 
     Without predictions ends are ordered so that the brighter side is on the right of end 0 -> end 1 as seen in the
-    picture; with predictions they run the way of the prediction, and the contrast is negative where the left is brighter.
+    picture; with predictions they run the way of the prediction, and contrast is negative where the left is brighter.
 
     Attributes:
         segments_px: (n, 2, 2) ends (u, v) [px].
@@ -67,6 +67,28 @@ class LineSegments:
         )
 
 
+def distinct(found: LineSegments, within_px: float = 0.7) -> LineSegments:
+    """The same segments without repeats, longest first: an edge that lies in two predictions' bands is found twice.
+
+    A segment is a repeat of a longer one if both its ends lie on it, within `within_px` across and 3 px along, and its
+    brighter side is the same.
+    """
+    order = np.argsort(-found.lengths_px, kind="stable")
+    sorted_ = found.take(order)
+    start, delta = sorted_.segments_px[:, 0], sorted_.segments_px[:, 1] - sorted_.segments_px[:, 0]
+    length = sorted_.lengths_px
+    along = delta / length[:, None]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    on = np.ones((len(found), len(found)), bool)  # [i, j]: segment j lies on segment i
+    for end in (0, 1):
+        places = sorted_.segments_px[:, end].T
+        t, o = (axis @ places - np.sum(axis * start, axis=1)[:, None] for axis in (along, across))
+        on &= (np.abs(o) <= within_px) & (t >= -3.0) & (t <= length[:, None] + 3.0)
+    bright_right = along * np.sign(sorted_.contrast)[:, None]
+    on &= bright_right @ bright_right.T > 0.0
+    return sorted_.take(~np.any(np.triu(on, 1), axis=0))
+
+
 def find_lines(
     image: Any,
     predicted_px: Any = None,
@@ -75,6 +97,7 @@ def find_lines(
     min_length_px: float = 8.0,
     min_contrast: float = 2.0,
     max_turn_rad: float = 0.3,
+    systematic_px: float = 0.03,
 ) -> LineSegments:
     """Straight edges of an image.
 
@@ -85,6 +108,8 @@ def find_lines(
         min_length_px: shorter segments are dropped [px].
         min_contrast: fainter segments are dropped [grey levels].
         max_turn_rad: segments turned further from their prediction are dropped [rad].
+        systematic_px: added in quadrature to the deviations: what no length of edge averages out, such as a lens that
+            is not quite known, or a renderer that places a vertical edge to a sixteenth of a pixel.
 
     Raises:
         ValueError: the image is not (h, w), the predictions are not (m, 2, 2), or a limit is not positive.
@@ -98,10 +123,10 @@ def find_lines(
     if predicted_px is None:
         rough = _whole_image(image, pixels)
         fit = refine(pixels, rough, np.ones(len(rough)), noise, (2, 2))
-        return _checked(fit, np.full(len(rough), -1, np.intp), min_length_px, min_contrast)
+        return _checked(fit, np.full(len(rough), -1, np.intp), min_length_px, min_contrast, systematic_px)
     near = find_in_bands(pixels, _predictions(predicted_px), noise, band_px, min_length_px, max_turn_rad)
     fit = refine(pixels, near.segments_px, near.sign, noise, (2,))
-    return _checked(fit, near.predicted, min_length_px, min_contrast)
+    return _checked(fit, near.predicted, min_length_px, min_contrast, systematic_px)
 
 
 def _predictions(predicted_px: Any) -> NDArray[np.float64]:
@@ -114,7 +139,7 @@ def _predictions(predicted_px: Any) -> NDArray[np.float64]:
 
 
 def _whole_image(image: Any, pixels: NDArray[np.float32]) -> NDArray[np.float64]:
-    """LSD's segments (n, 2, 2) [px], brighter side on the right, its constant offset removed, those under 5 px dropped."""
+    """LSD's segments (n, 2, 2) of 5 px and more, brighter side on the right, its constant offset removed [px]."""
     eight_bit = np.asarray(image)
     if eight_bit.dtype != np.uint8:
         eight_bit = np.clip(np.rint(pixels), 0, 255).astype(np.uint8)
@@ -126,7 +151,12 @@ def _whole_image(image: Any, pixels: NDArray[np.float32]) -> NDArray[np.float64]
     return np.asarray(segments[np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1) >= 5.0])
 
 
-def _checked(fit: Refined, owner: NDArray[np.intp], min_length: float, min_contrast: float) -> LineSegments:
-    found = LineSegments(fit.segments_px, fit.sigma_offset_px, fit.sigma_angle_rad, fit.contrast, owner)
-    keep = (found.lengths_px >= min_length) & (np.abs(fit.contrast) >= min_contrast) & (fit.support >= _LEAST_SUPPORT)
-    return found.take(keep)
+def _checked(
+    fit: Refined, owner: NDArray[np.intp], min_length: float, min_contrast: float, systematic: float
+) -> LineSegments:
+    length = np.linalg.norm(fit.segments_px[:, 1] - fit.segments_px[:, 0], axis=1)
+    keep = (length >= min_length) & (np.abs(fit.contrast) >= min_contrast) & (fit.support >= _LEAST_SUPPORT)
+    offset = np.hypot(fit.sigma_offset_px, systematic)
+    # A displacement spread evenly along a segment of length L has, as a slope, deviation sqrt(12) / L.
+    angle = np.hypot(fit.sigma_angle_rad, 12.0**0.5 * systematic / np.maximum(length, 1.0))
+    return LineSegments(fit.segments_px, offset, angle, fit.contrast, owner).take(keep)

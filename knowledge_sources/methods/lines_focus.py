@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.lines_sample import sample
+from world_models.camera import clip_segments
 
 _ALONG_PX = 2.0
 _ACROSS_PX = 1.0
@@ -32,18 +33,17 @@ _LEAST_DENSITY = 0.6
 
 @dataclass(frozen=True, slots=True)
 class _Strips:
-    """The bands: x, y (rows, columns) [px] of every canvas cell, and each column's strip and place along it."""
+    """The bands: x, y (rows, columns) [px] of every canvas cell, each column's prediction, which may hold peaks."""
 
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     owner: NDArray[np.intp]
     usable: NDArray[np.bool_]
-    first: NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Segments (n, 2, 2) [px], 1 where the right-hand side is the brighter one else -1 (n,), and whose band each is in (n,)."""
+    """Segments (n, 2, 2) [px]; 1 where the right-hand side is brighter, else -1 (n,); whose band each is in (n,)."""
 
     segments_px: NDArray[np.float64]
     sign: NDArray[np.float64]
@@ -73,9 +73,12 @@ def find_in_bands(
 
 
 def _strips(shape: tuple[int, ...], predicted: NDArray[np.float64], band: float) -> _Strips | None:
+    # What is further outside than the band cannot show, however far a prediction runs.
+    clipped, usable = clip_segments(predicted + band, round(shape[1] + 2.0 * band), round(shape[0] + 2.0 * band))
+    predicted = clipped - band
     delta = predicted[:, 1] - predicted[:, 0]
     length = np.linalg.norm(delta, axis=1)
-    usable = np.isfinite(length) & (length > 1e-6)
+    usable &= length > 1e-6
     if not usable.any():
         return None
     which = np.flatnonzero(usable)
@@ -94,7 +97,7 @@ def _strips(shape: tuple[int, ...], predicted: NDArray[np.float64], band: float)
     y = base[:, 1] + offset * across[strip, 1]
     inside = (x > 1.0) & (x < shape[1] - 2.0) & (y > 1.0) & (y < shape[0] - 2.0)
     inside &= (step >= _GUARD_PX) & (step < counts[strip] - _GUARD_PX) & (np.abs(offset) <= band)
-    return _Strips(x, y, which[strip], inside, first)
+    return _Strips(x, y, which[strip], inside)
 
 
 def _gradient(canvas: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -124,7 +127,7 @@ Chains = tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.intp]]
 
 
 def _chains(gradient: NDArray[np.float32], usable: NDArray[np.bool_], threshold: float, min_length: float) -> Chains:
-    """Column, sub-pixel row and chain number of each gradient peak, chain by chain; chains sure to be too short are left out."""
+    """Column, sub-pixel row and chain number of each gradient peak, by chain, without chains sure to be too short."""
     peak = np.zeros(gradient.shape, bool)
     mid = gradient[1:-1]
     peak[1:-1] = (mid > threshold) & (mid >= gradient[:-2]) & (mid > gradient[2:])
@@ -172,7 +175,8 @@ def _straight(
     high = np.maximum.reduceat(np.where(on_line, column, -np.inf), start)
     count = np.bincount(label[on_line], minlength=n)
     length = high - low + 1.0
-    good = (count >= 3) & (length >= min_length) & (count >= _LEAST_DENSITY * length) & (np.abs(slope) <= np.tan(max_turn))
+    good = (count >= 3) & (length >= min_length) & (count >= _LEAST_DENSITY * length)
+    good &= np.abs(slope) <= np.tan(max_turn)
     which = np.flatnonzero(good)
     ends = np.stack([_place(strips, c[which], (offset + slope * c)[which]) for c in (low, high)], axis=1)
     owner = np.zeros(n, np.intp)

@@ -1,7 +1,7 @@
 """Sub-pixel refinement: a rough segment is moved to where the brightness changes fastest across it.
 
-Across each segment, every 2 px along it, the peak of the gradient is found to a fraction of a pixel; a line is fitted to
-the peaks, weighted by the squared gradient (a peak's variance falls with it) and by Tukey's function of the residual.
+Across each segment, every 2 px along it, the peak of the gradient is found to a fraction of a pixel; a line is fitted
+to the peaks, weighted by the squared gradient (a peak's variance falls with it) and Tukey's function of the residual.
 """
 
 from __future__ import annotations
@@ -36,9 +36,6 @@ _CORRELATION = 2.0
 
 _END_SHARE = 0.35
 """A sample is past the end of its edge if its gradient is below this share of the strongest within two samples."""
-
-_SYSTEMATIC_PX = 0.01
-"""What no amount of length averages out: rendering, rounding, compression [px]."""
 
 _PRIOR_PEAKS = 4.0
 """How many peaks the predicted scatter counts for beside the measured one."""
@@ -126,7 +123,7 @@ def _rulers(segments: NDArray[np.float64]) -> _Rulers:
 def _gradient(
     smooth: NDArray[np.float32], rulers: _Rulers, reach: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Brightness gradient across (samples, 2 reach + 1) [1/px] at offsets -reach .. reach px; the lines' places (samples, 2)."""
+    """Gradient across (samples, 2 reach + 1) [1/px] at offsets -reach .. reach px, and the samples' places."""
     offsets = np.arange(-reach - 1, reach + 2, dtype=float)
     on_line = rulers.origin[rulers.owner] + rulers.t[:, None] * rulers.along[rulers.owner]
     normal = rulers.across[rulers.owner]
@@ -158,9 +155,9 @@ def _phase_bias(
 ) -> NDArray[np.float64]:
     """How far bilinear reading moves a peak [px].
 
-    At a fraction f of a pixel it weighs the neighbours by 1 - f and f: unbiased in the mean, but skewed, with third moment
-    f (1 - f) (1 - 2 f). On a vertical edge all samples share f and nothing averages out. How far that skew moves the top of
-    the parabola was computed for a step behind lenses of several blurs; the parabola's bend tells them apart.
+    At a fraction f of a pixel it weighs the neighbours by 1 - f and f: unbiased in the mean, but skewed, with third
+    moment f (1 - f) (1 - 2 f). On a vertical edge all samples share f and nothing averages out. How far that skew moves
+    the top of the parabola was computed for a step behind lenses of several blurs; the parabola's bend tells which.
     """
     normal = rulers.across[rulers.owner]
     f = (on_line + offset[:, None] * normal) % 1.0
@@ -201,8 +198,8 @@ def _fit(rulers: _Rulers, peak: NDArray[np.float64], height: NDArray[np.float64]
     variance = _peak_variance(rulers, weight, residual, mass, count, gradient, noise)
     effective = mass**2 / np.maximum(rulers.total(weight**2), 1e-12)
     per_mean = _CORRELATION * variance / np.maximum(effective, 1.0)
-    variance_slope = per_mean / np.maximum(spread, 1e-6) + 3.0 * _SYSTEMATIC_PX**2 / rulers.half**2
-    variance_offset = per_mean + middle**2 * variance_slope + _SYSTEMATIC_PX**2
+    variance_slope = per_mean / np.maximum(spread, 1e-6)
+    variance_offset = per_mean + middle**2 * variance_slope
     samples = np.diff(np.append(rulers.start, len(owner)))
     return _Fit(offset, slope, variance_offset, variance_slope, gradient, count / samples, inlier)
 
@@ -228,8 +225,8 @@ def _peak_variance(
 ) -> NDArray[np.float64]:
     """Variance of one peak [px^2]: what the noise predicts, corrected by the scatter that is seen.
 
-    White noise of deviation s, smoothed by sigma, has a second derivative of variance 3 s^2 / (16 pi sigma^6); a peak of
-    height g and width b has curvature g / b^2; the quotient is the peak's displacement.
+    White noise of deviation s, smoothed by sigma, has a second derivative of variance 3 s^2 / (16 pi sigma^6); a peak
+    of height g and width b has curvature g / b^2; the quotient is the peak's displacement.
     """
     predicted = noise * math.sqrt(3.0 / (16.0 * math.pi)) / SMOOTHING_PX**3 * _EDGE_BLUR_PX**2
     prior = (predicted / np.maximum(gradient, 1e-6)) ** 2 + _FLOOR_PX**2
@@ -243,7 +240,8 @@ def _weighted_line(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[NDArray[np.float64], ...]]:
     """Offset at t = 0 and slope, with the weights' sum, mean place and variance of place along the line."""
     t = rulers.t
-    mass, t1, t2, p1, tp = rulers.total(np.stack([weight, weight * t, weight * t * t, weight * peak, weight * t * peak], 1)).T
+    terms = np.stack([np.ones_like(t), t, t * t, peak, t * peak], axis=1)
+    mass, t1, t2, p1, tp = rulers.total(weight[:, None] * terms).T
     safe = np.where(mass > 0, mass, 1.0)
     middle, level = t1 / safe, p1 / safe
     spread = np.maximum(t2 / safe - middle**2, 0.0)

@@ -1,7 +1,7 @@
 """The photometric probe: does this face's region look as the model says?
 
-Lighting is not modelled, so brightness is compared up to a gain that is given with bounds; colour shares and texture are
-not so free.
+Lighting is not modelled, so brightness is compared up to a gain that is given with bounds; colour shares and texture
+are not so free.
 """
 
 from __future__ import annotations
@@ -67,7 +67,8 @@ def measure_appearance(image: Any, polygon_px: Any) -> Appearance:
     array = np.asarray(image, np.float32)
     polygon = np.asarray(polygon_px, float)
     if array.ndim not in (2, 3) or polygon.ndim != 2 or polygon.shape[1] != 2 or len(polygon) < 3:
-        raise ValueError(f"expected an image (h, w[, 3]) and a polygon (k >= 3, 2), got {array.shape} and {polygon.shape}")
+        got = f"{array.shape} and {polygon.shape}"
+        raise ValueError(f"expected an image (h, w[, 3]) and a polygon (k >= 3, 2), got {got}")
     channels = array[..., None] if array.ndim == 2 else array
     mask = _inside(channels.shape[:2], polygon)
     count = int(mask.sum())

@@ -49,7 +49,7 @@ def segment_regions(
     Args:
         sector_px: side of the sectors whose histograms are taken [px].
         min_area_px: smaller regions join the neighbour that is most like them.
-        join_levels: touching parts of different sectors join where the means along their border differ less [grey levels].
+        join_levels: parts of different sectors join where they differ less along their border [grey levels].
 
     Raises:
         ValueError: not a grey image, or a limit is not positive.
@@ -70,7 +70,7 @@ def segment_regions(
 def histogram_valleys(levels: NDArray[np.uint8], least_share: float = 0.02) -> NDArray[np.float64]:
     """Grey levels that part the modes of a histogram; empty where there is one mode.
 
-    A valley counts where it is under 0.6 of the lower of its two peaks, and each side holds `least_share` of the pixels.
+    A valley counts where it is under 0.6 of the lower of its two peaks and each side holds `least_share` of the pixels.
     """
     counts = np.histogram(levels, _BINS, (0.0, 256.0))[0].astype(float)
     smooth = np.convolve(np.pad(counts, 3, mode="edge"), np.array([1, 3, 6, 7, 6, 3, 1]) / 27.0, mode="valid")
@@ -93,7 +93,7 @@ def _minima(smooth: NDArray[np.float64]) -> list[int]:
 def _sector_labels(levels: NDArray[np.uint8], side: int) -> NDArray[np.int32]:
     """Connected parts of one histogram mode, each within one sector.
 
-    A sector's histogram is taken a quarter of its side beyond it, lest what only just reaches into it have no mode there.
+    A sector's histogram is taken a quarter of its side beyond it, lest what only just reaches into it have no mode.
     """
     margin = side // 4
     height, width = levels.shape
@@ -135,7 +135,7 @@ def _joined_sectors(
 def _agglomerated(
     a: NDArray[np.int64], b: NDArray[np.int64], areas: NDArray[np.int64], means: NDArray[np.float64], limit: float
 ) -> NDArray[np.int64]:
-    """Whose region each part belongs to, after joining pairs in order whose regions' means differ by less than a limit."""
+    """Whose region each part is in after joining, in order, pairs whose regions' means differ less than `limit`."""
     parent = list(range(len(areas)))
     area, mean = areas.astype(float).tolist(), means.tolist()
 

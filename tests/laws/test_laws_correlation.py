@@ -63,10 +63,11 @@ def test_the_position_shifts_with_the_image(seed: int, du: int, dv: int) -> None
     image = pattern(seed)
     template = extract_template(image, middle((0.3, -0.2)), 9)
     still = correlate(template, image, middle(), 6.0)
-    moved = correlate(template, np.roll(image, (dv, du), axis=(0, 1)), middle((du, dv)), 6.0)
+    shift = np.array([du, dv])
+    moved = correlate(template, np.roll(image, (dv, du), axis=(0, 1)), middle(shift), 6.0)
     assert still is not None
     assert moved is not None
-    np.testing.assert_allclose(moved.position_px, still.position_px + (du, dv), atol=1e-3)
+    np.testing.assert_allclose(moved.position_px, still.position_px + shift, atol=1e-3)
     assert moved.peak == pytest.approx(still.peak, abs=1e-4)
 
 
@@ -104,7 +105,8 @@ def test_the_peak_is_the_best_of_all_correlations_worked_out_one_by_one(seed: in
         for v in range(centre - search, centre + search + 1)
     }
     best = max(scores, key=lambda place: scores[place])
-    assert scores[best] - 1e-3 <= found.peak <= scores[best] + 0.1
+    assert scores[best] - 1e-3 <= found.peak <= 1.4 * max(scores[best], 0.0) + 0.02  # between pixels it may be better
+    assert np.abs(found.position_px - centre).max() <= search
     assert np.abs(found.position_px - best).max() <= 1.6
 
 

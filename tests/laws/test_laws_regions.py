@@ -14,6 +14,7 @@ from knowledge_sources.methods.regions import histogram_valleys, segment_regions
 
 few = settings(deadline=None, max_examples=20)
 seeds = st.integers(0, 10_000)
+sides = st.integers(20, 45)
 
 
 def boxes(seed: int, noise: float = 2.0) -> NDArray[np.uint8]:
@@ -50,8 +51,11 @@ def test_no_region_is_smaller_than_asked(seed: int, least: int) -> None:
 
 
 @few
-@given(st.integers(10, 80), st.integers(10, 60), st.integers(20, 45), st.integers(20, 45), st.floats(0.0, 4.0), seeds)
-def test_a_box_on_a_plain_ground_is_one_region(u: int, v: int, width: int, height: int, noise: float, seed: int) -> None:
+@given(st.tuples(st.integers(10, 80), st.integers(10, 60)), sides, sides, st.floats(0.0, 4.0), seeds)
+def test_a_box_on_a_plain_ground_is_one_region(
+    corner: tuple[int, int], width: int, height: int, noise: float, seed: int
+) -> None:
+    u, v = corner
     truth = np.zeros((128, 160), bool)
     truth[v : v + height, u : u + width] = True
     image = np.where(truth, 170.0, 70.0) + noise * np.random.default_rng(seed).standard_normal(truth.shape)

@@ -19,7 +19,7 @@ from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)
 BUILDING = Building.of_faces(box_room(), samples=1)
-COMMANDS = st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-1.0, 2.0)), max_size=12)
+COMMANDS = st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(0.0, 2.0)), max_size=12)
 
 
 def body(seed: int, put_down_sigma: float = 0.0) -> SimulatedBody:
@@ -29,13 +29,13 @@ def body(seed: int, put_down_sigma: float = 0.0) -> SimulatedBody:
 
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 10**6), COMMANDS)
-def test_the_robot_never_enters_a_wall_and_a_contact_cuts_the_claim(seed: int, commands: list[tuple[float, float]]) -> None:
+def test_no_wall_is_entered_and_a_contact_cuts_the_claim(seed: int, commands: list[tuple[float, float]]) -> None:
     robot = body(seed)
     for turn, move in commands:
         before = robot.truth.collisions
         report = robot.execute(MotorCommand(turn, move))
         assert BUILDING.obstacles.clearance_m(robot.truth.world_from_robot) >= 0.0
-        assert (robot.truth.collisions > before) == (abs(report.move_m) < abs(move) - 0.0011)
+        assert (robot.truth.collisions > before) == (report.move_m < move - 0.0011)
 
 
 @settings(deadline=None, max_examples=25)

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from world_models.locales import Doorway, distance_to_border
+from world_models.locales import Doorway
+from world_models.outlines import distance_to_border
 from world_models.store import WORLDS, load_world, read_world
 from world_models.toml_source import Source
 from world_models.world import World

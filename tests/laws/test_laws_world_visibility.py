@@ -3,14 +3,16 @@
 import math
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
+from world_models.outlines import inside_polygon
+from world_models.shadows import TOUCHING_M
 from world_models.store import WORLDS, load_world
-from world_models.visibility import TOUCHING_M, VisibleLines, visible_lines, visible_points
+from world_models.visibility import VisibleLines, visible_lines, visible_points
 
 WORLD = load_world(WORLDS / "research_center.toml", details=[])
 CAMERA = Camera.from_field_of_view(math.radians(65.0))
@@ -37,6 +39,7 @@ def views(draw: st.DrawFn) -> Pose:
         outline = WORLD.outline(draw(st.sampled_from(WORLD.rooms)))
         u, v = draw(st.floats(0.15, 0.85)), draw(st.floats(0.15, 0.85))
         x, y = outline[0] + u * (outline[1] - outline[0]) + v * (outline[3] - outline[0])
+    assume(not any(inside_polygon(np.array([x, y]), thing.footprint_world, 0.02) for thing in WORLD.things))
     mount = CameraMount(draw(st.floats(0.8, 1.5)), 0.0, draw(st.floats(-0.3, 0.3)))
     return mount.camera_from_robot @ Pose2(x, y, heading).lifted().inverse()
 
@@ -49,12 +52,12 @@ def hidden_by(centre: NDArray[np.float64], point: NDArray[np.float64]) -> tuple[
     facing = normal @ ray < 0
     p = np.cross(ray, e2)
     det = np.sum(e1 * p, axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = centre - a
-        u = np.sum(s * p, axis=1) / det
-        q = np.cross(s, e1)
-        v = (q @ ray) / det
-        t = np.sum(e2 * q, axis=1) / det
+    det = np.where(np.abs(det) < 1e-12, np.nan, det)
+    s = centre - a
+    u = np.sum(s * p, axis=1) / det
+    q = np.cross(s, e1)
+    v = (q @ ray) / det
+    t = np.sum(e2 * q, axis=1) / det
     depth = -(np.sum(normal * (point - a), axis=1)) / np.linalg.norm(normal, axis=1)
 
     def any_hit(slack: float, deeper_m: float) -> bool:

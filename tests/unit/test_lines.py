@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from knowledge_sources.methods.lines import find_lines
+from knowledge_sources.methods.lines import distinct, find_lines
 
 
 def square() -> np.ndarray:
@@ -33,6 +33,12 @@ def test_invisible_and_pointlike_predictions_find_nothing_and_keep_the_numbering
 
 def test_predictions_outside_the_image_find_nothing() -> None:
     assert len(find_lines(square(), [[[500.0, 500.0], [600.0, 600.0]]])) == 0
+
+
+def test_a_prediction_that_runs_to_the_horizon_costs_no_more_than_the_image() -> None:
+    found = find_lines(square(), [[[-1e9, 17.0], [1e9, 17.0]]], min_length_px=20.0)
+    assert len(found) == 1
+    np.testing.assert_allclose(found.segments_px[0, :, 1], 15.5, atol=0.05)
 
 
 def test_the_four_sides_of_a_square_lie_half_a_pixel_outside_its_pixels() -> None:
@@ -63,6 +69,26 @@ def test_a_segment_ends_where_its_edge_ends() -> None:
 def test_the_same_image_gives_the_same_lines_as_bytes_and_as_floats() -> None:
     a, b = find_lines(square()), find_lines(square().astype(float))
     np.testing.assert_array_equal(a.segments_px, b.segments_px)
+
+
+def test_an_edge_in_two_bands_is_found_twice_and_is_one_distinct_edge() -> None:
+    predicted = np.array([[[20.0, 18.0], [59.0, 18.0]], [[59.0, 13.0], [20.0, 13.0]]])
+    found = find_lines(square(), predicted, min_length_px=20.0)
+    assert sorted(found.predicted.tolist()) == [0, 1]
+    once = distinct(found)
+    assert len(once) == 1
+    assert once.lengths_px[0] == found.lengths_px.max()
+
+
+def test_both_edges_of_a_thin_stripe_are_distinct() -> None:
+    image = np.full((64, 64), 180, np.uint8)
+    image[:, 30:34] = 60
+    found = find_lines(image, [[[33.0, 60.0], [33.0, 4.0]]])
+    assert len(distinct(found, within_px=6.0)) == 2
+
+
+def test_no_lines_are_no_distinct_lines() -> None:
+    assert len(distinct(find_lines(np.zeros((30, 30), np.uint8)))) == 0
 
 
 def test_take_keeps_every_field_together() -> None:

@@ -71,5 +71,5 @@ def test_an_arc_is_tangent_to_the_robot_at_its_start() -> None:
 @pytest.mark.parametrize("bad", [{"turn_sigma_rad": -1.0}, {"shortfall_low": 0.5}, {"speed_m_per_s": 0.0},
                                  {"distance_sigma": math.nan}])
 def test_impossible_parameters_are_refused(bad: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match="expected .* got"):
+    with pytest.raises(ValueError, match=r"expected .* got"):
         ActuatorParameters(**bad)

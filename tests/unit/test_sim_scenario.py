@@ -14,7 +14,8 @@ MINIMAL = 'world = "w"\ngoal = "(ptrans (a (1,2,0)) (b (3.5,-4,0)))"\n'
 
 
 def test_every_shipped_scenario_loads() -> None:
-    assert {"lab-to-allens-office", "hallway-kidnap", "bump", "lights-off", "forty-foot-hallway"} <= set(list_scenarios())
+    shipped = set(list_scenarios())
+    assert {"lab-to-allens-office", "hallway-kidnap", "bump", "lights-off", "forty-foot-hallway"} <= shipped
     assert all(load_scenario(name).description for name in list_scenarios())
 
 
@@ -32,7 +33,8 @@ def test_places_are_in_feet() -> None:
 
 
 def test_units_are_in_the_keys() -> None:
-    scenario = parse_scenario(MINIMAL + "[start]\nheading_deg = 90\nput_down_sigma_in = 2\n[camera]\nmount_height_ft = 3\n")
+    tables = "[start]\nheading_deg = 90\nput_down_sigma_in = 2\n[camera]\nmount_height_ft = 3\n"
+    scenario = parse_scenario(MINIMAL + tables)
     assert scenario.start.heading_rad == pytest.approx(math.pi / 2)
     assert scenario.start.put_down_sigma_m == pytest.approx(0.0508)
     assert scenario.camera.mount.height_m == pytest.approx(0.9144)

@@ -9,6 +9,8 @@ from knowledge_sources.methods.pose.lines import TINY, LineSet
 
 OVERLAP_SLACK_PX = 5.0
 """How far beside the model line's end an observed segment may lie [px]."""
+FARTHEST = 1e-16
+"""Square of the least share of a plane's normal that counts as lying in the image."""
 
 
 def projection_planes(lines: LineSet, rotation: Array, translation: Array) -> tuple[Array, Array]:
@@ -29,16 +31,23 @@ def image_distances(lines: LineSet, rotation: Array, translation: Array) -> Arra
 
 def plane_distances(lines: LineSet, planes: Array) -> Array:
     """(..., n, 2) signed distances [px] for the planes' normals (..., n, 3) in the camera frame."""
-    reach = np.hypot(planes[..., 0] / lines.focal_px[0], planes[..., 1] / lines.focal_px[1])
+    reach = _reach(planes, lines.focal_px)
     along = np.matmul(lines.rays, planes[..., None])[..., 0]
-    return np.asarray(along / np.maximum(reach, TINY)[..., None])
+    return np.asarray(along / reach[..., None])
+
+
+def _reach(planes: Array, focal_px: Array) -> Array:
+    """Length (...) of the image line's normal; kept off zero, where the line leaves the image plane altogether."""
+    squares = planes * planes
+    flat = squares[..., 0] / focal_px[0] ** 2 + squares[..., 1] / focal_px[1] ** 2
+    return np.asarray(np.sqrt(flat + FARTHEST * np.sum(squares, axis=-1) + TINY**2))
 
 
 def distance_slopes(lines: LineSet, planes: Array) -> tuple[Array, Array]:
     """Distances (..., n, 2) [px] and their derivatives (..., n, 2, 3) by the plane's normal."""
     inverse_focal2 = np.array([*(1.0 / lines.focal_px**2), 0.0])
     tilt = planes * inverse_focal2
-    reach = np.maximum(np.sqrt(np.sum(planes * tilt, axis=-1)), TINY)[..., None]
+    reach = _reach(planes, lines.focal_px)[..., None]
     distances = np.matmul(lines.rays, planes[..., None])[..., 0] / reach
     slopes = (lines.rays - distances[..., None] * (tilt / reach)[..., None, :]) / reach[..., None]
     return distances, slopes

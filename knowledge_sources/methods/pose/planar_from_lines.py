@@ -31,6 +31,9 @@ from world_models.frames import Pose, Pose2
 
 SUBSET_LINES = 28
 """Pairs are formed of so many of the longest segments (378 pairs)."""
+LONGEST_STEP = np.array([2.0, 2.0, 0.5])
+"""A pair that asks for more (m, m, rad) at once is nearly degenerate: it goes there by degrees or not at all."""
+LONGEST_STEP.setflags(write=False)
 FINALISTS = 5
 ROUNDS = 8
 
@@ -107,7 +110,8 @@ def _pair_states(lines: LineSet, pairs: Any, belief: PlanarPrior, mount: Pose, i
         r = (distances * scale).reshape(len(pairs), 4, 1)
         across = np.swapaxes(j, 1, 2)
         _, pull = prior_pull(states, belief)
-        states = states - np.linalg.solve(across @ j + belief.information, across @ r + pull[..., None])[..., 0]
+        step = np.linalg.solve(across @ j + belief.information, across @ r + pull[..., None])[..., 0]
+        states = states - np.clip(step, -LONGEST_STEP, LONGEST_STEP)
     return states
 
 

@@ -1,0 +1,131 @@
+"""Missions by scenario, settings and seed: one at a time or several in worker processes, with the same results."""
+
+from __future__ import annotations
+
+import multiprocessing
+import re
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+from blackboard.journal import Sink
+from harvey.errors import BadInput
+from harvey.run_directory import new_run
+from harvey.tally import Row, Tally
+
+if TYPE_CHECKING:
+    from sim.assembly import Stage
+
+Follow = Callable[[Tally], Sink]
+"""Makes the sink that shows what a tally counts; it is called after the tally."""
+
+WORKERS = 2
+MOST_SEEDS = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One mission to run.
+
+    Attributes:
+        scenario: name or file.
+        settings: (key, value) as in ``--set key=value``.
+        seed: of all chance.
+        out: its run directory; None keeps nothing.
+    """
+
+    scenario: str
+    settings: tuple[tuple[str, str], ...]
+    seed: int
+    out: Path | None = None
+
+    @property
+    def named(self) -> str:
+        """In a line."""
+        return " ".join([self.scenario, f"seed {self.seed}", *(f"{key}={value}" for key, value in self.settings)])
+
+    def stage(self) -> Stage:
+        """Raises BadInput where the scenario or a setting cannot be used."""
+        from sim.assembly import set_stage
+        from sim.scenario import ScenarioError, load_scenario, with_settings
+
+        try:
+            return set_stage(with_settings(load_scenario(self.scenario), dict(self.settings)))
+        except ScenarioError as error:
+            raise BadInput(str(error)) from None
+
+
+def seeds_of(text: str) -> tuple[int, ...]:
+    """``3``, ``0..19`` (both included) or ``1,4,9``. Raises BadInput."""
+    seeds: list[int] = []
+    for part in text.split(","):
+        match = re.fullmatch(r"(\d{1,9})(?:\.\.(\d{1,9}))?", part.strip(), re.ASCII)
+        first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
+        if last < first or last - first >= MOST_SEEDS:
+            raise BadInput(f"--seed: expected a number, a range as 0..19 or a list as 1,4,9, got {text!r}")
+        seeds += range(first, last + 1)
+    return tuple(dict.fromkeys(seeds))
+
+
+def settings_of(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """``key=value`` pairs. Raises BadInput."""
+    for text in texts:
+        if not text.partition("=")[0] or "=" not in text:
+            raise BadInput(f"--set: expected key=value, as servo.action=off, got {text!r}")
+    pairs = (text.partition("=") for text in texts)
+    return tuple((key.strip(), value.strip()) for key, _, value in pairs)
+
+
+def run_task(task: Task, *, sinks: Sequence[Sink] = (), follow: Follow | None = None, live: bool = False) -> Row:
+    """Run one mission; ``follow`` makes a sink that shows what is counted. Raises BadInput for what the user gave."""
+    stage = task.stage()
+    from harvey.mission import run_mission
+
+    out = None if task.out is None else new_run(task.out)
+    tally = Tally(stage)
+    shown = (follow(tally),) if follow else ()
+    began_s = time.perf_counter()
+    result = run_mission(stage, task.seed, out=out, sinks=(tally, *shown, *sinks), live=live)
+    return tally.row(task.seed, result, time.perf_counter() - began_s)
+
+
+def run_all(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Task, Row]]:
+    """Run several missions; they come as they are done, in whatever order.
+
+    A mission's row follows from its task alone, so that the number of workers changes nothing but the time.
+    """
+    spawn = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(min(workers, len(tasks)) or 1, mp_context=spawn, initializer=_become_worker)
+    try:
+        futures = {pool.submit(run_task, task): task for task in tasks}
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in multiprocessing.active_children():
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown()
+
+
+def _become_worker() -> None:
+    """The parent decides when to stop; when it does, recordings are closed on the way out."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _exit)
+
+
+def _exit(_number: int, _frame: FrameType | None) -> None:
+    sys.exit(143)
+
+
+def one_thread(environment: Mapping[str, str]) -> dict[str, str]:
+    """The environment with numerical libraries on one thread: results then do not depend on the number of cores."""
+    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+    return {**environment, **{name: environment.get(name, "1") for name in names}}

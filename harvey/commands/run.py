@@ -1,0 +1,91 @@
+"""``harvey run``: drive a mission in the simulator."""
+
+from __future__ import annotations
+
+import os
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from harvey.campaign import Task, one_thread, run_all, run_task, seeds_of, settings_of
+from harvey.commands.command import Command
+from harvey.errors import BadInput
+from harvey.run_directory import RUNS
+from harvey.tally import Row
+
+
+def _arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("scenario", metavar="SCENARIO", help="a name from harvey list, or a TOML file")
+    parser.add_argument("--seed", metavar="N", default="0", help="of all chance: 3, 0..19 or 1,4,9 (0)")
+    parser.add_argument("--out", metavar="DIR", help="where the run is kept (runs/SCENARIO-SEED; several: one each)")
+    parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
+                        help="change a setting of the scenario, as servo.action=off; may be repeated")
+    parser.add_argument("--check", action="store_true", help="only check beforehand whether the milestones can be seen")
+    parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
+    parser.add_argument("--trace", action="store_true", help="print every cycle: changes, candidates, choice, effects")
+
+
+def _run(args: Namespace) -> int:
+    os.environ.update(one_thread(os.environ))
+    seeds, settings = seeds_of(args.seed), settings_of(args.settings)
+    tasks = tuple(Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1)) for seed in seeds)
+    if args.check:
+        return _check(tasks[0])
+    if len(tasks) == 1:
+        return _one(tasks[0], args)
+    if args.trace or args.live:
+        raise BadInput(f"--{'trace' if args.trace else 'live'}: expected one seed, got {len(tasks)}")
+    return _several(tasks)
+
+
+def _out(args: Namespace, seed: int, many: bool) -> Path:
+    name = Path(args.scenario).stem
+    if args.out:
+        return Path(args.out) / str(seed) if many else Path(args.out)
+    return RUNS / name / str(seed) if many else RUNS / f"{name}-{seed}"
+
+
+def _check(task: Task) -> int:
+    stage = task.stage()
+    print(f"{stage.scenario.name}: the scenario, its world and its start are sound")
+    print("harvey run --check: not yet available; it will say beforehand which milestones can be seen", file=sys.stderr)
+    return 2
+
+
+def _one(task: Task, args: Namespace) -> int:
+    from harvey.progress import following
+    from harvey.summary import one
+    from harvey.trace import printing
+
+    sinks = (printing(sys.stdout),) if args.trace else ()
+    with following(sys.stderr) as follow:
+        row = run_task(task, sinks=sinks, follow=None if args.trace else follow, live=args.live)
+    print(one(row, task.out))
+    return 0 if row.reached else 1
+
+
+def _several(tasks: tuple[Task, ...]) -> int:
+    from harvey.progress import counted
+    from harvey.summary import several
+
+    tasks[0].stage()
+    rows: dict[int, Row] = {}
+    for task, row in counted(run_all(tasks), len(tasks), sys.stderr):
+        rows[task.seed] = row
+    print(several([rows[seed] for seed in sorted(rows)]))
+    print(f"the runs are in {tasks[0].out.parent if tasks[0].out else RUNS}")
+    return 0 if all(row.reached for row in rows.values()) else 1
+
+
+COMMAND = Command(
+    "run", "drive a mission in the simulator",
+    (
+        ("harvey run lab-to-allens-office", "Figure 17's mission"),
+        ("harvey run lab-to-allens-office --seed 0..19", "twenty of them, and a table"),
+        ("harvey run hallway-kidnap --seed 3 --trace", "print what each cycle sees, weighs and does"),
+        ("harvey run bump --set servo.action=off", "without correcting on the move"),
+        ("harvey run my_mission.toml --set start.heading_deg=80 --out runs/try", "a mission of your own"),
+    ),
+    _arguments, _run,
+    "Exit code 0: the goal was reached; 1: it was not; 2: the input cannot be used.",
+)

@@ -1,0 +1,34 @@
+"""What the command line answers for in plain words instead of a traceback."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+
+class BadInput(ValueError):
+    """Something the user gave cannot be used: says what was expected and what came. Exit code 2."""
+
+
+class Terminated(BaseException):
+    """SIGTERM came; like KeyboardInterrupt it passes every ``except Exception``, so that files are closed."""
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Turns SIGTERM into :class:`Terminated` for a while; only the main thread may set signals."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _terminate(_number: int, _frame: FrameType | None) -> None:
+    raise Terminated

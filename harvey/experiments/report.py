@@ -1,0 +1,62 @@
+"""Report: what every experiment returns, printed as a table or as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from harvey.tables import table
+
+Cell = str | int | float | None
+"""None is shown as a dash: nobody has measured it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A table of measurements with what was assumed.
+
+    Attributes:
+        title: what was measured.
+        columns: names of the columns; by custom what, paper, peer, ours.
+        rows: as many cells each.
+        notes: every assumption, and what the figures say.
+        claims: what must hold, each with whether it does.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    notes: tuple[str, ...] = ()
+    claims: tuple[tuple[str, bool], ...] = ()
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise ValueError(f"expected {len(self.columns)} cells for {self.columns}, got {row}")
+
+    @property
+    def holds(self) -> bool:
+        """Whether every claim does."""
+        return all(held for _, held in self.claims)
+
+    def text(self) -> str:
+        """For people."""
+        shown = table(self.columns, [[_shown(cell) for cell in row] for row in self.rows])
+        claims = [f"{'holds' if held else 'FAILS'}: {claim}" for claim, held in self.claims]
+        return "\n".join([self.title, "", shown, *([""] if self.notes or claims else []), *self.notes, *claims])
+
+    def record(self) -> Mapping[str, Any]:
+        """As JSON types."""
+        return {
+            "title": self.title,
+            "rows": [dict(zip(self.columns, row, strict=True)) for row in self.rows],
+            "notes": list(self.notes),
+            "claims": [{"claim": claim, "holds": held} for claim, held in self.claims],
+        }
+
+
+def _shown(cell: Cell) -> str:
+    if cell is None:
+        return "-"
+    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)

@@ -1,0 +1,91 @@
+"""A run directory: ``recording.rrd``, ``journal.jsonl`` and ``result.json``."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from harvey.errors import BadInput
+
+RUNS = Path("runs")
+"""Where runs are kept unless ``--out`` says otherwise."""
+
+FILES = ("recording.rrd", "journal.jsonl", "result.json")
+
+
+@dataclass(frozen=True, slots=True)
+class RunDirectory:
+    """Where one run is recorded."""
+
+    path: Path
+
+    @property
+    def recording(self) -> Path:
+        return self.path / "recording.rrd"
+
+    @property
+    def journal(self) -> Path:
+        return self.path / "journal.jsonl"
+
+    @property
+    def result(self) -> Path:
+        return self.path / "result.json"
+
+    def read_result(self) -> dict[str, Any]:
+        """The result; empty where the run has none (it was cut off). Raises BadInput where it is malformed."""
+        if not self.result.exists():
+            return {}
+        try:
+            data = json.loads(self.result.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise BadInput(f"{self.result}: expected a readable file, got: {error.strerror}") from None
+        except (ValueError, RecursionError) as error:
+            raise BadInput(f"{self.result}: expected JSON, got: {error}") from None
+        if not isinstance(data, dict):
+            raise BadInput(f"{self.result}: expected a JSON object, got {type(data).__name__}")
+        return data
+
+
+def new_run(path: Path) -> Path:
+    """Make room for a run: an older run there goes.
+
+    Raises:
+        BadInput: the directory cannot be made, or holds other things than a run.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        others = sorted(p.name for p in path.iterdir() if p.name not in FILES)
+        if others:
+            raise BadInput(f"--out {path}: expected a new directory or an older run's, got one with {others[0]!r}")
+        for name in FILES:
+            (path / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise BadInput(f"--out {path}: expected a directory to write to, got: {error.strerror}") from None
+    return path
+
+
+def open_run(text: str, needed: str = "journal.jsonl") -> RunDirectory:
+    """The run that a user names: its directory, a file in it, or its name under ``runs/``.
+
+    Raises:
+        BadInput: there is none (near ones are listed), or it lacks the needed file.
+    """
+    path = next((p for p in (Path(text), RUNS / text) if p.exists()), None)
+    if path is None:
+        raise BadInput(f"expected a run directory{_near(text)}, got {text!r}, which does not exist")
+    run = RunDirectory(path if path.is_dir() else path.parent)
+    inner = sorted(str(p.parent) for p in run.path.glob("*/journal.jsonl"))
+    if inner and not run.journal.exists():
+        raise BadInput(f"expected one run, got {text!r}, which holds {len(inner)} of them, as {inner[0]}")
+    if not (run.path / needed).is_file():
+        raise BadInput(f"expected a run directory with a {needed}, got {text!r}, which has none")
+    return run
+
+
+def _near(text: str) -> str:
+    known = [str(p.parent) for p in (*RUNS.glob("*/journal.jsonl"), *RUNS.glob("*/*/journal.jsonl"))]
+    near = difflib.get_close_matches(text, sorted(known), n=4, cutoff=0.5) or sorted(known)[:4]
+    return f" as {', '.join(near)}" if near else " (harvey run makes them under runs/)"

@@ -1,0 +1,139 @@
+"""Why: from an entry down to what it rests on, as a walk through the journal."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from harvey.errors import BadInput
+from harvey.records import Candidate, DecisionRecord, EntryRecord
+from harvey.sentences import sentence
+from harvey.units import count
+
+DEPTH = 5
+"""How many steps down the walk goes unless told otherwise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """One line of the explanation.
+
+    Attributes:
+        depth: 0 for what is explained.
+        ref: of the entry.
+        record: what the journal says of it; None where it says nothing.
+        known: whether it was told before.
+        hidden: how many reasons of its own are left out because they lie too deep.
+    """
+
+    depth: int
+    ref: str
+    record: EntryRecord | None
+    known: bool = False
+    hidden: int = 0
+
+
+class History:
+    """Every revision of every entry of a run, and the decision that made it."""
+
+    def __init__(self, decisions: Iterable[DecisionRecord]) -> None:
+        """Raises BadInput where a line of the journal is malformed."""
+        self._entries: dict[str, EntryRecord] = {}
+        self._newest: dict[str, str] = {}
+        self._decisions: dict[int, DecisionRecord] = {}
+        for decision in decisions:
+            self._decisions[decision.cycle] = decision
+            for record in (*decision.observed, *decision.made):
+                if record.change != "Retracted" or record.ref not in self._entries:
+                    self._entries[record.ref] = record
+                self._newest[record.id] = record.ref
+
+    def entry(self, ref: str) -> EntryRecord | None:
+        return self._entries.get(ref)
+
+    def decision(self, cycle: int) -> DecisionRecord:
+        """Raises BadInput where the run has no such cycle."""
+        if cycle not in self._decisions:
+            have = f"cycles {min(self._decisions)} to {max(self._decisions)}" if self._decisions else "none"
+            raise BadInput(f"--at: expected a cycle of the run, which has {have}, got {cycle}")
+        return self._decisions[cycle]
+
+    def outcome(self) -> str:
+        """Ref of how the mission ended, or, where it did not come to that, of the last entry.
+
+        Raises:
+            BadInput: the journal is empty.
+        """
+        outcomes = [id for id in self._newest if id.startswith("Outcome-")]
+        if not self._newest:
+            raise BadInput("expected a run with at least one entry in its journal, got none")
+        return self._newest[outcomes[-1]] if outcomes else next(reversed(self._entries))
+
+    def named(self, text: str) -> str:
+        """The ref that a user means: ``MotorCommand-12.3``, or ``MotorCommand-12`` for its last revision.
+
+        Raises:
+            BadInput: the run has no such entry; near ones are named.
+        """
+        names = {name.lower(): ref for name, ref in self._newest.items()} | {ref.lower(): ref for ref in self._entries}
+        if text.lower() in names:
+            return names[text.lower()]
+        ids = list(self._newest)
+        near = difflib.get_close_matches(text, ids, n=4, cutoff=0.6) or [ids[0], ids[-1]] if ids else []
+        raise BadInput(f"expected an entry of the run, as {', '.join(near) or 'none'}, got {text!r}")
+
+
+def walk(history: History, ref: str, depth: int = DEPTH) -> Iterator[Reason]:
+    """The entry, then what it rests on, depth first; what is shared is told where it first comes up."""
+    told: set[str] = set()
+    stack = [(0, ref)]
+    while stack:
+        level, name = stack.pop()
+        record = history.entry(name)
+        if name in told or record is None:
+            yield Reason(level, name, record, known=name in told)
+            continue
+        told.add(name)
+        hidden = len(record.because) if level >= depth else 0
+        yield Reason(level, name, record, hidden=hidden)
+        if not hidden:
+            stack += [(level + 1, reason) for reason in reversed(record.because)]
+
+
+def explain(history: History, ref: str, depth: int = DEPTH) -> Iterator[str]:
+    """The walk in plain sentences, indented."""
+    record = history.entry(ref)
+    if record is not None:
+        yield _who(record, history)
+    reasons = list(walk(history, ref, depth))
+    for index, reason in enumerate(reasons):
+        leads_on = index + 1 < len(reasons) and reasons[index + 1].depth > reason.depth
+        yield _line(reason) + (", because" if leads_on else "")
+    if any(reason.hidden for reason in reasons):
+        yield f"(--depth {depth + 1} goes on where it says \"and so on\")"
+
+
+def _line(reason: Reason) -> str:
+    indent = "  " * reason.depth
+    if reason.record is None:
+        return f"{indent}{reason.ref}, of which the journal says nothing"
+    if reason.known:
+        return f"{indent}{reason.ref}, as above"
+    tail = f" (and so on: {count(reason.hidden, 'reason')} below)" if reason.hidden else ""
+    return f"{indent}{reason.ref}: {sentence(reason.record)}{tail}"
+
+
+def _who(record: EntryRecord, history: History) -> str:
+    if record.observed:
+        return f"{record.ref} came from outside, from {record.author}, and was taken up in cycle {record.cycle}."
+    decision = history.decision(record.cycle)
+    head = f"{record.ref} was made in cycle {record.cycle} by {record.author}"
+    if decision.chosen is None:
+        return head + "."
+    second = f"; next was {_rated(decision.runner_up)}" if decision.runner_up else "; nothing else was pending"
+    return f"{head}, chosen as {_rated(decision.chosen)}, with the {decision.focus} level in focus{second}."
+
+
+def _rated(c: Candidate) -> str:
+    return f"{c.source} ({c.level} level, rated {c.rating:.2f}) on {c.trigger}"

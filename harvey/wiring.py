@@ -1,0 +1,57 @@
+"""The only place where experts, ports and servo levels meet. Adding an expert takes one file and one line here."""
+
+from __future__ import annotations
+
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from blackboard.servoing import Servoing
+from knowledge_sources.correlator_tracker import CorrelatorTracker
+from knowledge_sources.dead_reckoner import DeadReckoner
+from knowledge_sources.escalator import Escalator
+from knowledge_sources.interpreter import Interpreter
+from knowledge_sources.line_finder import LineFinder
+from knowledge_sources.matcher import Matcher
+from knowledge_sources.med_r_and_t import MedRAndT
+from knowledge_sources.milestone_judge import MilestoneJudge
+from knowledge_sources.milestone_selector import MilestoneSelector
+from knowledge_sources.mission_keeper import MissionKeeper
+from knowledge_sources.motor import Motor
+from knowledge_sources.plan_adjuster import PlanAdjuster
+from knowledge_sources.relocalizer import Relocalizer
+from knowledge_sources.sketcher import Sketcher
+from sim.scenario import Scenario, Servo
+from world_models.actuator import ActuatorModel
+from world_models.robot import RobotModel
+from world_models.store import load_world
+
+
+def knowledge_sources(robot: RobotModel) -> tuple[KnowledgeSource, ...]:
+    """Every expert, in no order that matters: control comes from triggers, ratings and levels."""
+    return (
+        Interpreter(robot),
+        Sketcher(robot),
+        MilestoneSelector(robot),
+        Motor(robot),
+        DeadReckoner(robot),
+        CorrelatorTracker(robot),
+        LineFinder(),
+        Matcher(robot),
+        MedRAndT(robot),
+        MilestoneJudge(robot),
+        PlanAdjuster(robot),
+        Escalator(),
+        Relocalizer(robot),
+        MissionKeeper(),
+    )
+
+
+def robot_model(scenario: Scenario) -> RobotModel:
+    """What the robot knows: the world file without the building's details, its camera and its wheels' kind."""
+    camera = scenario.camera
+    return RobotModel(load_world(scenario.world), camera.camera, camera.mount, ActuatorModel())
+
+
+def servoing(servo: Servo) -> Servoing:
+    """The levels that a scenario leaves on."""
+    on = {Level.ACTION: servo.action, Level.PLAN: servo.plan, Level.GOAL: servo.goal}
+    return Servoing(frozenset(level for level, is_on in on.items() if not is_on))

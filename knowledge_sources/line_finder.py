@@ -1,0 +1,49 @@
+"""Line finder (§1.2): straight line segments of a picture that was asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Post
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from knowledge_sources.methods.images import decode
+from knowledge_sources.methods.lines import find_lines
+from knowledge_sources.questions import open_milestone
+from world_models.body import Frame
+from world_models.frames import frozen
+from world_models.percepts import Segments
+
+
+class LineFinder(KnowledgeSource):
+    """Finds the segments of a frame in which a milestone, or the way back from being lost, is looked for.
+
+    It looks at the whole frame, not only where lines are expected: how much agrees by chance must be known too.
+    """
+
+    level = Level.PLAN
+    watches = (Watch(Frame, (Posted,), lambda f: f.purpose in ("milestone", "probe")),)
+    writes = (Segments,)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        return 0.8
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        frame = trigger.entry
+        image = decode(frame.value.jpeg)
+        found = find_lines(image)
+        waiting = open_milestone(view) if frame.value.purpose == "milestone" else None
+        yield Post(
+            Segments(
+                frame.id,
+                "" if waiting is None else waiting.id,
+                frozen(found.segments_px),
+                frozen(found.sigma_offset_px),
+                float(np.std(image)),
+            ),
+            (frame,) if waiting is None else (frame, waiting),
+        )

@@ -1,0 +1,69 @@
+"""Med-R-and-T (§6.2.4): the robot's pose from matched lines of which some are matched wrongly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Post
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from knowledge_sources.methods.pose import planar_from_lines
+from knowledge_sources.questions import held
+from world_models.frames import frozen
+from world_models.percepts import LineMatch, PoseFix
+from world_models.robot import RobotModel
+from world_models.task import Milestone
+
+SIGMA_PX = 0.7
+"""Standard deviation of a segment's ends across the model line: finder, JPEG and model together."""
+LOOSER = 4.0
+DOUBT = (0.05, math.radians(1.5))
+"""The belief enters as a prior that is looser than it says by a factor and by these (m, rad): the lines shall decide."""
+
+
+class MedRAndT(KnowledgeSource):
+    """Solves for the pose on the floor, and says which pairs do not agree with it.
+
+    The mounting of the camera is known (§3.2), so three of the six unknowns of §6.2 are left. Subsets of lines propose,
+    all lines judge, and those that agree decide together.
+    """
+
+    level = Level.PLAN
+    watches = (Watch(LineMatch, (Posted,)),)
+    writes = (PoseFix,)
+
+    def __init__(self, robot: RobotModel) -> None:
+        self._robot = robot
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        return 0.8 if held(view) is not None else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        match, belief, milestone = trigger.entry, held(view), view.get(trigger.entry.value.milestone)
+        if belief is None or milestone is None:
+            return
+        m: Milestone = milestone.value
+        prior = LOOSER * belief.value.covariance_world(self._robot.world)
+        prior = prior + np.diag([DOUBT[0] ** 2, DOUBT[0] ** 2, DOUBT[1] ** 2])
+        found = planar_from_lines(
+            match.value.lines_world,
+            match.value.segments_px,
+            self._robot.camera,
+            self._robot.mount.camera_from_robot,
+            belief.value.world_from_robot(self._robot.world),
+            prior_covariance=prior,
+            landmark_ids=[m.landmark_of[i] for i in match.value.pairs[:, 0]],
+            sigma_px=SIGMA_PX,
+        )
+        yield Post(
+            PoseFix(
+                match.id, found.world_from_robot, frozen(found.covariance), np.asarray(found.inliers, bool),
+                frozen(found.residuals_px), tuple(reason or "" for reason in found.rejected),
+            ),
+            (match, belief),
+        )

@@ -1,0 +1,165 @@
+"""Possible pairs of model and data lines, as linear forms in the placement that lays the data on the model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.matching_fit import Similarity2, best_fits
+from knowledge_sources.methods.matching_hough import LineTable, Peak, undirected
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+SETTLE_PX = (8.0, 6.0, 4.0, 3.0, 2.0, 1.5)
+"""Widths of the loss, from the Hough cell's reach down to the pairs' own error."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairTable:
+    """p pairs. A placement is (cos, sin, T_u, T_v, s) of R p + T against s rho, §6.1.2.
+
+    Attributes:
+        model, data: (p,) indices. angles: (p,) data line's angle from the model line's [rad].
+        across, along: (p, 2, 5) rows that give, times a placement, the data ends' distances across the model line
+            and along it from its first end. lengths: (p,) of the model line. shares: (p,) the shorter of both lengths.
+        lines: number of model lines.
+    """
+
+    model: Index
+    data: Index
+    angles: Array
+    across: Array
+    along: Array
+    lengths: Array
+    shares: Array
+    lines: int
+
+    def take(self, chosen: NDArray[np.bool_]) -> PairTable:
+        """The pairs of a mask."""
+        return PairTable(
+            self.model[chosen],
+            self.data[chosen],
+            self.angles[chosen],
+            self.across[chosen],
+            self.along[chosen],
+            self.lengths[chosen],
+            self.shares[chosen],
+            self.lines,
+        )
+
+
+def pair_table(model: LineTable, data: LineTable, window_px: Array, window_rad: float) -> PairTable:
+    """Every pair within the windows: (m,) pixels across and along, and an angle; the turn's lever arm is added."""
+    apart = data.middles[None] - model.middles[:, None]
+    across = np.abs(np.einsum("mka,ma->mk", apart, model.normals))
+    along = np.abs(np.einsum("mka,ma->mk", apart, model.directions))
+    angles = undirected(data.angles[None] - model.angles[:, None])
+    reach = window_px[:, None]
+    lever = 0.5 * window_rad * model.lengths[:, None]
+    gap = along - 0.5 * (model.lengths[:, None] + data.lengths)
+    i, k = np.nonzero((across <= reach + lever) & (gap <= reach) & (np.abs(angles) <= window_rad))
+    starts = np.sum(model.directions * model.ends[:, 0], axis=1)
+    return PairTable(
+        model=i,
+        data=k,
+        angles=angles[i, k],
+        across=_rows(model.normals[i], model.offsets[i], data.ends[k]),
+        along=_rows(model.directions[i], starts[i], data.ends[k]),
+        lengths=model.lengths[i],
+        shares=np.minimum(data.lengths[k], model.lengths[i]),
+        lines=len(model.ends),
+    )
+
+
+def placement_of(peak: Peak) -> Array:
+    """(5,) the placement of the data on the model that undoes the peak's move of the model."""
+    c, s = np.cos(peak.turn_rad), np.sin(peak.turn_rad)
+    u, v = peak.shift_px
+    return np.array([c, -s, -(c * u + s * v), -(-s * u + c * v), 1.0])
+
+
+def model_move(placement: Array, centre: Array) -> Similarity2:
+    """The move of the model onto the data: the placement turned round."""
+    c, s, u, v, scale = placement
+    return Similarity2(
+        float(np.arctan2(-s, c)),
+        (float(-(c * u + s * v)), float(-(-s * u + c * v))),
+        float(scale),
+        (float(centre[0]), float(centre[1])),
+    )
+
+
+def gated(table: PairTable, placement: Array, gates: Array, window_rad: float) -> NDArray[np.bool_]:
+    """(p,) pairs that, so placed, lie within (m,) ``gates`` across, overlap along and are nearly parallel."""
+    gate = gates[table.model]
+    across = np.abs(table.across @ placement).max(axis=1)
+    along = table.along @ placement
+    turn = np.arctan2(placement[1], placement[0])
+    near = (across <= gate) & (np.abs(table.angles + turn) <= window_rad)
+    return np.asarray(near & (along.max(axis=1) >= -gate) & (along.min(axis=1) <= table.lengths + gate))
+
+
+def settled(table: PairTable, placements: Array) -> tuple[Array, Array]:
+    """Placements (k, 5) moved to where close pairs agree, and their support (k,) [px of model line].
+
+    Weights 1 / (1 + (d / width)^2)^2 with a narrowing width take the coarseness of the accumulator away.
+    """
+    forms = np.einsum("pea,peb->pab", table.across, table.across).reshape(len(table.model), 25)
+    at = placements
+    for width in SETTLE_PX:
+        weights = _closeness(table, at, width) ** 2 * table.shares
+        total = weights.sum(axis=1)
+        anchors = start_anchor(at, 1e-3 * total + 1e-9, 10.0 * total + 1e-9, total + 1e-9)
+        at = best_fits((weights @ forms).reshape(-1, 5, 5) + anchors, False, at).placements
+    return at, _support(table, at)
+
+
+def start_anchor(placements: Array, shift_weight: Array, turn_weight: Array, scale_weight: Array) -> Array:
+    """(k, 5, 5) weak pulls to placements (k, 5): few or parallel pairs still have one best fit."""
+    c, s = placements[:, 0], placements[:, 1]
+    zero, one = np.zeros_like(c), np.ones_like(c)
+    rows = np.stack(
+        [
+            np.stack([zero, zero, one, zero, -placements[:, 2]], axis=-1),
+            np.stack([zero, zero, zero, one, -placements[:, 3]], axis=-1),
+            np.stack([-s, c, zero, zero, zero], axis=-1),
+            np.stack([-c, -s, zero, zero, one], axis=-1),
+        ],
+        axis=1,
+    )
+    weights = np.stack([shift_weight, shift_weight, turn_weight, scale_weight], axis=1)
+    return np.asarray(np.swapaxes(rows * weights[..., None], 1, 2) @ rows)
+
+
+def _support(table: PairTable, placements: Array) -> Array:
+    """(k,) length of the model that close data lines account for, each model line at most its own."""
+    closeness = _closeness(table, placements, SETTLE_PX[-1]) * table.shares
+    found = np.zeros((len(placements), table.lines))
+    full = np.zeros(table.lines)
+    full[table.model] = table.lengths
+    for k, row in enumerate(closeness):
+        found[k] = np.bincount(table.model, row, table.lines)
+    return np.asarray(np.minimum(found, full).sum(axis=1))
+
+
+def _closeness(table: PairTable, placements: Array, width: float) -> Array:
+    """(k, p) from 1, on the model line and overlapping it, to 0."""
+    flat = table.across.reshape(-1, 5)
+    across = (placements @ flat.T).reshape(len(placements), -1, 2)
+    along = (placements @ table.along.reshape(-1, 5).T).reshape(len(placements), -1, 2)
+    beside = (along.max(axis=2) < 0.0) | (along.min(axis=2) > table.lengths)
+    square = 0.5 * (across[..., 0] ** 2 + across[..., 1] ** 2)
+    return np.where(beside, 0.0, 1.0 / (1.0 + square / width**2))
+
+
+def _rows(unit: Array, offset: Array, ends: Array) -> Array:
+    """(p, 2, 5) with unit . (R p + T) - s offset = row @ (cos, sin, T_u, T_v, s)."""
+    rows = np.empty((len(ends), 2, 5))
+    rows[..., 0] = np.sum(unit[:, None, :] * ends, axis=-1)
+    rows[..., 1] = unit[:, None, 1] * ends[..., 0] - unit[:, None, 0] * ends[..., 1]
+    rows[..., 2:4] = unit[:, None, :]
+    rows[..., 4] = -offset[:, None]
+    return rows

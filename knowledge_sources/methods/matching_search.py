@@ -1,0 +1,213 @@
+"""Local search over correspondences: every neighbour of a state judged in one batch (§6.1.1, §6.1.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.matching_fit import Fits, best_fits
+from knowledge_sources.methods.matching_objective import Terms
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Index = NDArray[np.intp]
+Strategy = Literal["first", "steepest"]
+
+GAIN = 1e-9
+"""A move must lower the match error by more than this."""
+STEPS_A_PAIR = 4
+"""The search stops after so many moves for each possible pair (it ends long before)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairSpace:
+    """The restricted space: p possible pairs of a model line and a data line.
+
+    Attributes:
+        members: (p,) rows of the table of pairs. model, data: (p,) indices. forms: (p, 5, 5) shares of E_fit.
+        masks: (p, c) cells of the model line that the data line covers.
+        lines: number of model lines.
+        anchor: (5, 5) weak pull to the placement ``start`` (5,) the space was formed at.
+    """
+
+    members: Index
+    model: Index
+    data: Index
+    forms: Array
+    masks: Mask
+    lines: int
+    anchor: Array
+    start: Array
+
+
+@dataclass(frozen=True, slots=True)
+class TraceStep:
+    """One state of the search: its pairs (model, data) and its match error, as a row of Figure 12(d)."""
+
+    pairs: tuple[tuple[int, int], ...]
+    evaluation: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Where a search ended: (p,) chosen pairs, E_match, moves made, and the states if kept."""
+
+    chosen: Mask
+    error: float
+    steps: int
+    trace: tuple[TraceStep, ...]
+
+
+def local_search(
+    space: PairSpace,
+    terms: Terms,
+    start: Mask,
+    *,
+    strategy: Strategy,
+    replace: bool,
+    with_scale: bool,
+    keep_trace: bool,
+) -> Found:
+    """Add or delete one pair at a time (k = 1) while the match error falls.
+
+    A data line goes to one model line: adding a pair takes its data line from the pair that had it. With ``replace``
+    a state that no single flip improves may also exchange one data line of a model line for another (§6.1.1 names
+    the lack of that move as the cause of local minima).
+    """
+    if strategy not in ("first", "steepest"):
+        raise ValueError(f'expected strategy "first" or "steepest", got {strategy!r}')
+    chosen = start.copy()
+    error = evaluate(space, terms, chosen, with_scale)
+    steps = [_step(space, chosen, error)] if keep_trace else []
+    last, done = -1, 0
+    for done in range(STEPS_A_PAIR * len(chosen)):
+        errors = flip_errors(space, terms, chosen, with_scale)
+        move = _pick(errors, error, strategy, last)
+        if move >= 0:
+            last, error = move, float(errors[move])
+            chosen = flipped(space, chosen, move)
+        else:
+            swap = _best_swap(space, terms, chosen, error, with_scale) if replace else None
+            if swap is None:
+                break
+            out, move, error = swap
+            chosen = flipped(space, chosen, move)
+            chosen[out] = False
+        if keep_trace:
+            steps.append(_step(space, chosen, error))
+    return Found(chosen, error, done, tuple(steps))
+
+
+def evaluate(space: PairSpace, terms: Terms, chosen: Mask, with_scale: bool) -> float:
+    """E_match of one state."""
+    fit = fit_of(space, chosen, with_scale)
+    lines = np.arange(space.lines)
+    return float(fit.errors[0] + terms.omission(1.0 - coverage(space, chosen), lines).sum())
+
+
+def fit_of(space: PairSpace, chosen: Mask, with_scale: bool) -> Fits:
+    """The best fit of one state."""
+    return best_fits((space.anchor + space.forms[chosen].sum(axis=0))[None], with_scale, space.start)
+
+
+def coverage(space: PairSpace, chosen: Mask) -> Array:
+    """(m,) share of each model line that the chosen data lines cover."""
+    return np.asarray((_counts(space, chosen) > 0).mean(axis=1))
+
+
+def flipped(space: PairSpace, chosen: Mask, move: int) -> Mask:
+    """The state after adding or deleting pair ``move``; an added pair takes its data line from another."""
+    out = chosen.copy()
+    if not chosen[move]:
+        out[space.data == space.data[move]] = False
+    out[move] = not chosen[move]
+    return out
+
+
+def flip_errors(space: PairSpace, terms: Terms, chosen: Mask, with_scale: bool) -> Array:
+    """(p,) E_match of every neighbour, each one flip away."""
+    counts = _counts(space, chosen)
+    rival = _rivals(space, chosen)
+    sign = np.where(chosen, -1.0, 1.0)
+    forms = space.anchor + space.forms[chosen].sum(axis=0) + sign[:, None, None] * space.forms
+    robs = rival >= 0
+    forms[robs] -= space.forms[rival[robs]]
+    errors = best_fits(forms, with_scale, space.start).errors
+    return np.asarray(errors + _omission_after(space, terms, chosen, counts, rival))
+
+
+def _omission_after(space: PairSpace, terms: Terms, chosen: Mask, counts: Array, rival: Index) -> Array:
+    """(p,) omission of every neighbour."""
+    covered = (counts > 0).mean(axis=1)
+    lines = np.arange(space.lines)
+    now = terms.omission(1.0 - covered, lines)
+    gained = (space.masks & (counts[space.model] == 0)).mean(axis=1)
+    lost = (space.masks & (counts[space.model] == 1)).mean(axis=1)
+    after = covered[space.model] + np.where(chosen, -lost, gained)
+    change = terms.omission(1.0 - after, space.model) - now[space.model]
+    robs = rival >= 0
+    other = rival[robs]
+    victim = space.model[other]
+    change[robs] += terms.omission(1.0 - covered[victim] + lost[other], victim) - now[victim]
+    return np.asarray(now.sum() + change)
+
+
+def _best_swap(
+    space: PairSpace, terms: Terms, chosen: Mask, error: float, with_scale: bool
+) -> tuple[int, int, float] | None:
+    """The best exchange (pair out, pair in, E_match) within a model line, if it lowers the match error."""
+    inside, outside = np.flatnonzero(chosen), np.flatnonzero(~chosen)
+    a, b = np.nonzero(space.model[inside][:, None] == space.model[outside][None])
+    if not len(a):
+        return None
+    out, into = inside[a], outside[b]
+    counts = _counts(space, chosen)
+    rival = _rivals(space, chosen)[into]
+    forms = space.anchor + space.forms[chosen].sum(axis=0) + space.forms[into] - space.forms[out]
+    robs = rival >= 0
+    forms[robs] -= space.forms[rival[robs]]
+    line = space.model[into]
+    after = counts[line] - space.masks[out] + space.masks[into]
+    covered = (counts > 0).mean(axis=1)
+    now = terms.omission(1.0 - covered, np.arange(space.lines))
+    change = terms.omission(1.0 - (after > 0).mean(axis=1), line) - now[line]
+    victim = space.model[rival[robs]]
+    lost = (space.masks[rival[robs]] & (counts[victim] == 1)).mean(axis=1)
+    change[robs] += terms.omission(1.0 - covered[victim] + lost, victim) - now[victim]
+    errors = best_fits(forms, with_scale, space.start).errors + now.sum() + change
+    best = int(np.argmin(errors))
+    return (int(out[best]), int(into[best]), float(errors[best])) if errors[best] < error - GAIN else None
+
+
+def _counts(space: PairSpace, chosen: Mask) -> Array:
+    """(m, c) how many chosen data lines cover each cell."""
+    counts = np.zeros((space.lines, space.masks.shape[1]))
+    np.add.at(counts, space.model[chosen], space.masks[chosen])
+    return counts
+
+
+def _rivals(space: PairSpace, chosen: Mask) -> Index:
+    """(p,) the chosen pair that holds the data line of a pair not chosen, or -1."""
+    holder = np.full(int(space.data.max(initial=-1)) + 1, -1, dtype=np.intp)
+    holder[space.data[chosen]] = np.flatnonzero(chosen)
+    return np.where(chosen, -1, holder[space.data])
+
+
+def _pick(errors: Array, error: float, strategy: Strategy, last: int) -> int:
+    """The move to take, or -1: the best, or the first that improves in turn after the last one taken."""
+    if strategy == "steepest":
+        best = int(np.argmin(errors)) if len(errors) else -1
+        return best if best >= 0 and errors[best] < error - GAIN else -1
+    better = np.flatnonzero(errors < error - GAIN)
+    if not len(better):
+        return -1
+    later = better[better > last]
+    return int(later[0] if len(later) else better[0])
+
+
+def _step(space: PairSpace, chosen: Mask, error: float) -> TraceStep:
+    pairs = zip(space.model[chosen].tolist(), space.data[chosen].tolist(), strict=True)
+    return TraceStep(tuple(sorted(pairs)), error)

@@ -1,0 +1,162 @@
+"""Milestone selector (§3.3, §4): which landmarks should be seen where, and from which direction they tell most."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.methods.views import ViewQuality, view_quality
+from knowledge_sources.questions import held, is_over, is_settled, open_discrepancy, open_milestone
+from world_models.body import Look
+from world_models.frames import Pose2, wrap_angle
+from world_models.location import Hypothesis
+from world_models.robot import RobotModel
+from world_models.task import Milestone, PlanSketch
+from world_models.visibility import VisibleLines, visible_lines
+
+FACING_RAD = math.radians(3.5)
+LINES = 60
+"""The most lines that one milestone expects."""
+LENGTH_PX = 12.0
+CONTRAST = 0.05
+SIGMA_PX = 0.7
+GOOD_PART = 0.3
+"""A view is good enough when it tells the place to this part of the tolerance there."""
+GOOD_RAD = math.radians(0.25)
+LEAST_LINES = 10
+GLANCES_RAD = tuple(math.radians(a) for a in (30, -30, 60, -60, 90, -90, 135, -135, 180))
+
+
+class MilestoneSelector(KnowledgeSource):
+    """Says what should be seen before a subgoal (M0 first), and asks to look.
+
+    It prefers the view that the robot has, then the one it will have next, then the one that would tell most. It also
+    checks the belief in between when tracking could not explain what it saw.
+    """
+
+    level = Level.PLAN
+    watches = (
+        Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and not s.verified),
+        Watch(Discrepancy, (Posted,), lambda d: d.is_open and d.level is Level.PLAN and d.magnitude is None),
+        Watch(Hypothesis, (Revised,), lambda h: h.is_held),
+    )
+    writes = (Milestone, Look)
+
+    def __init__(self, robot: RobotModel) -> None:
+        self._robot = robot
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        value, waiting = trigger.entry.value, open_milestone(view)
+        if is_over(view) or not is_settled(view) or open_discrepancy(view, Level.GOAL) is not None:
+            return None
+        if isinstance(value, Hypothesis):
+            turning = waiting is not None and waiting.value.status == "turning"
+            return 0.5 if waiting is not None and turning and self._faces(value, waiting.value) else None
+        if isinstance(value, Discrepancy):
+            return 0.7
+        return 0.5 if waiting is None else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        belief, waiting, value = held(view), open_milestone(view), trigger.entry.value
+        if belief is None:
+            return
+        if isinstance(value, PlanSketch):
+            yield from self._proposed(trigger.entry, belief)
+        elif waiting is None:
+            what = "check of the belief, because " + value.what
+            yield from self._looked_for(None, Milestone("", -1, what, self._heading(belief.value)), trigger.entry, belief)
+        else:
+            here = replace(waiting.value, look_heading_rad=self._heading(belief.value))
+            yield from self._looked_for(waiting, here, trigger.entry, belief)
+
+    def _proposed(self, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
+        """The milestone before the sketch's next subgoal, seen from the first direction that is good enough."""
+        pose = belief.value.world_from_robot(self._robot.world)
+        heading = self._direction(sketch.value, pose)
+        s = sketch.value
+        milestone = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}", heading)
+        if self._faces(belief.value, milestone):
+            yield from self._looked_for(None, milestone, sketch, belief)
+        else:
+            yield Post(milestone, (sketch, belief))
+
+    def _looked_for(
+        self, old: Entry[Milestone] | None, milestone: Milestone, trigger: Entry[object], belief: Entry[Hypothesis]
+    ) -> Iterable[Effect]:
+        """Predict the landmarks from the believed pose, and ask for the picture."""
+        pose = belief.value.world_from_robot(self._robot.world)
+        lines = self._seen_from(pose)
+        marks = sorted({int(i) for i in lines.landmark})
+        expected = replace(
+            milestone,
+            landmarks=tuple(self._robot.world.landmarks[i].name for i in marks),
+            expected=_nested(lines.lines_world),
+            expected_px=_nested(lines.segments_px),
+            landmark_of=tuple(marks.index(int(i)) for i in lines.landmark),
+            status="expected",
+        )
+        wish = Post(expected, (trigger, belief)) if old is None else Revise(old, expected, (trigger, belief))
+        yield wish
+        yield Post(Look("milestone"), (wish,))
+
+    def _direction(self, sketch: PlanSketch, pose: Pose2) -> float:
+        """The first heading from which the view is good enough, else the best [rad, world]."""
+        before = sketch.subgoals[sketch.at - 1] if sketch.at else None
+        tolerance = before.tolerance_m if before is not None else 0.1
+        rated: list[tuple[ViewQuality, float]] = []
+        for heading in self._candidates(sketch, pose):
+            quality = self._quality(Pose2(pose.x_m, pose.y_m, heading))
+            if quality.sigma_m <= GOOD_PART * tolerance and quality.sigma_rad <= GOOD_RAD and quality.lines >= LEAST_LINES:
+                return heading
+            rated.append((quality, heading))
+        best = min(range(len(rated)), key=lambda i: (rated[i][0].lines < LEAST_LINES, rated[i][0].sigma_m, i))
+        return rated[best][1]
+
+    def _candidates(self, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
+        wanted = sketch.subgoals[sketch.at - 1].destination if sketch.at else None
+        if wanted is not None and wanted.heading_rad is not None:
+            yield wanted.in_world(self._robot.world).heading_rad
+        yield pose.heading_rad
+        if sketch.current is not None:
+            end = sketch.current.destination.in_world(self._robot.world)
+            yield math.atan2(end.y_m - pose.y_m, end.x_m - pose.x_m)
+        yield from (wrap_angle(pose.heading_rad + glance) for glance in GLANCES_RAD)
+
+    def _quality(self, pose: Pose2) -> ViewQuality:
+        robot = self._robot
+        return view_quality(
+            self._seen_from(pose).lines_world, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_PX
+        )
+
+    def _seen_from(self, pose: Pose2) -> VisibleLines:
+        """The clearest of the lines that should be seen: long ones with contrast."""
+        robot = self._robot
+        lines = visible_lines(
+            robot.world, robot.camera, robot.camera_from_world(pose), min_length_px=LENGTH_PX, min_contrast=CONTRAST,
+            max_distance_m=15.0,
+        )
+        if len(lines) <= LINES:
+            return lines
+        lengths = np.linalg.norm(lines.segments_px[:, 1] - lines.segments_px[:, 0], axis=1)
+        clear = np.minimum(lengths, 120.0) * np.minimum(lines.contrast, 0.3)
+        return lines[np.sort(np.argsort(-clear, kind="stable")[:LINES])]
+
+    def _heading(self, belief: Hypothesis) -> float:
+        return belief.world_from_robot(self._robot.world).heading_rad
+
+    def _faces(self, belief: Hypothesis, milestone: Milestone) -> bool:
+        return abs(wrap_angle(self._heading(belief) - milestone.look_heading_rad)) <= FACING_RAD
+
+
+def _nested(array: np.ndarray) -> tuple[tuple[tuple[float, ...], ...], ...]:
+    return tuple(tuple(tuple(float(c) for c in p) for p in line) for line in array)

@@ -1,0 +1,42 @@
+"""Mission keeper (§4): says how the mission ended. Every mission ends in a declared outcome."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Quiescence, Revised, Watch
+from blackboard.effect import Effect, Post
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from knowledge_sources.questions import is_over, open_discrepancy, open_milestone
+from world_models.task import Goal, Outcome
+
+
+class MissionKeeper(KnowledgeSource):
+    """Declares ``reached`` when the goal is, and ``lost`` or ``failed`` when the board falls still before that."""
+
+    level = Level.GOAL
+    watches = (
+        Watch(Goal, (Revised,), lambda goal: goal.status == "reached"),
+        Watch(Quiescence, (Posted,)),
+    )
+    writes = (Outcome,)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        return None if is_over(view) else 1.0
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        if isinstance(trigger.entry.value, Goal):
+            reason = f"every milestone on the way to {trigger.entry.value.destination} was verified"
+            yield Post(Outcome("reached", reason), (trigger.entry,))
+            return
+        lost = open_discrepancy(view, Level.GOAL)
+        if lost is not None:
+            yield Post(Outcome("lost", f"{lost.value.what}, and nobody could tell where"), (trigger.entry, lost))
+            return
+        waiting = open_milestone(view)
+        what = "nobody had anything left to do"
+        if waiting is not None:
+            what = f"nobody answered for {waiting.id} ({waiting.value.what})"
+        yield Post(Outcome("failed", what), (trigger.entry,))

@@ -1,0 +1,172 @@
+"""Motor (§5): a primitive subgoal becomes a (TURN angle) and (MOVE distance), carried out increment by increment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.questions import held, is_over, is_settled, open_discrepancy, open_milestone, under_way
+from world_models.body import MotorCommand
+from world_models.frames import Pose2, wrap_angle
+from world_models.location import Hypothesis
+from world_models.robot import RobotModel
+from world_models.task import Leg, Milestone, PlanSketch
+
+LOOKAHEAD_M = 1.5
+"""Steers at the point of the line so far ahead, so that it comes back to the line and not only to its end."""
+FACING_RAD = math.radians(3.0)
+"""Turned to within this, it sets off."""
+AIM_RAD = math.radians(0.5)
+PASSED_M = 0.02
+CREEP_M = 0.25
+"""Nearer than this it steers straight at the end."""
+
+
+class Motor(KnowledgeSource):
+    """Commands the next increment of a leg from where the robot believes it is: this closes the action-level loop.
+
+    It begins a leg when a verified sketch has a primitive subgoal; it turns where a milestone is to be looked for; it
+    keeps still while anything above the action level is in doubt, or while a command is under way.
+    """
+
+    level = Level.ACTION
+    watches = (
+        Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and s.verified),
+        Watch(Leg, (Posted,)),
+        Watch(Hypothesis, (Posted, Revised), lambda h: h.is_held),
+        Watch(Milestone, (Posted,), lambda m: m.status == "turning"),
+        Watch(Discrepancy, (Revised,), lambda d: d.status == "corrected"),
+    )
+    writes = (MotorCommand, Leg, Discrepancy)
+
+    def __init__(self, robot: RobotModel) -> None:
+        self._robot = robot
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        if is_over(view) or not is_settled(view) or _is_in_doubt(view):
+            return None
+        milestone = open_milestone(view)
+        if milestone is not None:
+            return 0.3 if milestone.value.status == "turning" and self._look_error(view, milestone.value) else None
+        if under_way(view) is not None:
+            return 0.3
+        return 0.3 if _leg_wanted(view) is not None else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        belief, milestone = held(view), open_milestone(view)
+        if belief is None:
+            return
+        if milestone is not None:
+            turn = self._bounded(self._look_error(view, milestone.value) or 0.0)
+            yield Post(MotorCommand(turn, 0.0), (milestone, belief))
+            return
+        driving = under_way(view)
+        if driving is None:
+            yield from self._set_off(view, belief)
+            return
+        yield from self._increment(view, driving[0], belief)
+
+    def still_valid(self, view: View, trigger: Change) -> bool:
+        return view.is_current(trigger.entry) and not is_over(view)
+
+    def _look_error(self, view: View, milestone: Milestone) -> float | None:
+        """How far to turn to face a milestone's landmarks [rad]; None when it faces them."""
+        belief = held(view)
+        if belief is None:
+            return None
+        here = belief.value.world_from_robot(self._robot.world)
+        error = wrap_angle(milestone.look_heading_rad - here.heading_rad)
+        return error if abs(error) > FACING_RAD else None
+
+    def _set_off(self, view: View, belief: Entry[Hypothesis]) -> Iterable[Effect]:
+        sketch = _leg_wanted(view)
+        if sketch is None or sketch.value.current is None:
+            return
+        subgoal, world = sketch.value.current, self._robot.world
+        start, end = belief.value.world_from_robot(world), subgoal.destination.in_world(world)
+        heading = None if subgoal.destination.heading_rad is None else end.heading_rad
+        leg = Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m, subgoal.tolerance_m, heading)
+        yield Post(leg, (sketch, belief))
+
+    def _increment(self, view: View, leg: Entry[Leg], belief: Entry[Hypothesis]) -> Iterable[Effect]:
+        here = belief.value.world_from_robot(self._robot.world)
+        command = self._next(leg.value, here)
+        discrepancy = open_discrepancy(view, Level.ACTION)
+        corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
+        yield from corrected
+        if command is None:
+            yield Revise(leg, replace(leg.value, status="arrived"), (leg, belief, *corrected))
+            return
+        step = Revise(leg, replace(leg.value, increments=leg.value.increments + 1), (leg, belief, *corrected))
+        yield step
+        yield Post(command, (step, belief))
+
+    def _next(self, leg: Leg, here: Pose2) -> MotorCommand | None:
+        """The next increment; None on arrival."""
+        along, left = _progress(leg, here)
+        away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
+        if away <= leg.tolerance_m * 0.8 or (along <= PASSED_M and abs(left) <= leg.tolerance_m * 0.8):
+            return self._final_turn(leg, here)
+        aim = _aim(leg, along)
+        turn = wrap_angle(math.atan2(aim[1] - here.y_m, aim[0] - here.x_m) - here.heading_rad)
+        if abs(turn) > FACING_RAD:
+            return MotorCommand(self._bounded(turn), 0.0)
+        actuator = self._robot.actuator
+        distance = min(actuator.increment_m, actuator.commanded_m(away))
+        return MotorCommand(turn if abs(turn) > AIM_RAD / 10 else 0.0, distance)
+
+    def _final_turn(self, leg: Leg, here: Pose2) -> MotorCommand | None:
+        if leg.heading_rad is None:
+            return None
+        turn = wrap_angle(leg.heading_rad - here.heading_rad)
+        return MotorCommand(self._bounded(turn), 0.0) if abs(turn) > AIM_RAD else None
+
+    def _bounded(self, turn_rad: float) -> float:
+        """One increment of a turn; a long one in equal parts, so that landmarks stay in view from part to part."""
+        largest = self._robot.actuator.turn_increment_rad
+        return turn_rad / max(1, math.ceil(abs(turn_rad) / largest))
+
+
+def _is_in_doubt(view: View) -> bool:
+    """Whether something is open above the action level that its level has not measured within its bound."""
+    for level in (Level.PLAN, Level.GOAL):
+        found = open_discrepancy(view, level)
+        if found is not None and (found.value.magnitude is None or found.value.exceeds or level is Level.GOAL):
+            return True
+    action = open_discrepancy(view, Level.ACTION)
+    return action is not None and action.value.exceeds
+
+
+def _leg_wanted(view: View) -> Entry[PlanSketch] | None:
+    """The deepest active sketch, if its milestone is verified and its subgoal at hand is primitive."""
+    active = view.where(PlanSketch, lambda s: s.is_active)
+    if not active:
+        return None
+    deepest = max(active, key=lambda e: len(e.value.path))
+    s = deepest.value
+    return deepest if s.verified and s.current is not None and s.current.primitive else None
+
+
+def _progress(leg: Leg, here: Pose2) -> tuple[float, float]:
+    """What is left along the leg, and how far to the left of it the robot is [m]."""
+    dx, dy = leg.x1_m - leg.x0_m, leg.y1_m - leg.y0_m
+    length = math.hypot(dx, dy) or 1.0
+    rx, ry = leg.x1_m - here.x_m, leg.y1_m - here.y_m
+    return (rx * dx + ry * dy) / length, (rx * dy - ry * dx) / length
+
+
+def _aim(leg: Leg, along: float) -> tuple[float, float]:
+    """The point of the line to steer at [m, world]."""
+    if along < CREEP_M:
+        return leg.x1_m, leg.y1_m
+    length = math.hypot(leg.x1_m - leg.x0_m, leg.y1_m - leg.y0_m)
+    part = min(1.0, max(0.0, (length - along + LOOKAHEAD_M) / max(length, 1e-9)))
+    return leg.x0_m + part * (leg.x1_m - leg.x0_m), leg.y0_m + part * (leg.y1_m - leg.y0_m)

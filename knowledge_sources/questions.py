@@ -1,0 +1,55 @@
+"""Questions that several experts ask of the board; pure reads."""
+
+from __future__ import annotations
+
+from blackboard.board import View
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from world_models.body import MotionReport, MotorCommand
+from world_models.location import Hypothesis
+from world_models.task import Goal, Leg, Milestone, Outcome, PlanSketch
+
+
+def held(view: View) -> Entry[Hypothesis] | None:
+    """Where the robot believes it is."""
+    return view.latest(Hypothesis, lambda h: h.is_held)
+
+
+def active_goal(view: View) -> Entry[Goal] | None:
+    return view.latest(Goal, lambda g: g.is_active)
+
+
+def open_milestone(view: View) -> Entry[Milestone] | None:
+    """The milestone that is being looked for."""
+    return view.latest(Milestone, lambda m: m.is_open)
+
+
+def open_discrepancy(view: View, level: Level) -> Entry[Discrepancy] | None:
+    """The newest discrepancy that is open at a level."""
+    return view.latest(Discrepancy, lambda d: d.is_open and d.level is level)
+
+
+def under_way(view: View) -> tuple[Entry[Leg], Entry[PlanSketch]] | None:
+    """The leg that is being driven and the active sketch that wants it; None when there is none."""
+    leg = view.latest(Leg)
+    if leg is None or leg.value.status != "moving":
+        return None
+    sketch = view.get(leg.value.sketch)
+    if sketch is None:
+        return None
+    s: PlanSketch = sketch.value
+    return (leg, sketch) if s.is_active and s.verified and s.at == leg.value.index else None
+
+
+def is_settled(view: View) -> bool:
+    """Whether every motor command was reported and every report is in the belief: the robot stands where it thinks."""
+    belief, command, report = held(view), view.latest(MotorCommand), view.latest(MotionReport)
+    if belief is None or command is None:
+        return belief is not None
+    return report is not None and report.because == (command.ref,) and belief.value.motion == report.id
+
+
+def is_over(view: View) -> bool:
+    """Whether the mission has ended."""
+    return view.latest(Outcome) is not None

@@ -1,0 +1,130 @@
+"""The blueprint: which views there are and where, declared in this one place and embedded in every recording."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from logs import paths
+from world_models.camera import Camera
+from world_models.world import World
+
+ABOVE = 0.75
+"""The eye stands so high above the building, in lengths of its diagonal."""
+
+TRAILS = (paths.TRUE_TRAIL, paths.BELIEVED_TRAIL)
+
+SINCE_THE_START = rrb.VisibleTimeRange(
+    "cycle", start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative())
+
+
+def blueprint(world: World, camera: Camera) -> Any:
+    """All views of a run under one cursor: the building and the picture large, the reasons beside, time below."""
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(_description(), _why(), row_shares=[2, 3], name="in words"),
+            rrb.Vertical(_building(world), _below_building(), row_shares=[3, 2]),
+            rrb.Vertical(_picture(camera), _below_picture(), row_shares=[3, 2]),
+            column_shares=[3, 7, 5],
+        ),
+        rrb.TimePanel(timeline="cycle", state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_views=False,
+    )
+
+
+def _description() -> Any:
+    return rrb.TextDocumentView(origin=paths.DESCRIPTION, name="How to read this")
+
+
+def _why() -> Any:
+    return rrb.TextDocumentView(origin=paths.WHY, name="What Harvey thinks now")
+
+
+def _building(world: World) -> Any:
+    """From above and a little from the south."""
+    corners = np.concatenate([world.outline(name) for name in world.rooms])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    middle, size = (low + high) / 2, float(np.linalg.norm(high - low))
+    return rrb.Spatial3DView(
+        origin=paths.WORLD, name="Where: true (green) and believed (blue) robot, plan (orange)",
+        background=rrb.Background(color=[28, 30, 34, 255]), line_grid=False,
+        overrides={path: rrb.VisibleTimeRanges([SINCE_THE_START]) for path in TRAILS},
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=[middle[0], middle[1] - 0.35 * size, ABOVE * size],
+            look_target=[middle[0], middle[1], 0.0], eye_up=[0.0, 0.0, 1.0]),
+    )
+
+
+def _picture(camera: Camera) -> Any:
+    return rrb.Spatial2DView(
+        origin=paths.CAMERA, name="Eye: expected (yellow), found (cyan), matched (green), rejected (red)",
+        visual_bounds=rrb.VisualBounds2D(x_range=[0, camera.width], y_range=[0, camera.height]))
+
+
+def _below_building() -> Any:
+    return rrb.Tabs(_lanes(), _decisions(), _table(), name="decisions")
+
+
+def _lanes() -> Any:
+    return rrb.StateTimelineView(origin=paths.LANES, name="Who acts, and which level is in focus")
+
+
+def _decisions() -> Any:
+    return rrb.TextLogView(origin=paths.SENTENCES, name="Decisions")
+
+
+def _table() -> Any:
+    return rrb.DataframeView(origin=paths.TABLE, name="Decision table")
+
+
+def _below_picture() -> Any:
+    return rrb.Tabs(_sketch(), _errors(), name="plan and errors")
+
+
+def _sketch() -> Any:
+    return rrb.GraphView(
+        origin=paths.SKETCH, name="Plan sketches",
+        force_link=rrb.archetypes.ForceLink(enabled=False), force_many_body=rrb.archetypes.ForceManyBody(enabled=False),
+        force_position=rrb.archetypes.ForcePosition(enabled=False),
+        force_collision_radius=rrb.archetypes.ForceCollisionRadius(enabled=False),
+        force_center=rrb.archetypes.ForceCenter(enabled=False))
+
+
+def _errors() -> Any:
+    return rrb.Vertical(
+        _plot(paths.POSITION, "Position error [mm]"), _plot(paths.HEADING, "Heading error [deg]"),
+        _plot(paths.DEVIATION, "Discrepancies and their bounds [px]"), name="Errors")
+
+
+def _plot(origin: str, name: str) -> Any:
+    return rrb.TimeSeriesView(origin=origin, name=name, plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop))
+
+
+DESCRIPTION = """\
+# Harvey
+
+A robot drives from one room to another by what its camera shows. Experts round a blackboard decide; **every cycle is one
+decision**. Drag the cursor in the time bar below, or play.
+
+| colour | meaning |
+|---|---|
+| green | the true robot (simulator only), matched lines |
+| blue | the robot as Harvey believes it to be; its ellipse is drawn 20 times as large |
+| orange | goal, plan sketch, leg under way; in the picture: drift of a followed point, drawn 5 times as long |
+| yellow | what he expects to see |
+| cyan | what he found in the picture |
+| red | what he looked for and did not find, or rejected |
+| grey | done |
+
+**Tabs**: who acts, decisions, decision table; plan sketches, errors.
+"""
+
+
+def describe(title: str) -> Any:
+    """The text beside the views."""
+    return rr.TextDocument(f"{DESCRIPTION}\n*{title}*\n", media_type="text/markdown")

@@ -1,0 +1,73 @@
+"""Decisions: a plain sentence and a table row a cycle for people, and the whole record for programs."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import rerun as rr
+
+from blackboard.activation import Activation
+from blackboard.change import Change
+from blackboard.journal import Decision, decision_line
+from logs.mirror import Moment
+from logs.paths import RECORDS, SENTENCES, TABLE
+from logs.tape import Tape
+
+RECORD = "record"
+"""The component that holds a decision's line."""
+
+
+class Decisions:
+    """Logs every decision in three forms."""
+
+    def begin(self, tape: Tape) -> None:
+        """Nothing holds at all times."""
+
+    def log(self, tape: Tape, moment: Moment) -> None:
+        decision = moment.decision
+        tape.log(RECORDS, rr.AnyValues(**{RECORD: decision_line(decision)}))
+        tape.log(SENTENCES, rr.TextLog(sentence(decision), level=log_level(decision)))
+        tape.log(TABLE, rr.AnyValues(**row(decision)))
+
+
+def sentence(decision: Decision) -> str:
+    """What was decided, in words."""
+    if decision.chosen is None:
+        return "nobody acted"
+    who = f"{_bid(decision.chosen)} on {decision.chosen.trigger.entry.ref}"
+    if decision.refused:
+        return f"{who}: refused, {decision.refused.splitlines()[-1]}"
+    return f"{who}: {_deeds(decision.made)}"
+
+
+def log_level(decision: Decision) -> str:
+    """INFO for the ordinary; WARN when something was refused or differs; ERROR when an expert raised."""
+    if decision.refused:
+        return "ERROR" if decision.refused.startswith("raised") else "WARN"
+    doubt = any(type(change.entry.value).__name__ == "Discrepancy" for change in decision.made)
+    return "WARN" if doubt else "INFO" if decision.made else "DEBUG"
+
+
+def row(decision: Decision) -> dict[str, str | float]:
+    """The columns of the decision table."""
+    chosen, second = decision.chosen, decision.runner_up
+    return {
+        "focus": str(decision.focus),
+        "chosen": chosen.source.name if chosen else "",
+        "rating": float(chosen.rating) if chosen else 0.0,
+        "trigger": str(chosen.trigger.entry.ref) if chosen else "",
+        "runner_up": _bid(second) if second else "",
+        "waiting": float(decision.pending),
+        "did": _deeds(decision.made),
+    }
+
+
+def _bid(activation: Activation) -> str:
+    return f"{activation.source.name} (rating {activation.rating:.2f})"
+
+
+def _deeds(made: tuple[Change, ...]) -> str:
+    counts = Counter((change.kind.lower(), type(change.entry.value).__name__) for change in made)
+    named = {(c.kind.lower(), type(c.entry.value).__name__): str(c.entry.ref) for c in made}
+    parts = [f"{kind} {named[kind, what] if count == 1 else f'{count} {what}'}" for (kind, what), count in counts.items()]
+    return ", ".join(parts) or "did nothing"

@@ -1,0 +1,31 @@
+"""Frames: the camera's JPEG bytes, kept as they came, so that a run can be decided again from its recording."""
+
+from __future__ import annotations
+
+import rerun as rr
+
+from logs.mirror import Moment
+from logs.paths import CAMERA, IMAGE
+from logs.tape import Tape
+from world_models.body import Frame
+from world_models.camera import Camera
+
+NUMBER = "number"
+"""The component beside an image that holds the frame's number."""
+
+
+class Frames:
+    """Logs each picture as it is delivered."""
+
+    def __init__(self, camera: Camera) -> None:
+        self._camera = camera
+
+    def begin(self, tape: Tape) -> None:
+        camera = self._camera
+        tape.fix(CAMERA, rr.Pinhole(image_from_camera=camera.matrix, width=camera.width, height=camera.height))
+
+    def log(self, tape: Tape, moment: Moment) -> None:
+        for entry in moment.changed(Frame):
+            frame = entry.value
+            about = rr.AnyValues(number=frame.number, purpose=frame.purpose, entry=str(entry.ref))
+            tape.log(IMAGE, rr.EncodedImage(contents=frame.jpeg, media_type="image/jpeg"), about)

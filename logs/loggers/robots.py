@@ -1,0 +1,112 @@
+"""The robot as it truly is, as Harvey believes it is, and how sure he is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from logs.mirror import Mirror, Moment
+from logs.palette import BELIEVED, CANDIDATE, TRUE, Colour, faint
+from logs.paths import BELIEVED_ROBOT, BELIEVED_TRAIL, CANDIDATES, TRUE_ROBOT, TRUE_TRAIL, UNCERTAINTY
+from logs.tape import Tape
+from world_models.camera import Camera
+from world_models.frames import Pose2
+from world_models.location import Hypothesis
+from world_models.world import World
+
+RADIUS_M = 0.35
+"""Of the Denning platform."""
+
+SIGMA_SCALE = 20.0
+"""A few centimetres would not show in a building: the ellipse is drawn larger, and its label says so."""
+
+SIGHT_M = 2.5
+"""Length of the wedge that shows where the camera looks."""
+
+
+class Robots:
+    """Logs both robots when they move."""
+
+    def __init__(self, world: World, camera: Camera) -> None:
+        self._world = world
+        self._half_view_rad = np.arctan(camera.width / (2.0 * camera.fx))
+        self._last: dict[str, Pose2] = {}
+
+    def begin(self, tape: Tape) -> None:
+        tape.fix(f"{TRUE_ROBOT}/body", _cylinder(TRUE, RADIUS_M, 0.9, rr.components.FillMode.Solid))
+        tape.fix(f"{TRUE_ROBOT}/heading", _arrow(TRUE, 0.95))
+        tape.fix(f"{BELIEVED_ROBOT}/body", _cylinder(BELIEVED, RADIUS_M + 0.08, 1.3, rr.components.FillMode.MajorWireframe))
+        tape.fix(f"{BELIEVED_ROBOT}/heading", _arrow(BELIEVED, 1.35))
+        tape.fix(f"{BELIEVED_ROBOT}/sight", _wedge(float(self._half_view_rad)))
+
+    def log(self, tape: Tape, moment: Moment) -> None:
+        for pose in moment.truth[-1:]:
+            self._move(tape, TRUE_ROBOT, TRUE_TRAIL, pose, TRUE)
+        if moment.touched(Hypothesis):
+            self._log_belief(tape, moment.mirror)
+
+    def _log_belief(self, tape: Tape, mirror: Mirror) -> None:
+        tape.log(CANDIDATES, _candidates(self._world, mirror))
+        held = believed(mirror)
+        if held is None:
+            tape.log(UNCERTAINTY, rr.Clear(recursive=False))
+            return
+        pose = held.world_from_robot(self._world)
+        self._move(tape, BELIEVED_ROBOT, BELIEVED_TRAIL, pose, BELIEVED)
+        tape.log(UNCERTAINTY, _ellipse(pose, held.covariance_world(self._world)))
+
+    def _move(self, tape: Tape, robot: str, trail: str, pose: Pose2, colour: Colour) -> None:
+        before = self._last.get(robot, pose)
+        self._last[robot] = pose
+        turn = rr.RotationAxisAngle(axis=(0, 0, 1), radians=pose.heading_rad)
+        tape.log(robot, rr.Transform3D(translation=(pose.x_m, pose.y_m, 0.0), rotation=turn))
+        if before.distance_to(pose) > 1e-6:
+            step = [[before.x_m, before.y_m, 0.05], [pose.x_m, pose.y_m, 0.05]]
+            tape.log(trail, rr.LineStrips3D([step], colors=[colour], radii=0.03))
+
+
+def believed(mirror: Mirror) -> Hypothesis | None:
+    """The hypothesis that is acted on."""
+    entry = mirror.latest(Hypothesis, lambda h: h.is_held)
+    return entry.value if entry else None
+
+
+def _cylinder(colour: Colour, radius_m: float, height_m: float, fill: Any) -> Any:
+    return rr.Cylinders3D(lengths=[height_m], radii=[radius_m], centers=[[0, 0, height_m / 2]], colors=[colour], fill_mode=fill)
+
+
+def _arrow(colour: Colour, height_m: float) -> Any:
+    return rr.Arrows3D(origins=[[0, 0, height_m]], vectors=[[0.9, 0, 0]], radii=0.06, colors=[colour])
+
+
+def _wedge(half_view_rad: float) -> Any:
+    """What the camera covers, on the floor ahead."""
+    angles = np.linspace(-half_view_rad, half_view_rad, 9)
+    arc = [[SIGHT_M * np.cos(a), SIGHT_M * np.sin(a), 0.04] for a in angles]
+    apex = [0.0, 0.0, 0.04]
+    return rr.LineStrips3D([[apex, *arc, apex]], colors=[faint(BELIEVED, 120)], radii=0.015)
+
+
+def _ellipse(pose: Pose2, covariance_world: NDArray[np.float64]) -> Any:
+    values, axes = np.linalg.eigh(covariance_world[:2, :2])
+    angles = np.linspace(0.0, 2.0 * np.pi, 33)
+    circle = np.stack([np.cos(angles), np.sin(angles)])
+    ring = pose.position + SIGMA_SCALE * (axes @ (np.sqrt(np.maximum(values, 0.0))[:, None] * circle)).T
+    strip = np.column_stack([ring, np.full(len(ring), 0.06)])
+    label = f"1 sigma x {SIGMA_SCALE:.0f}"
+    return rr.LineStrips3D([strip], colors=[BELIEVED], radii=0.025, labels=[label], show_labels=True)
+
+
+def _candidates(world: World, mirror: Mirror) -> Any:
+    """Where else he might be: an arrow each, the longer the likelier."""
+    others = [e.value for e in mirror.all(Hypothesis) if e.value.status == "candidate"]
+    poses = [h.world_from_robot(world) for h in others]
+    lengths = [0.5 + h.weight for h in others]
+    return rr.Arrows3D(
+        origins=[[p.x_m, p.y_m, 0.1] for p in poses],
+        vectors=[[s * np.cos(p.heading_rad), s * np.sin(p.heading_rad), 0] for p, s in zip(poses, lengths, strict=True)],
+        radii=0.05, colors=[CANDIDATE],
+    )

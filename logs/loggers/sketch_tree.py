@@ -1,0 +1,124 @@
+"""The plan sketch tree (Figure 3): goal, subgoals and the milestones between them, laid out by us as an outline."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import rerun as rr
+
+from blackboard.entry import Entry
+from logs.mirror import Mirror, Moment
+from logs.palette import DONE, PLANNED, VERDICTS, WAITING, Colour
+from logs.paths import SKETCH
+from logs.tape import Tape
+from world_models.task import Certificate, Goal, Milestone, PlanSketch, Subgoal
+
+ROW, INDENT, LETTER = 26.0, 34.0, 6.6
+"""Height of a row, step to the right of a level, and width of a letter, in the graph's own units."""
+
+MARKS = {"verified": "✔", "refuted": "✘", "not testable": "?", "turning": "…", "expected": "…", "": "·"}
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One row of the outline; ``after`` is the row that it hangs on, or ""."""
+
+    id: str
+    label: str
+    colour: Colour
+    depth: int
+    after: str
+
+
+class SketchTree:
+    """Logs the whole tree when any of it changes."""
+
+    def begin(self, tape: Tape) -> None:
+        """Nothing holds at all times."""
+
+    def log(self, tape: Tape, moment: Moment) -> None:
+        if not moment.touched(Goal, PlanSketch, Milestone, Certificate):
+            return
+        nodes = outline(moment.mirror)
+        if nodes:
+            tape.log(SKETCH, _boxes(nodes), _arrows(nodes))
+
+
+def outline(mirror: Mirror) -> list[Node]:
+    """The rows of the newest goal's tree from top to bottom; finished sketches are folded into their subgoal."""
+    goal = mirror.latest(Goal)
+    if goal is None:
+        return []
+    root = Node(goal.id, _goal_label(goal.value), DONE if goal.value.status == "reached" else PLANNED, 0, "")
+    return [root, *_rows(mirror, goal.id, (), root)]
+
+
+def _rows(mirror: Mirror, goal: str, path: tuple[int, ...], parent: Node) -> Iterator[Node]:
+    sketch = _sketch(mirror, goal, path)
+    if sketch is None or (sketch.value.status == "done" and path):
+        return
+    last = parent
+    for number in range(len(sketch.value.subgoals) + 1):
+        last = _milestone_node(mirror, sketch, number, parent.depth + 1, last.id)
+        yield last
+        if number < len(sketch.value.subgoals):
+            last = _subgoal_node(sketch, number, parent.depth + 1, last.id)
+            yield last
+            yield from _rows(mirror, goal, (*path, number), last)
+
+
+def _sketch(mirror: Mirror, goal: str, path: tuple[int, ...]) -> Entry[PlanSketch] | None:
+    return mirror.latest(PlanSketch, lambda s: s.goal == goal and s.path == path and s.status != "superseded")
+
+
+def _subgoal_node(sketch: Entry[PlanSketch], number: int, depth: int, after: str) -> Node:
+    value = sketch.value
+    behind = value.status == "done" or number < value.at
+    colour = DONE if behind else PLANNED if number == value.at and value.is_active else WAITING
+    return Node(f"{sketch.id}/subgoal-{number}", subgoal_label(value.subgoals[number]), colour, depth, after)
+
+
+def _milestone_node(mirror: Mirror, sketch: Entry[PlanSketch], number: int, depth: int, after: str) -> Node:
+    verdict = _verdict(mirror, sketch, number)
+    what = mirror.latest(Milestone, lambda m: m.sketch == sketch.id and m.index == number)
+    text = f" {short(what.value.what)}" if what and what.value.is_open else ""
+    label = f"{MARKS.get(verdict, '·')} M{number}{text}"
+    return Node(f"{sketch.id}/milestone-{number}", label, VERDICTS.get(verdict, WAITING), depth, after)
+
+
+def _verdict(mirror: Mirror, sketch: Entry[PlanSketch], number: int) -> str:
+    """What became of a milestone: what the sketch holds of it counts most, then the last look at it."""
+    value = sketch.value
+    if number < value.at or (number == value.at and value.verified):
+        return "verified"
+    last = mirror.latest(Milestone, lambda m: m.sketch == sketch.id and m.index == number)
+    return last.value.status if last else ""
+
+
+def _goal_label(goal: Goal) -> str:
+    return f"{goal.origin.locale} → {goal.destination.locale}: {goal.status}"
+
+
+def subgoal_label(subgoal: Subgoal) -> str:
+    """Where a subgoal leads, in a few words."""
+    a, b = subgoal.origin, subgoal.destination
+    through = f" by {subgoal.passage}" if subgoal.passage else ""
+    if a.locale != b.locale:
+        return f"to {b.locale}{through}"
+    return f"{'go' if subgoal.primitive else 'reach'} to ({b.x_m:.1f}, {b.y_m:.1f}) m{through}"
+
+
+def short(text: str, most: int = 34) -> str:
+    """The beginning of a text that may be too long for a node."""
+    return text if len(text) <= most else text[: most - 1] + "…"
+
+
+def _boxes(nodes: list[Node]) -> rr.GraphNodes:
+    middles = [(INDENT * n.depth + LETTER * len(n.label) / 2, ROW * row) for row, n in enumerate(nodes)]
+    return rr.GraphNodes([n.id for n in nodes], positions=middles, labels=[n.label for n in nodes],
+                         colors=[n.colour for n in nodes], show_labels=True)
+
+
+def _arrows(nodes: list[Node]) -> rr.GraphEdges:
+    return rr.GraphEdges([(n.after, n.id) for n in nodes if n.after], graph_type="directed")

@@ -1,0 +1,77 @@
+"""What the diary knows of the board: rebuilt from the changes alone, as any later reader must."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from blackboard.change import Change, Retracted, always
+from blackboard.entry import Entry
+from blackboard.journal import Decision
+from world_models.frames import Pose2
+
+T = TypeVar("T")
+
+
+class Mirror:
+    """The current revision of every entry, as far as the changes tell."""
+
+    def __init__(self) -> None:
+        self._by_type: dict[type[Any], dict[str, Entry[Any]]] = {}
+        self._by_id: dict[str, Entry[Any]] = {}
+
+    def take(self, change: Change) -> None:
+        """Follow one change."""
+        entry = change.entry
+        same = self._by_type.setdefault(type(entry.value), {})
+        if isinstance(change, Retracted):
+            same.pop(entry.id, None)
+            self._by_id.pop(entry.id, None)
+        else:
+            same[entry.id] = self._by_id[entry.id] = entry
+
+    def get(self, id: str) -> Entry[Any] | None:
+        """The current revision of an entry, or None."""
+        return self._by_id.get(id)
+
+    def all(self, kind: type[T]) -> tuple[Entry[T], ...]:
+        """Current entries of a type, oldest first."""
+        return tuple(self._by_type.get(kind, {}).values())
+
+    def latest(self, kind: type[T], where: Callable[[T], bool] = always) -> Entry[T] | None:
+        """The newest posting of a type that satisfies a predicate, or None."""
+        newest_first = reversed(self._by_type.get(kind, {}).values())
+        return next((entry for entry in newest_first if where(entry.value)), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """One cycle as the loggers see it.
+
+    Attributes:
+        decision: what was decided.
+        mirror: the board after it.
+        truth: where the robot truly was since the last cycle, oldest first; empty where nobody knows.
+    """
+
+    decision: Decision
+    mirror: Mirror
+    truth: tuple[Pose2, ...] = ()
+    _changes: tuple[Change, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_changes", (*self.decision.observed, *self.decision.made))
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What was observed before the decision, then what it made."""
+        return self._changes
+
+    def changed(self, kind: type[T]) -> tuple[Entry[T], ...]:
+        """Entries of a type that were posted or revised."""
+        return tuple(c.entry for c in self._changes if isinstance(c.entry.value, kind) and not isinstance(c, Retracted))
+
+    def touched(self, *kinds: type[Any]) -> bool:
+        """Whether any entry of these types changed or went."""
+        return any(isinstance(c.entry.value, kinds) for c in self._changes)

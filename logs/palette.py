@@ -1,0 +1,30 @@
+"""Colours (red, green, blue, opacity) and what they mean, the same in every view."""
+
+from __future__ import annotations
+
+Colour = tuple[int, int, int, int]
+
+TRUE: Colour = (70, 210, 90, 255)
+BELIEVED: Colour = (70, 150, 255, 255)
+CANDIDATE: Colour = (180, 120, 255, 200)
+PLANNED: Colour = (255, 150, 40, 255)
+EXPECTED: Colour = (255, 220, 70, 255)
+FOUND: Colour = (0, 215, 230, 255)
+MATCHED: Colour = (130, 255, 60, 255)
+REJECTED: Colour = (255, 70, 60, 255)
+DONE: Colour = (140, 140, 140, 255)
+WAITING: Colour = (200, 200, 205, 255)
+DOOR: Colour = (120, 200, 140, 255)
+NAME: Colour = (255, 255, 255, 255)
+
+LEVELS: dict[str, Colour] = {"action": (90, 170, 255, 255), "plan": (255, 160, 50, 255), "goal": (235, 90, 120, 255)}
+
+VERDICTS: dict[str, Colour] = {
+    "verified": MATCHED, "refuted": REJECTED, "not testable": (190, 130, 255, 255), "turning": EXPECTED,
+    "expected": EXPECTED,
+}
+
+
+def faint(colour: Colour, opacity: int) -> Colour:
+    """The same colour, less of it."""
+    return (*colour[:3], opacity)

@@ -1,0 +1,43 @@
+"""How a fault is written in a scenario file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sim.faults import Displacement, Fault, LightsOff, Moment
+from sim.places import Place
+from sim.settings import read_settings
+from world_models.toml_source import Node
+
+
+@dataclass(frozen=True, slots=True)
+class FaultTable:
+    """Every key of a fault; which ones count depends on its kind."""
+
+    kind: str = ""
+    in_locale: str = ""
+    after_m: float = 0.0
+    after_s: float = 0.0
+    forward_m: float = 0.0
+    left_m: float = 0.0
+    turn_rad: float = 0.0
+    distance_m: float = 0.0
+    duration_s: float = 10.0
+    to_locale: str = ""
+    to_x_m: float = 0.0
+    to_y_m: float = 0.0
+    to_heading_rad: float = 0.0
+
+
+def read_fault(node: Node) -> Fault:
+    """One of a scenario's ``[[faults]]``. Raises WorldError where it is none."""
+    table = read_settings(node, FaultTable)
+    moment = Moment(table.in_locale, table.after_m, table.after_s)
+    if table.kind == "lights_off":
+        return LightsOff(moment, table.duration_s)
+    if table.kind not in ("bump", "kidnap"):
+        raise node.fail("kind = bump, kidnap or lights_off", repr(table.kind))
+    there = Place(table.to_locale, table.to_x_m, table.to_y_m) if table.to_locale else None
+    return Displacement(
+        table.kind, moment, table.forward_m, table.left_m, table.turn_rad, table.distance_m, there, table.to_heading_rad
+    )

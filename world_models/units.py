@@ -1,0 +1,7 @@
+"""Units at the edge: inside everything is metres and radians."""
+
+FOOT_M = 0.3048
+"""One foot [m]."""
+
+INCH_M = 0.0254
+"""One inch [m]."""
