@@ -38,8 +38,8 @@ class KnowledgeSource(ABC):
         return 0.5
 
     def still_valid(self, view: View, trigger: Change) -> bool:
-        """Asked again just before acting: does the trigger still hold? Pure. By default: it is the current revision."""
-        return view.is_current(trigger.entry)
+        """Asked again each cycle until it acts: is the trigger the current revision, and could it still answer? Pure."""
+        return view.is_current(trigger.entry) and self.rate(view, trigger) is not None
 
     @abstractmethod
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import re
 import signal
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from blackboard.journal import Sink
 from harvey.errors import BadInput
 from harvey.run_directory import new_run
-from harvey.tally import Row, Tally
+from harvey.tally import Tally
 
 if TYPE_CHECKING:
+    from harvey.mission import MissionResult
     from sim.assembly import Stage
 
 Follow = Callable[[Tally], Sink]
@@ -82,23 +83,28 @@ def settings_of(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
     return tuple((key.strip(), value.strip()) for key, _, value in pairs)
 
 
-def run_task(task: Task, *, sinks: Sequence[Sink] = (), follow: Follow | None = None, live: bool = False) -> Row:
+def run_task(
+    task: Task, *, sinks: Sequence[Sink] = (), follow: Follow | None = None, live: bool = False
+) -> MissionResult:
     """Run one mission; ``follow`` makes a sink that shows what is counted. Raises BadInput for what the user gave."""
     stage = task.stage()
     from harvey.mission import run_mission
 
     out = None if task.out is None else new_run(task.out)
     tally = Tally(stage)
-    shown = (follow(tally),) if follow else ()
-    began_s = time.perf_counter()
-    result = run_mission(stage, task.seed, out=out, sinks=(tally, *shown, *sinks), live=live)
-    return tally.row(task.seed, result, time.perf_counter() - began_s)
+    shown = (tally, follow(tally)) if follow else ()
+    if out is not None:
+        write_origin(out, {"scenario": stage.scenario.name, "seed": task.seed, "outcome": "unfinished"}, task)
+    result = run_mission(stage, task.seed, out=out, sinks=(*shown, *sinks), live=live)
+    if out is not None:
+        write_origin(out, result.record(), task)
+    return result
 
 
-def run_all(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Task, Row]]:
+def run_all(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Task, MissionResult]]:
     """Run several missions; they come as they are done, in whatever order.
 
-    A mission's row follows from its task alone, so that the number of workers changes nothing but the time.
+    A mission's result follows from its task alone, so that the number of workers changes nothing but the time.
     """
     spawn = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(min(workers, len(tasks)) or 1, mp_context=spawn, initializer=_become_worker)
@@ -113,6 +119,14 @@ def run_all(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Tas
         raise
     finally:
         pool.shutdown()
+
+
+def write_origin(out: Path, record: Mapping[str, Any], task: Task) -> None:
+    """Write ``result.json`` with the file and settings that the run came from, so that it can be decided again."""
+    origin = {"file": str(Path(task.scenario).resolve()) if task.scenario.endswith(".toml") else task.scenario,
+              "settings": dict(task.settings)}
+    text = json.dumps({**record, "origin": origin}, indent=2) + "\n"
+    (out / "result.json").write_text(text, encoding="utf-8")
 
 
 def _become_worker() -> None:

@@ -75,6 +75,9 @@ def _answer(args: Namespace) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        print(f"harvey: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        return 2
     except (BadInput, WorldError, RecordingError) as error:
         print(f"harvey: {error}", file=sys.stderr)
         return 2

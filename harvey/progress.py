@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from tqdm import tqdm
 
 from blackboard.journal import Decision, Sink
 from harvey.campaign import Follow, Task
 from harvey.summary import millimetres
-from harvey.tally import Row, Tally
+from harvey.tally import Tally
 from harvey.units import count
+
+if TYPE_CHECKING:
+    from harvey.mission import MissionResult
 
 
 class Bar:
@@ -66,12 +69,14 @@ def following(out: TextIO) -> Iterator[Follow]:
             item.close()
 
 
-def counted(done: Iterable[tuple[Task, Row]], total: int, out: TextIO) -> Iterator[tuple[Task, Row]]:
+def counted(
+    done: Iterable[tuple[Task, MissionResult]], total: int, out: TextIO
+) -> Iterator[tuple[Task, MissionResult]]:
     """Missions as they are done, with a bar on a terminal and a line for each elsewhere."""
     with tqdm(total=total, file=out, disable=not out.isatty(), unit="mission", leave=False) as bar:
-        for number, (task, row) in enumerate(done, 1):
+        for number, (task, result) in enumerate(done, 1):
             if not out.isatty():
-                how = f"{row.outcome}, {millimetres(row.error_m)}"
+                how = f"{result.outcome}, {millimetres(result.final_error_m)}"
                 print(f"{number} of {total}: {task.named}: {how}", file=out, flush=True)
             bar.update()
-            yield task, row
+            yield task, result

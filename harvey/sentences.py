@@ -181,6 +181,7 @@ def _root(variance: Any) -> float:
 MAKERS: Mapping[str, Callable[[Value], str]] = {
     "Command": _command, "Goal": _goal, "PlanSketch": _plan_sketch, "Leg": _leg, "Milestone": _milestone,
     "Certificate": _certificate, "Outcome": _outcome, "Tracks": _tracks, "Segments": _segments,
-    "LineMatch": _line_match, "PoseFix": _pose_fix, "Hypothesis": _hypothesis, "MotorCommand": _motion,
-    "MotionReport": _motion_report, "Look": _look, "Frame": _frame, "Discrepancy": _discrepancy, "Quiescence": _quiescence,
+    "LineMatch": _line_match, "PoseFix": _pose_fix, "Hypothesis": _hypothesis,
+    "MotorCommand": _motion, "MotionReport": _motion_report, "Look": _look, "Frame": _frame,
+    "Discrepancy": _discrepancy, "Quiescence": _quiescence,
 }

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from harvey.tables import table
-from harvey.tally import Row
-from harvey.units import INCH_M, count
+from harvey.units import INCH_M, count, degrees
 
-COLUMNS = ("seed", "outcome", "error mm", "inches", "milestones", "refuted", "sketches", "replans", "collisions",
-           "path m", "robot s", "cycles", "wall s")
+if TYPE_CHECKING:
+    from harvey.mission import MissionResult
+
+COLUMNS = ("seed", "outcome", "error mm", "inches", "milestones", "refuted", "wrong", "sketches", "replans",
+           "relocated", "collisions", "path m", "robot s", "cycles", "wall s")
 
 
 def millimetres(error_m: float) -> str:
@@ -19,46 +22,51 @@ def millimetres(error_m: float) -> str:
     return f"{error_m * 1000.0:.1f} mm ({error_m / INCH_M:.2f} inches)"
 
 
-def one(row: Row, out: Path | None) -> str:
+def one(r: MissionResult, out: Path | None) -> str:
     """The summary of one mission."""
+    m = r.milestones
     lines = [
-        f"{row.outcome}: {row.reason}",
-        f"  final error   {millimetres(row.error_m)} from the goal",
-        f"  milestones    {row.verified} verified, {row.refuted} refuted",
-        f"  sketches      {count(row.sketches, 'plan sketch', 'plan sketches')}, {row.replans} of them superseded",
-        f"  goals         {count(row.goals, 'top-level goal')}",
-        f"  collisions    {row.collisions}",
-        f"  way           {row.path_m:.1f} m in {row.time_s:.0f} s of the robot's time",
-        f"  took          {row.wall_s:.1f} s for {count(row.cycles, 'cycle')}",
+        f"{r.outcome}: {r.reason}",
+        f"  final error   {millimetres(r.final_error_m)} from the goal, {degrees(r.final_heading_error_rad)} off",
+        f"  milestones    {m['verified']} verified, {m['refuted']} refuted, {m['not_testable']} not testable,"
+        f" {m['false_accepts']} accepted wrongly",
+        f"  plans         {count(r.sketches, 'sketch', 'sketches')}, {count(r.replans, 'replan')},"
+        f" {count(r.relocalizations, 'relocalization')}",
+        f"  collisions    {r.collisions}",
+        f"  way           {r.path_length_m:.1f} m in {r.sim_time_s:.0f} s of the robot's time",
+        f"  took          {r.wall_time_s:.1f} s for {count(r.decisions, 'cycle')} and {count(r.frames, 'frame')}",
     ]
     if out is not None:
-        lines += [f"  recording     {out / 'recording.rrd'}",
+        lines += [f"  recording     {out / 'recording.rrd'}", "",
                   f"open it with    harvey view {out}", f"ask it with     harvey why {out}"]
     return "\n".join(lines)
 
 
-def several(rows: Sequence[Row]) -> str:
+def several(results: Sequence[MissionResult]) -> str:
     """A table, one row a seed, with a summary row."""
-    cells = [_cells(row) for row in rows]
-    return table(COLUMNS, [*cells, _total(rows)], last_is_summary=True)
+    return table(COLUMNS, [*(_cells(r) for r in results), _total(results)], last_is_summary=True)
 
 
-def _cells(r: Row) -> tuple[str, ...]:
-    return (
-        str(r.seed), r.outcome, f"{r.error_m * 1000:.1f}", f"{r.error_m / INCH_M:.2f}", str(r.verified), str(r.refuted),
-        str(r.sketches), str(r.replans), str(r.collisions), f"{r.path_m:.1f}", f"{r.time_s:.0f}", str(r.cycles),
-        f"{r.wall_s:.1f}",
-    )
+def _cells(r: MissionResult) -> tuple[str, ...]:
+    counts, ways = _counts(r), _ways(r)
+    return (str(r.seed), r.outcome, f"{r.final_error_m * 1000:.1f}", f"{r.final_error_m / INCH_M:.2f}",
+            *(str(n) for n in counts), f"{ways[0]:.1f}", f"{ways[1]:.0f}", f"{ways[2]:.0f}", f"{ways[3]:.1f}")
 
 
-def _total(rows: Sequence[Row]) -> tuple[str, ...]:
-    reached = sum(1 for r in rows if r.reached)
-    worst_m = max(r.error_m for r in rows)
-    means = [math.fsum(values) / len(rows) for values in zip(*(_numbers(r) for r in rows), strict=True)]
-    return (f"{len(rows)}", f"{reached} reached", f"<= {worst_m * 1000:.1f}", f"<= {worst_m / INCH_M:.2f}",
-            *(f"{mean:.1f}" for mean in means[:4]), str(sum(r.collisions for r in rows)),
-            *(f"{mean:.1f}" for mean in means[4:]))
+def _counts(r: MissionResult) -> tuple[int, ...]:
+    m = r.milestones
+    return (m["verified"], m["refuted"], m["false_accepts"], r.sketches, r.replans, r.relocalizations, r.collisions)
 
 
-def _numbers(r: Row) -> tuple[float, ...]:
-    return r.verified, r.refuted, r.sketches, r.replans, r.path_m, r.time_s, r.cycles, r.wall_s
+def _ways(r: MissionResult) -> tuple[float, ...]:
+    return r.path_length_m, r.sim_time_s, r.decisions, r.wall_time_s
+
+
+def _total(results: Sequence[MissionResult]) -> tuple[str, ...]:
+    """Counts are summed, ways averaged, of errors the worst is told."""
+    reached = sum(1 for r in results if r.outcome == "reached")
+    worst_m = max(r.final_error_m for r in results)
+    sums = [sum(values) for values in zip(*(_counts(r) for r in results), strict=True)]
+    means = [math.fsum(values) / len(results) for values in zip(*(_ways(r) for r in results), strict=True)]
+    return ("all", f"{reached} of {len(results)} reached", f"max {worst_m * 1000:.1f}", f"{worst_m / INCH_M:.2f}",
+            *(str(n) for n in sums), f"{means[0]:.1f}", f"{means[1]:.0f}", f"{means[2]:.0f}", f"{means[3]:.1f}")

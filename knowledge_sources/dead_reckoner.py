@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from blackboard.board import View
@@ -9,10 +10,16 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
+from blackboard.servoing import Discrepancy
 from knowledge_sources.questions import held
-from world_models.body import Look, MotionReport
+from world_models.body import Look, MotionReport, MotorCommand
 from world_models.location import Hypothesis
 from world_models.robot import RobotModel
+
+STOPPED = 0.7
+"""A move of which the wheels claim less than this part was stopped by something."""
+PLAN_BOUND_PX = 30.0
+"""What plan-level servoing may correct, as in §6.1.4."""
 
 
 class DeadReckoner(KnowledgeSource):
@@ -20,7 +27,7 @@ class DeadReckoner(KnowledgeSource):
 
     level = Level.ACTION
     watches = (Watch(MotionReport, (Posted,)),)
-    writes = (Hypothesis, Look)
+    writes = (Hypothesis, Look, Discrepancy)
 
     def __init__(self, robot: RobotModel) -> None:
         self._robot = robot
@@ -44,3 +51,7 @@ class DeadReckoner(KnowledgeSource):
         step = Revise(belief, moved, (trigger.entry,))
         yield step
         yield Post(Look("track"), (step,))
+        command = view.latest(MotorCommand)
+        if command is not None and report.move_m < STOPPED * command.value.move_m:
+            what = f"the wheels claim {report.move_m:.2f} m of {command.value.move_m:.2f} m: something stopped the robot"
+            yield Post(Discrepancy(Level.ACTION, what, math.inf, (PLAN_BOUND_PX, PLAN_BOUND_PX), "px"), (trigger.entry,))

@@ -74,9 +74,6 @@ class Motor(KnowledgeSource):
             return
         yield from self._increment(view, driving[0], belief)
 
-    def still_valid(self, view: View, trigger: Change) -> bool:
-        return view.is_current(trigger.entry) and not is_over(view)
-
     def _look_error(self, view: View, milestone: Milestone) -> float | None:
         """How far to turn to face a milestone's landmarks [rad]; None when it faces them."""
         belief = held(view)

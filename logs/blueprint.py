@@ -12,7 +12,7 @@ from logs import paths
 from world_models.camera import Camera
 from world_models.world import World
 
-ABOVE = 0.75
+ABOVE = 0.55
 """The eye stands so high above the building, in lengths of its diagonal."""
 
 TRAILS = (paths.TRUE_TRAIL, paths.BELIEVED_TRAIL)
@@ -23,12 +23,13 @@ SINCE_THE_START = rrb.VisibleTimeRange(
 
 def blueprint(world: World, camera: Camera) -> Any:
     """All views of a run under one cursor: the building and the picture large, the reasons beside, time below."""
+    words = rrb.Vertical(_description(), _why(), row_shares=[4, 6])
+    decisions = rrb.Tabs(_decisions(), _table())
     return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(_description(), _why(), row_shares=[2, 3], name="in words"),
-            rrb.Vertical(_building(world), _below_building(), row_shares=[3, 2]),
-            rrb.Vertical(_picture(camera), _below_picture(), row_shares=[3, 2]),
-            column_shares=[3, 7, 5],
+        rrb.Vertical(
+            rrb.Horizontal(words, _building(world), _picture(camera), column_shares=[4, 9, 6]),
+            rrb.Horizontal(decisions, _lanes(), _sketch(), _errors(), column_shares=[5, 5, 4, 5]),
+            row_shares=[6, 5],
         ),
         rrb.TimePanel(timeline="cycle", state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
@@ -55,7 +56,7 @@ def _building(world: World) -> Any:
         background=rrb.Background(color=[28, 30, 34, 255]), line_grid=False,
         overrides={path: rrb.VisibleTimeRanges([SINCE_THE_START]) for path in TRAILS},
         eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=[middle[0], middle[1] - 0.35 * size, ABOVE * size],
+            kind=rrb.Eye3DKind.Orbital, position=[middle[0], middle[1] - 0.32 * size, ABOVE * size],
             look_target=[middle[0], middle[1], 0.0], eye_up=[0.0, 0.0, 1.0]),
     )
 
@@ -66,24 +67,18 @@ def _picture(camera: Camera) -> Any:
         visual_bounds=rrb.VisualBounds2D(x_range=[0, camera.width], y_range=[0, camera.height]))
 
 
-def _below_building() -> Any:
-    return rrb.Tabs(_lanes(), _decisions(), _table(), name="decisions")
-
-
 def _lanes() -> Any:
-    return rrb.StateTimelineView(origin=paths.LANES, name="Who acts, and which level is in focus")
+    return rrb.StateTimelineView(origin=paths.LANES, name="Who acts; which level is in focus")
 
 
 def _decisions() -> Any:
-    return rrb.TextLogView(origin=paths.SENTENCES, name="Decisions")
+    return rrb.TextLogView(
+        origin=paths.SENTENCES, name="Decisions: one a cycle",
+        columns=rrb.TextLogColumns(timeline_columns=["cycle"], text_log_columns=["loglevel", "body"]))
 
 
 def _table() -> Any:
     return rrb.DataframeView(origin=paths.TABLE, name="Decision table")
-
-
-def _below_picture() -> Any:
-    return rrb.Tabs(_sketch(), _errors(), name="plan and errors")
 
 
 def _sketch() -> Any:
@@ -106,25 +101,19 @@ def _plot(origin: str, name: str) -> Any:
 
 
 DESCRIPTION = """\
-# Harvey
+Harvey drives from room to room by what his camera shows. Experts round a blackboard decide, **one decision a cycle**.
+Drag the cursor at the bottom, or play.
 
-A robot drives from one room to another by what its camera shows. Experts round a blackboard decide; **every cycle is one
-decision**. Drag the cursor in the time bar below, or play.
-
-| colour | meaning |
-|---|---|
-| green | the true robot (simulator only), matched lines |
-| blue | the robot as Harvey believes it to be; its ellipse is drawn 20 times as large |
-| orange | goal, plan sketch, leg under way; in the picture: drift of a followed point, drawn 5 times as long |
-| yellow | what he expects to see |
-| cyan | what he found in the picture |
-| red | what he looked for and did not find, or rejected |
-| grey | done |
-
-**Tabs**: who acts, decisions, decision table; plan sketches, errors.
+- **green**: the true robot (known in simulation only); a line that was matched
+- **blue**: where Harvey believes he is; the ellipse is his doubt, drawn 20 times as large
+- **orange**: goal, plan, the leg under way; in the picture: how far a followed point has drifted, 5 times as long
+- **yellow**: what he expects to see
+- **cyan**: what he found in the picture
+- **red**: sought and not found, or rejected
+- **grey**: done
 """
 
 
 def describe(title: str) -> Any:
     """The text beside the views."""
-    return rr.TextDocument(f"{DESCRIPTION}\n*{title}*\n", media_type="text/markdown")
+    return rr.TextDocument(f"## {title}\n{DESCRIPTION}", media_type="text/markdown")

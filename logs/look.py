@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import socket
 import sys
 import time
@@ -50,9 +51,10 @@ def viewer() -> Iterator[Any]:
         RecordingError: it cannot start.
     """
     try:
-        client = ViewerClient.spawn(headless=True, port=_free_port(), hide_welcome_screen=True)
+        client = ViewerClient.spawn(
+            headless=True, port=_free_port(), hide_welcome_screen=True, executable_path=_executable())
     except (RuntimeError, OSError, ValueError) as error:
-        raise RecordingError(f"the viewer cannot start ({error}); {NEEDS}") from None
+        raise RecordingError(f"the viewer cannot start ({str(error).strip().splitlines()[0]}); {NEEDS}") from None
     try:
         _await(client)
         yield client
@@ -81,6 +83,11 @@ def _await(client: Any) -> None:
             last = error
             time.sleep(1.0)
     raise RecordingError(f"the viewer does not answer ({last}); {NEEDS}")
+
+
+def _executable() -> str | None:
+    """The viewer that is installed beside this Python, whether or not it is on the search path."""
+    return shutil.which("rerun", path=str(Path(sys.executable).parent))
 
 
 def _free_port() -> int:

@@ -11,7 +11,6 @@ from harvey.campaign import Task, one_thread, run_all, run_task, seeds_of, setti
 from harvey.commands.command import Command
 from harvey.errors import BadInput
 from harvey.run_directory import RUNS
-from harvey.tally import Row
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -59,9 +58,9 @@ def _one(task: Task, args: Namespace) -> int:
 
     sinks = (printing(sys.stdout),) if args.trace else ()
     with following(sys.stderr) as follow:
-        row = run_task(task, sinks=sinks, follow=None if args.trace else follow, live=args.live)
-    print(one(row, task.out))
-    return 0 if row.reached else 1
+        result = run_task(task, sinks=sinks, follow=None if args.trace else follow, live=args.live)
+    print(one(result, task.out))
+    return 0 if result.outcome == "reached" else 1
 
 
 def _several(tasks: tuple[Task, ...]) -> int:
@@ -69,12 +68,10 @@ def _several(tasks: tuple[Task, ...]) -> int:
     from harvey.summary import several
 
     tasks[0].stage()
-    rows: dict[int, Row] = {}
-    for task, row in counted(run_all(tasks), len(tasks), sys.stderr):
-        rows[task.seed] = row
-    print(several([rows[seed] for seed in sorted(rows)]))
+    results = {task.seed: result for task, result in counted(run_all(tasks), len(tasks), sys.stderr)}
+    print(several([results[task.seed] for task in tasks]))
     print(f"the runs are in {tasks[0].out.parent if tasks[0].out else RUNS}")
-    return 0 if all(row.reached for row in rows.values()) else 1
+    return 0 if all(r.outcome == "reached" for r in results.values()) else 1
 
 
 COMMAND = Command(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching_fit import Fits, Similarity2
+from knowledge_sources.methods.matching_fit import Fits, Similarity2, best_fits
 from knowledge_sources.methods.matching_hough import LineTable, Peak, hough_peaks, line_table
 from knowledge_sources.methods.matching_objective import Objective, Terms, likelihood_terms, paper_terms
 from knowledge_sources.methods.matching_pairs import (
@@ -29,6 +30,7 @@ from knowledge_sources.methods.matching_search import (
     coverage,
     fit_of,
     local_search,
+    nearest,
 )
 
 Array = NDArray[np.float64]
@@ -131,13 +133,11 @@ def match_lines(
         starts = placement_of(start)[None]
     tries = []
     for placement in starts:
-        space, first = _pair_space(table, placement, gates, pair_rad, terms, scene)
-        found = local_search(
-            space, terms, first, strategy=strategy, replace=replace, with_scale=with_scale, keep_trace=trace
-        )
+        space, first = _pair_space(table, placement, gates, pair_rad, terms, with_scale)
+        found = local_search(space, terms, first, strategy=strategy, replace=replace, keep_trace=trace)
         tries.append((space, found))
     space, found = min(tries, key=lambda tried: tried[1].error)
-    return _match(space, found, table, fit_of(space, found.chosen, with_scale), centre, terms, objective)
+    return _match(space, found, table, fit_of(space, found.chosen), centre, terms, objective)
 
 
 def format_trace(match: Match) -> str:
@@ -169,7 +169,7 @@ def _starts(
 
 
 def _pair_space(
-    table: PairTable, placement: Array, gates: Array, pair_rad: float, terms: Terms, scene: LineTable
+    table: PairTable, placement: Array, gates: Array, pair_rad: float, terms: Terms, with_scale: bool
 ) -> tuple[PairSpace, Mask]:
     """The restricted space at a placement, and the state to start from: each near data line to its nearest line."""
     members = np.flatnonzero(gated(table, placement, gates, pair_rad))
@@ -182,20 +182,10 @@ def _pair_space(
     forms = np.swapaxes(rows * weights[:, None, None], 1, 2) @ rows
     shift, turn, scale = (np.array([w]) for w in terms.anchor_weights)
     anchor = start_anchor(placement[None], shift, turn, scale)[0]
-    space = PairSpace(members, model, data, forms, masks, table.lines, anchor, placement)
+    fit = partial(best_fits, with_scale=with_scale, start=placement)
+    space = PairSpace(members, model, data, forms, masks, table.lines, anchor, fit)
     distances = np.sqrt(np.mean((rows @ placement) ** 2, axis=1))
-    return space, _nearest(data, distances, distances <= 0.5 * gates[model], len(scene.ends))
-
-
-def _nearest(data: NDArray[np.intp], distances: Array, near: Mask, count: int) -> Mask:
-    """(p,) for each of ``count`` data lines the nearest of its near pairs."""
-    order = np.lexsort((distances, data))
-    order = order[near[order]]
-    first = np.ones(len(order), bool)
-    first[1:] = data[order[1:]] != data[order[:-1]]
-    chosen = np.zeros(len(data), bool)
-    chosen[order[first]] = True
-    return chosen
+    return space, nearest(data, distances, distances <= 0.5 * gates[model])
 
 
 def _match(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching_fit import Fits, best_fits
+from knowledge_sources.methods.matching_fit import Fits
 from knowledge_sources.methods.matching_objective import Terms
 
 Array = NDArray[np.float64]
@@ -27,10 +28,11 @@ class PairSpace:
     """The restricted space: p possible pairs of a model line and a data line.
 
     Attributes:
-        members: (p,) rows of the table of pairs. model, data: (p,) indices. forms: (p, 5, 5) shares of E_fit.
+        members: (p,) rows of the table of pairs. model, data: (p,) indices. forms: (p, d, d) shares of E_fit.
         masks: (p, c) cells of the model line that the data line covers.
         lines: number of model lines.
-        anchor: (5, 5) weak pull to the placement ``start`` (5,) the space was formed at.
+        anchor: (d, d) pull to the placement the space was formed at.
+        fit: the best fits of k forms (k, d, d).
     """
 
     members: Index
@@ -40,7 +42,7 @@ class PairSpace:
     masks: Mask
     lines: int
     anchor: Array
-    start: Array
+    fit: Callable[[Array], Fits]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +70,6 @@ def local_search(
     *,
     strategy: Strategy,
     replace: bool,
-    with_scale: bool,
     keep_trace: bool,
 ) -> Found:
     """Add or delete one pair at a time (k = 1) while the match error falls.
@@ -80,17 +81,17 @@ def local_search(
     if strategy not in ("first", "steepest"):
         raise ValueError(f'expected strategy "first" or "steepest", got {strategy!r}')
     chosen = start.copy()
-    error = evaluate(space, terms, chosen, with_scale)
+    error = evaluate(space, terms, chosen)
     steps = [_step(space, chosen, error)] if keep_trace else []
     last, done = -1, 0
     for done in range(STEPS_A_PAIR * len(chosen)):
-        errors = flip_errors(space, terms, chosen, with_scale)
+        errors = flip_errors(space, terms, chosen)
         move = _pick(errors, error, strategy, last)
         if move >= 0:
             last, error = move, float(errors[move])
             chosen = flipped(space, chosen, move)
         else:
-            swap = _best_swap(space, terms, chosen, error, with_scale) if replace else None
+            swap = _best_swap(space, terms, chosen, error) if replace else None
             if swap is None:
                 break
             out, move, error = swap
@@ -101,21 +102,32 @@ def local_search(
     return Found(chosen, error, done, tuple(steps))
 
 
-def evaluate(space: PairSpace, terms: Terms, chosen: Mask, with_scale: bool) -> float:
+def evaluate(space: PairSpace, terms: Terms, chosen: Mask) -> float:
     """E_match of one state."""
-    fit = fit_of(space, chosen, with_scale)
+    fit = fit_of(space, chosen)
     lines = np.arange(space.lines)
     return float(fit.errors[0] + terms.omission(1.0 - coverage(space, chosen), lines).sum())
 
 
-def fit_of(space: PairSpace, chosen: Mask, with_scale: bool) -> Fits:
+def fit_of(space: PairSpace, chosen: Mask) -> Fits:
     """The best fit of one state."""
-    return best_fits((space.anchor + space.forms[chosen].sum(axis=0))[None], with_scale, space.start)
+    return space.fit((space.anchor + space.forms[chosen].sum(axis=0))[None])
 
 
 def coverage(space: PairSpace, chosen: Mask) -> Array:
     """(m,) share of each model line that the chosen data lines cover."""
     return np.asarray((_counts(space, chosen) > 0).mean(axis=1))
+
+
+def nearest(data: Index, distances: Array, near: Mask) -> Mask:
+    """(p,) a state to start from: for each data line the nearest (p,) ``distances`` of its ``near`` pairs."""
+    order = np.lexsort((distances, data))
+    order = order[near[order]]
+    first = np.ones(len(order), bool)
+    first[1:] = data[order[1:]] != data[order[:-1]]
+    chosen = np.zeros(len(data), bool)
+    chosen[order[first]] = True
+    return chosen
 
 
 def flipped(space: PairSpace, chosen: Mask, move: int) -> Mask:
@@ -127,7 +139,7 @@ def flipped(space: PairSpace, chosen: Mask, move: int) -> Mask:
     return out
 
 
-def flip_errors(space: PairSpace, terms: Terms, chosen: Mask, with_scale: bool) -> Array:
+def flip_errors(space: PairSpace, terms: Terms, chosen: Mask) -> Array:
     """(p,) E_match of every neighbour, each one flip away."""
     counts = _counts(space, chosen)
     rival = _rivals(space, chosen)
@@ -135,7 +147,7 @@ def flip_errors(space: PairSpace, terms: Terms, chosen: Mask, with_scale: bool) 
     forms = space.anchor + space.forms[chosen].sum(axis=0) + sign[:, None, None] * space.forms
     robs = rival >= 0
     forms[robs] -= space.forms[rival[robs]]
-    errors = best_fits(forms, with_scale, space.start).errors
+    errors = space.fit(forms).errors
     return np.asarray(errors + _omission_after(space, terms, chosen, counts, rival))
 
 
@@ -156,7 +168,7 @@ def _omission_after(space: PairSpace, terms: Terms, chosen: Mask, counts: Array,
 
 
 def _best_swap(
-    space: PairSpace, terms: Terms, chosen: Mask, error: float, with_scale: bool
+    space: PairSpace, terms: Terms, chosen: Mask, error: float
 ) -> tuple[int, int, float] | None:
     """The best exchange (pair out, pair in, E_match) within a model line, if it lowers the match error."""
     inside, outside = np.flatnonzero(chosen), np.flatnonzero(~chosen)
@@ -177,7 +189,7 @@ def _best_swap(
     victim = space.model[rival[robs]]
     lost = (space.masks[rival[robs]] & (counts[victim] == 1)).mean(axis=1)
     change[robs] += terms.omission(1.0 - covered[victim] + lost, victim) - now[victim]
-    errors = best_fits(forms, with_scale, space.start).errors + now.sum() + change
+    errors = space.fit(forms).errors + now.sum() + change
     best = int(np.argmin(errors))
     return (int(out[best]), int(into[best]), float(errors[best])) if errors[best] < error - GAIN else None
 

@@ -25,9 +25,9 @@ class Decisions:
 
     def log(self, tape: Tape, moment: Moment) -> None:
         decision = moment.decision
-        tape.log(RECORDS, rr.AnyValues(**{RECORD: decision_line(decision)}))
+        tape.log(RECORDS, rr.AnyValues(True, record=decision_line(decision)))
         tape.log(SENTENCES, rr.TextLog(sentence(decision), level=log_level(decision)))
-        tape.log(TABLE, rr.AnyValues(**row(decision)))
+        tape.log(TABLE, rr.AnyValues(True, **row(decision)))
 
 
 def sentence(decision: Decision) -> str:
@@ -69,5 +69,6 @@ def _bid(activation: Activation) -> str:
 def _deeds(made: tuple[Change, ...]) -> str:
     counts = Counter((change.kind.lower(), type(change.entry.value).__name__) for change in made)
     named = {(c.kind.lower(), type(c.entry.value).__name__): str(c.entry.ref) for c in made}
-    parts = [f"{kind} {named[kind, what] if count == 1 else f'{count} {what}'}" for (kind, what), count in counts.items()]
+    parts = [f"{kind} {named[kind, what]}" if count == 1 else f"{kind} {count} x {what}"
+             for (kind, what), count in counts.items()]
     return ", ".join(parts) or "did nothing"

@@ -27,7 +27,8 @@ class Plan:
     def __init__(self, world: World) -> None:
         self._world = world
         self._drawn: tuple[tuple[type[Any], str, Callable[[Mirror], Any]], ...] = (
-            (Goal, GOAL, self._flag), (PlanSketch, PATH, self._way), (Leg, LEG, _leg), (Milestone, LANDMARKS, _landmarks))
+            (Goal, GOAL, self._flag), (PlanSketch, PATH, self._way), (Leg, LEG, _leg),
+            (Milestone, LANDMARKS, _landmarks))
 
     def begin(self, tape: Tape) -> None:
         """Nothing holds at all times."""

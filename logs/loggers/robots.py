@@ -23,6 +23,9 @@ RADIUS_M = 0.35
 SIGMA_SCALE = 20.0
 """A few centimetres would not show in a building: the ellipse is drawn larger, and its label says so."""
 
+STILL_M = 1e-3
+TRAIL_HEIGHT_M = 0.2
+
 SIGHT_M = 2.5
 """Length of the wedge that shows where the camera looks."""
 
@@ -36,9 +39,10 @@ class Robots:
         self._last: dict[str, Pose2] = {}
 
     def begin(self, tape: Tape) -> None:
-        tape.fix(f"{TRUE_ROBOT}/body", _cylinder(TRUE, RADIUS_M, 0.9, rr.components.FillMode.Solid))
+        solid, wires = rr.components.FillMode.Solid, rr.components.FillMode.MajorWireframe
+        tape.fix(f"{TRUE_ROBOT}/body", _cylinder(TRUE, RADIUS_M, 0.9, solid))
         tape.fix(f"{TRUE_ROBOT}/heading", _arrow(TRUE, 0.95))
-        tape.fix(f"{BELIEVED_ROBOT}/body", _cylinder(BELIEVED, RADIUS_M + 0.08, 1.3, rr.components.FillMode.MajorWireframe))
+        tape.fix(f"{BELIEVED_ROBOT}/body", _cylinder(BELIEVED, RADIUS_M + 0.08, 1.3, wires))
         tape.fix(f"{BELIEVED_ROBOT}/heading", _arrow(BELIEVED, 1.35))
         tape.fix(f"{BELIEVED_ROBOT}/sight", _wedge(float(self._half_view_rad)))
 
@@ -59,13 +63,15 @@ class Robots:
         tape.log(UNCERTAINTY, _ellipse(pose, held.covariance_world(self._world)))
 
     def _move(self, tape: Tape, robot: str, trail: str, pose: Pose2, colour: Colour) -> None:
-        before = self._last.get(robot, pose)
+        before = self._last.get(robot)
+        if before == pose:
+            return
         self._last[robot] = pose
         turn = rr.RotationAxisAngle(axis=(0, 0, 1), radians=pose.heading_rad)
         tape.log(robot, rr.Transform3D(translation=(pose.x_m, pose.y_m, 0.0), rotation=turn))
-        if before.distance_to(pose) > 1e-6:
-            step = [[before.x_m, before.y_m, 0.05], [pose.x_m, pose.y_m, 0.05]]
-            tape.log(trail, rr.LineStrips3D([step], colors=[colour], radii=0.03))
+        if before is not None and before.distance_to(pose) > STILL_M:
+            step = [[p.x_m, p.y_m, TRAIL_HEIGHT_M] for p in (before, pose)]
+            tape.log(trail, rr.LineStrips3D([step], colors=[colour], radii=0.04))
 
 
 def believed(mirror: Mirror) -> Hypothesis | None:
@@ -75,7 +81,8 @@ def believed(mirror: Mirror) -> Hypothesis | None:
 
 
 def _cylinder(colour: Colour, radius_m: float, height_m: float, fill: Any) -> Any:
-    return rr.Cylinders3D(lengths=[height_m], radii=[radius_m], centers=[[0, 0, height_m / 2]], colors=[colour], fill_mode=fill)
+    return rr.Cylinders3D(
+        lengths=[height_m], radii=[radius_m], centers=[[0, 0, height_m / 2]], colors=[colour], fill_mode=fill)
 
 
 def _arrow(colour: Colour, height_m: float) -> Any:
@@ -96,8 +103,8 @@ def _ellipse(pose: Pose2, covariance_world: NDArray[np.float64]) -> Any:
     circle = np.stack([np.cos(angles), np.sin(angles)])
     ring = pose.position + SIGMA_SCALE * (axes @ (np.sqrt(np.maximum(values, 0.0))[:, None] * circle)).T
     strip = np.column_stack([ring, np.full(len(ring), 0.06)])
-    label = f"1 sigma x {SIGMA_SCALE:.0f}"
-    return rr.LineStrips3D([strip], colors=[BELIEVED], radii=0.025, labels=[label], show_labels=True)
+    label = f"1 sigma, drawn {SIGMA_SCALE:.0f} times as large"
+    return rr.LineStrips3D([strip], colors=[BELIEVED], radii=0.025, labels=[label], show_labels=False)
 
 
 def _candidates(world: World, mirror: Mirror) -> Any:
@@ -107,6 +114,7 @@ def _candidates(world: World, mirror: Mirror) -> Any:
     lengths = [0.5 + h.weight for h in others]
     return rr.Arrows3D(
         origins=[[p.x_m, p.y_m, 0.1] for p in poses],
-        vectors=[[s * np.cos(p.heading_rad), s * np.sin(p.heading_rad), 0] for p, s in zip(poses, lengths, strict=True)],
+        vectors=[[s * np.cos(p.heading_rad), s * np.sin(p.heading_rad), 0.0]
+                 for p, s in zip(poses, lengths, strict=True)],
         radii=0.05, colors=[CANDIDATE],
     )

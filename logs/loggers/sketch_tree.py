@@ -14,8 +14,9 @@ from logs.paths import SKETCH
 from logs.tape import Tape
 from world_models.task import Certificate, Goal, Milestone, PlanSketch, Subgoal
 
-ROW, INDENT, LETTER = 26.0, 34.0, 6.6
-"""Height of a row, step to the right of a level, and width of a letter, in the graph's own units."""
+ROW, INDENT = 26.0, 34.0
+LETTER, BORDER = 5.4, 26.0
+"""The graph's own units: height of a row, step to the right of a level, width of a letter and of a node's border."""
 
 MARKS = {"verified": "✔", "refuted": "✘", "not testable": "?", "turning": "…", "expected": "…", "": "·"}
 
@@ -115,10 +116,10 @@ def short(text: str, most: int = 34) -> str:
 
 
 def _boxes(nodes: list[Node]) -> rr.GraphNodes:
-    middles = [(INDENT * n.depth + LETTER * len(n.label) / 2, ROW * row) for row, n in enumerate(nodes)]
+    middles = [(INDENT * n.depth + (BORDER + LETTER * len(n.label)) / 2, ROW * row) for row, n in enumerate(nodes)]
     return rr.GraphNodes([n.id for n in nodes], positions=middles, labels=[n.label for n in nodes],
                          colors=[n.colour for n in nodes], show_labels=True)
 
 
 def _arrows(nodes: list[Node]) -> rr.GraphEdges:
-    return rr.GraphEdges([(n.after, n.id) for n in nodes if n.after], graph_type="directed")
+    return rr.GraphEdges([(n.after, n.id) for n in nodes if n.after], graph_type="undirected")

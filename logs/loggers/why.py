@@ -64,7 +64,8 @@ def _believes(mirror: Mirror) -> str:
     if held is None:
         return "nothing about where he is: he is lost."
     pose = held.locale_from_robot
-    return (f"he is in {held.locale} at ({pose.x_m:.2f}, {pose.y_m:.2f}) m, heading {math.degrees(pose.heading_rad):.1f}°, "
+    where = f"({pose.x_m:.2f}, {pose.y_m:.2f}) m, heading {math.degrees(pose.heading_rad):.1f}°"
+    return (f"he is in {held.locale} at {where}, "
             f"give or take {1e3 * held.sigma_m:.0f} mm and {math.degrees(held.sigma_rad):.2f}° (from {held.basis}).")
 
 
@@ -125,9 +126,11 @@ def _concludes(mirror: Mirror) -> str:
     if entry is None:
         return ""
     c = entry.value
-    return (f"{c.verdict}: {c.reason}. {c.inliers} of {c.expected} expected lines support it, {100 * c.coverage:.0f} % of their "
-            f"length; off by {1e3 * c.deviation_m:.0f} mm and {math.degrees(c.deviation_rad):.2f}° ({c.deviation_px:.1f} px, "
-            f"tolerance {c.tolerance_px:.1f} px); probability that a wrong place looks so: {c.p_false:.1g}.")
+    support = f"{c.inliers} of {c.expected} expected lines support it, {100 * c.coverage:.0f} % of their length"
+    off = f"off by {1e3 * c.deviation_m:.0f} mm and {math.degrees(c.deviation_rad):.2f}°"
+    pixels = f"{c.deviation_px:.1f} px, tolerance {c.tolerance_px:.1f} px"
+    return (f"*{c.verdict}*: {c.reason}. {support}; {off} ({pixels}); "
+            f"probability that a wrong place looks so: {c.p_false:.1g}.")
 
 
 def _doubts(mirror: Mirror) -> str:

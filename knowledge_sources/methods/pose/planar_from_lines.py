@@ -34,7 +34,9 @@ SUBSET_LINES = 28
 LONGEST_STEP = np.array([2.0, 2.0, 0.5])
 """A pair that asks for more (m, m, rad) at once is nearly degenerate: it goes there by degrees or not at all."""
 LONGEST_STEP.setflags(write=False)
-FINALISTS = 5
+FINALISTS = 8
+WIDENING = (4.0, 2.0, 1.0, 1.0)
+"""In the polish of the finalists, round by round, by how much the squared bound on inliers is wider."""
 ROUNDS = 8
 
 
@@ -80,8 +82,9 @@ def planar_from_lines(
     candidates = _candidates(lines, groups, belief, camera_from_robot)
     costs = _costs(lines, candidates, belief, camera_from_robot, bound)
     order = np.argsort(costs, kind="stable")[:FINALISTS]
-    polished = [_polished(lines, candidates[i], belief, camera_from_robot, bound) for i in order]
-    state, near, _ = min(polished, key=lambda found: found[2])
+    finalists = _polished(lines, candidates[order], belief, camera_from_robot, bound)
+    best = int(np.argmin(_costs(lines, finalists, belief, camera_from_robot, bound)))
+    state, near = _agreed(lines, finalists[best], belief, camera_from_robot, bound)
     return _settled(lines, near, state, belief, camera_from_robot, bound)
 
 
@@ -122,19 +125,31 @@ def _costs(lines: LineSet, states: Array, belief: PlanarPrior, mount: Pose, boun
     return np.asarray(np.minimum(errors, bound).sum(axis=1) + share)
 
 
-def _polished(
-    lines: LineSet, state: Array, belief: PlanarPrior, mount: Pose, bound: float
-) -> tuple[Array, Mask, float]:
-    """Alternate inliers and likelihood until they agree; the state, its inliers and its truncated cost."""
-    near = _near(lines, state, mount, 4.0 * bound)
+def _polished(lines: LineSet, states: Array, belief: PlanarPrior, mount: Pose, bound: float) -> Array:
+    """States (k, 3) moved by Gauss-Newton on each one's own inliers, all at once; the first rounds let more in."""
+    for widening in WIDENING:
+        distances, jacobian = line_jacobian(lines.points[:, 0], lines.directions, lines, states, mount)
+        scaled = distances / lines.sigma_px[:, None]
+        near = np.sum(scaled**2, axis=2) <= widening * bound
+        j = (jacobian / lines.sigma_px[:, None, None]).reshape(len(states), -1, 3)
+        weighted = np.swapaxes(j * np.repeat(near, 2, axis=1)[..., None], 1, 2)
+        _, pull = prior_pull(states, belief)
+        gradient = weighted @ scaled.reshape(len(states), -1, 1) + pull[..., None]
+        step = np.linalg.solve(weighted @ j + belief.information, gradient)[..., 0]
+        states = states - np.clip(step, -LONGEST_STEP, LONGEST_STEP)
+    return states
+
+
+def _agreed(lines: LineSet, state: Array, belief: PlanarPrior, mount: Pose, bound: float) -> tuple[Array, Mask]:
+    """Alternate inliers and likelihood until they agree."""
+    near = _near(lines, state, mount, bound)
     for _ in range(ROUNDS):
         state = _descend(lines.take(near), state, belief, mount).state
         again = _near(lines, state, mount, bound)
         if np.array_equal(again, near):
             break
         near = again
-    errors = np.where(near, squared_distances(lines, *camera_states(state, mount)), bound)
-    return state, near, float(np.sum(np.minimum(errors, bound)) + prior_pull(state, belief)[0])
+    return state, near
 
 
 def _near(lines: LineSet, state: Array, mount: Pose, bound: float) -> Mask:

@@ -1,0 +1,68 @@
+# `make help` tells what there is. PYTHON and VENV may be given: make environment PYTHON=python3.13 VENV=.venv-3.13
+PYTHON ?= python3
+VENV ?= .venv
+SCENARIO ?= lab-to-allens-office
+
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --quiet --quiet --disable-pip-version-check
+LOCK := .venv-lock
+COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --generate-hashes --strip-extras \
+	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
+
+# One thread: faster for matrices as small as ours, and the order of additions never varies.
+export OPENBLAS_NUM_THREADS := 1
+export OMP_NUM_THREADS := 1
+
+.PHONY: help run test environment lock clean
+
+help:
+	@echo "make run          prepare everything, then drive: harvey run $(SCENARIO)"
+	@echo "make test         ruff, mypy, import contracts, pytest"
+	@echo "make environment  only prepare $(VENV), for running and for testing"
+	@echo "make lock         write requirements.lock and requirements-dev.lock anew from pyproject.toml"
+	@echo "make clean        remove environments and caches; recordings in runs/ stay"
+	@echo "Options: PYTHON=$(PYTHON) (3.11 or newer), VENV=$(VENV), SCENARIO=$(SCENARIO)"
+
+run: $(VENV)/.ready-to-run
+	@$(BIN)/harvey run $(SCENARIO)
+
+test: $(VENV)/.ready-to-test
+	@echo "== ruff" && $(BIN)/ruff check
+	@echo "== mypy" && $(BIN)/mypy
+	@echo "== import contracts" && $(BIN)/lint-imports
+	@echo "== pytest" && $(BIN)/pytest -n 2
+
+environment: $(VENV)/.ready-to-test
+
+$(BIN)/python:
+	@$(PYTHON) -c "" 2>/dev/null \
+		|| { echo "harvey needs Python 3.11 or newer; '$(PYTHON)' does not run. Give one: make run PYTHON=python3.13"; exit 1; }
+	@$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11))" \
+		|| { echo "harvey needs Python 3.11 or newer; '$(PYTHON)' is $$($(PYTHON) -V 2>&1)." \
+			"Give another: make run PYTHON=python3.13"; exit 1; }
+	@echo "== Preparing $(VENV) with $$($(PYTHON) -V); the first time takes a minute or two"
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+$(VENV)/.ready-to-run: requirements.lock pyproject.toml | $(BIN)/python
+	@echo "== Installing what harvey needs ($$(grep -c == requirements.lock) packages)"
+	@$(PIP) install --require-hashes -r requirements.lock
+	@echo "== Installing harvey"
+	@$(PIP) install --no-deps --no-build-isolation -e .
+	@touch $@
+
+$(VENV)/.ready-to-test: requirements-dev.lock $(VENV)/.ready-to-run
+	@echo "== Installing what the tests need ($$(grep -c == requirements-dev.lock) packages)"
+	@$(PIP) install --require-hashes -r requirements-dev.lock
+	@touch $@
+
+lock:
+	@$(PYTHON) -m venv $(LOCK)
+	@$(LOCK)/bin/pip install --quiet --quiet pip-tools
+	@echo "== requirements.lock" && $(COMPILE) --build-deps-for editable -o requirements.lock pyproject.toml
+	@echo "== requirements-dev.lock" && $(PYTHON) -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))\
+	['project']['optional-dependencies']['dev'], sep='\n')" | $(COMPILE) -c requirements.lock -o requirements-dev.lock -
+	@rm -rf $(LOCK)
+
+clean:
+	rm -rf .venv .venv-* .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

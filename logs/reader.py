@@ -1,0 +1,72 @@
+"""Reading a recording back: every decision and every picture, without the simulator."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rerun.chunk import RrdReader
+
+from logs.errors import RecordingError
+from logs.loggers.decisions import RECORD
+from logs.loggers.frames import NUMBER
+from logs.paths import IMAGE, RECORDS
+
+ROW_ID = "rerun.controls.RowId"
+JPEG = "EncodedImage:blob"
+
+
+def read_decisions(path: Path) -> list[dict[str, Any]]:
+    """The decisions of a recording in their order, each as it stands in the journal.
+
+    Raises:
+        RecordingError: the file is no recording, or is damaged.
+    """
+    return [_decision(path, row[RECORD].as_py()) for row in _rows(path, RECORDS, (RECORD,))]
+
+
+def read_frames(path: Path) -> dict[int, bytes]:
+    """The pictures of a recording: number -> JPEG bytes, as the camera delivered them.
+
+    Raises:
+        RecordingError: the file is no recording, or is damaged.
+    """
+    return {row[NUMBER].as_py(): row[JPEG].values.to_numpy().tobytes() for row in _rows(path, IMAGE, (NUMBER, JPEG))}
+
+
+def _decision(path: Path, line: str) -> dict[str, Any]:
+    try:
+        record = json.loads(line)
+    except ValueError as error:
+        raise RecordingError(f"{path}: /{RECORDS}: expected a decision as JSON, got {line[:60]!r} ({error})") from None
+    if not isinstance(record, dict):
+        raise RecordingError(f"{path}: /{RECORDS}: expected a decision as a JSON object, got {line[:60]!r}")
+    return record
+
+
+def _rows(path: Path, entity: str, components: tuple[str, ...]) -> list[dict[str, Any]]:
+    """The rows of an entity that have all these components, in the order in which they were logged."""
+    if not path.is_file():
+        raise RecordingError(f"{path}: expected a recording, got no such file")
+    try:
+        rows = [row for batch in _batches(path, entity) for row in _complete(batch, components)]
+    except Exception as error:  # the reader's errors have no common type; the cause is in the file in any case
+        raise RecordingError(f"{path}: expected a whole Rerun recording, got: {error}") from None
+    return [row for _, row in sorted(rows, key=lambda pair: pair[0])]
+
+
+def _batches(path: Path, entity: str) -> Iterator[Any]:
+    for chunk in RrdReader(path).stream().filter(content=f"/{entity}", is_static=False):
+        yield chunk.to_record_batch()
+
+
+def _complete(batch: Any, components: tuple[str, ...]) -> Iterator[tuple[bytes, dict[str, Any]]]:
+    """(row id, components) of the rows of a batch that have all of the components."""
+    if not set(components) <= set(batch.schema.names):
+        return
+    for number, row_id in enumerate(batch.column(ROW_ID)):
+        cells = [batch.column(name)[number].values for name in components]
+        if all(cell is not None and len(cell) for cell in cells):
+            yield row_id.as_py(), {name: cell[0] for name, cell in zip(components, cells, strict=True)}
