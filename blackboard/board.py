@@ -29,9 +29,11 @@ class Blackboard:
 
         Raises:
             StaleError: a Revise or Retract names a revision that is no longer current.
+            ValueError: a value of another type than the entry's, or a reason that is no entry and no earlier effect.
         """
         acts = tuple(effects)
         self._refuse_stale(acts)
+        self._refuse_malformed(acts)
         made: dict[int, Ref] = {}
         changes = []
         for effect in acts:
@@ -53,17 +55,21 @@ class Blackboard:
             touched.add(effect.entry.id)
 
     @staticmethod
+    def _refuse_malformed(acts: tuple[Effect, ...]) -> None:
+        earlier: set[int] = set()
+        for effect in acts:
+            for reason in effect.because:
+                if not isinstance(reason, Ref | Entry) and id(reason) not in earlier:
+                    expected = "because to hold entries or earlier effects of the same act"
+                    raise ValueError(f"expected {expected}, got {reason!r}")
+            if isinstance(effect, Revise) and type(effect.value) is not type(effect.entry.value):
+                raise ValueError(f"expected {effect.entry.ref} to stay a {type(effect.entry.value).__name__}, "
+                                 f"got a {type(effect.value).__name__}")
+            earlier.add(id(effect))
+
+    @staticmethod
     def _reasons(effect: Effect, made: dict[int, Ref]) -> tuple[Ref, ...]:
-        named = []
-        for reason in effect.because:
-            if isinstance(reason, Ref):
-                named.append(reason)
-            elif isinstance(reason, Entry):
-                named.append(reason.ref)
-            elif id(reason) in made:
-                named.append(made[id(reason)])
-            else:
-                raise ValueError(f"expected because to hold entries or earlier effects of the same act, got {reason!r}")
+        named = (r if isinstance(r, Ref) else r.ref if isinstance(r, Entry) else made[id(r)] for r in effect.because)
         return tuple(dict.fromkeys(named))
 
     def _apply_one(self, effect: Effect, author: str, cycle: int, because: tuple[Ref, ...]) -> Change:
@@ -74,9 +80,6 @@ class Blackboard:
             self._store(entry)
             return Posted(entry)
         if isinstance(effect, Revise):
-            if type(effect.value) is not type(effect.entry.value):
-                raise ValueError(f"expected {effect.entry.ref} to stay a {type(effect.entry.value).__name__}, "
-                                 f"got a {type(effect.value).__name__}")
             entry = Entry(effect.entry.id, effect.entry.revision + 1, effect.value, author, cycle, because)
             self._store(entry)
             return Revised(entry)
@@ -104,6 +107,14 @@ class View:
     def get(self, id: str) -> Entry[Any] | None:
         """The current revision of an entry, or None."""
         return self._board._current.get(id)
+
+    def __getitem__(self, id: str) -> Entry[Any]:
+        """The current revision of an entry that must be there.
+
+        Raises:
+            KeyError: it is not on the board.
+        """
+        return self._board._current[id]
 
     def is_current(self, entry: Entry[Any]) -> bool:
         now = self.get(entry.id)

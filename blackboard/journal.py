@@ -6,7 +6,7 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -52,15 +52,17 @@ Sink = Callable[[Decision], None]
 
 def plain(value: Any) -> Any:
     """A value as JSON types: dataclasses and mappings become objects, arrays lists, bytes their length and SHA-256."""
+    if isinstance(value, Enum):
+        return value.name.lower()
     if value is None or isinstance(value, bool | int | str):
-        return value.name.lower() if isinstance(value, Enum) else value
+        return value
     if isinstance(value, float):
         return value if math.isfinite(value) else repr(value)
     if isinstance(value, bytes):
         return {"bytes": len(value), "sha256": hashlib.sha256(value).hexdigest()}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if isinstance(value, dict):
+    if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, tuple | list):
         return [plain(v) for v in value]

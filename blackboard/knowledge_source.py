@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import Any, ClassVar
 
 from blackboard.board import View
-from blackboard.change import Change, Watch
+from blackboard.change import Change, Retracted, Watch
 from blackboard.effect import Effect
 from blackboard.level import Level
 
@@ -38,8 +38,12 @@ class KnowledgeSource(ABC):
         return 0.5
 
     def still_valid(self, view: View, trigger: Change) -> bool:
-        """Asked again each cycle until it acts: is the trigger the current revision, and could it still answer? Pure."""
-        return view.is_current(trigger.entry) and self.rate(view, trigger) is not None
+        """Asked again each cycle until it acts: does the trigger still stand, and could it still answer? Pure.
+
+        A trigger stands while its entry is the current revision; a retraction stands for good.
+        """
+        stands = isinstance(trigger, Retracted) or view.is_current(trigger.entry)
+        return stands and self.rate(view, trigger) is not None
 
     @abstractmethod
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:

@@ -1,8 +1,8 @@
 """Scheduler: one cycle takes the changes, lets the experts bid, executes one act and journals it.
 
-Order of a cycle: changes of the last cycle -> obviate what no longer holds -> activate the watchers -> choose (pure) ->
-ask ``still_valid`` again -> act -> apply -> journal -> ports. The journal has the decision before any port sees it, so
-that nothing reaches the motors that is not written down.
+Order of a cycle: changes of the last cycle -> ask all that is pending ``still_valid`` again, and obviate what is not ->
+activate the watchers -> choose (pure) -> act -> apply -> journal -> ports. The journal has the decision before any port
+sees it, so that nothing reaches the motors that is not written down.
 """
 
 from __future__ import annotations
@@ -77,12 +77,13 @@ class Scheduler:
         self.cycle += 1
         seen, self._unseen = self._unseen, ()
         observed, self._observed = self._observed, ()
-        obviated = list(self._agenda.obviate(self._holds))
-        activated = self._activate(seen, obviated)
+        obviated: list[Obviated] = []
+        activated: list[Activation] = []
+        fault = self._hear_bids(seen, activated, obviated)
         focus = self._servoing.focus(self.view)
-        ranked = self._servoing.choose(self._agenda, focus)
+        ranked = () if fault else self._servoing.choose(self._agenda, focus)
         chosen = ranked[0] if ranked else None
-        made, refused = self._execute(chosen) if chosen else ((), "")
+        made, refused = self._execute(chosen) if chosen else ((), fault)
         decision = Decision(
             self.cycle, seen, observed, focus, tuple(activated), tuple(obviated), chosen,
             ranked[1] if len(ranked) > 1 else None, len(self._agenda), made, refused,
@@ -96,9 +97,15 @@ class Scheduler:
     def _holds(self, activation: Activation) -> bool:
         return activation.source.still_valid(self.view, activation.trigger)
 
-    def _activate(self, seen: tuple[Change, ...], obviated: list[Obviated]) -> list[Activation]:
-        return [a for change in seen for source in self._sources
-                if (a := self._activation(source, change, obviated)) is not None]
+    def _hear_bids(self, seen: tuple[Change, ...], activated: list[Activation], obviated: list[Obviated]) -> str:
+        """Drops what no longer holds, activates the watchers; tells how an expert raised, if so: then nobody acts."""
+        try:
+            obviated += self._agenda.obviate(self._holds)
+            bids = (self._activation(source, change, obviated) for change in seen for source in self._sources)
+            activated += (bid for bid in bids if bid is not None)
+        except Exception:  # whatever an expert does wrong is journalled, never lost
+            return RAISED + traceback.format_exc(limit=-4)
+        return ""
 
     def _activation(self, source: KnowledgeSource, change: Change, obviated: list[Obviated]) -> Activation | None:
         if not any(watch.sees(change) for watch in source.watches) or not source.still_valid(self.view, change):
@@ -106,6 +113,8 @@ class Scheduler:
         rating = source.rate(self.view, change)
         if rating is None:
             return None
+        if not 0.0 <= rating <= 1.0:
+            raise ValueError(f"expected a rating of 0..1 from {source.name}, got {rating}")
         self._numbers += 1
         activation = Activation(self._numbers, source, change, rating, self.cycle)
         replaced = self._agenda.add(activation)
@@ -124,7 +133,7 @@ class Scheduler:
             return self.board.apply(effects, author=source.name, cycle=self.cycle), ""
         except StaleError as error:
             return (), f"stale: {error}"
-        except Exception:  # whatever an expert does wrong is journalled, never lost
+        except Exception:
             return (), RAISED + traceback.format_exc(limit=-4)
 
     def _tell_ports(self, made: tuple[Change, ...]) -> None:

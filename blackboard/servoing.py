@@ -39,6 +39,10 @@ class Discrepancy:
     unit: str
     status: str = "open"
 
+    def __post_init__(self) -> None:
+        if self.magnitude is not None and not self.magnitude >= 0.0:
+            raise ValueError(f"expected a magnitude of at least 0 {self.unit}, got {self.magnitude}")
+
     @property
     def bound(self) -> float:
         """The bound of its own level."""

@@ -22,7 +22,8 @@ def metres(value: Any) -> str:
 
 
 def degrees(value: Any) -> str:
-    return f"{math.degrees(number(value)):.1f} degrees"
+    """An angle, never as minus nought."""
+    return f"{round(math.degrees(number(value)), 1) + 0.0:.1f} degrees"
 
 
 def turn(value: Any) -> str:
@@ -39,6 +40,8 @@ def quantity(value: Any, unit: str) -> str:
     """A number in a unit that the journal names; lengths and angles in the units that people use."""
     if unit == "m":
         return metres(value)
+    if unit == "px":
+        return f"{number(value):.2f} px"
     return degrees(value) if unit == "rad" else f"{number(value):.3g} {unit}".rstrip()
 
 

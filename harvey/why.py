@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from textwrap import fill
 
+from harvey.diff import differing_leaves
 from harvey.errors import BadInput
 from harvey.records import Candidate, DecisionRecord, EntryRecord
 from harvey.sentences import sentence
 from harvey.units import count
 
+WIDTH = 120
+DEEPEST_INDENT = 20
+FEW = 2
 DEPTH = 5
 """How many steps down the walk goes unless told otherwise."""
 
@@ -23,6 +28,7 @@ class Reason:
         depth: 0 for what is explained.
         ref: of the entry.
         record: what the journal says of it; None where it says nothing.
+        after: the entry that rests on it; None for what is explained.
         known: whether it was told before.
         hidden: how many reasons of its own are left out because they lie too deep.
     """
@@ -30,6 +36,7 @@ class Reason:
     depth: int
     ref: str
     record: EntryRecord | None
+    after: EntryRecord | None = None
     known: bool = False
     hidden: int = 0
 
@@ -84,44 +91,56 @@ class History:
         raise BadInput(f"expected an entry of the run, as {', '.join(near) or 'none'}, got {text!r}")
 
 
-def walk(history: History, ref: str, depth: int = DEPTH) -> Iterator[Reason]:
-    """The entry, then what it rests on, depth first; what is shared is told where it first comes up."""
+def walk(history: History, refs: Sequence[str], depth: int = DEPTH) -> Iterator[Reason]:
+    """Each entry, then what it rests on, depth first; what is shared is told where it first comes up."""
     told: set[str] = set()
-    stack = [(0, ref)]
+    stack: list[tuple[int, str, EntryRecord | None]] = [(0, ref, None) for ref in reversed(refs)]
     while stack:
-        level, name = stack.pop()
+        level, name, after = stack.pop()
         record = history.entry(name)
         if name in told or record is None:
-            yield Reason(level, name, record, known=name in told)
+            yield Reason(level, name, record, after, known=name in told)
             continue
         told.add(name)
         hidden = len(record.because) if level >= depth else 0
-        yield Reason(level, name, record, hidden=hidden)
+        yield Reason(level, name, record, after, hidden=hidden)
         if not hidden:
-            stack += [(level + 1, reason) for reason in reversed(record.because)]
+            stack += [(level + 1, reason, record) for reason in reversed(record.because)]
 
 
-def explain(history: History, ref: str, depth: int = DEPTH) -> Iterator[str]:
+def explain(history: History, refs: Sequence[str], depth: int = DEPTH) -> Iterator[str]:
     """The walk in plain sentences, indented."""
-    record = history.entry(ref)
-    if record is not None:
-        yield _who(record, history)
-    reasons = list(walk(history, ref, depth))
+    reasons = list(walk(history, refs, depth))
     for index, reason in enumerate(reasons):
+        if reason.depth == 0 and reason.record is not None:
+            yield from ["", _who(reason.record, history)] if index else [_who(reason.record, history)]
         leads_on = index + 1 < len(reasons) and reasons[index + 1].depth > reason.depth
-        yield _line(reason) + (", because" if leads_on else "")
+        yield _wrapped(reason.depth, _told(reason) + (", because" if leads_on else ""))
     if any(reason.hidden for reason in reasons):
         yield f"(--depth {depth + 1} goes on where it says \"and so on\")"
 
 
-def _line(reason: Reason) -> str:
-    indent = "  " * reason.depth
+def _wrapped(depth: int, text: str) -> str:
+    indent = "  " * min(depth, DEEPEST_INDENT)
+    return fill(text, WIDTH, initial_indent=indent, subsequent_indent=indent + "    ", break_on_hyphens=False)
+
+
+def _told(reason: Reason) -> str:
     if reason.record is None:
-        return f"{indent}{reason.ref}, of which the journal says nothing"
+        return f"{reason.ref}, of which the journal says nothing"
     if reason.known:
-        return f"{indent}{reason.ref}, as above"
+        return f"{reason.ref}, as above"
     tail = f" (and so on: {count(reason.hidden, 'reason')} below)" if reason.hidden else ""
-    return f"{indent}{reason.ref}: {sentence(reason.record)}{tail}"
+    return f"{reason.ref}: {_said(reason.record, reason.after)}{tail}"
+
+
+def _said(record: EntryRecord, after: EntryRecord | None) -> str:
+    """The sentence; of an earlier revision of what rests on it, only what little was different, if it was little."""
+    if after is not None and after.id == record.id:
+        changed = list(differing_leaves(record.value, after.value))
+        if 0 < len(changed) <= FEW:
+            return "before that, " + ", ".join(f"{path} = {then}" for path, then, _ in changed)
+    return sentence(record)
 
 
 def _who(record: EntryRecord, history: History) -> str:

@@ -134,7 +134,7 @@ class CorrelatorTracker(KnowledgeSource):
         pose = belief.world_from_robot(self._robot.world)
         points = np.array([t.point_world for t in tracks])
         depth, predicted, spread = self._predicted(points, pose, belief.covariance_world(self._robot.world))
-        pictures = {name: decode(_bytes_of(view, name)) for name in sorted({t.template_frame for t in tracks})}
+        pictures = {name: decode(view[name].value.jpeg) for name in sorted({t.template_frame for t in tracks})}
         out = []
         for t, z, at, sigma in zip(tracks, depth, predicted, spread, strict=True):
             ahead = z > NEAR_M and fits(image.shape, at, HALF_PX + 2)
@@ -201,7 +201,8 @@ class CorrelatorTracker(KnowledgeSource):
         robot = self._robot
         camera_from_world = robot.camera_from_world(pose)
         points = visible_points(
-            robot.world, robot.camera, camera_from_world, margin_px=HALF_PX + 4.0, min_contrast=0.08, max_distance_m=15.0
+            robot.world, robot.camera, camera_from_world, margin_px=HALF_PX + 4.0, min_contrast=0.08,
+            max_distance_m=15.0,
         )
         strength = np.array([corner_strength(image, px, HALF_PX) for px in points.points_px])
         taken = [np.array(t.found_px or t.predicted_px) for t in kept]
@@ -229,15 +230,6 @@ class CorrelatorTracker(KnowledgeSource):
         old: Entry[Tracks] | None, tracks: Tracks, because: tuple[object, ...]
     ) -> Iterable[Effect]:
         yield Post(tracks, because) if old is None else Revise(old, tracks, because)
-
-
-def _bytes_of(view: View, name: str) -> bytes:
-    """The bytes of a frame that a track was begun in."""
-    entry = view.get(name)
-    if entry is None:
-        raise ValueError(f"expected the frame {name} of a template on the board, it is gone")
-    jpeg: bytes = entry.value.jpeg
-    return jpeg
 
 
 def _correlated(track: Track, template: Template, image: NDArray[np.uint8], sigma: float, scale: float) -> Track:

@@ -53,5 +53,6 @@ class DeadReckoner(KnowledgeSource):
         yield Post(Look("track"), (step,))
         command = view.latest(MotorCommand)
         if command is not None and report.move_m < STOPPED * command.value.move_m:
-            what = f"the wheels claim {report.move_m:.2f} m of {command.value.move_m:.2f} m: something stopped the robot"
-            yield Post(Discrepancy(Level.ACTION, what, math.inf, (PLAN_BOUND_PX, PLAN_BOUND_PX), "px"), (trigger.entry,))
+            what = f"something stopped the robot: {report.move_m:.2f} m of {command.value.move_m:.2f} m are claimed"
+            stopped = Discrepancy(Level.ACTION, what, math.inf, (PLAN_BOUND_PX, PLAN_BOUND_PX), "px")
+            yield Post(stopped, (trigger.entry,))

@@ -23,7 +23,7 @@ SIGMA_PX = 0.7
 """Standard deviation of a segment's ends across the model line: finder, JPEG and model together."""
 LOOSER = 4.0
 DOUBT = (0.05, math.radians(1.5))
-"""The belief enters as a prior that is looser than it says by a factor and by these (m, rad): the lines shall decide."""
+"""The belief enters as a prior that is looser by a factor and by these (m, rad): the lines shall decide."""
 
 
 class MedRAndT(KnowledgeSource):

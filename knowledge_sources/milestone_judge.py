@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
@@ -26,6 +27,9 @@ TOLERANCE_PX = 30.0
 """Up to where plan-level servoing may adjust: the window in which the matcher looks (§6.1.4)."""
 DARK = 6.0
 """A frame of less contrast (standard deviation of its grey values) shows nothing."""
+
+
+Floats = NDArray[np.float64]
 
 
 class MilestoneJudge(KnowledgeSource):
@@ -57,8 +61,8 @@ class MilestoneJudge(KnowledgeSource):
         yield Post(found, (verdict,)) if last is None else Revise(last, found, (verdict,))
 
     def _certificate(self, view: View, fix: Entry[PoseFix], milestone: Entry[Milestone]) -> Certificate:
-        match: LineMatch = _of(view, fix.value.match)
-        segments: Segments = _of(view, match.segments)
+        match: LineMatch = view[fix.value.match].value
+        segments: Segments = view[match.segments].value
         m, pose = milestone.value, fix.value.world_from_robot
         lines = np.array(m.expected, float).reshape(-1, 2, 3)
         evidence = verify(self._robot, lines, segments.segments_px, pose)
@@ -92,12 +96,6 @@ def _milestone_of(view: View, fix: PoseFix) -> Entry[Milestone] | None:
     return milestone if milestone is not None and milestone.value.status == "expected" else None
 
 
-def _of(view: View, name: str):  # type: ignore
-    entry = view.get(name)
-    assert entry is not None
-    return entry.value
-
-
 def _verdict(expected: int, contrast: float, evidence: Verification, deviation_px: float) -> tuple[str, str]:
     a = evidence.agreement
     if contrast < DARK:
@@ -110,7 +108,7 @@ def _verdict(expected: int, contrast: float, evidence: Verification, deviation_p
     return "verified", f"{found} accounted for, {deviation_px:.1f} px from where expected"
 
 
-def _median_shift(before_px: np.ndarray, after_px: np.ndarray) -> float:
+def _median_shift(before_px: Floats, after_px: Floats) -> float:
     """Median distance of line middles before and after [px]; infinite where none is in view."""
     shift = np.linalg.norm(before_px.mean(axis=1) - after_px.mean(axis=1), axis=1)
     shift = shift[np.isfinite(shift)]

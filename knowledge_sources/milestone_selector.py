@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
@@ -16,7 +18,7 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.views import ViewQuality, view_quality
-from knowledge_sources.questions import held, is_over, is_settled, open_discrepancy, open_milestone
+from knowledge_sources.questions import deepest_sketch, held, is_over, is_settled, open_discrepancy, open_milestone
 from world_models.body import Look
 from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis
@@ -47,8 +49,9 @@ class MilestoneSelector(KnowledgeSource):
     level = Level.PLAN
     watches = (
         Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and not s.verified),
-        Watch(Discrepancy, (Posted,), lambda d: d.is_open and d.level is Level.PLAN and d.magnitude is None),
+        Watch(Discrepancy, (Posted, Revised)),
         Watch(Hypothesis, (Revised,), lambda h: h.is_held),
+        Watch(Milestone, (Revised,), lambda m: not m.is_open),
     )
     writes = (Milestone, Look)
 
@@ -56,28 +59,39 @@ class MilestoneSelector(KnowledgeSource):
         self._robot = robot
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        value, waiting = trigger.entry.value, open_milestone(view)
-        if is_over(view) or not is_settled(view) or open_discrepancy(view, Level.GOAL) is not None:
+        task = self._task(view)
+        if task is None:
             return None
-        if isinstance(value, Hypothesis):
-            turning = waiting is not None and waiting.value.status == "turning"
-            return 0.5 if waiting is not None and turning and self._faces(value, waiting.value) else None
-        if isinstance(value, Discrepancy):
-            return 0.7
-        return 0.5 if waiting is None else None
+        return 0.7 if isinstance(task.value, Discrepancy) else 0.5
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, waiting, value = held(view), open_milestone(view), trigger.entry.value
-        if belief is None:
+        belief, task, waiting = held(view), self._task(view), open_milestone(view)
+        if belief is None or task is None:
             return
-        if isinstance(value, PlanSketch):
-            yield from self._proposed(trigger.entry, belief)
+        if isinstance(task.value, PlanSketch):
+            yield from self._proposed(task, belief)
         elif waiting is None:
-            what = "check of the belief, because " + value.what
-            yield from self._looked_for(None, Milestone("", -1, what, self._heading(belief.value)), trigger.entry, belief)
+            what = f"check of the belief, because {task.value.what}"
+            check = Milestone("", -1, what, self._heading(belief.value))
+            yield from self._looked_for(None, check, task, belief)
         else:
             here = replace(waiting.value, look_heading_rad=self._heading(belief.value))
-            yield from self._looked_for(waiting, here, trigger.entry, belief)
+            yield from self._looked_for(waiting, here, task, belief)
+
+    def _task(self, view: View) -> Entry[Any] | None:
+        """What asks for a look now: a doubt, a milestone that is faced, or a sketch whose milestone is due."""
+        belief, waiting = held(view), open_milestone(view)
+        if belief is None or is_over(view) or not is_settled(view) or open_discrepancy(view, Level.GOAL) is not None:
+            return None
+        if waiting is not None and waiting.value.status == "expected":
+            return None
+        doubt = open_discrepancy(view, Level.PLAN)
+        if doubt is not None and doubt.value.magnitude is None:
+            return doubt
+        if waiting is not None:
+            return waiting if self._faces(belief.value, waiting.value) else None
+        sketch = deepest_sketch(view)
+        return sketch if sketch is not None and not sketch.value.verified else None
 
     def _proposed(self, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         """The milestone before the sketch's next subgoal, seen from the first direction that is good enough."""
@@ -91,7 +105,7 @@ class MilestoneSelector(KnowledgeSource):
             yield Post(milestone, (sketch, belief))
 
     def _looked_for(
-        self, old: Entry[Milestone] | None, milestone: Milestone, trigger: Entry[object], belief: Entry[Hypothesis]
+        self, old: Entry[Milestone] | None, milestone: Milestone, task: Entry[Any], belief: Entry[Hypothesis]
     ) -> Iterable[Effect]:
         """Predict the landmarks from the believed pose, and ask for the picture."""
         pose = belief.value.world_from_robot(self._robot.world)
@@ -105,7 +119,7 @@ class MilestoneSelector(KnowledgeSource):
             landmark_of=tuple(marks.index(int(i)) for i in lines.landmark),
             status="expected",
         )
-        wish = Post(expected, (trigger, belief)) if old is None else Revise(old, expected, (trigger, belief))
+        wish = Post(expected, (task, belief)) if old is None else Revise(old, expected, (task, belief))
         yield wish
         yield Post(Look("milestone"), (wish,))
 
@@ -116,7 +130,8 @@ class MilestoneSelector(KnowledgeSource):
         rated: list[tuple[ViewQuality, float]] = []
         for heading in self._candidates(sketch, pose):
             quality = self._quality(Pose2(pose.x_m, pose.y_m, heading))
-            if quality.sigma_m <= GOOD_PART * tolerance and quality.sigma_rad <= GOOD_RAD and quality.lines >= LEAST_LINES:
+            sharp = quality.sigma_m <= GOOD_PART * tolerance and quality.sigma_rad <= GOOD_RAD
+            if sharp and quality.lines >= LEAST_LINES:
                 return heading
             rated.append((quality, heading))
         best = min(range(len(rated)), key=lambda i: (rated[i][0].lines < LEAST_LINES, rated[i][0].sigma_m, i))
@@ -158,5 +173,5 @@ class MilestoneSelector(KnowledgeSource):
         return abs(wrap_angle(self._heading(belief) - milestone.look_heading_rad)) <= FACING_RAD
 
 
-def _nested(array: np.ndarray) -> tuple[tuple[tuple[float, ...], ...], ...]:
+def _nested(array: NDArray[np.float64]) -> tuple[tuple[tuple[float, ...], ...], ...]:
     return tuple(tuple(tuple(float(c) for c in p) for p in line) for line in array)

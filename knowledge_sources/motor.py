@@ -13,7 +13,15 @@ from blackboard.entry import Entry
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.questions import held, is_over, is_settled, open_discrepancy, open_milestone, under_way
+from knowledge_sources.questions import (
+    deepest_sketch,
+    held,
+    is_over,
+    is_settled,
+    open_discrepancy,
+    open_milestone,
+    under_way,
+)
 from world_models.body import MotorCommand
 from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis
@@ -143,13 +151,12 @@ def _is_in_doubt(view: View) -> bool:
 
 
 def _leg_wanted(view: View) -> Entry[PlanSketch] | None:
-    """The deepest active sketch, if its milestone is verified and its subgoal at hand is primitive."""
-    active = view.where(PlanSketch, lambda s: s.is_active)
-    if not active:
+    """The sketch that is being carried out, if its milestone is verified and its subgoal at hand is primitive."""
+    sketch = deepest_sketch(view)
+    if sketch is None:
         return None
-    deepest = max(active, key=lambda e: len(e.value.path))
-    s = deepest.value
-    return deepest if s.verified and s.current is not None and s.current.primitive else None
+    s = sketch.value
+    return sketch if s.verified and s.current is not None and s.current.primitive else None
 
 
 def _progress(leg: Leg, here: Pose2) -> tuple[float, float]:

@@ -30,16 +30,22 @@ def open_discrepancy(view: View, level: Level) -> Entry[Discrepancy] | None:
     return view.latest(Discrepancy, lambda d: d.is_open and d.level is level)
 
 
+def deepest_sketch(view: View) -> Entry[PlanSketch] | None:
+    """The most detailed active sketch for the active goal: the one that is being carried out (Figure 3)."""
+    goal = active_goal(view)
+    if goal is None:
+        return None
+    active = view.where(PlanSketch, lambda s: s.is_active and s.goal == goal.id)
+    return max(active, key=lambda entry: len(entry.value.path), default=None)
+
+
 def under_way(view: View) -> tuple[Entry[Leg], Entry[PlanSketch]] | None:
-    """The leg that is being driven and the active sketch that wants it; None when there is none."""
-    leg = view.latest(Leg)
-    if leg is None or leg.value.status != "moving":
+    """The leg that is being driven and the sketch that wants it; None when there is none."""
+    leg, sketch = view.latest(Leg), deepest_sketch(view)
+    if leg is None or sketch is None or leg.value.status != "moving":
         return None
-    sketch = view.get(leg.value.sketch)
-    if sketch is None:
-        return None
-    s: PlanSketch = sketch.value
-    return (leg, sketch) if s.is_active and s.verified and s.at == leg.value.index else None
+    s = sketch.value
+    return (leg, sketch) if s.verified and leg.value.sketch == sketch.id and s.at == leg.value.index else None
 
 
 def is_settled(view: View) -> bool:

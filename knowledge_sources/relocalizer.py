@@ -1,4 +1,4 @@
-"""Relocalizer (§2, §4): goal-level perceptual servoing. Lost, it looks about, finds out where it is, and begins anew."""
+"""Relocalizer (§2, §4): goal-level perceptual servoing. Lost, it looks about until it knows, and begins anew."""
 
 from __future__ import annotations
 

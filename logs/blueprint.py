@@ -23,13 +23,13 @@ SINCE_THE_START = rrb.VisibleTimeRange(
 
 def blueprint(world: World, camera: Camera) -> Any:
     """All views of a run under one cursor: the building and the picture large, the reasons beside, time below."""
-    words = rrb.Vertical(_description(), _why(), row_shares=[4, 6])
+    words = rrb.Vertical(_description(), _why(), row_shares=[3, 7])
     decisions = rrb.Tabs(_decisions(), _table())
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(words, _building(world), _picture(camera), column_shares=[4, 9, 6]),
-            rrb.Horizontal(decisions, _lanes(), _sketch(), _errors(), column_shares=[5, 5, 4, 5]),
-            row_shares=[6, 5],
+            rrb.Horizontal(decisions, _lanes(), _sketch(), _errors(), column_shares=[11, 8, 7, 8]),
+            row_shares=[11, 10],
         ),
         rrb.TimePanel(timeline="cycle", state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
@@ -92,8 +92,8 @@ def _sketch() -> Any:
 
 def _errors() -> Any:
     return rrb.Vertical(
-        _plot(paths.POSITION, "Position error [mm]"), _plot(paths.HEADING, "Heading error [deg]"),
-        _plot(paths.DEVIATION, "Discrepancies and their bounds [px]"), name="Errors")
+        rrb.Tabs(_plot(paths.POSITION, "Position error [mm]"), _plot(paths.HEADING, "Heading error [deg]")),
+        _plot(paths.DEVIATION, "Discrepancies and their bounds [px]"))
 
 
 def _plot(origin: str, name: str) -> Any:
@@ -116,4 +116,4 @@ Drag the cursor at the bottom, or play.
 
 def describe(title: str) -> Any:
     """The text beside the views."""
-    return rr.TextDocument(f"## {title}\n{DESCRIPTION}", media_type="text/markdown")
+    return rr.TextDocument(f"**{title}**. {DESCRIPTION}", media_type="text/markdown")

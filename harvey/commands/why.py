@@ -29,9 +29,8 @@ def _run(args: Namespace) -> int:
         decision = history.decision(args.at)
         print("\n".join(trace_of(decisions, args.at)))
         refs = [record.ref for record in decision.made]
-    for ref in refs:
         print()
-        print("\n".join(explain(history, ref, max(0, args.depth))))
+    print("\n".join(explain(history, refs, max(0, args.depth))))
     return 0
 
 

@@ -52,7 +52,7 @@ class Agreement:
 
 
 def coverage(lines_px: Floats, segments_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
-    """(m,) part of each line (m, 2, 2) that lies under segments (k, 2, 2) nearer and less turned than the tolerances."""
+    """(m,) part of each line (m, 2, 2) that lies under segments (k, 2, 2) within the tolerances."""
     if not len(lines_px) or not len(segments_px):
         return np.where(np.isnan(lines_px).any(axis=(1, 2)), np.nan, 0.0)
     a, d = lines_px[:, 0], lines_px[:, 1] - lines_px[:, 0]

@@ -1,8 +1,8 @@
 """Which of many poses fits the segments best? Oriented chamfer matching of projected model lines.
 
-For each direction of line there is a map of the distance to the nearest segment of about that direction; a pose is scored
-by reading the maps where points of the model lines fall. Source: G. Borgefors, Hierarchical chamfer matching, PAMI 1988,
-with directions kept apart as in M.-Y. Liu et al., Fast directional chamfer matching, CVPR 2010.
+For each direction of line there is a map of the distance to the nearest segment of about that direction; a pose is
+scored by reading the maps where points of the model lines fall. Source: G. Borgefors, Hierarchical chamfer matching,
+PAMI 1988, with directions kept apart as in M.-Y. Liu et al., Fast directional chamfer matching, CVPR 2010.
 """
 
 from __future__ import annotations

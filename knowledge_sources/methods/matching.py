@@ -127,12 +127,9 @@ def match_lines(
     else:
         raise ValueError(f'expected objective "paper" or "likelihood", got {objective!r}')
     table = pair_table(still, scene, hough_px + np.maximum(gates, SETTLE_PX[0]), hough_rad + pair_rad)
-    if start is None:
-        starts = _starts(still, scene, table, hough_px, hough_rad, peaks)
-    else:
-        starts = placement_of(start)[None]
+    placements = [placement_of(start)] if start else _starts(still, scene, table, hough_px, hough_rad, peaks)
     tries = []
-    for placement in starts:
+    for placement in placements:
         space, first = _pair_space(table, placement, gates, pair_rad, terms, with_scale)
         found = local_search(space, terms, first, strategy=strategy, replace=replace, keep_trace=trace)
         tries.append((space, found))

@@ -50,8 +50,8 @@ def best_fits(forms: Array, with_scale: bool, start: Array) -> Fits:
     Source: §6.1.2, E_fit = sum_i (l_i / 2) sum over both ends (n_i . (R p_i + T) - s rho_i)^2, each bracket linear
     in (cos, sin, T_u, T_v, s), so that a state is the sum of its pairs' forms.
     With scale the rest is x'Qx on the unit circle, tan 2 phi = 2 Q12 / (Q11 - Q22): the second-order equation.
-    Without, a linear term is left and the minimum is a root of a quartic; a few Newton steps from the turn of ``start`` (5,) or (k, 5)
-    find it.
+    Without, a linear term is left and the minimum is a root of a quartic; a few Newton steps from the turn of
+    ``start`` (5,) or (k, 5) find it.
     """
     reduced, back = _without_shift(forms)
     if with_scale:

@@ -8,14 +8,26 @@ objective and the local search are those of :func:`match_lines`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching_fit import Fits
-from knowledge_sources.methods.matching_hough import undirected
+from knowledge_sources.methods.matching_floor_pairs import (
+    Array,
+    FloorPairs,
+    FloorScene,
+    Index,
+    Mask,
+    floor_scene,
+    gated_pairs,
+    near_pairs,
+    pairs_at,
+    projected_lengths,
+    taken,
+)
+from knowledge_sources.methods.matching_floor_settle import settled_places
 from knowledge_sources.methods.matching_objective import Terms, likelihood_terms
 from knowledge_sources.methods.matching_search import (
     Found,
@@ -26,28 +38,12 @@ from knowledge_sources.methods.matching_search import (
     local_search,
     nearest,
 )
-from knowledge_sources.methods.pose.lines import LineSet, line_set
-from knowledge_sources.methods.pose.planar import camera_states, line_jacobian, planar_prior, pose2
-from world_models.camera import NEAR_M, Camera
+from knowledge_sources.methods.pose.planar import pose2
+from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
-
-GATE_SIGMAS = 3.0
-GATE_PX = 3.0
-GATE_RAD = 0.12
-"""Beyond what the prior allows, a pair may be off by this much: the segment's own error."""
-GRID = (-2.0, -1.0, 0.0, 1.0, 2.0)
-"""Starts along each axis of the prior, in its deviations."""
-FIRST_WIDTHS_PX = (16.0, 12.0, 8.0)
-LATER_WIDTHS_PX = (6.0, 4.0, 3.0, 2.0)
-CLOSE_PX = 40.0
-"""Pairs further than this from a place are left out when it is settled exactly."""
-FINALISTS = 8
-SEARCHED = 3
 COVER_CELLS = 48
+"""Cells along a model line by which its coverage is counted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,34 +68,6 @@ class FloorMatch:
     def e_match(self) -> float:
         """The match error: smaller is better."""
         return self.e_fit + self.e_omission
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Scene:
-    """The call's givens: model and data lines, camera, mount and prior."""
-
-    model: Array
-    data: Array
-    data_lines: LineSet
-    camera: Camera
-    mount: Pose
-    mean: Array
-    information: Array
-    root: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Pairs:
-    """p pairs at a state: distances (p, 2) [px], slopes (p, 2, 3), along (p, 2) from 0 to ``lengths`` (p,) [px]."""
-
-    model: Index
-    data: Index
-    distances: Array
-    slopes: Array
-    along: Array
-    lengths: Array
-    angles: Array
-    shares: Array
 
 
 def match_on_floor(
@@ -127,177 +95,22 @@ def match_on_floor(
         pair_px, pair_rad: the restricted space round a place. sigma_px: of a data end about its model line.
         chance_exponent, chance_px: see :func:`likelihood_terms`.
     """
-    scene = _scene(model_lines_world, data_px, camera, camera_from_robot, prior, prior_covariance)
-    lengths_px, _ = _projected_lengths(scene, scene.mean)
+    scene = floor_scene(model_lines_world, data_px, camera, camera_from_robot, prior, prior_covariance)
+    lengths_px, _ = projected_lengths(scene, scene.mean)
     terms = likelihood_terms(lengths_px, len(scene.data), sigma_px, chance_exponent, chance_px, pair_px)
-    wide = _gated_pairs(scene)
+    wide = gated_pairs(scene)
     tries = []
-    for state in _places(scene, wide):
-        pairs = _pairs_at(scene, state, wide.model, wide.data)
-        pairs = _take(pairs, _near(pairs, pair_px, pair_rad))
+    for state in settled_places(scene, wide):
+        pairs = pairs_at(scene, state, wide.model, wide.data)
+        pairs = taken(pairs, near_pairs(pairs, pair_px, pair_rad))
         space, first = _space(scene, state, pairs, sigma_px, pair_px)
-        tries.append((space, pairs, state, local_search(space, terms, first, strategy="steepest", replace=True,
-                                                         keep_trace=False)))
+        found = local_search(space, terms, first, strategy="steepest", replace=True, keep_trace=False)
+        tries.append((space, pairs, state, found))
     space, pairs, state, found = min(tries, key=lambda tried: tried[3].error)
     return _floor_match(space, pairs, state, found, terms)
 
 
-def _scene(model: Any, data: Any, camera: Camera, mount: Pose, prior: Pose2, covariance: Any) -> _Scene:
-    belief = planar_prior(prior, covariance)
-    data = np.asarray(data, float).reshape(-1, 2, 2)
-    model = np.asarray(model, float).reshape(-1, 2, 3)
-    if not len(model):
-        raise ValueError("expected at least one model line, got none")
-    data_lines = line_set(np.broadcast_to(model[:1], (len(data), 2, 3)), data, camera, 1.0)
-    root = np.linalg.cholesky(np.linalg.inv(belief.information))
-    pinhole = replace(camera, distortion=None)
-    return _Scene(
-        model, camera.undistort(data), data_lines, pinhole, mount, belief.mean, belief.information, root
-    )
-
-
-def _model_lines(scene: _Scene, rows: Index, columns: Index) -> LineSet:
-    """Model lines ``rows`` paired with the data lines ``columns``."""
-    span = scene.model[:, 1] - scene.model[:, 0]
-    directions = span / np.linalg.norm(span, axis=1, keepdims=True)
-    moments = np.cross(scene.model[:, 0], directions)
-    seen = scene.data_lines.take(columns)
-    return replace(seen, points=scene.model[rows], directions=directions[rows], moments=moments[rows])
-
-
-def _projected(scene: _Scene, state: Array) -> tuple[Array, Mask]:
-    """(m, 2, 2) model lines in the image plane, cut at the near plane but not at the border; whether any is left."""
-    p = scene.model @ (turn := camera_states(state, scene.mount))[0].T + turn[1]
-    z = p[..., 2]
-    drop = np.where(np.abs(z[:, 1] - z[:, 0]) < 1e-9, 1.0, z[:, 1] - z[:, 0])
-    cut = p[:, 0] + ((NEAR_M - z[:, 0]) / drop)[:, None] * (p[:, 1] - p[:, 0])
-    behind = z < NEAR_M
-    p = np.where(behind[..., None], cut[:, None, :], p)
-    visible = ~behind.all(axis=1)
-    p[~visible] = (0.0, 0.0, 1.0)
-    return scene.camera.project(p), visible
-
-
-def _projected_lengths(scene: _Scene, state: Array) -> tuple[Array, Mask]:
-    px, visible = _projected(scene, state)
-    return np.maximum(np.linalg.norm(px[:, 1] - px[:, 0], axis=1), 1.0), visible
-
-
-def _gated_pairs(scene: _Scene) -> _Pairs:
-    """Pairs within 3 deviations of the prediction, in offset at both ends and in angle."""
-    px, visible = _projected(scene, scene.mean)
-    span = px[:, 1] - px[:, 0]
-    lengths = np.maximum(np.linalg.norm(span, axis=1), 1.0)
-    angles = np.arctan2(span[:, 1], span[:, 0])
-    data_span = scene.data[:, 1] - scene.data[:, 0]
-    data_angles = np.arctan2(data_span[:, 1], data_span[:, 0])
-    turn = np.abs(undirected(data_angles[None] - angles[:, None]))
-    i, k = np.nonzero((turn <= 0.6) & visible[:, None])
-    pairs = _pairs_at(scene, scene.mean, i, k)
-    moved = pairs.slopes @ scene.root
-    spread = np.sqrt(np.sum(moved**2, axis=-1))
-    data_lengths = np.linalg.norm(data_span, axis=1)[k]
-    turned = np.sqrt(np.sum((moved[:, 1] - moved[:, 0]) ** 2, axis=-1)) / np.maximum(data_lengths, 1.0)
-    near = np.all(np.abs(pairs.distances) <= GATE_SIGMAS * spread + GATE_PX, axis=1)
-    near &= turn[i, k] <= GATE_SIGMAS * turned + GATE_RAD
-    reach = GATE_SIGMAS * spread.max(axis=1) + 30.0
-    near &= (pairs.along.max(axis=1) >= -reach) & (pairs.along.min(axis=1) <= lengths[i] + reach)
-    return _take(pairs, near)
-
-
-def _pairs_at(scene: _Scene, state: Array, i: Index, k: Index) -> _Pairs:
-    lines = _model_lines(scene, i, k)
-    distances, slopes = line_jacobian(lines.points[:, 0], lines.directions, lines, state, scene.mount)
-    px, _ = _projected(scene, state)
-    span = px[:, 1] - px[:, 0]
-    lengths = np.maximum(np.linalg.norm(span, axis=1), 1.0)
-    units = span / lengths[:, None]
-    along = np.sum((scene.data[k] - px[i, 0][:, None, :]) * units[i][:, None, :], axis=-1)
-    data_span = scene.data[k, 1] - scene.data[k, 0]
-    angles = undirected(np.arctan2(data_span[:, 1], data_span[:, 0]) - np.arctan2(units[i, 1], units[i, 0]))
-    shares = np.minimum(np.linalg.norm(data_span, axis=1), lengths[i])
-    return _Pairs(i, k, distances, slopes, along, lengths[i], angles, shares)
-
-
-def _take(pairs: _Pairs, chosen: Mask) -> _Pairs:
-    return _Pairs(*(getattr(pairs, name)[chosen] for name in _Pairs.__slots__))
-
-
-def _near(pairs: _Pairs, pair_px: float, pair_rad: float) -> Mask:
-    near = (np.abs(pairs.distances).max(axis=1) <= pair_px) & (np.abs(pairs.angles) <= pair_rad)
-    beside = (pairs.along.max(axis=1) < -pair_px) | (pairs.along.min(axis=1) > pairs.lengths + pair_px)
-    return np.asarray(near & ~beside)
-
-
-def _places(scene: _Scene, wide: _Pairs) -> list[Array]:
-    """States to search from: a grid over the prior, settled, the best settled again at their own places."""
-    axes = np.stack(np.meshgrid(GRID, GRID, GRID, indexing="ij"), axis=-1).reshape(-1, 3)
-    if not len(wide.model):
-        return [scene.mean]
-    steps, support = _settled(wide, axes @ scene.root.T, scene.information, np.zeros(3), FIRST_WIDTHS_PX)
-    steps = steps[_distinct(steps, support, FINALISTS, scene)]
-    places, scores = [], []
-    for step in steps:
-        state = scene.mean + step
-        close = np.abs(wide.distances + wide.slopes @ step).max(axis=1) < CLOSE_PX
-        for widths in (LATER_WIDTHS_PX, LATER_WIDTHS_PX[-2:]):
-            pairs = _pairs_at(scene, state, wide.model[close], wide.data[close])
-            more, score = _settled(pairs, np.zeros((1, 3)), scene.information, state - scene.mean, widths)
-            state = state + more[0]
-        places.append(state)
-        scores.append(float(score[0]))
-    states = np.stack(places)
-    return [states[i] for i in _distinct(states, np.array(scores), SEARCHED, scene)]
-
-
-def _distinct(states: Array, scores: Array, count: int, scene: _Scene) -> list[int]:
-    """The best ``count`` that differ by more than a twentieth of the prior's deviation."""
-    whitened = states @ np.linalg.inv(scene.root).T
-    kept: list[int] = []
-    for i in np.argsort(-scores, kind="stable"):
-        if all(np.abs(whitened[i] - whitened[j]).max() > 0.05 for j in kept):
-            kept.append(int(i))
-        if len(kept) == count:
-            break
-    return kept
-
-
-def _settled(
-    pairs: _Pairs, steps: Array, information: Array, offset: Array, widths: tuple[float, ...]
-) -> tuple[Array, Array]:
-    """Steps (s, 3) moved to where close pairs agree, to first order, and their support (s,) [px of model line]."""
-    slopes = pairs.slopes.reshape(-1, 3)
-    rests = pairs.distances.reshape(-1)
-    squares = np.einsum("pea,peb->pab", pairs.slopes, pairs.slopes).reshape(-1, 9)
-    pulls = np.einsum("pea,pe->pa", pairs.slopes, pairs.distances)
-    for width in widths:
-        closeness = _closeness(steps @ slopes.T + rests, width)
-        weights = closeness**2 * (pairs.shares / 20.0) / width**2
-        hessian = (weights @ squares).reshape(-1, 3, 3) + information
-        gradient = weights @ pulls + information @ offset
-        steps = -np.linalg.solve(hessian, gradient[..., None])[..., 0]
-    closeness = _closeness(steps @ slopes.T + rests, widths[-1])
-    beside = (pairs.along.max(axis=1) < -20.0) | (pairs.along.min(axis=1) > pairs.lengths + 20.0)
-    return steps, _support(pairs, np.where(beside, 0.0, closeness) * pairs.shares)
-
-
-def _closeness(distances: Array, width: float) -> Array:
-    """(s, p) from 1, on the model line, to 0; distances (s, 2 p)."""
-    square = distances * distances
-    return np.asarray(1.0 / (1.0 + (square[:, 0::2] + square[:, 1::2]) * (0.5 / width**2)))
-
-
-def _support(pairs: _Pairs, found: Array) -> Array:
-    """(s,) model length that close data account for, each model line at most its own."""
-    count = int(pairs.model.max(initial=0)) + 1
-    belongs = np.zeros((len(pairs.model), count))
-    belongs[np.arange(len(pairs.model)), pairs.model] = 1.0
-    full = np.zeros(count)
-    full[pairs.model] = pairs.lengths
-    return np.asarray(np.minimum(found @ belongs, full).sum(axis=1))
-
-
-def _space(scene: _Scene, state: Array, pairs: _Pairs, sigma_px: float, pair_px: float) -> tuple[PairSpace, Mask]:
+def _space(scene: FloorScene, state: Array, pairs: FloorPairs, sigma_px: float, pair_px: float) -> tuple[PairSpace, Mask]:
     """The restricted space at a state: forms in (dx, dy, dheading, 1), the prior as anchor."""
     rows = np.concatenate([pairs.slopes, pairs.distances[..., None]], axis=-1) / (np.sqrt(2.0) * sigma_px)
     away = (state - scene.mean)[:, None]
@@ -322,10 +135,10 @@ def _floor_fits(forms: Array) -> Fits:
     hessian, pull = forms[:, :3, :3], forms[:, :3, 3:]
     steps = -np.linalg.solve(hessian, pull)
     errors = forms[:, 3, 3] + np.sum(pull * steps, axis=(1, 2))
-    return Fits(np.maximum(errors, 0.0), steps[..., 0])
+    return Fits(np.maximum(errors, 0.0), np.asarray(steps[..., 0], np.float64))
 
 
-def _floor_match(space: PairSpace, pairs: _Pairs, state: Array, found: Found, terms: Terms) -> FloorMatch:
+def _floor_match(space: PairSpace, pairs: FloorPairs, state: Array, found: Found, terms: Terms) -> FloorMatch:
     fit = fit_of(space, found.chosen)
     covered = coverage(space, found.chosen)
     chosen = np.flatnonzero(found.chosen)

@@ -83,8 +83,8 @@ def local_search(
     chosen = start.copy()
     error = evaluate(space, terms, chosen)
     steps = [_step(space, chosen, error)] if keep_trace else []
-    last, done = -1, 0
-    for done in range(STEPS_A_PAIR * len(chosen)):
+    last, moves = -1, 0
+    while moves < STEPS_A_PAIR * len(chosen):
         errors = flip_errors(space, terms, chosen)
         move = _pick(errors, error, strategy, last)
         if move >= 0:
@@ -97,16 +97,16 @@ def local_search(
             out, move, error = swap
             chosen = flipped(space, chosen, move)
             chosen[out] = False
+        moves += 1
         if keep_trace:
             steps.append(_step(space, chosen, error))
-    return Found(chosen, error, done, tuple(steps))
+    return Found(chosen, error, moves, tuple(steps))
 
 
 def evaluate(space: PairSpace, terms: Terms, chosen: Mask) -> float:
     """E_match of one state."""
-    fit = fit_of(space, chosen)
     lines = np.arange(space.lines)
-    return float(fit.errors[0] + terms.omission(1.0 - coverage(space, chosen), lines).sum())
+    return float(fit_of(space, chosen).errors[0] + terms.omission(1.0 - coverage(space, chosen), lines).sum())
 
 
 def fit_of(space: PairSpace, chosen: Mask) -> Fits:
@@ -196,9 +196,8 @@ def _best_swap(
 
 def _counts(space: PairSpace, chosen: Mask) -> Array:
     """(m, c) how many chosen data lines cover each cell."""
-    counts = np.zeros((space.lines, space.masks.shape[1]))
-    np.add.at(counts, space.model[chosen], space.masks[chosen])
-    return counts
+    belongs = space.model[chosen] == np.arange(space.lines)[:, None]
+    return belongs.astype(float) @ space.masks[chosen].astype(float)
 
 
 def _rivals(space: PairSpace, chosen: Mask) -> Index:

@@ -34,7 +34,7 @@ class ViewQuality:
 def view_quality(
     lines_world: NDArray[np.float64], camera: Camera, camera_from_robot: Pose, world_from_robot: Pose2, sigma_px: float
 ) -> ViewQuality:
-    """From the Fisher information of visible model lines (n, 2, 3) whose ends are seen with ``sigma_px`` across them."""
+    """From the Fisher information of visible model lines (n, 2, 3), their ends seen with ``sigma_px`` across them."""
     n = len(lines_world)
     if n == 0:
         return ViewQuality(math.inf, math.inf, 0)

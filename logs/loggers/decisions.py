@@ -9,9 +9,14 @@ import rerun as rr
 from blackboard.activation import Activation
 from blackboard.change import Change
 from blackboard.journal import Decision, decision_line
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
 from logs.mirror import Moment
 from logs.paths import RECORDS, SENTENCES, TABLE
 from logs.tape import Tape
+
+TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "doubted", "halted")
+"""Statuses of milestones, sketches, goals, hypotheses and legs that stand for something gone wrong."""
 
 RECORD = "record"
 """The component that holds a decision's line."""
@@ -41,11 +46,17 @@ def sentence(decision: Decision) -> str:
 
 
 def log_level(decision: Decision) -> str:
-    """INFO for the ordinary; WARN when something was refused or differs; ERROR when an expert raised."""
+    """INFO for the ordinary; WARN when something was refused or goes wrong; ERROR when an expert raised."""
     if decision.refused:
         return "ERROR" if decision.refused.startswith("raised") else "WARN"
-    doubt = any(type(change.entry.value).__name__ == "Discrepancy" for change in decision.made)
-    return "WARN" if doubt else "INFO" if decision.made else "DEBUG"
+    return "WARN" if any(map(_is_trouble, decision.made)) else "INFO" if decision.made else "DEBUG"
+
+
+def _is_trouble(change: Change) -> bool:
+    value = change.entry.value
+    if isinstance(value, Discrepancy):
+        return value.exceeds or value.status == "escalated" or (value.is_open and value.level is not Level.ACTION)
+    return getattr(value, "status", "") in TROUBLES
 
 
 def row(decision: Decision) -> dict[str, str | float]:

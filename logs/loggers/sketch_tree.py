@@ -107,7 +107,7 @@ def subgoal_label(subgoal: Subgoal) -> str:
     through = f" by {subgoal.passage}" if subgoal.passage else ""
     if a.locale != b.locale:
         return f"to {b.locale}{through}"
-    return f"{'go' if subgoal.primitive else 'reach'} to ({b.x_m:.1f}, {b.y_m:.1f}) m{through}"
+    return f"{'go to' if subgoal.primitive else 'reach'} ({b.x_m:.1f}, {b.y_m:.1f}) m{through}"
 
 
 def short(text: str, most: int = 34) -> str:

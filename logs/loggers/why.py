@@ -126,11 +126,9 @@ def _concludes(mirror: Mirror) -> str:
     if entry is None:
         return ""
     c = entry.value
-    support = f"{c.inliers} of {c.expected} expected lines support it, {100 * c.coverage:.0f} % of their length"
-    off = f"off by {1e3 * c.deviation_m:.0f} mm and {math.degrees(c.deviation_rad):.2f}°"
-    pixels = f"{c.deviation_px:.1f} px, tolerance {c.tolerance_px:.1f} px"
-    return (f"*{c.verdict}*: {c.reason}. {support}; {off} ({pixels}); "
-            f"probability that a wrong place looks so: {c.p_false:.1g}.")
+    off = f"{1e3 * c.deviation_m:.0f} mm and {math.degrees(c.deviation_rad):.2f}° from what he believed"
+    return (f"**{c.verdict}**: {c.reason} (tolerance {c.tolerance_px:.1f} px); {off}; "
+            f"a wrong place looks so with probability {c.p_false:.1g}.")
 
 
 def _doubts(mirror: Mirror) -> str:
@@ -172,6 +170,6 @@ def _list(names: tuple[str, ...]) -> str:
 
 CHAPTERS: tuple[tuple[str, Callable[[Mirror], str]], ...] = (
     ("The end:", _ended), ("Harvey wants", _wants), ("He believes", _believes), ("He does:", _does),
-    ("He expects", _expects), ("He sees", _sees), ("He concluded last:", _concludes), ("He doubts", _doubts),
+    ("He expects", _expects), ("He sees", _sees), ("He doubts", _doubts), ("He last judged", _concludes),
     ("Last motor command:", _because),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from knowledge_sources.methods.pose.descent import cross
 from knowledge_sources.methods.pose.estimate import Array, Mask
 from knowledge_sources.methods.pose.lines import TINY, LineSet
 
@@ -20,7 +21,7 @@ def projection_planes(lines: LineSet, rotation: Array, translation: Array) -> tu
     """
     turned = np.swapaxes(rotation, -1, -2)
     directions = lines.directions @ turned
-    return directions, lines.moments @ turned + np.cross(translation[..., None, :], directions)
+    return directions, lines.moments @ turned + cross(translation[..., None, :], directions)
 
 
 def image_distances(lines: LineSet, rotation: Array, translation: Array) -> Array:
@@ -60,15 +61,15 @@ def image_jacobian(lines: LineSet, rotation: Array, translation: Array) -> tuple
     """
     directions, planes = projection_planes(lines, rotation, translation)
     distances, slopes = distance_slopes(lines, planes)
-    turn = np.cross(planes[..., None, :], slopes)
-    shift = np.cross(directions[..., None, :], slopes)
+    turn = cross(planes[..., None, :], slopes)
+    shift = cross(directions[..., None, :], slopes)
     return distances, np.concatenate([turn, shift], axis=-1)
 
 
 def depths(lines: LineSet, rotation: Array, translation: Array) -> Array:
     """(n, 2) depth [m] at which each model line passes the observed ends; negative behind the camera."""
     directions, planes = projection_planes(lines, rotation, translation)
-    across = np.cross(lines.rays, directions[:, None, :])
+    across = cross(lines.rays, directions[:, None, :])
     size = np.maximum(np.sum(across * across, axis=-1), TINY)
     return np.asarray(np.sum(planes[:, None, :] * across, axis=-1) / size)
 

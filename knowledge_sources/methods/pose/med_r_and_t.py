@@ -9,7 +9,7 @@ import numpy as np
 
 from knowledge_sources.methods.pose.descent import information_inverse
 from knowledge_sources.methods.pose.estimate import Array, Mask, PoseEstimate
-from knowledge_sources.methods.pose.guard import FEW_LINES, NO_SUBSET, estimate_at, guarded, prior_estimate, reasons
+from knowledge_sources.methods.pose.guard import NO_SUBSET, estimate_at, guarded, prior_estimate, reasons
 from knowledge_sources.methods.pose.lines import LineSet, landmark_groups, line_set
 from knowledge_sources.methods.pose.r_and_t import PoseState
 from knowledge_sources.methods.pose.r_and_t_ml import likeliest, r_and_t_ml

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose.descent import Normal
+from knowledge_sources.methods.pose.descent import Normal, cross
 from knowledge_sources.methods.pose.estimate import Array
 from knowledge_sources.methods.pose.image_error import distance_slopes
 from knowledge_sources.methods.pose.lines import LineSet
@@ -124,28 +123,6 @@ def point_jacobian(
     slopes[:, :, 2] = -image / z[:, None]
     slopes *= focal_px[:, None]
     return p, image * focal_px, slopes @ np.swapaxes(moves, 1, 2)
-
-
-def cross(a: Array, b: Array) -> Array:
-    """a x b over the last axis; cheaper than the library's on small batches."""
-    return np.stack(
-        [
-            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
-            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
-            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
-        ],
-        axis=-1,
-    )
-
-
-def state_of(pose: Pose2) -> Array:
-    """(3,) x, y, heading."""
-    return np.array([pose.x_m, pose.y_m, pose.heading_rad])
-
-
-def heading_deg(state: Array) -> float:
-    """The state's heading in degrees, for messages."""
-    return math.degrees(float(state[2]))
 
 
 def _robot_from_world(headings_rad: Array) -> Array:

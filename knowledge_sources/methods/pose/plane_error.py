@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from knowledge_sources.methods.pose.descent import information_inverse
+from knowledge_sources.methods.pose.descent import cross, information_inverse
 from knowledge_sources.methods.pose.estimate import Array
 from knowledge_sources.methods.pose.lines import TINY, LineSet
 
@@ -34,7 +34,7 @@ def plane_distances_m(lines: LineSet, ends: Array) -> Array:
 
 def plane_jacobian(lines: LineSet, ends: Array) -> Array:
     """Derivatives (n, 2, 6) of n . q by the left perturbation: (q x n, n)."""
-    turn = np.cross(ends, lines.normals[:, None, :])
+    turn = cross(ends, lines.normals[:, None, :])
     return np.concatenate([turn, np.broadcast_to(lines.normals[:, None, :], ends.shape)], axis=-1)
 
 
@@ -56,8 +56,8 @@ def end_noise(lines: LineSet, vectors: Array) -> Array:
     across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(lines.lengths_px, TINY)[:, None]
     shift = np.zeros_like(first)
     shift[:, :2] = across * lines.sigma_px[:, None] / lines.focal_px
-    size = np.maximum(np.linalg.norm(np.cross(first, second), axis=1), TINY)[:, None]
-    planes = np.stack([np.cross(shift, second) / size, np.cross(first, shift) / size], axis=1)
+    size = np.maximum(np.linalg.norm(cross(first, second), axis=1), TINY)[:, None]
+    planes = np.stack([cross(shift, second) / size, cross(first, shift) / size], axis=1)
     return np.asarray(vectors @ np.swapaxes(planes, 1, 2))
 
 

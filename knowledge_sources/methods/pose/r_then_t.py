@@ -10,6 +10,7 @@ import numpy as np
 from knowledge_sources.methods.pose.descent import (
     Descent,
     Normal,
+    cross,
     descend,
     information_inverse,
     normal_equations,
@@ -68,7 +69,7 @@ def _solve_rotation(lines: LineSet, prior: Pose, weights: Array) -> Descent[Arra
     def linearise(rotation: Array) -> Normal:
         turned = lines.directions @ rotation.T
         misses = np.sum(lines.normals * turned, axis=1, keepdims=True)
-        return normal_equations(misses * root, np.cross(turned, lines.normals) * root)
+        return normal_equations(misses * root, cross(turned, lines.normals) * root)
 
     return descend(prior.rotation, linearise, lambda rotation, step: rotations(step) @ rotation)
 
@@ -76,7 +77,7 @@ def _solve_rotation(lines: LineSet, prior: Pose, weights: Array) -> Descent[Arra
 def _covariance(lines: LineSet, rotation: Array, translation: Array, weights: Array) -> Array:
     """The ends' noise carried through both stages."""
     turned = lines.directions @ rotation.T
-    jacobian = np.cross(turned, lines.normals)
+    jacobian = cross(turned, lines.normals)
     noise = end_noise(lines, turned[:, None, :])[:, 0]
     weighted = jacobian * weights[:, None]
     turn = -information_inverse(weighted.T @ jacobian) @ (weighted[:, None, :] * noise[..., None]).reshape(-1, 3).T

@@ -1,0 +1,100 @@
+"""What was observed, as values again: from the journal's JSON and, for pictures, the recording's bytes."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import types
+import typing
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from blackboard.change import Quiescence
+from blackboard.effect import Effect, Post, Retract, Revise
+from blackboard.entry import Entry, Ref
+from harvey.errors import BadInput
+from harvey.records import EntryRecord
+from world_models.body import Frame, MotionReport
+from world_models.task import Command, Outcome
+
+OBSERVED: Mapping[str, type[Any]] = {t.__name__: t for t in (Command, MotionReport, Frame, Quiescence, Outcome)}
+"""The types of value that come from outside."""
+
+
+def effect_of(record: EntryRecord, frames: Mapping[int, bytes], current: Callable[[str], Entry[Any] | None]) -> Effect:
+    """The effect that brought about an observed change.
+
+    Args:
+        frames: number -> JPEG bytes of the pictures.
+        current: the current revision of an entry.
+
+    Raises:
+        BadInput: the value is of no type that is observed, its fields are not the type's, or its picture is lacking.
+    """
+    because = tuple(_ref(text) for text in record.because)
+    if record.change == "Posted":
+        return Post(value_of(record, frames), because)
+    entry = current(record.id)
+    if entry is None:
+        raise BadInput(f"{record.ref}: expected an entry on the board, got none")
+    return Retract(entry, because) if record.change == "Retracted" else Revise(entry, value_of(record, frames), because)
+
+
+def value_of(record: EntryRecord, frames: Mapping[int, bytes]) -> Any:
+    """The value itself. Raises BadInput as :func:`effect_of` does."""
+    if record.type not in OBSERVED:
+        raise BadInput(f"{record.ref}: expected an observation ({', '.join(OBSERVED)}), got a {record.type}")
+    value = dict(record.value) if isinstance(record.value, dict) else record.value
+    if record.type == "Frame" and isinstance(value, dict):
+        value["jpeg"] = _picture(record, value, frames)
+    try:
+        return _decoded(value, OBSERVED[record.type])
+    except (ValueError, TypeError) as error:
+        raise BadInput(f"{record.ref}: {error}") from None
+
+
+def _picture(record: EntryRecord, value: Mapping[str, Any], frames: Mapping[int, bytes]) -> bytes:
+    """The bytes of a frame, after checking that they are those that the journal saw."""
+    number, seen = value.get("number"), value.get("jpeg")
+    if not isinstance(number, int) or number not in frames:
+        raise BadInput(f"{record.ref}: expected picture {number} in the recording, which has {len(frames)} pictures")
+    jpeg = frames[number]
+    if not isinstance(seen, dict) or hashlib.sha256(jpeg).hexdigest() != seen.get("sha256"):
+        raise BadInput(f"{record.ref}: expected the picture that the journal saw, got another one for number {number}")
+    return jpeg
+
+
+def _decoded(value: Any, hint: Any) -> Any:
+    """A value of the type that a hint names, from JSON types. Numbers stay as they were written."""
+    origin = typing.get_origin(hint)
+    if origin in (types.UnionType, typing.Union):
+        return None if value is None else _decoded(value, next(a for a in typing.get_args(hint) if a is not type(None)))
+    if origin is tuple:
+        return _tuple(value, typing.get_args(hint))
+    if dataclasses.is_dataclass(hint) and isinstance(hint, type):
+        return _dataclass(value, hint)
+    if hint is float and isinstance(value, str):
+        return float(value)
+    if not isinstance(value, (int, float) if hint is float else hint):
+        raise ValueError(f"expected {hint.__name__}, got {value!r}")
+    return value
+
+
+def _tuple(value: Any, hints: tuple[Any, ...]) -> tuple[Any, ...]:
+    kinds = hints[:1] * len(value) if Ellipsis in hints else hints
+    return tuple(_decoded(item, kind) for item, kind in zip(value, kinds, strict=True))
+
+
+def _dataclass(value: Any, kind: type[Any]) -> Any:
+    hints = typing.get_type_hints(kind)
+    names = [field.name for field in dataclasses.fields(kind)]
+    if not isinstance(value, dict) or sorted(value) != sorted(names):
+        raise ValueError(f"expected {kind.__name__} with {', '.join(names)}, got {value!r}")
+    return kind(**{name: _decoded(value[name], hints[name]) for name in names})
+
+
+def _ref(text: str) -> Ref:
+    id, _, revision = text.rpartition(".")
+    if not revision.isdecimal():
+        raise BadInput(f"expected a revision as Goal-1.0, got {text!r}")
+    return Ref(id, int(revision))
