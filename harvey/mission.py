@@ -21,10 +21,11 @@ from logs.sink import Recorder
 from sim.assembly import Stage
 from sim.body import SimulatedBody
 from sim.scenario import Limits, Scenario
+from sim.truth import cross_track_m
 from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis, covariance_tuple, diagonal
 from world_models.robot import RobotModel
-from world_models.task import Command, Goal, Milestone, Outcome, PlanSketch
+from world_models.task import Command, Goal, Leg, Milestone, Outcome, PlanSketch
 
 FALSE_M = 0.15
 """A milestone that is verified while the robot is further than this from where it then believes it is, is a false accept."""
@@ -41,6 +42,7 @@ class MissionResult:
         milestones: how many were verified, refuted, not testable and (by the truth) accepted falsely.
         replans: sketches adjusted or drawn anew; relocalizations: how often it found itself again.
         sketches: how many plan sketches were drawn.
+        max_cross_track_m: how far the robot truly strayed from the line of the leg it was driving.
     """
 
     scenario: str
@@ -74,12 +76,18 @@ class Tally:
         self._robot, self._body = robot, body
         self.decisions = self.replans = self.relocalizations = self.sketches = 0
         self.milestones = {"verified": 0, "refuted": 0, "not_testable": 0, "false_accepts": 0}
+        self.max_cross_track_m = 0.0
+        self._leg: Leg | None = None
+        self._gone = 0
 
     def __call__(self, decision: Decision) -> None:
         self.decisions += 1
+        self._follow()
         for change in decision.made:
             value, revision = change.entry.value, change.entry.revision
-            if isinstance(value, Milestone) and value.status.replace(" ", "_") in self.milestones:
+            if isinstance(value, Leg):
+                self._leg = value if value.status == "moving" else None
+            elif isinstance(value, Milestone) and value.status.replace(" ", "_") in self.milestones:
                 self.milestones[value.status.replace(" ", "_")] += 1
             elif isinstance(value, PlanSketch):
                 self.sketches += revision == 0
@@ -90,6 +98,15 @@ class Tally:
                 self.relocalizations += value.basis == "relocalization"
                 if value.basis == "milestone":
                     self.milestones["false_accepts"] += self._is_false(value)
+
+    def _follow(self) -> None:
+        """How far the robot truly strayed from the leg that it was driving since the last decision."""
+        track = self._body.track
+        if self._leg is not None:
+            start, end = Pose2(self._leg.x0_m, self._leg.y0_m, 0.0), Pose2(self._leg.x1_m, self._leg.y1_m, 0.0)
+            strayed = (abs(cross_track_m(t.world_from_robot, start, end)) for t in track[self._gone:])
+            self.max_cross_track_m = max(self.max_cross_track_m, *strayed, 0.0)
+        self._gone = len(track)
 
     def _is_false(self, value: Hypothesis) -> bool:
         believed, true = value.world_from_robot(self._robot.world), self._body.truth.world_from_robot
@@ -232,7 +249,7 @@ def _result(
         relocalizations=tally.relocalizations,
         sketches=tally.sketches,
         collisions=score.collisions,
-        max_cross_track_m=score.max_cross_track_m,
+        max_cross_track_m=tally.max_cross_track_m,
     )
 
 

@@ -81,7 +81,11 @@ def _decoded(value: Any, hint: Any) -> Any:
 
 
 def _tuple(value: Any, hints: tuple[Any, ...]) -> tuple[Any, ...]:
+    if not isinstance(value, list):
+        raise ValueError(f"expected a list, got {value!r}")
     kinds = hints[:1] * len(value) if Ellipsis in hints else hints
+    if len(kinds) != len(value):
+        raise ValueError(f"expected {len(kinds)} items, got {value!r}")
     return tuple(_decoded(item, kind) for item, kind in zip(value, kinds, strict=True))
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
@@ -52,7 +52,7 @@ def scenario_of(run: RunDirectory) -> Scenario:
     """The scenario with the settings that a run was made with. Raises BadInput where the result does not say."""
     from sim.scenario import ScenarioError, load_scenario, with_settings
 
-    origin = run.read_result().get("origin")
+    origin: Any = run.read_result().get("origin")
     try:
         file, settings = str(origin["file"]), dict(origin["settings"])
     except (TypeError, KeyError, ValueError):

@@ -49,17 +49,22 @@ class RunDirectory:
         return data
 
 
-def new_run(path: Path) -> Path:
-    """Make room for a run: an older run there goes.
-
-    Raises:
-        BadInput: the directory cannot be made, or holds other things than a run.
-    """
+def vacant(path: Path) -> Path:
+    """A place where a run may be written: nothing, or an older run. Raises BadInput where there is anything else."""
     try:
-        path.mkdir(parents=True, exist_ok=True)
-        others = sorted(p.name for p in path.iterdir() if p.name not in FILES)
-        if others:
-            raise BadInput(f"--out {path}: expected a new directory or an older run's, got one with {others[0]!r}")
+        here = next(p for p in (path, *path.parents) if p.exists())
+        others = sorted(p.name for p in here.iterdir() if p.name not in FILES)
+    except OSError as error:
+        raise BadInput(f"--out {path}: expected a directory, got: {error.strerror}") from None
+    if others and here == path:
+        raise BadInput(f"--out {path}: expected a new directory or an older run's, got one with {others[0]!r}")
+    return path
+
+
+def new_run(path: Path) -> Path:
+    """Make room for a run: an older run there goes. Raises BadInput where that cannot be."""
+    try:
+        vacant(path).mkdir(parents=True, exist_ok=True)
         for name in FILES:
             (path / name).unlink(missing_ok=True)
     except OSError as error:

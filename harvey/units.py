@@ -16,9 +16,9 @@ def number(value: Any) -> float:
 
 
 def metres(value: Any) -> str:
-    """A length: millimetres below 10 cm, metres above."""
+    """A length: millimetres up to 10 cm, metres beyond."""
     m = number(value)
-    return f"{m * 1000.0:.0f} mm" if abs(m) < 0.1 else f"{m:.2f} m"
+    return f"{m * 1000.0:.0f} mm" if abs(m) <= 0.1 else f"{m:.2f} m"
 
 
 def degrees(value: Any) -> str:

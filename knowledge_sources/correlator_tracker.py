@@ -22,7 +22,14 @@ from blackboard.entry import Entry
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.methods.correlation import Template, corner_strength, correlate, extract_template, fits
+from knowledge_sources.methods.correlation import (
+    Template,
+    correlate,
+    corner_strength,
+    extract_template,
+    fits,
+    self_correlation,
+)
 from knowledge_sources.methods.images import decode
 from knowledge_sources.methods.pose.planar import point_jacobian
 from knowledge_sources.methods.pose.planar_from_points import planar_from_points
@@ -41,7 +48,7 @@ TRACKS = 14
 FEW = 9
 """With fewer than this, new ones are taken."""
 SPACING_PX = 28.0
-LEAST_PEAK = 0.75
+LEAST_PEAK = 0.7
 LEAST_MARGIN = 0.08
 """How much better than the second best place in its window a landmark must correlate: is the peak unique?"""
 LEAST_CORNER = 3.0
@@ -50,6 +57,11 @@ MISSES = 2
 """A landmark that is not found so often in a row is given up."""
 LEAST = 4
 """Fewer expected landmarks than this do not make a discrepancy."""
+LOST_PART = 1.0 / 3.0
+"""When fewer than this part of the expected landmarks agree, tracking cannot explain what it sees."""
+UNIQUE = 0.8
+"""A landmark's patch must not look more like another place nearby than this (correlation)."""
+UNIQUE_PX = 14.0
 PLAN_BOUND_PX = 30.0
 """What plan-level servoing may correct: the window of the matcher's Hough transform (§6.1.4)."""
 SIGMAS = 4.0
@@ -103,7 +115,7 @@ class CorrelatorTracker(KnowledgeSource):
         because = (frame, belief) if old is None else (frame, belief, old)
         corrected = self._corrected(belief.value, seen, old.value.anchors) if seen and old is not None else None
         agreeing = 0 if corrected is None else corrected.agreeing
-        if expected >= LEAST and 2 * agreeing < expected:
+        if expected >= LEAST and agreeing < LOST_PART * expected:
             what = f"{expected - agreeing} of {expected} landmarks are not where they were expected"
             yield from self._told(view, what, math.inf, belief.value, because)
             yield from self._kept(old, Tracks(frame.id, HALF_PX, ()), because)
@@ -211,7 +223,7 @@ class CorrelatorTracker(KnowledgeSource):
             if strength[i] < LEAST_CORNER or len(taken) >= TRACKS:
                 break
             px, point = points.points_px[i], points.points_world[i]
-            if all(np.linalg.norm(px - other) >= SPACING_PX for other in taken):
+            if all(np.linalg.norm(px - other) >= SPACING_PX for other in taken) and _is_unique(image, px):
                 taken.append(px)
                 name = robot.world.landmarks[points.landmark[i]].name
                 new.append(_begun(point, px, float(camera_from_world.apply(point)[2]), name, frame))
@@ -230,6 +242,10 @@ class CorrelatorTracker(KnowledgeSource):
         old: Entry[Tracks] | None, tracks: Tracks, because: tuple[object, ...]
     ) -> Iterable[Effect]:
         yield Post(tracks, because) if old is None else Revise(old, tracks, because)
+
+
+def _is_unique(image: NDArray[np.uint8], px: NDArray[np.float64]) -> bool:
+    return bool(self_correlation(image, px, HALF_PX, UNIQUE_PX).second_peak < UNIQUE)
 
 
 def _correlated(track: Track, template: Template, image: NDArray[np.uint8], sigma: float, scale: float) -> Track:

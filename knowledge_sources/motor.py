@@ -50,8 +50,8 @@ class Motor(KnowledgeSource):
         Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and s.verified),
         Watch(Leg, (Posted,)),
         Watch(Hypothesis, (Posted, Revised), lambda h: h.is_held),
-        Watch(Milestone, (Posted,), lambda m: m.status == "turning"),
-        Watch(Discrepancy, (Revised,), lambda d: d.status == "corrected"),
+        Watch(Milestone),
+        Watch(Discrepancy, (Revised,)),
     )
     writes = (MotorCommand, Leg, Discrepancy)
 

@@ -9,11 +9,14 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from logs import paths
+from logs.loggers.decisions import COLUMNS
+from logs.loggers.plan import FLAG_M
 from world_models.camera import Camera
 from world_models.world import World
 
-ABOVE = 0.55
-"""The eye stands so high above the building, in lengths of its diagonal."""
+ABOVE, SOUTH = 0.6, 0.12
+"""The eye stands so high above the building and so far to the south of its middle, in lengths of its diagonal: steeply
+enough to look over the walls into a narrow hallway."""
 
 TRAILS = (paths.TRUE_TRAIL, paths.BELIEVED_TRAIL)
 
@@ -23,12 +26,12 @@ SINCE_THE_START = rrb.VisibleTimeRange(
 
 def blueprint(world: World, camera: Camera) -> Any:
     """All views of a run under one cursor: the building and the picture large, the reasons beside, time below."""
-    words = rrb.Vertical(_description(), _why(), row_shares=[3, 7])
+    words = rrb.Vertical(_description(), _why(), row_shares=[4, 7])
     decisions = rrb.Tabs(_decisions(), _table())
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(words, _building(world), _picture(camera), column_shares=[4, 9, 6]),
-            rrb.Horizontal(decisions, _lanes(), _sketch(), _errors(), column_shares=[11, 8, 7, 8]),
+            rrb.Horizontal(decisions, _lanes(), _sketch(), _errors(), column_shares=[13, 8, 7, 7]),
             row_shares=[11, 10],
         ),
         rrb.TimePanel(timeline="cycle", state="collapsed"),
@@ -56,7 +59,7 @@ def _building(world: World) -> Any:
         background=rrb.Background(color=[28, 30, 34, 255]), line_grid=False,
         overrides={path: rrb.VisibleTimeRanges([SINCE_THE_START]) for path in TRAILS},
         eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=[middle[0], middle[1] - 0.32 * size, ABOVE * size],
+            kind=rrb.Eye3DKind.Orbital, position=[middle[0], middle[1] - SOUTH * size, FLAG_M + ABOVE * size],
             look_target=[middle[0], middle[1], 0.0], eye_up=[0.0, 0.0, 1.0]),
     )
 
@@ -73,12 +76,14 @@ def _lanes() -> Any:
 
 def _decisions() -> Any:
     return rrb.TextLogView(
-        origin=paths.SENTENCES, name="Decisions: one a cycle",
+        origin=paths.TABLE, name="Decisions: one a cycle",
         columns=rrb.TextLogColumns(timeline_columns=["cycle"], text_log_columns=["loglevel", "body"]))
 
 
 def _table() -> Any:
-    return rrb.DataframeView(origin=paths.TABLE, name="Decision table")
+    columns = [f"/{paths.TABLE}:{name}" for name in COLUMNS]
+    query = rrb.archetypes.DataframeQuery(timeline="cycle", select=["cycle", *columns])
+    return rrb.DataframeView(origin=paths.TABLE, name="Decision table", query=query)
 
 
 def _sketch() -> Any:
@@ -104,13 +109,9 @@ DESCRIPTION = """\
 Harvey drives from room to room by what his camera shows. Experts round a blackboard decide, **one decision a cycle**.
 Drag the cursor at the bottom, or play.
 
-- **green**: the true robot (known in simulation only); a line that was matched
-- **blue**: where Harvey believes he is; the ellipse is his doubt, drawn 20 times as large
-- **orange**: goal, plan, the leg under way; in the picture: how far a followed point has drifted, 5 times as long
-- **yellow**: what he expects to see
-- **cyan**: what he found in the picture
-- **red**: sought and not found, or rejected
-- **grey**: done
+**Green**: the true robot (known in simulation only); lines that match. **Blue**: where Harvey believes he is, with an
+ellipse of doubt (1 sigma, 20 times as large). **Orange**: goal, plan, leg; in the picture: drift of a point, 5 times as
+long. **Yellow**: expected. **Cyan**: found. **Red**: missed or rejected. **Grey**: done.
 """
 
 

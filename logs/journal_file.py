@@ -29,6 +29,7 @@ class JournalFile:
             OSError: the file cannot be written.
         """
         self._path, self._sync = path, sync
+        self._last: tuple[Decision, str] | None = None
         self._file = path.open("w", encoding="utf-8", newline="\n")
 
     def __call__(self, decision: Decision) -> None:
@@ -38,12 +39,18 @@ class JournalFile:
             OSError: the file cannot be written any more, as when the disk is full; names the file.
         """
         try:
-            self._file.write(decision_line(decision) + "\n")
+            self._file.write(self.line(decision) + "\n")
             self._file.flush()
             if self._sync:
                 os.fsync(self._file.fileno())
         except OSError as error:
             raise OSError(error.errno, f"cannot write the journal: {error.strerror}", str(self._path)) from error
+
+    def line(self, decision: Decision) -> str:
+        """A decision's line, without its newline; the last one is remembered."""
+        if self._last is None or self._last[0] is not decision:
+            self._last = decision, decision_line(decision)
+        return self._last[1]
 
     def close(self) -> None:
         """No more decisions."""

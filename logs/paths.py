@@ -10,7 +10,7 @@ FLOORS, WALLS, THINGS = f"{BUILDING}/floors", f"{BUILDING}/walls", f"{BUILDING}/
 NAMES, DOORWAYS = f"{BUILDING}/names", f"{BUILDING}/doorways"
 TRUE_ROBOT, TRUE_TRAIL = f"{WORLD}/robot/true", f"{WORLD}/robot/true_trail"
 BELIEVED_ROBOT, BELIEVED_TRAIL = f"{WORLD}/robot/believed", f"{WORLD}/robot/believed_trail"
-UNCERTAINTY, CANDIDATES = f"{WORLD}/robot/uncertainty", f"{WORLD}/robot/candidates"
+CANDIDATES = f"{WORLD}/robot/candidates"
 GOAL, PATH, LEG, LANDMARKS = f"{WORLD}/plan/goal", f"{WORLD}/plan/path", f"{WORLD}/plan/leg", f"{WORLD}/plan/landmarks"
 
 CAMERA = "camera"
@@ -24,7 +24,7 @@ FOCUS = f"{LANES}/focus"
 WHY = "why"
 
 DECISION = "decision"
-SENTENCES, TABLE, RECORDS = f"{DECISION}/sentences", f"{DECISION}/table", f"{DECISION}/records"
+TABLE, RECORDS = f"{DECISION}/table", f"{DECISION}/records"
 
 ERRORS = "errors"
 POSITION, HEADING, DEVIATION = f"{ERRORS}/position", f"{ERRORS}/heading", f"{ERRORS}/deviation"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from rerun.chunk import RrdReader
+from rerun.error_utils import RerunWarning
 
 from logs.errors import RecordingError
 from logs.loggers.decisions import RECORD
@@ -58,7 +60,10 @@ def _rows(path: Path, entity: str, components: tuple[str, ...]) -> list[dict[str
 
 
 def _batches(path: Path, entity: str) -> Iterator[Any]:
-    for chunk in RrdReader(path).stream().filter(content=f"/{entity}", is_static=False):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RerunWarning)  # a recording without footer, as a crash leaves it, is read as well
+        reader = RrdReader(path)
+    for chunk in reader.stream().filter(content=f"/{entity}", is_static=False):
         yield chunk.to_record_batch()
 
 

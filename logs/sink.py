@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
-from blackboard.journal import Decision
+from blackboard.journal import Decision, decision_line
 from logs.blueprint import blueprint, describe
 from logs.loggers import Logger
 from logs.loggers.building import Building
@@ -35,9 +36,11 @@ class Recorder:
 
     def __init__(
         self, path: Path | None, *, world: World, camera: Camera, mount: CameraMount, title: str, recording_id: str,
-        live: bool = False,
+        live: bool = False, line_of: Callable[[Decision], str] = decision_line,
     ) -> None:
         """Begin a recording in a file (``path``), for a viewer that connects now (``live``), or both.
+
+        ``line_of`` gives a decision's line in the journal; :meth:`JournalFile.line` spares making it twice.
 
         Raises:
             RecordingError: the file cannot be written.
@@ -49,7 +52,7 @@ class Recorder:
         self._truth: list[Pose2] = []
         self._loggers: tuple[Logger, ...] = (
             Building(world), Robots(world, camera), Plan(world), Frames(camera), Image(camera),
-            SketchTree(), Lanes(), Decisions(), Errors(world), Why(),
+            SketchTree(), Lanes(), Decisions(line_of), Errors(world), Why(),
         )
         self._tape.fix(DESCRIPTION, describe(title))
         for logger in self._loggers:
@@ -85,7 +88,7 @@ class Recorder:
         self._truth.clear()
         for change in moment.changes:
             self._mirror.take(change)
-        for kind in (Frame, MotionReport):
-            times = (entry.value.sim_time_s for entry in moment.changed(kind))
-            self._sim_time_s = max(self._sim_time_s, *times, 0.0)
+        times = [*(e.value.sim_time_s for e in moment.changed(Frame)),
+                 *(e.value.sim_time_s for e in moment.changed(MotionReport))]
+        self._sim_time_s = max([self._sim_time_s, *times])
         return moment

@@ -36,7 +36,7 @@ class ActuatorParameters:
         command_s: time that every command takes besides.
     """
 
-    turn_scale_sigma: float = 0.01
+    turn_scale_sigma: float = 0.02
     turn_sigma_rad: float = math.radians(0.1)
     skitter_sigma_m: float = 0.003
     curvature_low_per_m: float = 0.0045

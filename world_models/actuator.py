@@ -32,7 +32,7 @@ class ActuatorModel:
     reach: float = 228.3 / 240.0
     reach_sigma: float = 0.012
     curvature_sigma_per_m: float = 0.011
-    turn_sigma: float = 0.015
+    turn_sigma: float = 0.025
     turn_sigma_rad: float = math.radians(0.2)
     skitter_m: float = 0.004
     increment_m: float = 0.6096

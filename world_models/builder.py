@@ -112,7 +112,8 @@ class _Site:
         for wall in self.walls[door.between[1]].values():
             ends = wall.world_from_wall.inverse().apply(ends_world)
             faces_back = float(wall.inward_world @ near.inward_world) < -0.999
-            if faces_back and -THICKEST_WALL_M <= ends[0, 1] <= 1e-6 and ends[1, 0] >= 0 and ends[0, 0] <= wall.length_m:
+            behind = -THICKEST_WALL_M <= ends[0, 1] <= 1e-6
+            if faces_back and behind and ends[1, 0] >= 0 and ends[0, 0] <= wall.length_m:
                 neighbour = door.between[0] if door.is_open else None
                 opening = Opening(door.name, float(ends[1, 0]), float(ends[0, 0]), door.height_m, neighbour)
                 return wall.locale, wall.name, opening
@@ -165,8 +166,9 @@ class _Site:
         wall = self.walls[spec.locale][str(spec.wall)]
         across = _coordinate_along(wall.name, wall.world_from_wall.inverse() @ world_from_locale, spec.along_m)
         if not 0 <= across <= wall.length_m:
-            self.faults.append(Fault(spec.source, f"{spec.name}: expected a place on the {wall.name} wall of "
-                                                  f"{spec.locale}, got one {across:.2f} m along its {wall.length_m:.2f} m"))
+            self.faults.append(Fault(
+                spec.source, f"{spec.name}: expected a place on the {wall.name} wall of {spec.locale}, "
+                             f"got one {across:.2f} m along its {wall.length_m:.2f} m"))
         return wall.world_from_wall @ Pose(np.eye(3), np.array([across, 0.0, spec.up_m]))
 
 
@@ -178,7 +180,8 @@ def _check_fit(wall: Wall, opening: Opening) -> None:
     if opening.left_m < 0.0 or opening.right_m > wall.length_m or opening.top_m > wall.height_m:
         raise _Unbuildable(
             f"expected an opening within the {wall.name} wall of {wall.locale} ({wall.length_m:.2f} m long, "
-            f"{wall.height_m:.2f} m high), got {opening.left_m:.2f} .. {opening.right_m:.2f} m, {opening.top_m:.2f} m high"
+            f"{wall.height_m:.2f} m high), "
+            f"got {opening.left_m:.2f} .. {opening.right_m:.2f} m, {opening.top_m:.2f} m high"
         )
     for other in wall.openings:
         if opening.left_m < other.right_m and other.left_m < opening.right_m:

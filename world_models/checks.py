@@ -1,4 +1,4 @@
-"""What can be wrong with a world that could be read: rooms that overlap, leak or cannot be reached, misplaced things."""
+"""What is wrong with a world that could be read: rooms that overlap, leak or cannot be reached, things misplaced."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _overlapping(world: World) -> Iterator[Finding]:
 
 
 def _overlap(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """Whether two simple polygons share more than a border, by points just inside the sides and in the middle of each."""
+    """Whether two simple polygons share more than a border, by points just inside their sides and in the middle."""
     return _reaches_into(one, other) or _reaches_into(other, one)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,7 @@ BOX_EDGES: tuple[tuple[int, Side, Side], ...] = tuple(
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A block in the frame of a part: x to the right as one stands with the back to the wall, y off the wall, z up [m]."""
+    """A block in the frame of a part: x to the right as one stands with the back to the wall, y off it, z up [m]."""
 
     x: Range
     y: Range
@@ -165,7 +166,7 @@ class Solid:
         low, high = self.boxes[index].ranges[axis]
         ends = {end for box in self.boxes for end in box.ranges[axis] if low + CONTACT_M < end < high - CONTACT_M}
         marks = [low, *sorted(ends), high]
-        return list(zip(marks, marks[1:], strict=False))
+        return list(pairwise(marks))
 
     def _ground_at(self, index: int, axis: int, middle: float, side: Side, other: Side) -> float | None:
         """Brightness of what a side lies against, just at its edge with ``other``; ``None`` where it is open."""
@@ -233,8 +234,9 @@ def _back_to_back(box: Box, other: Box, side: Side) -> bool:
 def _covers(box: Box, other: Box, side: Side) -> bool:
     """Whether ``box`` lies against the whole of a side of ``other``."""
     across = [a for a in range(3) if a != side[0]]
-    return _back_to_back(box, other, side) and all(box.ranges[a][0] <= other.ranges[a][0] + CONTACT_M for a in across) and all(
-        box.ranges[a][1] >= other.ranges[a][1] - CONTACT_M for a in across
+    return _back_to_back(box, other, side) and all(
+        box.ranges[a][0] <= other.ranges[a][0] + CONTACT_M and box.ranges[a][1] >= other.ranges[a][1] - CONTACT_M
+        for a in across
     )
 
 

@@ -33,7 +33,8 @@ def plan_svg(world: World) -> str:
     for name in world.rooms:
         shapes += [paper.frame(world, name), paper.text(world.outline(name).mean(axis=0), name)]
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}">'
-    return "\n".join([head, _STYLE, f'<rect width="{width:.0f}" height="{height:.0f}" fill="#777"/>', *shapes, "</svg>\n"])
+    ground = f'<rect width="{width:.0f}" height="{height:.0f}" fill="#777"/>'
+    return "\n".join([head, _STYLE, ground, *shapes, "</svg>\n"])
 
 
 _STYLE = """<style>

@@ -1,4 +1,4 @@
-"""Which locales the camera can look into, and through which part of the image: the doorway network as a focus (§3.4)."""
+"""Which locales the camera can look into, and through which part of the image: the doorways as a focus (§3.4)."""
 
 from __future__ import annotations
 

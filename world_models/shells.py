@@ -151,7 +151,8 @@ class Shell:
         solids = []
         if look.baseboard:
             stretches = wall.free_of_openings(CASING_M)
-            solids.append(self._strip(index, "baseboard", look.baseboard, stretches, (0.0, BASEBOARD_M), BASEBOARD_PROUD_M))
+            z = (0.0, BASEBOARD_M)
+            solids.append(self._strip(index, "baseboard", look.baseboard, stretches, z, BASEBOARD_PROUD_M))
         if look.moulding:
             z = (wall.height_m - MOULDING_M, wall.height_m)
             solids.append(self._strip(index, "moulding", look.moulding, [(0.0, wall.length_m)], z, MOULDING_PROUD_M))

@@ -28,6 +28,7 @@ WORLDS = Path(__file__).parent / "worlds"
 
 RECTANGLE_WALLS = ("south", "east", "north", "west")
 FINISH_KEYS = ("walls", "floor", "ceiling", "baseboard", "moulding", "frame", "leaf", "threshold")
+LOCALE_KEYS = ("in", "at", "turn", "size", "outline", "height", "things", "properties", *FINISH_KEYS[:5])
 DEFAULT_KEYS = (*FINISH_KEYS, "height", "door_width", "door_height")
 
 
@@ -96,8 +97,7 @@ class _Draft:
     # -- locales -----------------------------------------------------------------------------------------------------
 
     def _locale(self, name: str, node: Node) -> LocaleSpec:
-        node.table(("kind",), ("in", "at", "turn", "size", "outline", "height", "walls", "floor", "ceiling", "baseboard",
-                               "moulding", "things", "properties"))
+        node.table(("kind",), LOCALE_KEYS)
         if name == self.name:
             raise node.fail("a name other than that of the whole world", repr(name))
         outline, names = self._outline(node)
@@ -120,7 +120,7 @@ class _Draft:
             corners = [item.numbers((2,), -self.shelf.far, self.shelf.far) for item in node["outline"].items(least=3)]
             outline = np.array(corners) * self.shelf.unit_m
             if not is_simple(outline):
-                raise node["outline"].fail("corners that go round a room counter-clockwise without crossing or doubling")
+                raise node["outline"].fail("corners counter-clockwise round a room, without crossing or doubling")
             return outline, tuple(f"side-{index}" for index in range(len(outline)))
         return None, ()
 
@@ -187,7 +187,8 @@ class _Draft:
         return DoorSpec(
             name, between, self._wall(node["wall"], between[0]),
             self.shelf.coordinate(node["along"]),
-            self.shelf.length(width, 0.1, 20.0) if width else 0.9, self.shelf.length(height, 0.1, 20.0) if height else 2.0,
+            self.shelf.length(width, 0.1, 20.0) if width else 0.9,
+            self.shelf.length(height, 0.1, 20.0) if height else 2.0,
             is_open, frame, leaf, threshold, self.shelf.part(node["panel"]) if "panel" in node else (), node.where,
         )
 

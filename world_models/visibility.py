@@ -1,9 +1,9 @@
 """Which model lines and corners a camera sees: exact hidden-line removal by shadow volumes.
 
-Seen from the optical centre, a convex one-sided surface hides what lies in its shadow: beyond its plane and within the
-pyramid of its sides. Each of these bounds is linear in a point, so that the hidden part of a segment is an interval,
-computed for all pairs of lines and surfaces at once (:mod:`world_models.shadows`). Locales that no chain of doorways opens to the camera are
-left out beforehand (§3.4: the locale network as a focusing mechanism).
+Seen from the optical centre, a convex one-sided surface hides what lies in its shadow: beyond its plane and within
+the pyramid of its sides. Each of these bounds is linear in a point, so that the hidden part of a segment is an
+interval, computed for all pairs of lines and surfaces at once (:mod:`world_models.shadows`). Locales that no chain of
+doorways opens to the camera are left out beforehand (§3.4: the locale network as a focusing mechanism).
 """
 
 from __future__ import annotations

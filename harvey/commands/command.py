@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -33,3 +33,10 @@ class Command:
     def epilog(self) -> str:
         width = max(len(command) for command, _ in self.examples)
         return "examples:\n" + "\n".join(f"  {command.ljust(width)}   {what}" for command, what in self.examples)
+
+
+def whole(text: str) -> int:
+    """An argument that is a whole number from 0."""
+    if not (text.isascii() and text.isdecimal()):
+        raise ArgumentTypeError(f"expected a whole number from 0, got {text!r}")
+    return int(text)

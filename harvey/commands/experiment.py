@@ -5,22 +5,19 @@ from __future__ import annotations
 import json
 from argparse import ArgumentParser, Namespace
 
-from harvey.commands.command import Command
-from harvey.errors import BadInput
+from harvey.commands.command import Command, whole
 
 
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", help="which one; harvey list names them")
     parser.add_argument("--quick", action="store_true", help="a small version")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
-    parser.add_argument("--seed", metavar="N", type=int, default=0, help="of all chance (0)")
+    parser.add_argument("--seed", metavar="N", type=whole, default=0, help="of all chance (0)")
 
 
 def _run(args: Namespace) -> int:
     from harvey import experiments
 
-    if args.seed < 0:
-        raise BadInput(f"--seed: expected a whole number from 0, got {args.seed}")
     report = experiments.run(args.name, quick=args.quick, seed=args.seed)
     print(json.dumps(report.record(), indent=2) if args.json else report.text())
     return 0 if report.holds else 1

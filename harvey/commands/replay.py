@@ -21,12 +21,12 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
+    run = open_run(args.run, "recording.rrd")
+    os.environ.update(one_thread(os.environ))
     from blackboard.journal import decision_line, decision_record
     from harvey.replay import replayed, scenario_of, scheduler_of
     from logs.reader import read_frames
 
-    os.environ.update(one_thread(os.environ))
-    run = open_run(args.run)
     frames = read_frames(run.recording)
     agreed = 0
     for pair, line in zip(replayed(_shown(run), frames, scheduler_of(scenario_of(run))), _lines(run), strict=False):

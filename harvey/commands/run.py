@@ -10,7 +10,7 @@ from pathlib import Path
 from harvey.campaign import Task, one_thread, run_all, run_task, seeds_of, settings_of
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_directory import RUNS
+from harvey.run_directory import RUNS, vacant
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -40,8 +40,8 @@ def _run(args: Namespace) -> int:
 def _out(args: Namespace, seed: int, many: bool) -> Path:
     name = Path(args.scenario).stem
     if args.out:
-        return Path(args.out) / str(seed) if many else Path(args.out)
-    return RUNS / name / str(seed) if many else RUNS / f"{name}-{seed}"
+        return vacant(Path(args.out) / str(seed) if many else Path(args.out))
+    return vacant(RUNS / name / str(seed) if many else RUNS / f"{name}-{seed}")
 
 
 def _check(task: Task) -> int:

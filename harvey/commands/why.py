@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from harvey.commands.command import Command
+from harvey.commands.command import Command, whole
 from harvey.records import read_records
 from harvey.run_directory import open_run
 from harvey.trace import trace_of
@@ -16,8 +16,8 @@ def _arguments(parser: ArgumentParser) -> None:
     which = parser.add_mutually_exclusive_group()
     which.add_argument("entry", metavar="ENTRY", nargs="?",
                        help="as MotorCommand-12 (its last revision) or Leg-3.2; without one: how the mission ended")
-    which.add_argument("--at", metavar="CYCLE", type=int, help="explain what this cycle did")
-    parser.add_argument("--depth", metavar="N", type=int, default=DEPTH, help=f"how many steps down to go ({DEPTH})")
+    which.add_argument("--at", metavar="CYCLE", type=whole, help="explain what this cycle did")
+    parser.add_argument("--depth", metavar="N", type=whole, default=DEPTH, help=f"how many steps down to go ({DEPTH})")
 
 
 def _run(args: Namespace) -> int:
@@ -30,7 +30,7 @@ def _run(args: Namespace) -> int:
         print("\n".join(trace_of(decisions, args.at)))
         refs = [record.ref for record in decision.made]
         print()
-    print("\n".join(explain(history, refs, max(0, args.depth))))
+    print("\n".join(explain(history, refs, args.depth)))
     return 0
 
 

@@ -75,7 +75,8 @@ def _claims(results: dict[Task, MissionResult], seeds: Sequence[int]) -> tuple[t
         done = (results[task] for task in _tasks(scenario, off, seeds))
         return sum(1 for r in done if r.outcome == "reached" and r.final_error_m <= INCH_M)
 
-    claims = [(f"{s}: with all levels every mission arrives within an inch", good(s, ()) == len(seeds)) for s in SCENARIOS]
+    claims = [(f"{s}: with all levels on, every mission arrives within an inch", good(s, ()) == len(seeds))
+              for s in SCENARIOS]
     claims += [(f"{s}: with all levels off fewer do", good(s, LEVELS[-1][1]) < good(s, ())) for s in SCENARIOS]
     without = good("hallway-kidnap", ("goal",))
     claims.append(("hallway-kidnap: without the goal level fewer do", without < good("hallway-kidnap", ())))

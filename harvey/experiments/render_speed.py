@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,13 +18,16 @@ from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 
 FRAMES, QUICK_FRAMES = 300, 60
+TRIES = 3
+"""Each frame's time is the best of so many: what else the machine does is none of the renderer's fault."""
 CARDS, QUICK_CARDS = 200, 40
+Times = NDArray[np.float64]
 FLAT_M = 1e6
 """A texture scale at which a plain surface is of one colour."""
 
 
 def run(quick: bool, seed: int) -> Report:
-    """Frames along the way of Figure 17's mission, and the edges of cards held before the camera in all ways."""
+    """Frames from all over the building of Figure 17's mission, and the edges of cards turned in all ways."""
     stage, rng = set_stage(load_scenario("lab-to-allens-office")), np.random.default_rng(seed)
     ideal_s, whole_s = _frame_times_s(stage, rng, QUICK_FRAMES if quick else FRAMES)
     errors_px = _edge_errors_px(stage.scenario.camera.camera, rng, QUICK_CARDS if quick else CARDS)
@@ -42,30 +44,29 @@ def run(quick: bool, seed: int) -> Report:
         ),
         notes=(
             f"{len(whole_s)} frames at random free places of the rooms of {stage.world.name}, headings at random.",
-            f"{len(errors_px)} rows across the edges of square cards 3 to 5 m away; where a box-filtered edge lies is the"
-            " sum of its profile. Projected with world_models.camera, of which the renderer uses nothing.",
+            f"Time is processor time of all threads together, for each frame the best of {TRIES}.",
+            f"{len(errors_px)} rows across the edges of square cards 3 to 5 m away; where a box-filtered edge lies is"
+            " the sum of its profile. The projection is the robot's own, of which the renderer uses nothing.",
         ),
         claims=(("at least 60 frames a second", speed >= 60.0), ("edges within 0.1 px RMS", rms_px < 0.1)),
     )
 
 
-def _frame_times_s(stage: Stage, rng: np.random.Generator, frames: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(frames,) seconds of drawing, and of drawing with noise and compression."""
+def _frame_times_s(stage: Stage, rng: np.random.Generator, frames: int) -> tuple[Times, Times]:
+    """(frames,) seconds of drawing, and of drawing with noise and compression, summed over all threads."""
     camera, mount, sensor = stage.scenario.camera.camera, stage.scenario.camera.mount, stage.scenario.sensor
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    ideal_s, whole_s = np.empty(frames), np.empty(frames)
-    try:
-        for index in range(-1, frames):  # the first one compiles, and does not count
-            camera_from_world = mount.camera_from_robot @ _free_pose(stage, rng).lifted().inverse()
-            began_s = time.perf_counter()
+    times_s = []
+    for _ in range(frames + 1):
+        camera_from_world = mount.camera_from_robot @ _free_pose(stage, rng).lifted().inverse()
+        tries_s = []
+        for _ in range(TRIES):
+            began_s = time.process_time()
             radiance = stage.building.renderer.radiance(camera, camera_from_world)
-            drawn_s = time.perf_counter()
+            drawn_s = time.process_time()
             compressed(exposed(radiance, sensor, rng), sensor.jpeg_quality)
-            if index >= 0:
-                ideal_s[index], whole_s[index] = drawn_s - began_s, time.perf_counter() - began_s
-    finally:
-        cv2.setNumThreads(threads)
+            tries_s.append((drawn_s - began_s, time.process_time() - began_s))
+        times_s.append(min(tries_s, key=lambda pair: pair[1]))
+    ideal_s, whole_s = np.array(times_s[1:]).T  # the first one compiles
     return ideal_s, whole_s
 
 
@@ -94,7 +95,7 @@ def _card_errors_px(camera: Camera, rng: np.random.Generator) -> NDArray[np.floa
     faces = (PatchFace((Patch("wall", wall, (0.1, 0.1, 0.1), "plain", FLAT_M),)),
              PatchFace((Patch("card", corners, (0.9, 0.9, 0.9), "plain", FLAT_M),)))
     image = Renderer.of_faces(faces).radiance(camera, Pose.identity())[..., 1].astype(float)
-    pixels, _ = camera.project(corners)
+    pixels = camera.project(corners)
     return np.concatenate([edge_offsets_px(image, pixels[[i, (i + 1) % 4]]) for i in range(4)])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -93,6 +94,7 @@ def match_lines(
     replace: bool = True,
     peaks: int = 3,
     start: Peak | None = None,
+    first_pairs: Collection[tuple[int, int]] | None = None,
     trace: bool = False,
 ) -> Match:
     """Match the projected model to the data lines.
@@ -111,6 +113,7 @@ def match_lines(
         with_scale: fit a scale too.
         strategy: "steepest", or the paper's "first" improvement. replace: allow exchanges at local minima.
         peaks: placements tried. start: this placement (about the mean of the model's ends) instead of Hough's.
+        first_pairs: (model, data) pairs of the first state; ``None``: each near data line to its nearest model line.
         trace: keep the states of the search.
     """
     model, data = _checked(model_px, "model_px"), _checked(data_px, "data_px")
@@ -131,6 +134,8 @@ def match_lines(
     tries = []
     for placement in placements:
         space, first = _pair_space(table, placement, gates, pair_rad, terms, with_scale)
+        if first_pairs is not None:
+            first = np.array([pair in first_pairs for pair in zip(space.model, space.data, strict=True)], bool)
         found = local_search(space, terms, first, strategy=strategy, replace=replace, keep_trace=trace)
         tries.append((space, found))
     space, found = min(tries, key=lambda tried: tried[1].error)

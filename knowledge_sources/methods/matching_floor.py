@@ -110,7 +110,9 @@ def match_on_floor(
     return _floor_match(space, pairs, state, found, terms)
 
 
-def _space(scene: FloorScene, state: Array, pairs: FloorPairs, sigma_px: float, pair_px: float) -> tuple[PairSpace, Mask]:
+def _space(
+    scene: FloorScene, state: Array, pairs: FloorPairs, sigma_px: float, pair_px: float
+) -> tuple[PairSpace, Mask]:
     """The restricted space at a state: forms in (dx, dy, dheading, 1), the prior as anchor."""
     rows = np.concatenate([pairs.slopes, pairs.distances[..., None]], axis=-1) / (np.sqrt(2.0) * sigma_px)
     away = (state - scene.mean)[:, None]

@@ -65,6 +65,9 @@ class Peak:
     votes: float
 
 
+NO_MOTION = Peak(0.0, (0.0, 0.0), 0.0)
+
+
 def hough_peaks(model: LineTable, data: LineTable, window_px: float, window_rad: float, count: int) -> list[Peak]:
     """The best ``count`` separate peaks, best first; no motion if nothing votes.
 
@@ -72,6 +75,8 @@ def hough_peaks(model: LineTable, data: LineTable, window_px: float, window_rad:
     across the model line that lays one on the other. A model line's votes at one offset count at most its own length:
     texture cannot outvote a contour. Gathering each line's votes at n . T gives the accumulator over T.
     """
+    if not (len(model.ends) and len(data.ends)):
+        return [NO_MOTION]
     turns = _turns(window_rad)
     step = 2.0 * window_px / (CELLS - 1)
     votes = _offset_votes(model, data, turns, window_px, window_rad, step)
@@ -151,4 +156,4 @@ def _separate_peaks(scores: Array, turns: Array, window_px: float, step: float, 
             break
         peaks.append(Peak(float(turns[t]), (float(axis[u]), float(axis[v])), float(scores[t, v, u])))
         left[max(t - 2, 0) : t + 3, max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3] = -np.inf
-    return peaks or [Peak(0.0, (0.0, 0.0), 0.0)]
+    return peaks or [NO_MOTION]

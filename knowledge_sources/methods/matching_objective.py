@@ -43,7 +43,7 @@ def paper_terms(model_lengths: Array, data_lengths: Array, alpha: float, beta: f
     Lengths count relative to the model's: E_fit is a mean squared distance [px^2], and a model line's omission
     weighs by its share of the model ("perhaps on the basis of model line length"); so weighted it spans Figure 12(d).
     """
-    total = float(np.sum(model_lengths))
+    total = max(float(np.sum(model_lengths)), 1.0)
     return Terms(
         end_weights=0.5 * data_lengths / total,
         omission_scale=alpha * model_lengths / total,

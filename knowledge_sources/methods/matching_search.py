@@ -197,7 +197,7 @@ def _best_swap(
 def _counts(space: PairSpace, chosen: Mask) -> Array:
     """(m, c) how many chosen data lines cover each cell."""
     belongs = space.model[chosen] == np.arange(space.lines)[:, None]
-    return belongs.astype(float) @ space.masks[chosen].astype(float)
+    return np.asarray(belongs.astype(np.float64) @ space.masks[chosen].astype(np.float64))
 
 
 def _rivals(space: PairSpace, chosen: Mask) -> Index:

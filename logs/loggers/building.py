@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,7 @@ from logs.mirror import Moment
 from logs.palette import DOOR, NAME
 from logs.paths import BUILDING, DOORWAYS, NAMES, WORLD
 from logs.tape import Tape
-from world_models.faces import area_vector
-from world_models.regions import LAMP, Region
+from world_models.regions import LAMP
 from world_models.world import World
 
 HEAD_HIGH_M = 1.8
@@ -32,8 +30,7 @@ class Building:
 
     def begin(self, tape: Tape) -> None:
         tape.fix(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        regions = [region for face in self._world.faces for region in (*face.front, *face.back)]
-        tape.fix(BUILDING, _mesh(region for region in regions if not _is_ceiling(region)))
+        tape.fix(BUILDING, _mesh(self._world))
         tape.fix(NAMES, _names(self._world))
         tape.fix(DOORWAYS, _doorways(self._world))
 
@@ -41,37 +38,25 @@ class Building:
         """Buildings do not change."""
 
 
-def _is_ceiling(region: Region) -> bool:
-    up = area_vector(region.polygon_world)[2]
-    return bool(up < 0 and region.polygon_world[:, 2].min() > HEAD_HIGH_M)
-
-
-def _mesh(regions: Iterable[Region]) -> Any:
-    """All regions as one mesh that shows from their visible sides only, so that no wall stands in one's way."""
-    points, triangles, colours, count = [], [], [], 0
-    for region in regions:
-        corners = len(region.polygon_world)
-        points.append(region.polygon_world)
-        triangles.append(count + _fan(corners))
-        colours.append(np.tile(_lit(region), (corners, 1)))
-        count += corners
+def _mesh(world: World) -> Any:
+    """All surfaces as one mesh that shows from their visible sides only, so that no wall stands in one's way."""
+    polygons, normals = world.scene.polygons_world, world.scene.planes_world[:, :3]
+    colours = np.array([region.colour for face in world.faces for region in (*face.front, *face.back)])
+    shown = (normals[:, 2] > -0.5) | (polygons[..., 2].min(axis=1) < HEAD_HIGH_M)
+    light = SOFT_LIGHT + LAMP_LIGHT * normals @ (LAMP / np.linalg.norm(LAMP))
+    lit = np.clip(255.0 * light[:, None] * colours, 0, 255).astype(np.uint8)[shown]
+    corners = polygons.shape[1]
     return rr.Mesh3D(
-        vertex_positions=np.concatenate(points), triangle_indices=np.concatenate(triangles),
-        vertex_colors=np.concatenate(colours), face_rendering=rr.components.MeshFaceRendering.Front,
+        vertex_positions=polygons[shown].reshape(-1, 3), vertex_colors=np.repeat(lit, corners, axis=0),
+        triangle_indices=_triangles(len(lit), corners), face_rendering=rr.components.MeshFaceRendering.Front,
     )
 
 
-def _fan(corners: int) -> NDArray[np.int64]:
-    """(corners - 2, 3) the triangles of a convex polygon."""
+def _triangles(count: int, corners: int) -> NDArray[np.int64]:
+    """(count * (corners - 2), 3) fans for convex polygons that lie one after the other."""
     rest = np.arange(1, corners - 1)
-    return np.stack([np.zeros_like(rest), rest, rest + 1], axis=1)
-
-
-def _lit(region: Region) -> NDArray[np.uint8]:
-    normal = area_vector(region.polygon_world)
-    facing = normal @ LAMP / (np.linalg.norm(normal) * np.linalg.norm(LAMP))
-    light = SOFT_LIGHT + LAMP_LIGHT * facing
-    return np.asarray(np.clip(255.0 * light * np.array(region.colour), 0, 255), np.uint8)
+    fan = np.stack([np.zeros_like(rest), rest, rest + 1], axis=1)
+    return (fan[None] + corners * np.arange(count)[:, None, None]).reshape(-1, 3)
 
 
 def _names(world: World) -> Any:

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 
 import rerun as rr
 
 from blackboard.activation import Activation
 from blackboard.change import Change
-from blackboard.journal import Decision, decision_line
-from blackboard.level import Level
+from blackboard.journal import Decision
 from blackboard.servoing import Discrepancy
 from logs.mirror import Moment
-from logs.paths import RECORDS, SENTENCES, TABLE
+from logs.paths import RECORDS, TABLE
 from logs.tape import Tape
 
 TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "doubted", "halted")
 """Statuses of milestones, sketches, goals, hypotheses and legs that stand for something gone wrong."""
+
+COLUMNS = ("focus", "chosen", "rating", "trigger", "did", "runner_up", "waiting")
+"""Of the decision table."""
 
 RECORD = "record"
 """The component that holds a decision's line."""
@@ -25,14 +28,18 @@ RECORD = "record"
 class Decisions:
     """Logs every decision in three forms."""
 
+    def __init__(self, line_of: Callable[[Decision], str]) -> None:
+        """``line_of`` gives a decision's line in the journal."""
+        self._line_of = line_of
+
     def begin(self, tape: Tape) -> None:
         """Nothing holds at all times."""
 
     def log(self, tape: Tape, moment: Moment) -> None:
         decision = moment.decision
-        tape.log(RECORDS, rr.AnyValues(True, record=decision_line(decision)))
-        tape.log(SENTENCES, rr.TextLog(sentence(decision), level=log_level(decision)))
-        tape.log(TABLE, rr.AnyValues(True, **row(decision)))
+        tape.log(RECORDS, rr.AnyValues(record=[self._line_of(decision)]))
+        columns = {name: [value] for name, value in row(decision).items()}
+        tape.log(TABLE, rr.TextLog(sentence(decision), level=log_level(decision)), rr.AnyValues(True, **columns))
 
 
 def sentence(decision: Decision) -> str:
@@ -55,22 +62,23 @@ def log_level(decision: Decision) -> str:
 def _is_trouble(change: Change) -> bool:
     value = change.entry.value
     if isinstance(value, Discrepancy):
-        return value.exceeds or value.status == "escalated" or (value.is_open and value.level is not Level.ACTION)
+        return value.exceeds or value.status == "escalated" or (value.is_open and value.magnitude is None)
     return getattr(value, "status", "") in TROUBLES
 
 
 def row(decision: Decision) -> dict[str, str | float]:
-    """The columns of the decision table."""
+    """The decision table's columns, by :data:`COLUMNS`."""
     chosen, second = decision.chosen, decision.runner_up
-    return {
-        "focus": str(decision.focus),
-        "chosen": chosen.source.name if chosen else "",
-        "rating": float(chosen.rating) if chosen else 0.0,
-        "trigger": str(chosen.trigger.entry.ref) if chosen else "",
-        "runner_up": _bid(second) if second else "",
-        "waiting": float(decision.pending),
-        "did": _deeds(decision.made),
-    }
+    values = (
+        str(decision.focus),
+        chosen.source.name if chosen else "",
+        float(chosen.rating) if chosen else 0.0,
+        str(chosen.trigger.entry.ref) if chosen else "",
+        _deeds(decision.made),
+        _bid(second) if second else "",
+        float(decision.pending),
+    )
+    return dict(zip(COLUMNS, values, strict=True))
 
 
 def _bid(activation: Activation) -> str:

@@ -27,5 +27,5 @@ class Frames:
     def log(self, tape: Tape, moment: Moment) -> None:
         for entry in moment.changed(Frame):
             frame = entry.value
-            about = rr.AnyValues(number=frame.number, purpose=frame.purpose, entry=str(entry.ref))
+            about = rr.AnyValues(number=[frame.number], purpose=[frame.purpose], entry=[str(entry.ref)])
             tape.log(IMAGE, rr.EncodedImage(contents=frame.jpeg, media_type="image/jpeg"), about)

@@ -23,7 +23,11 @@ from world_models.task import Milestone
 DRIFT_SCALE = 5.0
 """Drifts of a few pixels would not show: their arrows are drawn longer, and the view's legend says so."""
 
-NAMES_PATH = f"{IMAGE}/names"
+NAMES_PATH, REJECTED_PATH = f"{IMAGE}/names", f"{IMAGE}/rejected"
+STYLES = ((EXPECTED_PATH, EXPECTED, 1.5), (SEGMENTS_PATH, FOUND, 1.0), (MATCHED_PATH, MATCHED, 2.0),
+          (REJECTED_PATH, REJECTED, 2.0))
+"""Lines of each kind: where, colour and half width on the screen."""
+
 MOST_NAMES = 6
 
 Floats = NDArray[np.float64]
@@ -37,7 +41,8 @@ class Image:
         self._shown: dict[str, None] = {}
 
     def begin(self, tape: Tape) -> None:
-        """Nothing holds at all times."""
+        for path, colour, width in STYLES:
+            tape.fix(path, rr.LineStrips2D.from_fields(colors=[colour], radii=rr.Radius.ui_points(width)))
 
     def log(self, tape: Tape, moment: Moment) -> None:
         if moment.touched(Frame):
@@ -45,9 +50,9 @@ class Image:
         for milestone in moment.changed(Milestone)[-1:]:
             self._expected(tape, milestone.value)
         for segments in moment.changed(Segments)[-1:]:
-            self._lines(tape, SEGMENTS_PATH, segments.value.segments_px, FOUND, 1.0)
+            self._lines(tape, SEGMENTS_PATH, segments.value.segments_px)
         for match in moment.changed(LineMatch)[-1:]:
-            self._lines(tape, MATCHED_PATH, match.value.segments_px, MATCHED, 2.0)
+            self._lines(tape, MATCHED_PATH, match.value.segments_px)
         for fix in moment.changed(PoseFix)[-1:]:
             self._inliers(tape, moment.mirror, fix.value)
         for tracks in moment.changed(Tracks)[-1:]:
@@ -65,23 +70,22 @@ class Image:
         tape.log(path, what)
         self._shown[path] = None
 
-    def _lines(self, tape: Tape, path: str, segments_px: Any, colour: Any, radius: float) -> None:
+    def _lines(self, tape: Tape, path: str, segments_px: Any) -> None:
         lines, inside = clip_segments(segments_px, *self._size)
-        colours = np.asarray(colour)[inside] if np.ndim(colour) == 2 else [colour]
-        self._show(tape, path, rr.LineStrips2D(lines[inside], colors=colours, radii=rr.Radius.ui_points(radius)))
+        self._show(tape, path, rr.LineStrips2D(lines[inside].astype(np.float32)))
 
     def _expected(self, tape: Tape, milestone: Milestone) -> None:
         if milestone.status == "turning" or not milestone.expected_px:
             return
         lines = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
-        self._lines(tape, EXPECTED_PATH, lines, EXPECTED, 1.5)
+        self._lines(tape, EXPECTED_PATH, lines)
         self._show(tape, NAMES_PATH, _names(milestone, *clip_segments(lines, *self._size)))
 
     def _inliers(self, tape: Tape, mirror: Mirror, fix: PoseFix) -> None:
         match = mirror.get(fix.match)
         if match is not None and isinstance(match.value, LineMatch):
-            colours = np.where(fix.inliers[:, None], np.array(MATCHED), np.array(REJECTED)).astype(np.uint8)
-            self._lines(tape, MATCHED_PATH, match.value.segments_px, colours, 2.0)
+            self._lines(tape, MATCHED_PATH, match.value.segments_px[fix.inliers])
+            self._lines(tape, REJECTED_PATH, match.value.segments_px[~fix.inliers])
 
     def _tracks(self, tape: Tape, tracks: Tracks) -> None:
         items = [track for track in tracks.items if self._inside(track.predicted_px)]

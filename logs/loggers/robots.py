@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from logs.mirror import Mirror, Moment
 from logs.palette import BELIEVED, CANDIDATE, TRUE, Colour, faint
-from logs.paths import BELIEVED_ROBOT, BELIEVED_TRAIL, CANDIDATES, TRUE_ROBOT, TRUE_TRAIL, UNCERTAINTY
+from logs.paths import BELIEVED_ROBOT, BELIEVED_TRAIL, CANDIDATES, TRUE_ROBOT, TRUE_TRAIL
 from logs.tape import Tape
 from world_models.camera import Camera
-from world_models.frames import Pose2
+from world_models.frames import Pose2, frozen
 from world_models.location import Hypothesis
 from world_models.world import World
 
@@ -26,6 +26,8 @@ SIGMA_SCALE = 20.0
 STILL_M = 1e-3
 TRAIL_HEIGHT_M = 0.2
 
+CIRCLE = frozen([np.cos(np.linspace(0.0, 2.0 * np.pi, 33)), np.sin(np.linspace(0.0, 2.0 * np.pi, 33))])
+
 SIGHT_M = 2.5
 """Length of the wedge that shows where the camera looks."""
 
@@ -37,6 +39,7 @@ class Robots:
         self._world = world
         self._half_view_rad = np.arctan(camera.width / (2.0 * camera.fx))
         self._last: dict[str, Pose2] = {}
+        self._has_candidates = False
 
     def begin(self, tape: Tape) -> None:
         solid, wires = rr.components.FillMode.Solid, rr.components.FillMode.MajorWireframe
@@ -45,33 +48,48 @@ class Robots:
         tape.fix(f"{BELIEVED_ROBOT}/body", _cylinder(BELIEVED, RADIUS_M + 0.08, 1.3, wires))
         tape.fix(f"{BELIEVED_ROBOT}/heading", _arrow(BELIEVED, 1.35))
         tape.fix(f"{BELIEVED_ROBOT}/sight", _wedge(float(self._half_view_rad)))
+        tape.fix(TRUE_TRAIL, rr.LineStrips3D.from_fields(colors=[TRUE], radii=0.04))
+        tape.fix(BELIEVED_TRAIL, rr.LineStrips3D.from_fields(colors=[BELIEVED], radii=0.04))
+        label = f"1 sigma, drawn {SIGMA_SCALE:.0f} times as large"
+        tape.fix(BELIEVED_ROBOT, rr.LineStrips3D.from_fields(
+            colors=[BELIEVED], radii=0.025, labels=[label], show_labels=False))
 
     def log(self, tape: Tape, moment: Moment) -> None:
         for pose in moment.truth[-1:]:
-            self._move(tape, TRUE_ROBOT, TRUE_TRAIL, pose, TRUE)
+            self._move(tape, TRUE_ROBOT, TRUE_TRAIL, pose)
         if moment.touched(Hypothesis):
             self._log_belief(tape, moment.mirror)
 
     def _log_belief(self, tape: Tape, mirror: Mirror) -> None:
-        tape.log(CANDIDATES, _candidates(self._world, mirror))
+        self._log_candidates(tape, mirror)
         held = believed(mirror)
-        if held is None:
-            tape.log(UNCERTAINTY, rr.Clear(recursive=False))
-            return
-        pose = held.world_from_robot(self._world)
-        self._move(tape, BELIEVED_ROBOT, BELIEVED_TRAIL, pose, BELIEVED)
-        tape.log(UNCERTAINTY, _ellipse(pose, held.covariance_world(self._world)))
+        if held is not None:
+            pose = held.world_from_robot(self._world)
+            ring = _ellipse(pose, held.covariance_world(self._world))
+            self._move(tape, BELIEVED_ROBOT, BELIEVED_TRAIL, pose, ring)
 
-    def _move(self, tape: Tape, robot: str, trail: str, pose: Pose2, colour: Colour) -> None:
+    def _log_candidates(self, tape: Tape, mirror: Mirror) -> None:
+        """Where else he might be: an arrow each, the longer the likelier."""
+        others = [e.value for e in mirror.all(Hypothesis) if e.value.status == "candidate"]
+        if not others and not self._has_candidates:
+            return
+        self._has_candidates = bool(others)
+        poses = [h.world_from_robot(self._world) for h in others]
+        vectors = [[(0.5 + h.weight) * np.cos(p.heading_rad), (0.5 + h.weight) * np.sin(p.heading_rad), 0.0]
+                   for h, p in zip(others, poses, strict=True)]
+        origins = [[p.x_m, p.y_m, 0.1] for p in poses]
+        tape.log(CANDIDATES, rr.Arrows3D(origins=origins, vectors=vectors, radii=0.05, colors=[CANDIDATE]))
+
+    def _move(self, tape: Tape, robot: str, trail: str, pose: Pose2, *more: Any) -> None:
         before = self._last.get(robot)
-        if before == pose:
+        if before == pose and not more:
             return
         self._last[robot] = pose
-        turn = rr.RotationAxisAngle(axis=(0, 0, 1), radians=pose.heading_rad)
-        tape.log(robot, rr.Transform3D(translation=(pose.x_m, pose.y_m, 0.0), rotation=turn))
+        turn = rr.Quaternion(xyzw=(0.0, 0.0, np.sin(pose.heading_rad / 2), np.cos(pose.heading_rad / 2)))
+        tape.log(robot, rr.Transform3D(translation=(pose.x_m, pose.y_m, 0.0), quaternion=turn), *more)
         if before is not None and before.distance_to(pose) > STILL_M:
             step = [[p.x_m, p.y_m, TRAIL_HEIGHT_M] for p in (before, pose)]
-            tape.log(trail, rr.LineStrips3D([step], colors=[colour], radii=0.04))
+            tape.log(trail, rr.LineStrips3D(np.array([step], np.float32)))
 
 
 def believed(mirror: Mirror) -> Hypothesis | None:
@@ -98,23 +116,9 @@ def _wedge(half_view_rad: float) -> Any:
 
 
 def _ellipse(pose: Pose2, covariance_world: NDArray[np.float64]) -> Any:
+    """One standard deviation of the position, in the frame of the believed robot."""
     values, axes = np.linalg.eigh(covariance_world[:2, :2])
-    angles = np.linspace(0.0, 2.0 * np.pi, 33)
-    circle = np.stack([np.cos(angles), np.sin(angles)])
-    ring = pose.position + SIGMA_SCALE * (axes @ (np.sqrt(np.maximum(values, 0.0))[:, None] * circle)).T
-    strip = np.column_stack([ring, np.full(len(ring), 0.06)])
-    label = f"1 sigma, drawn {SIGMA_SCALE:.0f} times as large"
-    return rr.LineStrips3D([strip], colors=[BELIEVED], radii=0.025, labels=[label], show_labels=False)
-
-
-def _candidates(world: World, mirror: Mirror) -> Any:
-    """Where else he might be: an arrow each, the longer the likelier."""
-    others = [e.value for e in mirror.all(Hypothesis) if e.value.status == "candidate"]
-    poses = [h.world_from_robot(world) for h in others]
-    lengths = [0.5 + h.weight for h in others]
-    return rr.Arrows3D(
-        origins=[[p.x_m, p.y_m, 0.1] for p in poses],
-        vectors=[[s * np.cos(p.heading_rad), s * np.sin(p.heading_rad), 0.0]
-                 for p, s in zip(poses, lengths, strict=True)],
-        radii=0.05, colors=[CANDIDATE],
-    )
+    ring = SIGMA_SCALE * (axes @ (np.sqrt(np.maximum(values, 0.0))[:, None] * CIRCLE)).T
+    c, s = np.cos(pose.heading_rad), np.sin(pose.heading_rad)
+    strip = np.column_stack([ring @ np.array([[c, -s], [s, c]]), np.full(len(ring), 0.06)])
+    return rr.LineStrips3D(strip[None].astype(np.float32))

@@ -51,7 +51,7 @@ def outline(mirror: Mirror) -> list[Node]:
     goal = mirror.latest(Goal)
     if goal is None:
         return []
-    root = Node(goal.id, _goal_label(goal.value), DONE if goal.value.status == "reached" else PLANNED, 0, "")
+    root = Node(goal.id, _goal_label(goal), DONE if goal.value.status == "reached" else PLANNED, 0, "")
     return [root, *_rows(mirror, goal.id, (), root)]
 
 
@@ -97,8 +97,9 @@ def _verdict(mirror: Mirror, sketch: Entry[PlanSketch], number: int) -> str:
     return last.value.status if last else ""
 
 
-def _goal_label(goal: Goal) -> str:
-    return f"{goal.origin.locale} → {goal.destination.locale}: {goal.status}"
+def _goal_label(goal: Entry[Goal]) -> str:
+    value = goal.value
+    return f"{goal.id}: {value.origin.locale} → {value.destination.locale}, {value.status}"
 
 
 def subgoal_label(subgoal: Subgoal) -> str:

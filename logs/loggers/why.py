@@ -8,6 +8,7 @@ from collections.abc import Callable
 import rerun as rr
 
 from blackboard.entry import Entry, Ref
+from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from logs.loggers.robots import believed
 from logs.loggers.sketch_tree import subgoal_label
@@ -73,9 +74,15 @@ def _does(mirror: Mirror) -> str:
     leg = mirror.latest(Leg, lambda g: g.status == "moving")
     sketch = mirror.latest(PlanSketch, lambda s: s.is_active and s.current is not None)
     if leg is None or sketch is None:
-        return "stands still" + (f", before: {_next(sketch.value)}." if sketch else ".")
+        return "stands still" + (f"; next: {_next(sketch.value)}." if sketch else ".")
     way = math.hypot(leg.value.x1_m - leg.value.x0_m, leg.value.y1_m - leg.value.y0_m)
-    return f"drives a straight leg of {way:.1f} m, {_next(sketch.value)}; {leg.value.increments} increments so far."
+    doing = "has halted on" if _is_halted(mirror) else "drives"
+    return f"{doing} a straight leg of {way:.1f} m, {_next(sketch.value)}; {leg.value.increments} increments so far."
+
+
+def _is_halted(mirror: Mirror) -> bool:
+    """Nothing moves while something above the action level is in doubt."""
+    return mirror.latest(Discrepancy, lambda d: d.is_open and d.level is not Level.ACTION) is not None
 
 
 def _next(sketch: PlanSketch) -> str:
@@ -170,6 +177,6 @@ def _list(names: tuple[str, ...]) -> str:
 
 CHAPTERS: tuple[tuple[str, Callable[[Mirror], str]], ...] = (
     ("The end:", _ended), ("Harvey wants", _wants), ("He believes", _believes), ("He does:", _does),
-    ("He expects", _expects), ("He sees", _sees), ("He doubts", _doubts), ("He last judged", _concludes),
+    ("He expects", _expects), ("He sees", _sees), ("He doubts:", _doubts), ("He last judged", _concludes),
     ("Last motor command:", _because),
 )

@@ -49,7 +49,8 @@ TOKENS = re.findall(r"\w+|[^\w\s]|\s+", SMALL)
 
 junk = st.one_of(
     st.sampled_from([*dict.fromkeys(TOKENS)]),
-    st.sampled_from(["-1", "0", "1e400", "nan", "inf", "-3.5", "99999999", "true", "[]", "{}", '""', "1979-05-27", "\\"]),
+    st.sampled_from(["-1", "0", "1e400", "nan", "inf", "-3.5", "99999999", "true", "[]", "{}", '""', "1979-05-27",
+                     "\\"]),
     st.text(max_size=3),
 )
 

@@ -51,7 +51,7 @@ def test_a_turned_locale_has_its_own_frame() -> None:
         (HEAD + '[finishes]\na = { colour = [0, 0, 2] }\n' + KITCHEN,
          "cottage.toml:4: finishes.a.colour.2: expected a number from 0 to 1, got 2"),
         (HEAD + '[locales.kitchen]\nkind = "room"\noutline = [[0, 0], [4, 4], [4, 0], [0, 4]]\n',
-         "cottage.toml:5: locales.kitchen.outline: expected corners that go round"),
+         "cottage.toml:5: locales.kitchen.outline: expected corners counter-clockwise round"),
         (HEAD + KITCHEN + '[doors]\nd = { between = ["kitchen", "hall"], wall = "east", along = 3 }\n',
          "cottage.toml:7: doors.d.between.1: expected one of kitchen, got 'hall'"),
         (HEAD + KITCHEN + '[doors]\nd = { between = ["kitchen"], wall = "east", along = 3, open = true }\n',
@@ -114,7 +114,7 @@ def test_details_may_not_change_the_world(old: str, new: str, message: str) -> N
 
 
 def test_details_may_not_give_a_name_another_meaning() -> None:
-    with pytest.raises(WorldError, match="more.toml:3: finishes.red: expected a new name"):
+    with pytest.raises(WorldError, match=r"more\.toml:3: finishes\.red: expected a new name"):
         read(HEAD + '[finishes]\nred = { colour = [0.5, 0, 0] }\n' + KITCHEN, DETAIL)
 
 
@@ -128,8 +128,9 @@ def test_the_shipped_files_are_read() -> None:
 
 def test_questions_about_unknown_names_are_refused() -> None:
     world = read(HEAD + KITCHEN)
-    for ask in (world.outline, world.obstacles, world.path_of, world.world_from_locale, world.doorways_of, world.landmark):
-        with pytest.raises(ValueError, match="expected .*got 'hall'"):
+    for ask in (world.outline, world.obstacles, world.path_of, world.world_from_locale, world.doorways_of,
+                world.landmark):
+        with pytest.raises(ValueError, match=r"expected .*got 'hall'"):
             ask("hall")
     with pytest.raises(ValueError, match=r"expected a point .* got shape \(4,\)"):
         world.locale_at([0, 0, 0, 0])

@@ -92,9 +92,9 @@ def all_kept(lines: LineSet, rotation: Array, translation: Array) -> tuple[str |
     return tuple(None if f else BEHIND for f in in_front(lines, rotation, translation))
 
 
-def guarded(lines: LineSet, prior: Pose, estimate: PoseEstimate) -> PoseEstimate:
-    """The estimate if its lines lie in front of the camera, else the prior."""
+def guarded(lines: LineSet, prior: Pose, estimate: PoseEstimate, kept: Mask | None = None) -> PoseEstimate:
+    """The estimate if its lines (those ``kept``) lie in front of the camera, else the prior."""
     pose = estimate.camera_from_world
-    if mostly_in_front(lines, pose.rotation, pose.translation):
+    if mostly_in_front(lines if kept is None else lines.take(kept), pose.rotation, pose.translation):
         return estimate
     return replace(prior_estimate(lines, prior, ALL_BEHIND), iterations=estimate.iterations)

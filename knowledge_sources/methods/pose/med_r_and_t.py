@@ -13,7 +13,7 @@ from knowledge_sources.methods.pose.guard import NO_SUBSET, estimate_at, guarded
 from knowledge_sources.methods.pose.lines import LineSet, landmark_groups, line_set
 from knowledge_sources.methods.pose.r_and_t import PoseState
 from knowledge_sources.methods.pose.r_and_t_ml import likeliest, r_and_t_ml
-from knowledge_sources.methods.pose.subset_poses import squared_distances, subset_poses
+from knowledge_sources.methods.pose.subset_poses import concentrated, squared_distances, subset_poses
 from knowledge_sources.methods.pose.subsets import group_subsets, padded_rows, subsets_needed
 from world_models.camera import Camera
 from world_models.frames import Pose
@@ -21,6 +21,10 @@ from world_models.frames import Pose
 MEDIAN_CHI2_2 = 1.386
 """Median of the chi-squared law with two degrees of freedom: a line has two residuals."""
 SUBSET = 3
+CONCENTRATED = 16
+"""So many of the best candidates are solved again on the lines that fit them best."""
+LEAST_SCALE = 0.3
+"""Lines that agree better than this share of ``sigma_px`` do not make others outliers."""
 
 
 def med_r_and_t(
@@ -51,12 +55,20 @@ def med_r_and_t(
     candidates = subset_candidates(lines, prior, landmark_ids, probability, outliers, rng)
     if candidates is None:
         return r_and_t_ml(model_lines_world, segments_px, camera, prior, sigma_px=sigma_px)
-    turns, shifts = candidates
+    turns, shifts = with_concentrated(lines, *candidates)
     errors = squared_distances(lines, turns, shifts)
     best = int(np.argmin(np.median(errors, axis=1)))
     scale = _robust_scale(float(np.median(errors[best])), len(lines))
     bound = 2.0 * (cutoff * scale) ** 2
     return refined_on(lines, prior, (turns[best], shifts[best]), errors[best] <= bound, bound)
+
+
+def with_concentrated(lines: LineSet, turns: Array, shifts: Array) -> tuple[Array, Array]:
+    """The candidates and, besides, those of least median solved again on the better half of all lines."""
+    medians = np.median(squared_distances(lines, turns, shifts), axis=1)
+    few = np.argsort(medians, kind="stable")[:CONCENTRATED]
+    more = concentrated(lines, turns[few], shifts[few], (len(lines) + SUBSET) // 2)
+    return np.concatenate([turns, more[0]]), np.concatenate([shifts, more[1]])
 
 
 def subset_candidates(
@@ -91,9 +103,10 @@ def refined_on(lines: LineSet, prior: Pose, start: PoseState, near: Mask, bound:
     estimate = estimate_at(
         lines, rotation, translation, covariance, rejected, end.normal.cost, end.iterations, reason
     )
-    return guarded(lines.take(near), prior, estimate)
+    return guarded(lines, prior, estimate, near)
 
 
 def _robust_scale(median_squared: float, n: int) -> float:
     """Standard deviation of one residual from the median over n lines, with the small-sample factor."""
-    return (1.0 + 5.0 / max(n - SUBSET, 1)) * float(np.sqrt(median_squared / MEDIAN_CHI2_2))
+    scale = (1.0 + 5.0 / max(n - SUBSET, 1)) * float(np.sqrt(median_squared / MEDIAN_CHI2_2))
+    return max(scale, LEAST_SCALE)

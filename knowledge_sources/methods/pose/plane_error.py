@@ -62,13 +62,13 @@ def end_noise(lines: LineSet, vectors: Array) -> Array:
 
 
 def propagated_covariance(lines: LineSet, rotation: Array, translation: Array, weights: Array) -> Array:
-    """(6, 6) covariance of the minimum of E1: its noise carried through, for E1 is not a likelihood.
+    """(6, 6) covariance of the minimum of E1 with ``weights`` (n, 2): its noise carried through.
 
-    Give ``weights`` (n, 2), divided by |q|^2, for E2.
+    E1 is not a likelihood, so the inverse Hessian would not do. For E2 divide the weights by |q|^2.
     """
     ends = camera_ends(lines, rotation, translation)
     jacobian = plane_jacobian(lines, ends)
-    weighted = jacobian * np.broadcast_to(weights.reshape(len(lines), -1), ends.shape[:2])[..., None]
+    weighted = jacobian * weights[..., None]
     hessian = np.einsum("ika,ikb->ab", weighted, jacobian)
     spread = np.einsum("ika,ikj->aij", weighted, end_noise(lines, ends)).reshape(6, -1)
     gain = information_inverse(hessian) @ spread

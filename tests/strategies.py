@@ -1,0 +1,90 @@
+"""What the laws of the board share: small values, an expert whose answers are given, and hypothesis strategies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from hypothesis import strategies as st
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect
+from blackboard.journal import Decision
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from blackboard.scheduler import Scheduler
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    count: int
+
+
+def silent(_view: View, _trigger: Change) -> Iterable[Effect]:
+    return ()
+
+
+class Expert(KnowledgeSource):
+    """A knowledge source whose answers are given when it is built.
+
+    Args:
+        called: its name.
+        on: the type of value that it watches.
+        act: what it does.
+        rate: its rating, or a function of view and trigger.
+        valid: a function that replaces still_valid; None leaves that as it is.
+    """
+
+    def __init__(
+        self,
+        called: str = "expert",
+        on: type[Any] = Note,
+        act: Callable[[View, Change], Iterable[Effect]] = silent,
+        *,
+        rate: float | Callable[[View, Change], float | None] = 0.5,
+        valid: Callable[[View, Change], bool] | None = None,
+        level: Level = Level.PLAN,
+        closes: Level | None = None,
+        kinds: tuple[type[Change], ...] = (Posted, Revised),
+        where: Callable[[Any], bool] = lambda _value: True,
+        writes: tuple[type[Any], ...] = (Note, Tally),
+    ) -> None:
+        self._called, self._act, self._rate, self._valid = called, act, rate, valid
+        self.level, self.closes, self.writes = level, closes, writes
+        self.watches = (Watch(on, kinds, where),)
+
+    @property
+    def name(self) -> str:
+        return self._called
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        return self._rate(view, trigger) if callable(self._rate) else self._rate
+
+    def still_valid(self, view: View, trigger: Change) -> bool:
+        return self._valid(view, trigger) if self._valid else super().still_valid(view, trigger)
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        return self._act(view, trigger)
+
+
+def run(scheduler: Scheduler, limit: int = 50) -> list[Decision]:
+    """Cycle until nothing is left to do, but not for ever."""
+    decisions: list[Decision] = []
+    while len(decisions) < limit and (decision := scheduler.step()) is not None:
+        decisions.append(decision)
+    return decisions
+
+
+notes = st.builds(Note, st.text(max_size=3))
+tallies = st.builds(Tally, st.integers(0, 9))
+values = notes | tallies
+levels = st.sampled_from(Level)
+ratings = st.floats(0.0, 1.0)
+magnitudes = st.floats(0.0, 10.0) | st.just(float("inf"))

@@ -1,0 +1,210 @@
+"""The command line with input that cannot be used: one sentence and exit code 2, never a traceback."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from harvey.cli import main
+from harvey.commands import COMMANDS
+from sim.scenario import SCENARIOS
+
+DECISION = {"cycle": 1, "focus": "action", "observed": [], "seen": [], "activated": [], "obviated": [], "chosen": None,
+            "runner_up": None, "pending": 0, "made": [], "refused": ""}
+
+
+SMALL_WORLD = """name = "cottage"
+units = "feet"
+[finishes]
+brown = { colour = [0.5, 0.3, 0.2] }
+[parts]
+table = [ { x = [0, 3], y = [0, 2], z = [0, 2.5], finish = "brown" } ]
+[locales.kitchen]
+kind = "room"
+size = [10, 8]
+things = [ { part = "table", at = [4, 3] } ]
+[locales.hall]
+kind = "room"
+at = [10.5, 0]
+outline = [[0, 0], [6, 0], [6, 8], [0, 8]]
+[doors]
+kitchen-door = { between = ["kitchen", "hall"], wall = "east", along = 4, open = true }
+"""
+
+
+def journalled(folder: Path, *lines: str | bytes) -> str:
+    """A run directory with this journal."""
+    folder.mkdir(exist_ok=True)
+    (folder / "journal.jsonl").write_bytes(b"".join(
+        (line.encode() if isinstance(line, str) else line) + b"\n" for line in lines))
+    return str(folder)
+
+
+def said(capsys: pytest.CaptureFixture[str], argv: list[str]) -> tuple[int, str]:
+    code = main(argv)
+    return code, capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("argv", "told"), [
+    (["run", "lab-to-alens-office"], "lab-to-allens-office"),
+    (["run", "lab-to-alens-office", "--check"], "lab-to-allens-office"),
+    (["run", "nowhere/mission.toml"], "No such file"),
+    (["run", "bump", "--seed", "5..2"], "0..19"),
+    (["run", "bump", "--seed", "-1"], "--seed"),
+    (["run", "bump", "--seed", "x"], "'x'"),
+    (["run", "bump", "--seed", "0..99999999"], "--seed"),
+    (["run", "bump", "--set", "servo.action"], "key=value"),
+    (["run", "bump", "--set", "=off"], "key=value"),
+    (["run", "bump", "--set", "servo.acton=off"], "servo.action"),
+    (["run", "bump", "--set", "servo.action=maybe"], "true or false"),
+    (["run", "bump", "--set", "limits.max_cycles=-3"], "above 0"),
+    (["run", "bump", "--seed", "0..1", "--trace"], "one seed"),
+    (["run", "bump", "--nonsense"], "--nonsense"),
+    (["view", "nowhere"], "does not exist"),
+    (["why", "nowhere"], "does not exist"),
+    (["replay", "nowhere"], "does not exist"),
+    (["diff", "nowhere", "nowhere"], "does not exist"),
+    (["why", "runs", "--at", "soon"], "soon"),
+    (["why", "runs", "--depth", "-1"], "--depth"),
+    (["world", "check", "nowhere.toml"], "No such file"),
+    (["world", "check", "nowhere"], "research_center"),
+    (["experiment", "levles"], "levels"),
+    (["experiment", "levels", "--seed", "-4"], "--seed"),
+    (["nonsense"], "invalid choice"),
+    ([], "COMMAND"),
+])
+def test_bad_input_is_named(argv: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                            monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, err = said(capsys, argv)
+    assert code == 2
+    assert told in err
+
+
+@pytest.mark.parametrize("argv", [
+    ["resume", "runs/x"], ["drive", "lab", "--port", "/dev/null"], ["calibrate"], ["emulate", "--port", "1"],
+    ["world", "import", "a.dxf", "--out", "b.toml"], ["run", "bump", "--check"],
+])
+def test_what_is_not_built_yet_says_so(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    code, err = said(capsys, argv)
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "not yet available" in err
+
+
+@pytest.mark.parametrize("command", [command.name for command in COMMANDS])
+def test_every_command_teaches_by_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert f"harvey {command}" in out.partition("examples:")[2]
+
+
+def test_the_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list"]) == 0
+    out = capsys.readouterr().out
+    assert "lab-to-allens-office" in out
+    assert "Figure 17" in out
+    assert "levels" in out
+
+
+@pytest.mark.parametrize(("line", "told"), [
+    ("{", "JSON"),
+    ("[1]", "JSON object"),
+    (b"\xff\xfe", "journal.jsonl:2"),
+    ('{"cycle": 2}', "'focus'"),
+    (json.dumps({**DECISION, "cycle": "two"}), "cycle"),
+    (json.dumps({**DECISION, "made": [3]}), "'change'"),
+    (json.dumps({**DECISION, "seen": [3]}), "seen"),
+    (json.dumps({**DECISION, "chosen": {"number": 1}}), "'source'"),
+    ("[" * 100_000, "journal.jsonl:2"),
+])
+def test_a_corrupt_line_of_a_journal_is_named(
+    line: str | bytes, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = journalled(tmp_path / "run", json.dumps(DECISION), line)
+    for argv in (["why", run], ["diff", run, run]):
+        code, err = said(capsys, argv)
+        assert code == 2
+        assert "journal.jsonl:2" in err
+        assert told in err
+
+
+def test_a_line_that_was_cut_off_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = journalled(tmp_path / "whole", json.dumps(DECISION))
+    cut = journalled(tmp_path / "cut", json.dumps(DECISION))
+    with (tmp_path / "cut" / "journal.jsonl").open("ab") as file:
+        file.write(b'{"cycle": 2, "foc')
+    assert main(["diff", whole, cut]) == 0
+    assert "all of their 1 decision" in capsys.readouterr().out
+
+
+def test_an_empty_journal_is_no_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, err = said(capsys, ["why", journalled(tmp_path / "run")])
+    assert code == 2
+    assert "at least one entry" in err
+
+
+def test_a_directory_of_runs_is_told_apart_from_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    journalled(tmp_path / "3", json.dumps(DECISION))
+    code, err = said(capsys, ["why", str(tmp_path)])
+    assert code == 2
+    assert str(tmp_path / "3") in err
+
+
+def test_a_run_does_not_overwrite_other_things(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    for out in (tmp_path, tmp_path / "thesis.tex", tmp_path / "thesis.tex" / "below"):
+        code, err = said(capsys, ["run", "bump", "--out", str(out)])
+        assert code == 2
+        assert "thesis.tex" in err
+    assert (tmp_path / "thesis.tex").read_text() == "years of work"
+
+
+def test_a_recording_is_not_opened_where_there_is_no_screen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    (tmp_path / "recording.rrd").write_bytes(b"RRF2")
+    code, err = said(capsys, ["view", str(tmp_path)])
+    assert code == 1
+    assert str(tmp_path / "recording.rrd") in err
+
+
+@st.composite
+def damaged(draw: st.DrawFn, text: bytes) -> bytes:
+    """Something like the text, with a few bytes lost, added, changed, or pieces swapped."""
+    for _ in range(draw(st.integers(1, 4))):
+        at = draw(st.integers(0, len(text)))
+        end = min(len(text), at + draw(st.sampled_from([0, 1, 3, 20, 200])))
+        piece = draw(st.binary(max_size=3) | st.sampled_from([b"=", b"[", b"]", b'"', b"-1e99", b"nan"]))
+        text = text[:at] + piece + text[end:]
+    return text
+
+
+MUTANTS = settings(deadline=None, max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@MUTANTS
+@given(data=st.data())
+def test_a_damaged_scenario_never_ends_in_a_traceback(
+    data: st.DataObject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sim.assembly.set_stage", lambda scenario: SimpleNamespace(scenario=scenario))
+    file = tmp_path / "mission.toml"
+    file.write_bytes(data.draw(damaged((SCENARIOS / "hallway-kidnap.toml").read_bytes())))
+    assert main(["run", str(file), "--check"]) == 2
+
+
+@MUTANTS
+@given(data=st.data())
+def test_a_damaged_world_never_ends_in_a_traceback(data: st.DataObject, tmp_path: Path) -> None:
+    file = tmp_path / "world.toml"
+    file.write_bytes(data.draw(damaged(SMALL_WORLD.encode())))
+    assert main(["world", "check", str(file)]) in (0, 2)

@@ -1,0 +1,204 @@
+"""The command line on a short recorded run: run, why, replay, diff, and being stopped."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from harvey.campaign import Task, run_all, seeds_of, settings_of
+from harvey.cli import main
+from harvey.errors import BadInput, Terminated
+from harvey.records import read_records
+from harvey.sentences import MAKERS
+from logs.journal_file import read_journal
+from logs.reader import read_decisions
+from world_models.frames import Pose2
+
+SHORT = ["--set", "limits.max_cycles=28"]
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A mission that was given 28 cycles, and its trace."""
+    out, printed = tmp_path_factory.mktemp("runs") / "short", io.StringIO()
+    with redirect_stdout(printed):
+        assert main(["run", "lab-to-allens-office", *SHORT, "--out", str(out), "--trace"]) == 1
+    return out, printed.getvalue()
+
+
+@pytest.fixture(scope="module")
+def run(told: tuple[Path, str]) -> Path:
+    return told[0]
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
+    """Two seeds of the same, and what was printed."""
+    out, printed, progress = tmp_path_factory.mktemp("runs") / "both", io.StringIO(), io.StringIO()
+    with redirect_stdout(printed), redirect_stderr(progress):
+        assert main(["run", "lab-to-allens-office", *SHORT, "--seed", "0..1", "--out", str(out)]) == 1
+    return out, printed.getvalue(), progress.getvalue()
+
+
+def test_a_run_leaves_its_three_files(run: Path) -> None:
+    assert sorted(p.name for p in run.iterdir()) == ["journal.jsonl", "recording.rrd", "result.json"]
+    result = json.loads((run / "result.json").read_text())
+    assert result["outcome"] == "failed"
+    assert result["origin"] == {"file": "lab-to-allens-office", "settings": {"limits.max_cycles": "28"}}
+
+
+def test_why_goes_down_to_the_command(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["why", str(run), "motorcommand-1", "--depth", "99"]) == 0
+    out = capsys.readouterr().out
+    assert "MotorCommand-1.0: turn" in out
+    assert "the user asked for (ptrans (robot-laboratory (16,2,0))" in out
+    assert "Frame-1.0: camera frame 0" in out
+
+
+def test_why_without_an_entry_tells_the_outcome(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["why", str(run)]) == 0
+    assert "the mission ended: failed" in capsys.readouterr().out
+
+
+def test_why_at_a_cycle_tells_what_it_did(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["why", str(run), "--at", "1"]) == 0
+    out = capsys.readouterr().out
+    assert "chooses   interpreter (goal) on Command-1.0" in out
+    assert "Goal-1.0 was made in cycle 1 by interpreter" in out
+    assert main(["why", str(run), "--at", "1000"]) == 2
+    assert "cycles 1 to" in capsys.readouterr().err
+
+
+def test_an_unknown_entry_is_answered_with_near_ones(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["why", str(run), "MotrCommand-1"]) == 2
+    assert "MotorCommand-1" in capsys.readouterr().err
+
+
+def test_every_kind_of_entry_has_its_own_sentence(run: Path) -> None:
+    records = [r for d in read_records(run / "journal.jsonl") for r in (*d.observed, *d.made)]
+    assert len({r.type for r in records}) >= 15
+    for record in records:
+        assert len(MAKERS[record.type](record.value)) > 5
+
+
+def test_replay_decides_the_same_to_the_byte(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(run)]) == 0
+    decisions = sum(1 for _ in read_journal(run / "journal.jsonl"))
+    assert f"{decisions} decisions decided again" in capsys.readouterr().out
+
+
+def copied(run: Path, to: Path, *, journal: str) -> Path:
+    """The run with another journal."""
+    to.mkdir()
+    for name in ("recording.rrd", "result.json"):
+        (to / name).write_bytes((run / name).read_bytes())
+    (to / "journal.jsonl").write_text(journal, encoding="utf-8", newline="\n")
+    return to
+
+
+def test_replay_finds_a_journal_that_was_tampered_with(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = (run / "journal.jsonl").read_text().splitlines(keepends=True)
+    assert '"rating":0.8' in lines[1]
+    lines[1] = lines[1].replace('"rating":0.8', '"rating":0.7')
+    assert main(["replay", str(copied(run, tmp_path / "forged", journal="".join(lines)))]) == 1
+    out = capsys.readouterr().out
+    assert "agree for 1 decision." in out
+    assert "rated 0.7" in out and "rated 0.8" in out
+
+
+def test_replay_refuses_pictures_that_the_journal_did_not_see(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    journal = (run / "journal.jsonl").read_text()
+    seen = journal.partition('"sha256":"')[2][:64]
+    forged = copied(run, tmp_path / "forged", journal=journal.replace(seen, "0" * 64))
+    assert main(["replay", str(forged)]) == 2
+    assert "another one for number 0" in capsys.readouterr().err
+
+
+def test_diff_names_the_first_decision_that_differs(
+    run: Path, both: tuple[Path, str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["diff", str(run), str(both[0] / "0")]) == 0
+    assert "agree in all" in capsys.readouterr().out
+    assert main(["diff", str(run), str(both[0] / "1")]) == 1
+    out = capsys.readouterr().out
+    assert "agree for 3 decisions." in out
+    assert "Frame-1.0" in out
+    assert "jpeg.sha256" in out
+
+
+def test_trace_prints_every_cycle(told: tuple[Path, str]) -> None:
+    printed = told[1]
+    assert [f"cycle {n}, focus" in printed for n in range(1, 29)] == [True] * 28
+    assert "posted    Goal-1.0 by interpreter: goal: from robot-laboratory" in printed
+    assert "next      sketcher" in printed
+
+
+def test_several_seeds_make_a_table_and_workers_do_not_matter(run: Path, both: tuple[Path, str, str]) -> None:
+    out, printed, progress = both
+    assert "0 of 2 reached" in printed
+    assert "2 of 2: " in progress
+    assert (run / "journal.jsonl").read_bytes() == (out / "0" / "journal.jsonl").read_bytes()
+
+
+def test_a_mistake_in_a_worker_comes_back(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(BadInput, match="servo"):
+        list(run_all([Task("bump", (("servo.acton", "off"),), 0, tmp_path)], workers=1))
+
+
+STOPS = [(KeyboardInterrupt, 130, "interrupted"), (Terminated, 143, "terminated")]
+
+
+@pytest.mark.parametrize(("raised", "code", "word"), STOPS)
+def test_being_stopped_is_told_in_a_line(
+    raised: type[BaseException], code: int, word: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def stopped(*_args: object, **_kwargs: object) -> None:
+        raise raised
+
+    here = Pose2(0.0, 0.0, 0.0)
+    monkeypatch.setattr("harvey.mission.run_mission", stopped)
+    monkeypatch.setattr("sim.assembly.set_stage", lambda scenario: SimpleNamespace(
+        scenario=scenario, world=None, start_world=here, goal_world=here))
+    assert main(["run", "bump", "--out", str(tmp_path / "run")]) == code
+    assert word in capsys.readouterr().err
+    assert json.loads((tmp_path / "run" / "result.json").read_text())["outcome"] == "unfinished"
+
+
+def test_sigterm_closes_the_recording(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    argv = [sys.executable, "-m", "harvey.cli", "run", "lab-to-allens-office", "--out", str(out)]
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(argv, stderr=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stderr is not None
+        first = process.stderr.readline()
+        process.send_signal(signal.SIGTERM)
+        rest = process.stderr.read()
+    assert "1 milestone verified" in first
+    assert process.returncode == 143
+    assert rest.endswith("harvey: terminated; what was recorded so far is kept\n")
+    assert "Traceback" not in rest
+    journal = list(read_journal(out / "journal.jsonl"))
+    assert len(journal) >= 7
+    assert len(read_decisions(out / "recording.rrd")) >= len(journal) - 1
+
+
+def test_seeds_and_settings_are_read() -> None:
+    assert seeds_of("3") == (3,)
+    assert seeds_of("0..4") == (0, 1, 2, 3, 4)
+    assert seeds_of("7,1..2,7") == (7, 1, 2)
+    assert settings_of(["a.b=off", "goal=(x=1)"]) == (("a.b", "off"), ("goal", "(x=1)"))
