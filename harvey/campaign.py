@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
 import re
 import signal
 import sys
@@ -109,7 +110,7 @@ def run_all(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Tas
     spawn = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(min(workers, len(tasks)) or 1, mp_context=spawn, initializer=_become_worker)
     try:
-        futures = {pool.submit(run_task, task): task for task in tasks}
+        futures = {pool.submit(_work, task): task for task in tasks}
         for future in as_completed(futures):
             yield futures[future], future.result()
     except BaseException:
@@ -130,9 +131,17 @@ def write_origin(out: Path, record: Mapping[str, Any], task: Task) -> None:
 
 
 def _become_worker() -> None:
-    """The parent decides when to stop; when it does, recordings are closed on the way out."""
+    """The parent decides when to stop."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _exit)
+
+
+def _work(task: Task) -> MissionResult:
+    """In a worker: a mission that is told to stop closes its files, and then the worker takes no other."""
+    try:
+        return run_task(task)
+    except SystemExit:
+        os._exit(143)
 
 
 def _exit(_number: int, _frame: FrameType | None) -> None:

@@ -24,13 +24,13 @@ class Bar:
     def __init__(self, tally: Tally, out: TextIO) -> None:
         self._tally = tally
         self._bar = tqdm(total=tally.way_m, file=out, leave=False, dynamic_ncols=True,
-                         bar_format="{percentage:3.0f} %|{bar}| {postfix} [{elapsed}]")
+                         bar_format="{percentage:3.0f} %|{bar}| {desc} [{elapsed}]")
 
     def __call__(self, decision: Decision) -> None:
         tally = self._tally
         self._bar.n = min(max(0.0, tally.way_m - tally.to_go_m), tally.way_m)
-        self._bar.set_postfix_str(f"{tally.to_go_m:.1f} m to go, {count(tally.verified, 'milestone')} verified,"
-                                  f" cycle {decision.cycle}", refresh=False)
+        told = f"{tally.to_go_m:.1f} m to go, {count(tally.verified, 'milestone')} verified, cycle {decision.cycle}"
+        self._bar.set_description_str(told, refresh=False)
         self._bar.update(0)
 
     def close(self) -> None:

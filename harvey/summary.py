@@ -12,6 +12,7 @@ from harvey.units import INCH_M, count, degrees
 
 if TYPE_CHECKING:
     from harvey.mission import MissionResult
+    from harvey.rehearsal import Prospect
 
 COLUMNS = ("seed", "outcome", "error mm", "inches", "milestones", "refuted", "wrong", "sketches", "replans",
            "relocated", "collisions", "path m", "robot s", "cycles", "wall s")
@@ -45,6 +46,17 @@ def one(r: MissionResult, out: Path | None) -> str:
 def several(results: Sequence[MissionResult]) -> str:
     """A table, one row a seed, with a summary row."""
     return table(COLUMNS, [*(_cells(r) for r in results), _total(results)], last_is_summary=True)
+
+
+def prospects(ahead: Sequence[Prospect]) -> str:
+    """The milestones to come, one a row."""
+    columns = ("milestone", "in", "x m", "y m", "looking", "landmarks", "lines", "place mm", "heading deg", "verdict")
+    return table(columns, [_prospect(p) for p in ahead])
+
+
+def _prospect(p: Prospect) -> tuple[str, ...]:
+    return (p.what, p.locale, f"{p.x_m:.2f}", f"{p.y_m:.2f}", f"{math.degrees(p.look_heading_rad):.0f}",
+            str(p.landmarks), str(p.lines), f"{p.sigma_m * 1000:.1f}", f"{math.degrees(p.sigma_rad):.2f}", p.verdict)
 
 
 def _cells(r: MissionResult) -> tuple[str, ...]:

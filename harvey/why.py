@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from textwrap import fill
@@ -29,7 +30,7 @@ class Reason:
         ref: of the entry.
         record: what the journal says of it; None where it says nothing.
         after: the entry that rests on it; None for what is explained.
-        known: whether it was told before.
+        known: ``above`` or ``below``, where it is told already or, nearer to what is explained, told yet.
         hidden: how many reasons of its own are left out because they lie too deep.
     """
 
@@ -37,7 +38,7 @@ class Reason:
     ref: str
     record: EntryRecord | None
     after: EntryRecord | None = None
-    known: bool = False
+    known: str = ""
     hidden: int = 0
 
 
@@ -92,20 +93,38 @@ class History:
 
 
 def walk(history: History, refs: Sequence[str], depth: int = DEPTH) -> Iterator[Reason]:
-    """Each entry, then what it rests on, depth first; what is shared is told where it first comes up."""
+    """Each entry, then what it rests on, depth first; what is shared is told once, nearest to what is explained."""
     told: set[str] = set()
+    nearest = _distances(history, refs, depth)
     stack: list[tuple[int, str, EntryRecord | None]] = [(0, ref, None) for ref in reversed(refs)]
     while stack:
         level, name, after = stack.pop()
         record = history.entry(name)
-        if name in told or record is None:
-            yield Reason(level, name, record, after, known=name in told)
+        known = "above" if name in told else "below" if nearest[name] < level else ""
+        if known or record is None:
+            yield Reason(level, name, record, after, known)
             continue
         told.add(name)
         hidden = len(record.because) if level >= depth else 0
         yield Reason(level, name, record, after, hidden=hidden)
         if not hidden:
             stack += [(level + 1, reason, record) for reason in reversed(record.because)]
+
+
+def _distances(history: History, refs: Sequence[str], depth: int) -> dict[str, int]:
+    """The fewest steps from what is explained to each entry that is at most ``depth`` steps away."""
+    nearest = dict.fromkeys(refs, 0)
+    queue = deque(refs)
+    while queue:
+        name = queue.popleft()
+        record = history.entry(name)
+        if record is None or nearest[name] >= depth:
+            continue
+        for reason in record.because:
+            if reason not in nearest:
+                nearest[reason] = nearest[name] + 1
+                queue.append(reason)
+    return nearest
 
 
 def explain(history: History, refs: Sequence[str], depth: int = DEPTH) -> Iterator[str]:
@@ -126,10 +145,10 @@ def _wrapped(depth: int, text: str) -> str:
 
 
 def _told(reason: Reason) -> str:
+    if reason.known:
+        return f"{reason.ref}, as {reason.known}"
     if reason.record is None:
         return f"{reason.ref}, of which the journal says nothing"
-    if reason.known:
-        return f"{reason.ref}, as above"
     tail = f" (and so on: {count(reason.hidden, 'reason')} below)" if reason.hidden else ""
     return f"{reason.ref}: {_said(reason.record, reason.after)}{tail}"
 

@@ -33,7 +33,6 @@ LOOKAHEAD_M = 1.5
 FACING_RAD = math.radians(3.0)
 """Turned to within this, it sets off."""
 AIM_RAD = math.radians(0.5)
-PASSED_M = 0.02
 CREEP_M = 0.25
 """Nearer than this it steers straight at the end."""
 
@@ -118,7 +117,7 @@ class Motor(KnowledgeSource):
         """The next increment; None on arrival."""
         along, left = _progress(leg, here)
         away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
-        if away <= leg.tolerance_m * 0.8 or (along <= PASSED_M and abs(left) <= leg.tolerance_m * 0.8):
+        if away <= leg.tolerance_m * 0.8 or (along <= 0.0 and abs(left) <= leg.tolerance_m * 0.8):
             return self._final_turn(leg, here)
         aim = _aim(leg, along)
         turn = wrap_angle(math.atan2(aim[1] - here.y_m, aim[0] - here.x_m) - here.heading_rad)

@@ -14,9 +14,12 @@ from logs.loggers.plan import FLAG_M
 from world_models.camera import Camera
 from world_models.world import World
 
-ABOVE, SOUTH = 0.6, 0.12
+ABOVE, SOUTH = 0.54, 0.11
 """The eye stands so high above the building and so far to the south of its middle, in lengths of its diagonal: steeply
 enough to look over the walls into a narrow hallway."""
+
+PLAYED_PER_S = 10.0
+"""Cycles, when the recording plays."""
 
 TRAILS = (paths.TRUE_TRAIL, paths.BELIEVED_TRAIL)
 
@@ -34,7 +37,7 @@ def blueprint(world: World, camera: Camera) -> Any:
             rrb.Horizontal(decisions, _lanes(), _sketch(), _errors(), column_shares=[13, 8, 7, 7]),
             row_shares=[11, 10],
         ),
-        rrb.TimePanel(timeline="cycle", state="collapsed"),
+        rrb.TimePanel(timeline="cycle", state="collapsed", fps=PLAYED_PER_S),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_views=False,

@@ -60,8 +60,8 @@ def _rows(path: Path, entity: str, components: tuple[str, ...]) -> list[dict[str
 
 
 def _batches(path: Path, entity: str) -> Iterator[Any]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RerunWarning)  # a recording without footer, as a crash leaves it, is read as well
+    with warnings.catch_warnings():  # a recording without its footer, as a crash leaves it, is read as well
+        warnings.simplefilter("ignore", RerunWarning)
         reader = RrdReader(path)
     for chunk in reader.stream().filter(content=f"/{entity}", is_static=False):
         yield chunk.to_record_batch()

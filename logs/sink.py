@@ -51,7 +51,7 @@ class Recorder:
         self._sim_time_s = 0.0
         self._truth: list[Pose2] = []
         self._loggers: tuple[Logger, ...] = (
-            Building(world), Robots(world, camera), Plan(world), Frames(camera), Image(camera),
+            Building(world), Robots(world, camera, mount), Plan(world), Frames(camera), Image(camera),
             SketchTree(), Lanes(), Decisions(line_of), Errors(world), Why(),
         )
         self._tape.fix(DESCRIPTION, describe(title))

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mesh import FaceLike, Mesh, build_mesh
+from sim.noise import noise_table
+from sim.pieces import pieces_of
 from sim.projection import Lens, View, view_of
 from sim.rasterizer import sample_offsets, visible_patches
-from sim.textures import noise_table, shade
+from sim.textures import shade
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -56,9 +58,8 @@ class Renderer:
         lens = Lens.of(camera)
         view = view_of(self.mesh, lens, camera_from_world.rotation, camera_from_world.translation)
         seen = visible_patches(self.mesh, view, lens, self.samples)
-        image: NDArray[np.float32] = shade(
-            seen, sample_offsets(self.samples), self._looks(view), self.noise, HAZE_PER_M
-        )
+        pieces = pieces_of(seen, sample_offsets(self.samples), len(self.mesh))
+        image: NDArray[np.float32] = shade(pieces, self._looks(view), self.noise, HAZE_PER_M)
         return image
 
     def image(self, camera: Camera, camera_from_world: Pose) -> NDArray[np.uint8]:

@@ -10,6 +10,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+MEAN, SPREAD = np.float32(510.0), np.float32(1.0 / np.sqrt((256.0**2 - 1.0) / 3.0))
+"""Mean and reciprocal of the standard deviation of the sum of four random bytes."""
+LEAST, HALF, MOST = np.float32(0.0), np.float32(0.5), np.float32(255.0)
+
 
 @dataclass(frozen=True, slots=True)
 class SensorParameters:
@@ -51,32 +55,36 @@ def exposed(
         gain *= parameters.lights_off_gain
     if parameters.blur_px > 0:
         radiance = np.asarray(cv2.GaussianBlur(radiance, (0, 0), parameters.blur_px), np.float32)
-    image: NDArray[np.uint8] = _noisy(radiance, 255.0 * gain, parameters.read_noise**2, parameters.shot_noise, key)
+    image: NDArray[np.uint8] = _noisy(
+        radiance, np.float32(255.0 * gain), np.float32(parameters.read_noise**2), np.float32(parameters.shot_noise),
+        np.uint32(key & 0xFFFFFFFF), np.uint32(key >> 32),
+    )
     return image
 
 
 def compressed(image_rgb: NDArray[np.uint8], quality: int) -> bytes:
     """JPEG bytes of an RGB image (h, w, 3)."""
-    done, data = cv2.imencode(".jpg", image_rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+    done, data = cv2.imencode(".jpg", cv2.cvtColor(image_rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not done:
         raise ValueError(f"expected an image that can be compressed, got shape {image_rgb.shape}")
     return bytes(data)
 
 
 @njit(cache=True, error_model="numpy")
-def _noisy(radiance: Any, gain: float, read_variance: float, shot: float, key: int) -> Any:
-    """Noise of variance ``read_variance + shot * level``: a counter-based hash gives four uniform numbers, whose sum is
-    as good as Gaussian to 3.4 sigma and costs a tenth of an exact one."""
+def _noisy(radiance: Any, gain: Any, read_variance: Any, shot: Any, key: Any, salt: Any) -> Any:
+    """Noise of variance ``read_variance + shot * level``: a counter-based hash (murmur3's finaliser) gives four uniform
+    numbers, whose sum is as good as Gaussian to 3.4 sigma. All is in 32 bits, so that LLVM makes vector code of it.
+    """
     levels = radiance.ravel()
     out = np.empty(len(levels), np.uint8)
     for i in range(len(levels)):
-        h = np.uint64(i) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(key)
-        h = (h ^ (h >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-        h = (h ^ (h >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-        h ^= h >> np.uint64(31)
-        low = (h & np.uint64(0xFFFF)) + ((h >> np.uint64(16)) & np.uint64(0xFFFF))
-        high = ((h >> np.uint64(32)) & np.uint64(0xFFFF)) + (h >> np.uint64(48))
-        unit = (np.float64(low + high) / 65536.0 - 2.0) * 1.7320508075688772
+        h = np.uint32(np.uint32(np.uint32(i) + key) * np.uint32(0x9E3779B9)) ^ salt
+        h = np.uint32(np.uint32(h ^ (h >> np.uint32(16))) * np.uint32(0x85EBCA6B))
+        h = np.uint32(np.uint32(h ^ (h >> np.uint32(13))) * np.uint32(0xC2B2AE35))
+        h = np.uint32(h ^ (h >> np.uint32(16)))
+        pairs = np.uint32((h & np.uint32(0xFF00FF)) + ((h >> np.uint32(8)) & np.uint32(0xFF00FF)))
+        total = np.int32(np.uint32((pairs & np.uint32(0xFFFF)) + (pairs >> np.uint32(16))))
         level = gain * levels[i]
-        out[i] = np.uint8(min(255.0, max(0.0, level + unit * np.sqrt(read_variance + shot * level) + 0.5)))
+        noise = (np.float32(total) - MEAN) * SPREAD * np.sqrt(read_variance + shot * level)
+        out[i] = np.uint8(np.int32(np.minimum(MOST, np.maximum(LEAST, level + noise + HALF))))
     return out.reshape(radiance.shape)

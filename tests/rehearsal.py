@@ -9,6 +9,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+
 from blackboard.board import View
 from blackboard.change import Change, Watch
 from blackboard.effect import Effect, Post, Retract, Revise
@@ -155,7 +156,8 @@ def _find(view: View) -> Iterable[Effect]:
     found = np.array([[[101.0, 60.0], [101.0, 390.0]], [[5.0, 20.0], [600.0, 290.0]], [[-9.0, -9.0], [-1.0, -1.0]]])
     yield Post(Segments(frame.id, milestone.id, found, np.full(3, 0.3), 40.0), (frame,))
     pairs = np.array([[0, 0], [1, 1]])
-    match = Post(LineMatch(milestone.id, "Segments-1", pairs, np.array(LINES_WORLD), found[:2], 0.1, np.ones(2)), (frame,))
+    lines = np.array(LINES_WORLD)
+    match = Post(LineMatch(milestone.id, "Segments-1", pairs, lines, found[:2], 0.1, np.ones(2)), (frame,))
     yield match
     yield Post(PoseFix("LineMatch-1", Pose2(1.02, 1.0, 0.01), 1e-4 * np.eye(3), np.array([True, False]),
                        np.ones((2, 2)), ("", "9 px away")), (match,))
@@ -164,8 +166,8 @@ def _find(view: View) -> Iterable[Effect]:
 def _judge(view: View) -> Iterable[Effect]:
     milestone, sketch = _last(view, Milestone), _last(view, PlanSketch)
     yield Revise(milestone, replace(milestone.value, status="verified"))
-    yield Post(Certificate(milestone.id, "PoseFix-1", "verified", "2 of 2 lines", 2, 2, 1, 0.9, 0.5, 0.02, 0.01, 1.5, 30.0,
-                           1e-6), (milestone,))
+    yield Post(Certificate(milestone.id, "PoseFix-1", "verified", "2 of 2 lines", 2, 2, 1, 0.9, 0.5, 0.02, 0.01, 1.5,
+                           30.0, 1e-6), (milestone,))
     yield Revise(sketch, replace(sketch.value, verified=True))
 
 

@@ -19,7 +19,7 @@ def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", help="where the run is kept (runs/SCENARIO-SEED; several: one each)")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
                         help="change a setting of the scenario, as servo.action=off; may be repeated")
-    parser.add_argument("--check", action="store_true", help="only check beforehand whether the milestones can be seen")
+    parser.add_argument("--check", action="store_true", help="do not drive; list the milestones to come")
     parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
     parser.add_argument("--trace", action="store_true", help="print every cycle: changes, candidates, choice, effects")
 
@@ -46,9 +46,14 @@ def _out(args: Namespace, seed: int, many: bool) -> Path:
 
 def _check(task: Task) -> int:
     stage = task.stage()
-    print(f"{stage.scenario.name}: the scenario, its world and its start are sound")
-    print("harvey run --check: not yet available; it will say beforehand which milestones can be seen", file=sys.stderr)
-    return 2
+    from harvey.rehearsal import rehearse
+    from harvey.summary import prospects
+
+    ahead, outcome = rehearse(stage.scenario)
+    print(prospects(ahead))
+    testable = all(p.verdict != "not testable" for p in ahead)
+    print(f"\nin thought, {stage.scenario.name} ends: {outcome.kind}, {outcome.reason}")
+    return 0 if outcome.kind == "reached" and testable else 1
 
 
 def _one(task: Task, args: Namespace) -> int:
@@ -57,6 +62,7 @@ def _one(task: Task, args: Namespace) -> int:
     from harvey.trace import printing
 
     sinks = (printing(sys.stdout),) if args.trace else ()
+    print(f"{task.named}: setting the stage", file=sys.stderr, flush=True)
     with following(sys.stderr) as follow:
         result = run_task(task, sinks=sinks, follow=None if args.trace else follow, live=args.live)
     print(one(result, task.out))
@@ -79,6 +85,7 @@ COMMAND = Command(
     (
         ("harvey run lab-to-allens-office", "Figure 17's mission"),
         ("harvey run lab-to-allens-office --seed 0..19", "twenty of them, and a table"),
+        ("harvey run lab-to-allens-office --check", "which milestones it will have, and how well each tells the place"),
         ("harvey run hallway-kidnap --seed 3 --trace", "print what each cycle sees, weighs and does"),
         ("harvey run bump --set servo.action=off", "without correcting on the move"),
         ("harvey run my_mission.toml --set start.heading_deg=80 --out runs/try", "a mission of your own"),

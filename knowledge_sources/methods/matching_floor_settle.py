@@ -26,18 +26,22 @@ def settled_places(scene: FloorScene, wide: FloorPairs) -> list[Array]:
         return [scene.mean]
     steps, support = _settled(wide, axes @ scene.root.T, scene.information, np.zeros(3), FIRST_WIDTHS_PX)
     steps = steps[_distinct(steps, support, FINALISTS, scene)]
-    places, scores = [], []
-    for step in steps:
-        state = scene.mean + step
-        close = np.abs(wide.distances + wide.slopes @ step).max(axis=1) < CLOSE_PX
-        for widths in (LATER_WIDTHS_PX, LATER_WIDTHS_PX[-2:]):
-            pairs = pairs_at(scene, state, wide.model[close], wide.data[close])
-            more, score = _settled(pairs, np.zeros((1, 3)), scene.information, state - scene.mean, widths)
-            state = state + more[0]
-        places.append(state)
-        scores.append(float(score[0]))
-    states = np.stack(places)
-    return [states[i] for i in _distinct(states, np.array(scores), SEARCHED, scene)]
+    exact = [_settled_exactly(scene, wide, scene.mean + step, step, LATER_WIDTHS_PX) for step in steps]
+    states = np.stack([state for state, _ in exact])
+    best = _distinct(states, np.array([score for _, score in exact]), SEARCHED, scene)
+    return [
+        _settled_exactly(scene, wide, states[i], states[i] - scene.mean, LATER_WIDTHS_PX[-2:])[0] for i in best
+    ]
+
+
+def _settled_exactly(
+    scene: FloorScene, wide: FloorPairs, state: Array, step: Array, widths: tuple[float, ...]
+) -> tuple[Array, float]:
+    """A state settled with the pairs linearised there, those that the first order (``step``) puts close; its support."""
+    close = np.abs(wide.distances + wide.slopes @ step).max(axis=1) < CLOSE_PX
+    pairs = pairs_at(scene, state, wide.model[close], wide.data[close])
+    more, support = _settled(pairs, np.zeros((1, 3)), scene.information, state - scene.mean, widths)
+    return state + more[0], float(support[0])
 
 
 def _distinct(states: Array, scores: Array, count: int, scene: FloorScene) -> list[int]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 
-import rerun as rr
-
 from blackboard.activation import Activation
 from blackboard.change import Change
 from blackboard.journal import Decision
@@ -18,8 +16,9 @@ from logs.tape import Tape
 TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "doubted", "halted")
 """Statuses of milestones, sketches, goals, hypotheses and legs that stand for something gone wrong."""
 
-COLUMNS = ("focus", "chosen", "rating", "trigger", "did", "runner_up", "waiting")
-"""Of the decision table."""
+COLUMNS = ("focus_level", "chosen_knowledge_source", "rating", "trigger_entry", "effects_on_the_board",
+           "runner_up_with_rating", "waiting")
+"""Of the decision table; the viewer makes a column as wide as its name."""
 
 RECORD = "record"
 """The component that holds a decision's line."""
@@ -37,9 +36,8 @@ class Decisions:
 
     def log(self, tape: Tape, moment: Moment) -> None:
         decision = moment.decision
-        tape.log(RECORDS, rr.AnyValues(record=[self._line_of(decision)]))
-        columns = {name: [value] for name, value in row(decision).items()}
-        tape.log(TABLE, rr.TextLog(sentence(decision), level=log_level(decision)), rr.AnyValues(True, **columns))
+        tape.add(RECORDS, **{RECORD: self._line_of(decision)})
+        tape.add(TABLE, text=sentence(decision), level=log_level(decision), **row(decision))
 
 
 def sentence(decision: Decision) -> str:

@@ -12,7 +12,7 @@ from logs.mirror import Mirror, Moment
 from logs.palette import BELIEVED, CANDIDATE, TRUE, Colour, faint
 from logs.paths import BELIEVED_ROBOT, BELIEVED_TRAIL, CANDIDATES, TRUE_ROBOT, TRUE_TRAIL
 from logs.tape import Tape
-from world_models.camera import Camera
+from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, frozen
 from world_models.location import Hypothesis
 from world_models.world import World
@@ -35,20 +35,16 @@ SIGHT_M = 2.5
 class Robots:
     """Logs both robots when they move."""
 
-    def __init__(self, world: World, camera: Camera) -> None:
-        self._world = world
-        self._half_view_rad = np.arctan(camera.width / (2.0 * camera.fx))
+    def __init__(self, world: World, camera: Camera, mount: CameraMount) -> None:
+        self._world, self._camera, self._mount = world, camera, mount
         self._last: dict[str, Pose2] = {}
         self._has_candidates = False
 
     def begin(self, tape: Tape) -> None:
-        solid, wires = rr.components.FillMode.Solid, rr.components.FillMode.MajorWireframe
-        tape.fix(f"{TRUE_ROBOT}/body", _cylinder(TRUE, RADIUS_M, 0.9, solid))
-        tape.fix(f"{TRUE_ROBOT}/heading", _arrow(TRUE, 0.95))
+        wires = rr.components.FillMode.MajorWireframe
         tape.fix(f"{BELIEVED_ROBOT}/body", _cylinder(BELIEVED, RADIUS_M + 0.08, 1.3, wires))
         tape.fix(f"{BELIEVED_ROBOT}/heading", _arrow(BELIEVED, 1.35))
-        tape.fix(f"{BELIEVED_ROBOT}/sight", _wedge(float(self._half_view_rad)))
-        tape.fix(TRUE_TRAIL, rr.LineStrips3D.from_fields(colors=[TRUE], radii=0.04))
+        tape.fix(f"{BELIEVED_ROBOT}/sight", _wedge(self._camera, self._mount.forward_m))
         tape.fix(BELIEVED_TRAIL, rr.LineStrips3D.from_fields(colors=[BELIEVED], radii=0.04))
         label = f"1 sigma, drawn {SIGMA_SCALE:.0f} times as large"
         tape.fix(BELIEVED_ROBOT, rr.LineStrips3D.from_fields(
@@ -56,6 +52,8 @@ class Robots:
 
     def log(self, tape: Tape, moment: Moment) -> None:
         for pose in moment.truth[-1:]:
+            if TRUE_ROBOT not in self._last:
+                _begin_truth(tape)
             self._move(tape, TRUE_ROBOT, TRUE_TRAIL, pose)
         if moment.touched(Hypothesis):
             self._log_belief(tape, moment.mirror)
@@ -65,8 +63,9 @@ class Robots:
         held = believed(mirror)
         if held is not None:
             pose = held.world_from_robot(self._world)
-            ring = _ellipse(pose, held.covariance_world(self._world))
-            self._move(tape, BELIEVED_ROBOT, BELIEVED_TRAIL, pose, ring)
+            points = ring(pose, held.covariance_world(self._world))
+            strip = np.column_stack([points, np.full(len(points), 0.06)])
+            self._move(tape, BELIEVED_ROBOT, BELIEVED_TRAIL, pose, rr.LineStrips3D(strip[None].astype(np.float32)))
 
     def _log_candidates(self, tape: Tape, mirror: Mirror) -> None:
         """Where else he might be: an arrow each, the longer the likelier."""
@@ -98,6 +97,13 @@ def believed(mirror: Mirror) -> Hypothesis | None:
     return entry.value if entry else None
 
 
+def _begin_truth(tape: Tape) -> None:
+    """The true robot has a shape only where somebody knows where it is."""
+    tape.fix(f"{TRUE_ROBOT}/body", _cylinder(TRUE, RADIUS_M, 0.9, rr.components.FillMode.Solid))
+    tape.fix(f"{TRUE_ROBOT}/heading", _arrow(TRUE, 0.95))
+    tape.fix(TRUE_TRAIL, rr.LineStrips3D.from_fields(colors=[TRUE], radii=0.04))
+
+
 def _cylinder(colour: Colour, radius_m: float, height_m: float, fill: Any) -> Any:
     return rr.Cylinders3D(
         lengths=[height_m], radii=[radius_m], centers=[[0, 0, height_m / 2]], colors=[colour], fill_mode=fill)
@@ -107,18 +113,18 @@ def _arrow(colour: Colour, height_m: float) -> Any:
     return rr.Arrows3D(origins=[[0, 0, height_m]], vectors=[[0.9, 0, 0]], radii=0.06, colors=[colour])
 
 
-def _wedge(half_view_rad: float) -> Any:
+def _wedge(camera: Camera, forward_m: float) -> Any:
     """What the camera covers, on the floor ahead."""
+    half_view_rad = np.arctan(camera.width / (2.0 * camera.fx))
     angles = np.linspace(-half_view_rad, half_view_rad, 9)
-    arc = [[SIGHT_M * np.cos(a), SIGHT_M * np.sin(a), 0.04] for a in angles]
-    apex = [0.0, 0.0, 0.04]
+    arc = [[forward_m + SIGHT_M * np.cos(a), SIGHT_M * np.sin(a), 0.04] for a in angles]
+    apex = [forward_m, 0.0, 0.04]
     return rr.LineStrips3D([[apex, *arc, apex]], colors=[faint(BELIEVED, 120)], radii=0.015)
 
 
-def _ellipse(pose: Pose2, covariance_world: NDArray[np.float64]) -> Any:
-    """One standard deviation of the position, in the frame of the believed robot."""
+def ring(pose: Pose2, covariance_world: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 2) one standard deviation of the position, enlarged, round the robot in the robot's own frame [m]."""
     values, axes = np.linalg.eigh(covariance_world[:2, :2])
-    ring = SIGMA_SCALE * (axes @ (np.sqrt(np.maximum(values, 0.0))[:, None] * CIRCLE)).T
+    offsets = SIGMA_SCALE * (axes @ (np.sqrt(np.maximum(values, 0.0))[:, None] * CIRCLE)).T
     c, s = np.cos(pose.heading_rad), np.sin(pose.heading_rad)
-    strip = np.column_stack([ring @ np.array([[c, -s], [s, c]]), np.full(len(ring), 0.06)])
-    return rr.LineStrips3D(strip[None].astype(np.float32))
+    return np.asarray(offsets @ np.array([[c, -s], [s, c]]))

@@ -83,8 +83,8 @@ def _subgoal_node(sketch: Entry[PlanSketch], number: int, depth: int, after: str
 def _milestone_node(mirror: Mirror, sketch: Entry[PlanSketch], number: int, depth: int, after: str) -> Node:
     verdict = _verdict(mirror, sketch, number)
     what = mirror.latest(Milestone, lambda m: m.sketch == sketch.id and m.index == number)
-    text = f" {short(what.value.what)}" if what and what.value.is_open else ""
-    label = f"{MARKS.get(verdict, '·')} M{number}{text}"
+    text = short(what.value.what.removeprefix(f"M{number} ")) if what and what.value.is_open else ""
+    label = f"{MARKS.get(verdict, '·')} M{number} {text}".rstrip()
     return Node(f"{sketch.id}/milestone-{number}", label, VERDICTS.get(verdict, WAITING), depth, after)
 
 

@@ -115,8 +115,8 @@ def _followed(mirror: Mirror) -> str:
 
 
 def _verified(mirror: Mirror) -> str:
-    """The evidence for the newest certificate, or as far as it goes for the milestone that is open."""
-    milestone, segments = mirror.latest(Milestone), mirror.latest(Segments)
+    """The evidence for or against the milestone that is open, as far as it goes."""
+    milestone, segments = mirror.latest(Milestone, lambda m: m.is_open), mirror.latest(Segments)
     if milestone is None or segments is None or segments.value.milestone != milestone.id:
         return ""
     words = [f"{len(segments.value.segments_px)} line segments"]
@@ -145,6 +145,7 @@ def _doubts(mirror: Mirror) -> str:
 
 def _discrepancy(d: Discrepancy) -> str:
     size = "not yet measured" if d.magnitude is None else f"{d.magnitude:.1f} {d.unit}"
+    size = size if d.magnitude != math.inf else "too large to be measured"
     bound = f", may correct up to {d.bound:.1f} {d.unit}" if math.isfinite(d.bound) else ""
     return f"{d.what}: {size} (at the {d.level} level{bound})."
 

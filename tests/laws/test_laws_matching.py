@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -80,11 +80,11 @@ def test_the_match_error_falls_at_every_step(seed: int, objective: Any, strategy
     model, data, _, _ = scene(seed, lines=6, clutter=80)
     found = match_lines(model, data, objective=objective, strategy=strategy, replace=replace, pair_px=8.0, trace=True)
     errors = [step.evaluation for step in found.trace]
-    assert all(after < before for before, after in zip(errors, errors[1:], strict=False))
+    assert all(after < before for before, after in pairwise(errors))
     assert len(errors) == found.steps + 1
     assert found.e_match == pytest.approx(errors[-1])
     most = 3 if replace else 2
-    for before, after in zip(found.trace, found.trace[1:], strict=False):
+    for before, after in pairwise(found.trace):
         assert 1 <= len(set(before.pairs) ^ set(after.pairs)) <= most
 
 

@@ -33,7 +33,8 @@ def hall(truth: Pose2) -> Array:
     lines = [[[1.5, y, z], [15.0, y, z]] for y in (-1.2, 1.2) for z in (0.0, 2.4)]
     for x in (3.0, 5.5, 8.0, 11.0):
         for y in (-1.2, 1.2):
-            lines += [[[x, y, 0.0], [x, y, 2.1]], [[x + 0.9, y, 0.0], [x + 0.9, y, 2.1]], [[x, y, 2.1], [x + 0.9, y, 2.1]]]
+            far = x + 0.9
+            lines += [[[x, y, 0.0], [x, y, 2.1]], [[far, y, 0.0], [far, y, 2.1]], [[x, y, 2.1], [far, y, 2.1]]]
     return truth.lifted().apply(np.array(lines))
 
 
@@ -62,7 +63,9 @@ def test_lines_agree_with_the_library_s_least_squares(heading: float, seed: int)
     truth = Pose2(4.0, -2.0, heading)
     lines, segments, rng = seen(truth, seed)
     prior = near(truth, rng)
-    found = planar_from_lines(lines, segments, CAMERA, MOUNT, prior, prior_covariance=PRIOR, sigma_px=SIGMA_PX, robust=False)
+    found = planar_from_lines(
+        lines, segments, CAMERA, MOUNT, prior, prior_covariance=PRIOR, sigma_px=SIGMA_PX, robust=False
+    )
     prepared = line_set(lines, segments, CAMERA, SIGMA_PX)
     root = np.linalg.cholesky(np.linalg.inv(PRIOR)).T
 
@@ -98,7 +101,8 @@ def test_gross_outliers_do_not_move_the_robot(heading: float, seed: int) -> None
     lines, segments, rng = seen(truth, seed)
     wrong = rng.permutation(len(lines))[: int(0.4 * len(lines))]
     segments[wrong] = rng.uniform(0.0, 511.0, (len(wrong), 2, 2))
-    found = planar_from_lines(lines, segments, CAMERA, MOUNT, near(truth, rng), prior_covariance=PRIOR, sigma_px=SIGMA_PX)
+    prior = near(truth, rng)
+    found = planar_from_lines(lines, segments, CAMERA, MOUNT, prior, prior_covariance=PRIOR, sigma_px=SIGMA_PX)
     error = np.abs(off(found.world_from_robot, truth))
     assert error[:2].max() < 0.02 and error[2] < 0.002
     gross = np.abs(found.residuals_px).max(axis=1) > 10.0 * SIGMA_PX

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sim.box_room import Patch, PatchFace, box_faces, box_room
 from sim.mesh import Mesh, build_mesh
+from sim.pieces import pieces_of
 from sim.projection import Lens, view_of
 from sim.rasterizer import sample_offsets, visible_patches
 from sim.renderer import Renderer
@@ -143,3 +144,25 @@ def test_a_closed_room_has_no_holes_and_the_same_pose_gives_the_same_bytes(x: fl
     assert seen.min() >= 0
     first, second = (Renderer.of_faces(box_room()).image(CAMERA, pose).tobytes() for _ in range(2))
     assert first == second
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(0, 10**6), st.integers(1, 4))
+def test_the_pieces_make_up_what_is_seen(seed: int, patches: int) -> None:
+    rng = np.random.default_rng(seed)
+    coarse = rng.integers(-1, patches, (6, 1, 5)).astype(np.int16)
+    seen = np.repeat(np.repeat(coarse, 4, axis=1), 7, axis=2)
+    scattered = rng.random(seen.shape) < 0.03
+    seen[scattered] = rng.integers(-1, patches, int(scattered.sum()))
+    pieces = pieces_of(seen, sample_offsets(4), patches)
+    parts = np.zeros((patches, 6, 35))
+    for patch in range(patches):
+        for i in pieces.order[pieces.first[patch] : pieces.first[patch + 1]]:
+            assert pieces.patch[i] == patch
+            columns = slice(pieces.column[i], pieces.column[i] + pieces.length[i])
+            parts[patch, pieces.row[i], columns] += pieces.weight[i]
+            samples = np.flatnonzero(seen[pieces.row[i], :, pieces.column[i]] == patch)
+            amid = pieces.column[i] + sample_offsets(4)[samples].mean(), pieces.row[i] + (samples.mean() - 1.5) / 4
+            assert np.allclose((pieces.u[i], pieces.v[i]), amid)
+    np.testing.assert_array_equal(parts, [(seen == patch).mean(axis=1) for patch in range(patches)])
+    np.testing.assert_array_equal(pieces.bare, (seen < 0).mean(axis=1))

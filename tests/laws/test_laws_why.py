@@ -83,6 +83,14 @@ def grounds(known: dict[str, EntryRecord], ref: str) -> set[str]:
     return found
 
 
+def within(known: dict[str, EntryRecord], ref: str, steps: int) -> set[str]:
+    """What an entry rests on in so many steps."""
+    found = {ref}
+    for _ in range(steps):
+        found |= {reason for name in found for reason in known[name].because}
+    return found
+
+
 @LAWS
 @given(journals(), st.integers(0, 10**6))
 def test_the_whole_walk_is_the_closure_and_tells_each_entry_once(lines: list[str], pick: int) -> None:
@@ -106,6 +114,9 @@ def test_a_short_walk_is_the_beginning_of_the_whole_and_says_what_it_leaves_out(
     ref = sorted(known)[pick % len(known)]
     reasons = list(walk(history, [ref], depth))
     assert max(r.depth for r in reasons) <= depth
+    told = [r.ref for r in reasons if not r.known]
+    assert len(told) == len(set(told))
+    assert set(told) == within(known, ref, depth)
     for reason in reasons:
         assert reason.hidden == (len(known[reason.ref].because) if reason.depth == depth and not reason.known else 0)
     lines_told = list(explain(history, [ref], depth))

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from harvey.cli import main
 from harvey.commands import COMMANDS
 from sim.scenario import SCENARIOS
+from world_models.task import Outcome
 
 DECISION = {"cycle": 1, "focus": "action", "observed": [], "seen": [], "activated": [], "obviated": [], "chosen": None,
             "runner_up": None, "pending": 0, "made": [], "refused": ""}
@@ -88,7 +89,7 @@ def test_bad_input_is_named(argv: list[str], told: str, tmp_path: Path, capsys: 
 
 @pytest.mark.parametrize("argv", [
     ["resume", "runs/x"], ["drive", "lab", "--port", "/dev/null"], ["calibrate"], ["emulate", "--port", "1"],
-    ["world", "import", "a.dxf", "--out", "b.toml"], ["run", "bump", "--check"],
+    ["world", "import", "a.dxf", "--out", "b.toml"],
 ])
 def test_what_is_not_built_yet_says_so(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     code, err = said(capsys, argv)
@@ -197,9 +198,10 @@ def test_a_damaged_scenario_never_ends_in_a_traceback(
     data: st.DataObject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sim.assembly.set_stage", lambda scenario: SimpleNamespace(scenario=scenario))
+    monkeypatch.setattr("harvey.rehearsal.rehearse", lambda scenario: ((), Outcome("reached", scenario.name)))
     file = tmp_path / "mission.toml"
     file.write_bytes(data.draw(damaged((SCENARIOS / "hallway-kidnap.toml").read_bytes())))
-    assert main(["run", str(file), "--check"]) == 2
+    assert main(["run", str(file), "--check"]) in (0, 2)
 
 
 @MUTANTS

@@ -146,6 +146,25 @@ def test_trace_prints_every_cycle(told: tuple[Path, str]) -> None:
     assert "next      sketcher" in printed
 
 
+def test_the_check_foresees_the_milestones_that_come(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "lab-to-allens-office", "--check"]) == 0
+    out = capsys.readouterr().out
+    rows = [line for line in out.splitlines() if line.endswith("clear")]
+    assert len(rows) >= 10
+    assert "ends: reached" in out
+    came = [r.value for d in read_records(run / "journal.jsonl") for r in d.made
+            if r.type == "Milestone" and r.value["status"] == "verified"]
+    assert len(came) >= 2
+    for row, milestone in zip(rows, came, strict=False):
+        assert row.startswith(f"{milestone['what']} ")
+        assert f" {len(milestone['expected'])} " in row
+
+
+def test_a_plan_whose_milestones_show_nothing_fails_the_check(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "lab-to-allens-office", "--check", "--set", "camera.mount_tilt_deg=85"]) == 1
+    assert "not testable" in capsys.readouterr().out
+
+
 def test_several_seeds_make_a_table_and_workers_do_not_matter(run: Path, both: tuple[Path, str, str]) -> None:
     out, printed, progress = both
     assert "0 of 2 reached" in printed
@@ -185,9 +204,10 @@ def test_sigterm_closes_the_recording(tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
     with subprocess.Popen(argv, stderr=subprocess.PIPE, text=True, env=environment) as process:
         assert process.stderr is not None
-        first = process.stderr.readline()
+        begun, first = process.stderr.readline(), process.stderr.readline()
         process.send_signal(signal.SIGTERM)
         rest = process.stderr.read()
+    assert "lab-to-allens-office seed 0" in begun
     assert "1 milestone verified" in first
     assert process.returncode == 143
     assert rest.endswith("harvey: terminated; what was recorded so far is kept\n")

@@ -70,5 +70,5 @@ def test_a_full_disk_is_told_with_the_name_of_the_file() -> None:
     full = Path("/dev/full")
     if not full.exists():
         pytest.skip("this system has no /dev/full")
-    with pytest.raises(OSError, match="cannot write the journal.*No space left.*/dev/full"):
+    with pytest.raises(OSError, match=r"cannot write the journal.*No space left.*/dev/full"):
         play([JournalFile(full)])

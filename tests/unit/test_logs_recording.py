@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from rerun.chunk import RrdReader
 
 from logs.errors import RecordingError
 from logs.journal_file import JournalFile, read_journal
@@ -52,15 +53,15 @@ def test_equal_runs_make_equal_recordings(tmp_path: Path) -> None:
 
 
 def test_without_the_truth_the_true_robot_is_not_drawn(tmp_path: Path) -> None:
-    from rerun.chunk import RrdReader
-
-    paths = {truth: {chunk.entity_path for chunk in RrdReader(recorded(tmp_path, truth=truth)).stream()
-                     if not chunk.is_static} for truth in (True, False)}
-    assert paths[True] - paths[False] == {"/world/robot/true", "/world/robot/true_trail"}
+    paths = {truth: {chunk.entity_path for chunk in RrdReader(recorded(tmp_path, truth=truth)).stream()}
+             for truth in (True, False)}
+    robot = "/world/robot/true"
+    assert paths[True] - paths[False] == {robot, f"{robot}/body", f"{robot}/heading", f"{robot}_trail"}
 
 
 def test_an_unfinished_recording_holds_what_was_flushed(tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "cut.rrd", world=house(), camera=CAMERA, mount=MOUNT, title="house", recording_id="cut")
+    recorder = Recorder(
+        tmp_path / "cut.rrd", world=house(), camera=CAMERA, mount=MOUNT, title="house", recording_id="cut")
     scheduler = play([recorder])
     flushed = read_decisions(tmp_path / "cut.rrd")
     assert 0 < len(flushed) <= scheduler.cycle
@@ -92,7 +93,8 @@ def test_a_recording_needs_somewhere_to_go() -> None:
 
 def test_a_folder_that_is_not_there_is_told_by_name(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"none/recording\.rrd: cannot be written"):
-        Recorder(tmp_path / "none" / "recording.rrd", world=house(), camera=CAMERA, mount=MOUNT, title="x", recording_id="x")
+        Recorder(
+            tmp_path / "none" / "recording.rrd", world=house(), camera=CAMERA, mount=MOUNT, title="x", recording_id="x")
 
 
 def test_a_full_disk_is_told() -> None:

@@ -13,6 +13,8 @@ from knowledge_sources.methods.pose.estimate import Array
 from world_models.camera import Camera
 
 TINY = 1e-12
+LandmarkIds = Sequence[Any] | NDArray[Any] | None
+"""A hashable name a line, or none at all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +89,7 @@ def line_set(model_lines_world: Any, segments_px: Any, camera: Camera, sigma_px:
     )
 
 
-def landmark_groups(landmark_ids: Sequence[Any] | NDArray[Any] | None, n: int) -> list[NDArray[np.intp]]:
+def landmark_groups(landmark_ids: LandmarkIds, n: int) -> list[NDArray[np.intp]]:
     """Indices of the lines of each landmark, in order of first appearance; one line a group without ids."""
     if landmark_ids is None:
         return [np.array([i]) for i in range(n)]

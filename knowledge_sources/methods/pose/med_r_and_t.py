@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from knowledge_sources.methods.pose.descent import information_inverse
 from knowledge_sources.methods.pose.estimate import Array, Mask, PoseEstimate
 from knowledge_sources.methods.pose.guard import NO_SUBSET, estimate_at, guarded, prior_estimate, reasons
-from knowledge_sources.methods.pose.lines import LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, landmark_groups, line_set
 from knowledge_sources.methods.pose.r_and_t import PoseState
 from knowledge_sources.methods.pose.r_and_t_ml import likeliest, r_and_t_ml
 from knowledge_sources.methods.pose.subset_poses import concentrated, squared_distances, subset_poses
@@ -33,7 +32,7 @@ def med_r_and_t(
     camera: Camera,
     prior: Pose,
     *,
-    landmark_ids: Sequence[Any] | None = None,
+    landmark_ids: LandmarkIds = None,
     sigma_px: Any = 1.0,
     probability: float | None = None,
     outliers: float = 0.5,
@@ -74,7 +73,7 @@ def with_concentrated(lines: LineSet, turns: Array, shifts: Array) -> tuple[Arra
 def subset_candidates(
     lines: LineSet,
     prior: Pose,
-    landmark_ids: Sequence[Any] | None,
+    landmark_ids: LandmarkIds,
     probability: float | None,
     outliers: float,
     rng: np.random.Generator | None,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
 
@@ -12,7 +11,7 @@ from knowledge_sources.methods.pose.descent import Descent, Normal, descend, inf
 from knowledge_sources.methods.pose.estimate import BEHIND, Array, Mask, PlanarEstimate
 from knowledge_sources.methods.pose.guard import reasons
 from knowledge_sources.methods.pose.image_error import in_front, overlapping
-from knowledge_sources.methods.pose.lines import LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, landmark_groups, line_set
 from knowledge_sources.methods.pose.planar import (
     FEW,
     NOT_BETTER,
@@ -48,7 +47,7 @@ def planar_from_lines(
     prior: Pose2,
     *,
     prior_covariance: Any = None,
-    landmark_ids: Sequence[Any] | None = None,
+    landmark_ids: LandmarkIds = None,
     sigma_px: Any = 1.0,
     robust: bool = True,
     cutoff: float = 3.0,

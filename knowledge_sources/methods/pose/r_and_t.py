@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from knowledge_sources.methods.pose.descent import Descent, Normal, descend, normal_equations, rotations
 from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
 from knowledge_sources.methods.pose.guard import FEW_LINES, all_kept, estimate_at, guarded
-from knowledge_sources.methods.pose.lines import TINY, LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.lines import TINY, LandmarkIds, LineSet, landmark_groups, line_set
 from knowledge_sources.methods.pose.plane_error import (
     Weighting,
     best_translation,
@@ -32,7 +32,7 @@ def r_and_t(
     camera: Camera,
     prior: Pose,
     *,
-    landmark_ids: Sequence[Any] | None = None,
+    landmark_ids: LandmarkIds = None,
     sigma_px: Any = 1.0,
     objective: Literal["E1", "E2"] = "E1",
     weighting: Weighting = "unit",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from knowledge_sources.methods.pose.guard import (
     prior_estimate,
 )
 from knowledge_sources.methods.pose.image_error import image_distances, image_jacobian
-from knowledge_sources.methods.pose.lines import LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, landmark_groups, line_set
 from knowledge_sources.methods.pose.r_and_t import PoseState, moved, solve_e1
 from world_models.camera import Camera
 from world_models.frames import Pose
@@ -35,7 +34,7 @@ def r_and_t_ml(
     camera: Camera,
     prior: Pose,
     *,
-    landmark_ids: Sequence[Any] | None = None,
+    landmark_ids: LandmarkIds = None,
     sigma_px: Any = 1.0,
     prior_covariance: Any = None,
 ) -> PoseEstimate:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from knowledge_sources.methods.pose.descent import (
 )
 from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
 from knowledge_sources.methods.pose.guard import FEW_LINES, all_kept, estimate_at, guarded
-from knowledge_sources.methods.pose.lines import LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, landmark_groups, line_set
 from knowledge_sources.methods.pose.plane_error import (
     Weighting,
     best_translation,
@@ -38,7 +37,7 @@ def r_then_t(
     camera: Camera,
     prior: Pose,
     *,
-    landmark_ids: Sequence[Any] | None = None,
+    landmark_ids: LandmarkIds = None,
     sigma_px: Any = 1.0,
     weighting: Weighting = "unit",
 ) -> PoseEstimate:

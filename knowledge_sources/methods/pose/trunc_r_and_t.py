@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from knowledge_sources.methods.pose.estimate import Array, Mask, PoseEstimate
 from knowledge_sources.methods.pose.image_error import in_front, overlapping
-from knowledge_sources.methods.pose.lines import LineSet, line_set
+from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, line_set
 from knowledge_sources.methods.pose.med_r_and_t import SUBSET, refined_on, subset_candidates
 from knowledge_sources.methods.pose.r_and_t import PoseState
 from knowledge_sources.methods.pose.r_and_t_ml import likeliest, r_and_t_ml
@@ -17,7 +16,7 @@ from knowledge_sources.methods.pose.subset_poses import concentrated, squared_di
 from world_models.camera import Camera
 from world_models.frames import Pose
 
-FINALISTS = 12
+FINALISTS = 5
 """So many of the best subsets are polished before the choice is made."""
 ROUNDS = 6
 CONCENTRATED = 24
@@ -31,7 +30,7 @@ def trunc_r_and_t(
     camera: Camera,
     prior: Pose,
     *,
-    landmark_ids: Sequence[Any] | None = None,
+    landmark_ids: LandmarkIds = None,
     sigma_px: Any = 1.0,
     probability: float | None = None,
     outliers: float = 0.7,

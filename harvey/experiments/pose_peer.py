@@ -1,0 +1,73 @@
+"""PoseLib, today's tool for poses from lines, where it is installed: the peer of the pose tables."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.camera import Camera
+from world_models.frames import Pose
+
+Array = NDArray[np.float64]
+
+NOT_INSTALLED = "not installed"
+
+
+class Peer:
+    """The two ways in which a user would call PoseLib from a prior."""
+
+    def __init__(self, library: Any) -> None:
+        self._library = library
+
+    @staticmethod
+    def found() -> Peer | None:
+        """``None`` if PoseLib is not installed."""
+        try:
+            return Peer(importlib.import_module("poselib"))
+        except ImportError:
+            return None
+
+    def refined(
+        self, lines: Array, segments: Array, camera: Camera, prior: Pose, *, loss: str, scale_px: float = 1.0
+    ) -> Pose:
+        """``refine_absolute_pose_pnpl`` with the loss "TRIVIAL" or "CAUCHY"."""
+        options = {"loss_type": loss, "loss_scale": scale_px}
+        pose, _ = self._library.refine_absolute_pose_pnpl(
+            *_arrays(lines, segments), self._pose(prior), _camera(camera), options, options
+        )
+        return _from_library(pose)
+
+    def ransac(self, lines: Array, segments: Array, camera: Camera, prior: Pose, *, limit_px: float) -> Pose:
+        """``estimate_absolute_pose_pnpl``: LO-RANSAC, told the prior, Cauchy loss in the end."""
+        options = {"max_reproj_error": limit_px, "max_epipolar_error": limit_px, "seed": 0}
+        losses = {"loss_type": "CAUCHY", "loss_scale": 0.5 * limit_px}
+        pose, _ = self._library.estimate_absolute_pose_pnpl(
+            *_arrays(lines, segments), _camera(camera), options, losses, self._pose(prior)
+        )
+        return _from_library(pose)
+
+    def _pose(self, pose: Pose) -> Any:
+        out = self._library.CameraPose()
+        out.R, out.t = pose.rotation.copy(), pose.translation.copy()
+        return out
+
+
+def _arrays(lines: Array, segments: Array) -> tuple[Array, ...]:
+    parts = (segments[:, 0], segments[:, 1], lines[:, 0], lines[:, 1])
+    return (np.zeros((0, 2)), np.zeros((0, 3)), *(np.ascontiguousarray(p, dtype=np.float64) for p in parts))
+
+
+def _camera(camera: Camera) -> dict[str, Any]:
+    return {
+        "model": "PINHOLE",
+        "width": camera.width,
+        "height": camera.height,
+        "params": [camera.fx, camera.fy, camera.cx, camera.cy],
+    }
+
+
+def _from_library(pose: Any) -> Pose:
+    return Pose(np.asarray(pose.R), np.asarray(pose.t))

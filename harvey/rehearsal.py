@@ -1,0 +1,140 @@
+"""Rehearsal: the mission in thought, before it is driven: which milestones it will have, and what each can tell.
+
+The experts themselves plan, select and drive; but wheels do exactly what they are told, and every milestone is taken
+for seen. So the rehearsal has the plan that the mission will have, as long as nothing goes wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Quiescence, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from blackboard.scheduler import RAISED, Scheduler
+from harvey.wiring import knowledge_sources, robot_model
+from knowledge_sources.methods.verification import LEAST_ACCOUNTED
+from knowledge_sources.methods.views import view_quality
+from knowledge_sources.milestone_selector import GOOD_PART, GOOD_RAD, LEAST_LINES, SIGMA_PX
+from knowledge_sources.questions import held
+from sim.scenario import Scenario
+from world_models.body import MotionReport, MotorCommand
+from world_models.location import Hypothesis, diagonal
+from world_models.robot import RobotModel
+from world_models.task import Command, Milestone, Outcome, PlanSketch
+
+TAKING_PART = ("interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "mission_keeper")
+MOST_CYCLES = 20_000
+SEEN_M, SEEN_RAD = 0.003, 0.001
+"""How well a milestone is taken to tell the place, in thought."""
+
+
+@dataclass(frozen=True, slots=True)
+class Prospect:
+    """A milestone to come.
+
+    Attributes:
+        what: in words.
+        locale, x_m, y_m: where it will be looked for, in the locale's frame.
+        look_heading_rad: in which direction [rad, world].
+        landmarks: how many; lines: how many of their lines.
+        sigma_m, sigma_rad: how well they will tell the place.
+        verdict: clear, weak or not testable.
+    """
+
+    what: str
+    locale: str
+    x_m: float
+    y_m: float
+    look_heading_rad: float
+    landmarks: int
+    lines: int
+    sigma_m: float
+    sigma_rad: float
+    verdict: str
+
+
+class Believer(KnowledgeSource):
+    """Takes every milestone that is expected for verified."""
+
+    level = Level.PLAN
+    watches = (Watch(Milestone, (Posted, Revised), lambda m: m.status == "expected"),)
+    writes = (Milestone, Hypothesis)
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        belief, milestone = held(view), trigger.entry
+        if belief is not None:
+            sure = replace(belief.value, covariance=diagonal(SEEN_M, SEEN_RAD), basis="milestone")
+            yield Revise(belief, sure, (milestone,))
+            yield Revise(milestone, replace(milestone.value, status="verified"), (milestone,))
+
+
+class PerfectWheels:
+    """A port that claims to have done exactly what was asked."""
+
+    name = "body"
+
+    def answer(self, change: Change) -> Iterable[Effect]:
+        value = change.entry.value
+        if isinstance(change, Posted) and isinstance(value, MotorCommand):
+            yield Post(MotionReport(value.turn_rad, value.move_m, 0.0, 0.0), (change.entry,))
+
+
+def rehearse(scenario: Scenario) -> tuple[tuple[Prospect, ...], Outcome]:
+    """The milestones in the order in which they will come, and how the mission ends in thought."""
+    robot = robot_model(scenario)
+    experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
+    scheduler = Scheduler([*experts, Believer()], ports=(PerfectWheels(),))
+    scheduler.tell([Post(_command(scenario))], "user")
+    prospects: list[Prospect] = []
+    while scheduler.view.latest(Outcome) is None and scheduler.cycle < MOST_CYCLES:
+        decision = scheduler.step()
+        if decision is None:
+            scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
+        elif decision.refused.startswith(RAISED):
+            return tuple(prospects), Outcome("failed", decision.refused.strip().splitlines()[-1])
+        else:
+            prospects += _prospects(robot, scheduler.view, decision.made)
+    outcome = scheduler.view.latest(Outcome)
+    return tuple(prospects), outcome.value if outcome else Outcome("failed", f"not there after {MOST_CYCLES} cycles")
+
+
+def _prospects(robot: RobotModel, view: View, made: Sequence[Change]) -> list[Prospect]:
+    """Those of the milestones that were just taken for verified."""
+    belief = held(view)
+    if belief is None:
+        return []
+    values = (change.entry.value for change in made)
+    milestones = (v for v in values if isinstance(v, Milestone) and v.status == "verified")
+    return [_prospect(robot, view, belief.value, milestone) for milestone in milestones]
+
+
+def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Milestone) -> Prospect:
+    lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
+    pose = belief.world_from_robot(robot.world)
+    quality = view_quality(lines, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_PX)
+    sharp = quality.sigma_m <= GOOD_PART * _tolerance_m(view, milestone) and quality.sigma_rad <= GOOD_RAD
+    verdict = "clear" if sharp and len(lines) >= LEAST_LINES else "weak"
+    return Prospect(
+        milestone.what, belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m,
+        milestone.look_heading_rad, len(milestone.landmarks), len(lines), quality.sigma_m, quality.sigma_rad,
+        verdict if len(lines) >= LEAST_ACCOUNTED else "not testable",
+    )
+
+
+def _tolerance_m(view: View, milestone: Milestone) -> float:
+    """Of the subgoal that the milestone ends."""
+    sketch = view.get(milestone.sketch)
+    if sketch is None or not isinstance(sketch.value, PlanSketch) or milestone.index < 1:
+        return 0.1
+    return float(sketch.value.subgoals[milestone.index - 1].tolerance_m)
+
+
+def _command(scenario: Scenario) -> Command:
+    arrival = scenario.arrival.heading_rad if scenario.arrival.matters else None
+    return Command(scenario.goal, scenario.start.heading_rad, arrival, diagonal(SEEN_M, SEEN_RAD))

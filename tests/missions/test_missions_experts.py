@@ -1,0 +1,134 @@
+"""The experts round the board: each may be missing, one may be added, none may know the truth, all rate purely."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterable, Sequence
+from types import FunctionType, ModuleType
+from typing import Any
+
+import pytest
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Post
+from blackboard.journal import Decision, plain
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from harvey.mission import run_mission
+from harvey.wiring import knowledge_sources, robot_model
+from sim.assembly import Stage
+from sim.body import SimulatedBody
+from sim.truth import Truth
+from world_models.body import MotionReport
+from world_models.robot import RobotModel
+
+NAMES = [
+    "interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "correlator_tracker", "line_finder",
+    "matcher", "med_r_and_t", "milestone_judge", "plan_adjuster", "escalator", "relocalizer", "mission_keeper",
+]
+NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer"}
+"""Where nothing goes wrong, the mission may be reached without these: they close the servo loops."""
+
+
+def test_these_are_the_experts(short_stage: Stage) -> None:
+    assert [ks.name for ks in knowledge_sources(robot_model(short_stage.scenario))] == NAMES
+
+
+@pytest.mark.parametrize("missing", NAMES)
+def test_without_any_one_of_them_the_outcome_is_clear(short_stage: Stage, missing: str) -> None:
+    refusals: list[str] = []
+
+    def sources(robot: RobotModel) -> Sequence[KnowledgeSource]:
+        return [ks for ks in knowledge_sources(robot) if ks.name != missing]
+
+    result = run_mission(short_stage, 3, sources=sources, sinks=[lambda d: refusals.append(d.refused)])
+    assert result.outcome in {"reached", "lost", "blocked", "failed"}
+    assert result.reason
+    assert not any(refusals)
+    if missing not in NOT_NEEDED:
+        assert result.outcome != "reached"
+
+
+class Odometer(KnowledgeSource):
+    """An expert of its own: counts motion reports."""
+
+    level = Level.ACTION
+    watches = (Watch(MotionReport, (Posted,)),)
+    writes = (str,)
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        yield Post(f"{trigger.entry.value.move_m:.2f} m", (trigger.entry,))
+
+
+def test_adding_one_takes_one_line(short_stage: Stage) -> None:
+    said: list[str] = []
+
+    def listen(decision: Decision) -> None:
+        said.extend(c.entry.value for c in decision.made if c.entry.author == "odometer")
+
+    result = run_mission(short_stage, 3, sources=lambda robot: (*knowledge_sources(robot), Odometer()), sinks=[listen])
+    assert result.outcome == "reached"
+    assert said
+
+
+def test_no_expert_holds_the_truth(short_stage: Stage) -> None:
+    """Nothing of the simulator can be reached from what an expert is built with."""
+    body = short_stage.body(3)
+    for source in knowledge_sources(robot_model(short_stage.scenario)):
+        assert not any(isinstance(thing, Truth | SimulatedBody | Stage) for thing in _reachable(source)), source.name
+    assert any(isinstance(thing, Truth) for thing in _reachable(body))  # the walk does find it where it is
+
+
+def _reachable(root: Any) -> Iterable[Any]:
+    """Every object that can be reached from one, code and modules left out."""
+    seen, todo = {id(root)}, [root]
+    while todo:
+        thing = todo.pop()
+        yield thing
+        for other in gc.get_referents(thing):
+            if id(other) not in seen and not isinstance(other, type | ModuleType | FunctionType):
+                seen.add(id(other))
+                todo.append(other)
+
+
+def test_rating_and_acting_are_pure(short_stage: Stage) -> None:
+    """Asked twice, every expert gives the same rating and asks for the same effects, and the board is as it was."""
+    checked = 0
+
+    class Asked(KnowledgeSource):
+        """Stands in for an expert and asks it twice."""
+
+        def __init__(self, inner: KnowledgeSource) -> None:
+            self._inner = inner
+            self.level, self.closes = inner.level, inner.closes
+            self.watches, self.writes = inner.watches, inner.writes
+
+        @property
+        def name(self) -> str:
+            return self._inner.name
+
+        def rate(self, view: View, trigger: Change) -> float | None:
+            nonlocal checked
+            size, rating = len(view), self._inner.rate(view, trigger)
+            assert self._inner.rate(view, trigger) == rating
+            assert rating is None or 0.0 <= rating <= 1.0
+            assert len(view) == size
+            checked += 1
+            return rating
+
+        def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+            size = len(view)
+            first, second = tuple(self._inner.act(view, trigger)), tuple(self._inner.act(view, trigger))
+            assert [_plain(e) for e in first] == [_plain(e) for e in second]
+            assert len(view) == size
+            return first
+
+    result = run_mission(short_stage, 3, sources=lambda robot: [Asked(ks) for ks in knowledge_sources(robot)])
+    assert result.outcome == "reached", result.reason
+    assert checked > 100
+
+
+def _plain(effect: Effect) -> Any:
+    value = getattr(effect, "value", None)
+    return type(effect).__name__, None if value is None else plain(value)
