@@ -69,19 +69,19 @@ def _leg(v: Value) -> str:
 
 
 def _milestone(v: Value) -> str:
-    of = f"M{v['index']} of {v['sketch']}" if v["sketch"] else "a check in between"
+    of = f"of {v['sketch']}" if v["sketch"] else "in between"
     names = list(v["landmarks"])
     shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
     seen = f" should show {count(len(v['expected']), 'model line')} of {shown}" if names else ""
-    return f"milestone {of} ({v['what']}): looking along {degrees(v['look_heading_rad'])}{seen}; {v['status']}"
+    return f"milestone {v['what']} ({of}): looking along {degrees(v['look_heading_rad'])}{seen}; {v['status']}"
 
 
 def _certificate(v: Value) -> str:
-    return (f"{v['milestone']} is {v['verdict']}: {v['reason']}; of {count(int(v['expected']), 'expected line')}"
-            f" {v['matched']} matched and {v['inliers']} agree ({100 * number(v['coverage']):.0f} % of their length,"
-            f" residual {quantity(v['residual_px'], 'px')}); {metres(v['deviation_m'])} and"
-            f" {degrees(v['deviation_rad'])} from the belief, {quantity(v['deviation_px'], 'px')} in the image against"
-            f" a tolerance of {quantity(v['tolerance_px'], 'px')}; chance of a wrong place {number(v['p_false']):.2g}")
+    agree = f"{count(int(v['inliers']), 'line')} agree to {quantity(v['residual_px'], 'px')} of {v['matched']} matched"
+    shift = f"{quantity(v['deviation_px'], 'px')} of the {quantity(v['tolerance_px'], 'px')} that may be corrected"
+    return (f"{v['milestone']} is {v['verdict']}: {v['reason']}; {agree}; {metres(v['deviation_m'])} and"
+            f" {degrees(v['deviation_rad'])} from the belief, {shift}; chance of a wrong place"
+            f" {number(v['p_false']):.2g}")
 
 
 def _outcome(v: Value) -> str:

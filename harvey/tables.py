@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 
@@ -22,4 +23,5 @@ def _line(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool]) ->
 
 
 def _is_number(cell: str) -> bool:
-    return cell.lstrip("+-") == "" or cell.lstrip("+-")[0].isdigit()
+    """Whether it is one number, or a dash for one that is not known."""
+    return re.fullmatch(r"[+-]?[\d.]+(e[+-]?\d+)?\s?%?|-|[+-]?inf|nan", cell) is not None

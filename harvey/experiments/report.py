@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from textwrap import fill
 from typing import Any
 
 from harvey.tables import table
 
+WIDTH = 120
 Cell = str | int | float | None
 """None is shown as a dash: nobody has measured it."""
 
@@ -44,7 +46,8 @@ class Report:
         """For people."""
         shown = table(self.columns, [[_shown(cell) for cell in row] for row in self.rows])
         claims = [f"{'holds' if held else 'FAILS'}: {claim}" for claim, held in self.claims]
-        return "\n".join([self.title, "", shown, *([""] if self.notes or claims else []), *self.notes, *claims])
+        words = [fill(line, WIDTH, subsequent_indent="  ") for line in (*self.notes, *claims)]
+        return "\n".join([self.title, "", shown, *([""] if words else []), *words])
 
     def record(self) -> Mapping[str, Any]:
         """As JSON types."""

@@ -37,7 +37,7 @@ def settled_places(scene: FloorScene, wide: FloorPairs) -> list[Array]:
 def _settled_exactly(
     scene: FloorScene, wide: FloorPairs, state: Array, step: Array, widths: tuple[float, ...]
 ) -> tuple[Array, float]:
-    """A state settled with the pairs linearised there, those that the first order (``step``) puts close; its support."""
+    """A state settled with the pairs linearised there (those that ``step`` puts close, to first order); its support."""
     close = np.abs(wide.distances + wide.slopes @ step).max(axis=1) < CLOSE_PX
     pairs = pairs_at(scene, state, wide.model[close], wide.data[close])
     more, support = _settled(pairs, np.zeros((1, 3)), scene.information, state - scene.mean, widths)
