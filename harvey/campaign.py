@@ -115,7 +115,7 @@ def run_all(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Tas
         for future in as_completed(futures):
             yield futures[future], future.result()
     except BrokenProcessPool:
-        raise BadInput("a worker process was killed from outside, as when memory runs out; its mission is lost") from None
+        raise BadInput("a worker process was killed from outside, as when memory runs out") from None
     except BaseException:
         pool.shutdown(wait=False, cancel_futures=True)
         for child in multiprocessing.active_children():

@@ -64,17 +64,22 @@ def _find_mixed(seen: Any) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-def _most_pieces(seen: Any, mixed: Any) -> int:
-    """At least as many pieces as there are."""
+def _most_pieces(seen: Any) -> int:
+    """At least as many pieces as there are, and not many more: memory that is given back has to be had again.
+
+    A pixel with c changes among its samples has at most c + 1 <= 2 c pieces. A run of pixels is the first of its row,
+    or differs from its neighbour in the first or last sample, or that has c > 1 and so at most 2 c - 1 pieces.
+    """
     height, samples, width = seen.shape
     count: int = height
     for y in range(height):
-        changes, several = 0, 0
+        changes = 0
         for x in range(1, width):
-            changes += seen[y, 0, x] != seen[y, 0, x - 1]
-        for x in range(width):
-            several += mixed[y, x] != 0
-        count += changes + several * (samples + 1)
+            changes += (seen[y, 0, x] != seen[y, 0, x - 1]) + (seen[y, samples - 1, x] != seen[y, samples - 1, x - 1])
+        for r in range(1, samples):
+            for x in range(width):
+                changes += 2 * (seen[y, r, x] != seen[y, r - 1, x])
+        count += changes
     return count
 
 
@@ -83,7 +88,7 @@ def _take_apart(seen: Any, offsets: Any) -> Any:
     """The fields of :class:`Pieces`: row, column, length, patch (4, n); weight, u, v (3, n); bare (height, width)."""
     height, _, width = seen.shape
     mixed, bare = _find_mixed(seen), np.zeros((height, width), np.float32)
-    most = _most_pieces(seen, mixed)
+    most = _most_pieces(seen)
     ints, floats = np.empty((4, most), np.int32), np.empty((3, most), np.float32)
     at = 0
     for y in range(height):

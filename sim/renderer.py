@@ -57,8 +57,9 @@ class Renderer:
         """The noiseless image (height, width, 3), RGB in 0..1."""
         lens = Lens.of(camera)
         view = view_of(self.mesh, lens, camera_from_world.rotation, camera_from_world.translation)
-        seen = visible_patches(self.mesh, view, lens, self.samples)
-        pieces = pieces_of(seen, sample_offsets(self.samples), len(self.mesh))
+        pieces = pieces_of(
+            visible_patches(self.mesh, view, lens, self.samples), sample_offsets(self.samples), len(self.mesh)
+        )
         image: NDArray[np.float32] = shade(pieces, self._looks(view), self.noise, HAZE_PER_M)
         return image
 
