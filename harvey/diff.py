@@ -10,7 +10,7 @@ from harvey.records import Candidate, DecisionRecord, EntryRecord, as_line
 from harvey.sentences import sentence
 from harvey.units import count
 
-MEANINGS = {
+MEANINGS: Mapping[str, str] = {
     "cycle": "the number of the cycle",
     "observed": "what came from outside",
     "seen": "the changes taken up",

@@ -11,7 +11,7 @@ from typing import Any
 
 from blackboard.change import Quiescence
 from blackboard.effect import Post
-from blackboard.journal import Decision, Sink
+from blackboard.journal import Decision, Sink, decision_line
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import RAISED, Scheduler
 from harvey.ports import BodyPort
@@ -28,8 +28,9 @@ from world_models.robot import RobotModel
 from world_models.task import Command, Goal, Leg, Milestone, Outcome, PlanSketch
 
 FALSE_M = 0.15
-"""A milestone that is verified while the robot is further than this from where it then believes it is, is a false accept."""
+"""A milestone is accepted falsely when the robot is further than this from where it believes it is after it."""
 FALSE_RAD = 0.06
+"""Or turned by more than this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +163,7 @@ class _Diary:
                 None if out is None else out / "recording.rrd",
                 world=robot.world, camera=robot.camera, mount=robot.mount, live=live,
                 title=f"harvey {scenario.name}", recording_id=f"{scenario.name}-{seed}",
+                line_of=decision_line if self._journal is None else self._journal.line,
             )
 
     @property
@@ -197,8 +199,8 @@ def _to_the_end(scheduler: Scheduler, limits: Limits, body: SimulatedBody, diary
             scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
             told_still = scheduler.cycle + 1
         elif decision.refused.startswith(RAISED):
-            return _declared(scheduler, "failed", f"{decision.chosen.source.name if decision.chosen else '?'} raised "
-                             + decision.refused.strip().splitlines()[-1])
+            who = decision.chosen.source.name if decision.chosen else "an expert that was asked"
+            return _declared(scheduler, "failed", f"{who} raised {decision.refused.strip().splitlines()[-1]}")
         elif (over := _over(limits, scheduler, body)) is not None:
             return _declared(scheduler, "failed", over)
     scheduler.step()  # the outcome itself is seen, so that it stands in the journal

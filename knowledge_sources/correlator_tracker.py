@@ -24,8 +24,8 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.correlation import (
     Template,
-    correlate,
     corner_strength,
+    correlate,
     extract_template,
     fits,
     self_correlation,

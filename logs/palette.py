@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 Colour = tuple[int, int, int, int]
 
 TRUE: Colour = (70, 210, 90, 255)
@@ -17,9 +19,9 @@ WAITING: Colour = (200, 200, 205, 255)
 DOOR: Colour = (120, 200, 140, 255)
 NAME: Colour = (255, 255, 255, 255)
 
-LEVELS: dict[str, Colour] = {"action": (90, 170, 255, 255), "plan": (255, 160, 50, 255), "goal": (235, 90, 120, 255)}
+LEVELS: Mapping[str, Colour] = {"action": (90, 170, 255, 255), "plan": (255, 160, 50, 255), "goal": (235, 90, 120, 255)}
 
-VERDICTS: dict[str, Colour] = {
+VERDICTS: Mapping[str, Colour] = {
     "verified": MATCHED, "refuted": REJECTED, "not testable": (190, 130, 255, 255), "turning": EXPECTED,
     "expected": EXPECTED,
 }

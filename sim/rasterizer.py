@@ -10,6 +10,7 @@ Jitted functions of this file call only one another, because numba's cache does 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from sim.projection import Lens, View
 NEAR_M = 0.02
 """Patches are cut at this depth in front of the optical centre [m]."""
 
-ROOKS = {
+ROOKS: Mapping[int, tuple[int, ...]] = {
     1: (0,),
     4: (0, 2, 1, 3),
     8: (1, 4, 7, 2, 6, 3, 0, 5),

@@ -84,7 +84,7 @@ class Camera:
         """Which pixels (..., 2) lie in the image, at least ``margin_px`` from its border."""
         p = np.asarray(pixels, float)
         high = np.array([self.width - 0.5, self.height - 0.5]) - margin_px
-        return np.all((p >= margin_px - 0.5) & (p <= high), axis=-1)
+        return np.asarray(np.all((p >= margin_px - 0.5) & (p <= high), axis=-1))
 
     def project_segments(
         self, lines_world: Any, camera_from_world: Pose

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+
 def frozen(array: Any, shape: tuple[int | None, ...] | None = None) -> NDArray[np.float64]:
     """A read-only float64 copy of ``array``; ``None`` in ``shape`` matches any length.
 
@@ -129,7 +130,8 @@ class Pose2:
     def lifted(self, z_m: float = 0.0) -> Pose:
         """The same pose in SE(3), standing on the plane z = ``z_m``."""
         c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        return Pose([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], [self.x_m, self.y_m, z_m])
+        rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return Pose(rotation, np.array([self.x_m, self.y_m, z_m]))
 
     def distance_to(self, other: Pose2) -> float:
         """Distance on the floor [m]."""

@@ -111,7 +111,8 @@ class Hypothesis:
         locale_from_world = flattened(world.world_from_locale(locale)).inverse()
         turn = _turn(locale_from_world.heading_rad)
         own = turn @ np.asarray(covariance_world, float) @ turn.T
-        return Hypothesis(locale, locale_from_world @ world_from_robot, covariance_tuple(own), basis, status, weight, motion)
+        pose = locale_from_world @ world_from_robot
+        return Hypothesis(locale, pose, covariance_tuple(own), basis, status, weight, motion)
 
 
 def _turn(angle_rad: float) -> NDArray[np.float64]:

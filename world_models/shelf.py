@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -9,7 +10,7 @@ from world_models.geometer import Box, Range
 from world_models.regions import TEXTURES, Finish
 from world_models.toml_source import Node
 
-UNITS_M = {"feet": 0.3048, "metres": 1.0}
+UNITS_M: Mapping[str, float] = {"feet": 0.3048, "metres": 1.0}
 FARTHEST_M = 10_000.0
 SMALLEST_M = 0.001
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,7 @@ from world_models.frames import Pose
 Array = NDArray[np.float64]
 Solver = Callable[..., PoseEstimate]
 
-PAPER = {
+PAPER: Mapping[tuple[int, float], tuple[tuple[float, ...], tuple[float, ...]]] = {
     (5, 1.0): ((11.44, 13.96, 51.16), (0.21, 2.03, 1.16)),
     (5, 5.0): ((32.69, 39.85, 149.40), (1.08, 10.14, 6.20)),
     (10, 1.0): ((9.24, 8.83, 8.84), (0.02, 1.73, 0.08)),
@@ -37,7 +37,11 @@ PAPER = {
     (30, 1.0): ((0.40, 1.01, 0.36), (0.06, 0.48, 0.06)),
     (30, 5.0): ((2.09, 5.05, 1.82), (0.32, 2.39, 0.32)),
 }
-CHOSEN = {5: (0, 4, 12, 14, 20), 10: (0, 2, 4, 8, 12, 14, 16, 19, 20, 24), 30: tuple(range(30))}
+CHOSEN: Mapping[int, tuple[int, ...]] = {
+    5: (0, 4, 12, 14, 20),
+    10: (0, 2, 4, 8, 12, 14, 16, 19, 20, 24),
+    30: tuple(range(30)),
+}
 """Which of the campus's lines, by hand: posts near, corners and roofs far."""
 PRIOR_M, PRIOR_RAD = 1.0, 0.05
 SIGMA_PX = 0.5

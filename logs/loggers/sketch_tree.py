@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import rerun as rr
@@ -18,7 +18,9 @@ ROW, INDENT = 26.0, 34.0
 LETTER, BORDER = 5.4, 26.0
 """The graph's own units: height of a row, step to the right of a level, width of a letter and of a node's border."""
 
-MARKS = {"verified": "✔", "refuted": "✘", "not testable": "?", "turning": "…", "expected": "…", "": "·"}
+MARKS: Mapping[str, str] = {
+    "verified": "✔", "refuted": "✘", "not testable": "?", "turning": "…", "expected": "…", "": "·",
+}
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""A short mission, on pixels, for laws that every mission must keep: across Allen's office, from the door to the desk."""
+"""A short mission on pixels, for laws that every mission must keep: across Allen's office."""
 
 from __future__ import annotations
 

@@ -46,13 +46,13 @@ def test_moves_fall_short_by_a_factor_that_is_constant_within_a_run() -> None:
     assert min(ratios) < 228.3 / 240.0 < max(ratios)
 
 
-def test_turns_skitter_by_millimetres_and_err_by_about_a_percent() -> None:
+def test_turns_skitter_by_millimetres_and_err_by_about_two_percent() -> None:
     rng = np.random.default_rng(1)
     wheels = Wheels.drawn(ActuatorParameters(), rng)
     turns = [wheels.turned(math.pi / 2.0, rng) for _ in range(500)]
     assert 0.002 < np.std([t.x_m for t in turns]) < 0.004
     assert 0.002 < np.std([t.y_m for t in turns]) < 0.004
-    assert 0.8 < math.degrees(float(np.std([t.heading_rad for t in turns]))) < 1.1
+    assert 1.6 < math.degrees(float(np.std([t.heading_rad for t in turns]))) < 2.1
     assert wheels.turned(0.0, rng) == Pose2(0.0, 0.0, 0.0)
 
 
