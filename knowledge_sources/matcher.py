@@ -2,30 +2,41 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from knowledge_sources.methods.matching import match_lines
+from knowledge_sources.methods.matching import Match, match_lines
+from knowledge_sources.methods.matching_floor import FloorMatch, match_on_floor
 from knowledge_sources.questions import held
 from world_models.frames import frozen
+from world_models.location import Hypothesis
 from world_models.percepts import LineMatch, Segments
 from world_models.robot import RobotModel
 from world_models.task import Milestone
 
-PAIR_PX = (4.0, 15.0)
-"""A pair may lie apart by the belief's uncertainty in the image, within these bounds [px]."""
-NEAR_M = 2.0
-"""The distance for which that uncertainty is taken."""
+Floats = NDArray[np.float64]
+RIGID_PX = 6.0
+"""Up to this uncertainty in the image the picture moves nearly as one: §6.1's fit in the image is right. Beyond it,
+perspective bends the move, and the fit is made on the floor instead."""
+NEAR_M = 2.5
+"""The distance at which that uncertainty is taken."""
+PAIR_PX = 4.0
 
 
 class Matcher(KnowledgeSource):
-    """Matches the projected model to the data lines in the image, before any pose is solved for."""
+    """Matches the projected model to the data lines before any pose is solved for.
+
+    The search, its objective and its start are §6.1's. Where the belief is sure enough the model is fitted as a rigid
+    figure in the image; where it is not, as a picture taken from a place on the floor near the believed one.
+    """
 
     level = Level.PLAN
     watches = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
@@ -36,17 +47,17 @@ class Matcher(KnowledgeSource):
 
     def rate(self, view: View, trigger: Change) -> float | None:
         milestone = view.get(trigger.entry.value.milestone)
-        return 0.8 if milestone is not None and milestone.value.status == "expected" else None
+        return 0.8 if milestone is not None and milestone.value.status == "expected" and held(view) else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        segments, milestone = trigger.entry, view.get(trigger.entry.value.milestone)
-        if milestone is None:
+        segments, belief = trigger.entry, held(view)
+        milestone = view[segments.value.milestone]
+        if belief is None:
             return
         m: Milestone = milestone.value
-        model_px = np.array(m.expected_px, float).reshape(-1, 2, 2)
         lines_world = np.array(m.expected, float).reshape(-1, 2, 3)
         data_px = segments.value.segments_px
-        found = match_lines(model_px, data_px, pair_px=self._pair_px(view), objective="likelihood")
+        found = self._found(m, lines_world, data_px, belief.value)
         pairs = np.asarray(found.pairs, np.int64).reshape(-1, 2)
         yield Post(
             LineMatch(
@@ -56,9 +67,13 @@ class Matcher(KnowledgeSource):
             (segments, milestone),
         )
 
-    def _pair_px(self, view: View) -> float:
-        belief = held(view)
-        if belief is None:
-            return PAIR_PX[1]
-        spread = 2.0 * self._robot.camera.fx * belief.value.sigma_m / NEAR_M
-        return float(min(max(PAIR_PX[0], spread), PAIR_PX[1]))
+    def _found(
+        self, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
+    ) -> Match | FloorMatch:
+        if self._robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / NEAR_M) <= RIGID_PX:
+            model_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
+            return match_lines(model_px, data_px, pair_px=PAIR_PX, objective="likelihood")
+        return match_on_floor(
+            lines_world, data_px, self._robot.camera, self._robot.mount.camera_from_robot,
+            belief.world_from_robot(self._robot.world), belief.covariance_world(self._robot.world),
+        )

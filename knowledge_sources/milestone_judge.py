@@ -53,9 +53,9 @@ class MilestoneJudge(KnowledgeSource):
         verdict = Post(certificate, (fix, milestone))
         yield verdict
         yield Revise(milestone, replace(milestone.value, status=certificate.verdict), (verdict,))
-        verified = certificate.verdict == "verified"
-        magnitude = certificate.deviation_px if verified else math.inf
-        what = f"{milestone.value.what} is {certificate.verdict}: {certificate.reason}"
+        c = certificate
+        magnitude = c.deviation_px if c.verdict == "verified" or c.deviation_px > c.tolerance_px else math.inf
+        what = f"{milestone.value.what} is {c.verdict}"
         found = Discrepancy(Level.PLAN, what, magnitude, (0.0, TOLERANCE_PX), "px")
         last = open_discrepancy(view, Level.PLAN)
         yield Post(found, (verdict,)) if last is None else Revise(last, found, (verdict,))
@@ -105,7 +105,10 @@ def _verdict(expected: int, contrast: float, evidence: Verification, deviation_p
     found = f"{a.accounted} of {a.seen} lines, {evidence.coverage:.0%} of their length"
     if not evidence.holds:
         return "refuted", f"{found} accounted for; at a wrong place {a.chance:.0%} are by chance"
-    return "verified", f"{found} accounted for, {deviation_px:.1f} px from where expected"
+    where = f"{found} accounted for, {deviation_px:.1f} px from where expected"
+    if deviation_px > TOLERANCE_PX:
+        return "refuted", f"{where}: more than the {TOLERANCE_PX:.0f} px that the plan may be adjusted by"
+    return "verified", where
 
 
 def _median_shift(before_px: Floats, after_px: Floats) -> float:

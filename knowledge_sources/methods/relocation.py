@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.chamfer import ChamferMaps, chamfer_maps, chamfer_score, sample_lines
-from knowledge_sources.methods.matching import match_lines
+from knowledge_sources.methods.matching_floor import match_on_floor
 from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.methods.verification import Verification, verify
 from world_models.camera import Camera
@@ -27,9 +27,11 @@ WIDE = Camera.from_field_of_view(math.radians(125.0), 512, 512)
 APART_M, APART_RAD = 0.3, math.radians(6.0)
 """Candidates nearer to each other than this are one."""
 FINALISTS = 8
-ROUNDS = (14.0, 4.0)
-"""Gates [px] of the two rounds of matching by which a candidate is refined."""
-LOOSE = np.diag([0.3**2, 0.3**2, math.radians(6.0) ** 2])
+ROUNDS = (
+    np.diag([0.2**2, 0.2**2, math.radians(4.0) ** 2]),
+    np.diag([0.03**2, 0.03**2, math.radians(0.5) ** 2]),
+)
+"""How far off a candidate may be before each of the two rounds of matching that refine it: covariances (3, 3)."""
 SIGMA_PX = 0.7
 
 
@@ -114,18 +116,21 @@ def _lines_round(robot: RobotModel, x: float, y: float) -> Floats:
 
 
 def _refined(robot: RobotModel, segments_px: Floats, pose: Pose2) -> Candidate | None:
-    """Match, solve, and again with a narrower gate; None where the picture does not bear it out."""
-    covariance = LOOSE
-    for gate in ROUNDS:
+    """Match, solve, and again from nearer; None where the picture does not bear it out."""
+    covariance = ROUNDS[0]
+    for spread in ROUNDS:
         lines = visible_lines(robot.world, robot.camera, robot.camera_from_world(pose), min_length_px=12.0,
                               min_contrast=0.05, max_distance_m=15.0)
-        found = match_lines(lines.segments_px, segments_px, pair_px=gate, objective="likelihood")
+        found = match_on_floor(
+            lines.lines_world, segments_px, robot.camera, robot.mount.camera_from_robot, pose, spread
+        )
         if len(found.pairs) < 3:
             return None
         model, data = found.pairs[:, 0], found.pairs[:, 1]
         fix = planar_from_lines(
-            lines.lines_world[model], segments_px[data], robot.camera, robot.mount.camera_from_robot, pose,
-            prior_covariance=LOOSE, landmark_ids=list(lines.landmark[model]), sigma_px=SIGMA_PX,
+            lines.lines_world[model], segments_px[data], robot.camera, robot.mount.camera_from_robot,
+            found.world_from_robot, prior_covariance=ROUNDS[0], landmark_ids=list(lines.landmark[model]),
+            sigma_px=SIGMA_PX,
         )
         pose, covariance = fix.world_from_robot, np.asarray(fix.covariance)
     lines = visible_lines(robot.world, robot.camera, robot.camera_from_world(pose), min_length_px=12.0,
