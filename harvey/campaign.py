@@ -22,7 +22,7 @@ from harvey.run_directory import new_run
 from harvey.tally import Tally
 
 if TYPE_CHECKING:
-    from harvey.mission import MissionResult
+    from harvey.referee import MissionResult
     from sim.assembly import Stage
 
 Follow = Callable[[Tally], Sink]
@@ -149,9 +149,3 @@ def _work(task: Task) -> MissionResult:
 
 def _exit(_number: int, _frame: FrameType | None) -> None:
     sys.exit(143)
-
-
-def one_thread(environment: Mapping[str, str]) -> dict[str, str]:
-    """The environment with numerical libraries on one thread: results then do not depend on the number of cores."""
-    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-    return {**environment, **{name: environment.get(name, "1") for name in names}}

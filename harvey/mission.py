@@ -5,114 +5,25 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from blackboard.change import Quiescence
 from blackboard.effect import Post
-from blackboard.journal import Decision, Sink, decision_line
+from blackboard.journal import Sink, decision_line
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import RAISED, Scheduler
 from harvey.ports import BodyPort
-from harvey.wiring import knowledge_sources, robot_model, servoing
+from harvey.referee import MissionResult, Referee
+from harvey.wiring import command, knowledge_sources, robot_model, servoing
 from logs.journal_file import JournalFile
 from logs.sink import Recorder
 from sim.assembly import Stage
 from sim.body import SimulatedBody
 from sim.scenario import Limits, Scenario
-from sim.truth import cross_track_m
-from world_models.frames import Pose2, wrap_angle
-from world_models.location import Hypothesis, covariance_tuple, diagonal
+from world_models.frames import Pose2
+from world_models.location import Hypothesis
 from world_models.robot import RobotModel
-from world_models.task import Command, Goal, Leg, Milestone, Outcome, PlanSketch
-
-FALSE_M = 0.15
-"""A milestone is accepted falsely when the robot is further than this from where it believes it is after it."""
-FALSE_RAD = 0.06
-"""Or turned by more than this."""
-
-
-@dataclass(frozen=True, slots=True)
-class MissionResult:
-    """What is written to ``result.json``.
-
-    Attributes:
-        outcome: reached, lost, blocked or failed; reason: why.
-        final_heading_error_rad: from the wanted heading; where none is wanted, from what Harvey believed.
-        milestones: how many were verified, refuted, not testable and (by the truth) accepted falsely.
-        replans: sketches adjusted or drawn anew; relocalizations: how often it found itself again.
-        sketches: how many plan sketches were drawn.
-        max_cross_track_m: how far the robot truly strayed from the line of the leg it was driving.
-    """
-
-    scenario: str
-    seed: int
-    outcome: str
-    reason: str
-    goal: str
-    final_error_m: float
-    final_heading_error_rad: float
-    path_length_m: float
-    sim_time_s: float
-    wall_time_s: float
-    frames: int
-    decisions: int
-    milestones: dict[str, int]
-    replans: int
-    relocalizations: int
-    sketches: int
-    collisions: int
-    max_cross_track_m: float
-
-    def record(self) -> dict[str, Any]:
-        """As JSON types."""
-        return {name: getattr(self, name) for name in self.__slots__}
-
-
-class Tally:
-    """A sink that counts what the result tells, and compares each accepted milestone with the truth."""
-
-    def __init__(self, robot: RobotModel, body: SimulatedBody) -> None:
-        self._robot, self._body = robot, body
-        self.decisions = self.replans = self.relocalizations = self.sketches = 0
-        self.milestones = {"verified": 0, "refuted": 0, "not_testable": 0, "false_accepts": 0}
-        self.max_cross_track_m = 0.0
-        self._leg: Leg | None = None
-        self._gone = 0
-
-    def __call__(self, decision: Decision) -> None:
-        self.decisions += 1
-        self._follow()
-        for change in decision.made:
-            value, revision = change.entry.value, change.entry.revision
-            if isinstance(value, Leg):
-                self._leg = value if value.status == "moving" else None
-            elif isinstance(value, Milestone) and value.status.replace(" ", "_") in self.milestones:
-                self.milestones[value.status.replace(" ", "_")] += 1
-            elif isinstance(value, PlanSketch):
-                self.sketches += revision == 0
-                self.replans += value.adjustments > 0 and value.verified and change.entry.author == "sketcher"
-            elif isinstance(value, Goal):
-                self.replans += value.status == "abandoned"
-            elif isinstance(value, Hypothesis) and value.is_held:
-                self.relocalizations += value.basis == "relocalization"
-                if value.basis == "milestone":
-                    self.milestones["false_accepts"] += self._is_false(value)
-
-    def _follow(self) -> None:
-        """How far the robot truly strayed from the leg that it was driving since the last decision."""
-        track = self._body.track
-        if self._leg is not None:
-            start, end = Pose2(self._leg.x0_m, self._leg.y0_m, 0.0), Pose2(self._leg.x1_m, self._leg.y1_m, 0.0)
-            strayed = (abs(cross_track_m(t.world_from_robot, start, end)) for t in track[self._gone:])
-            self.max_cross_track_m = max(self.max_cross_track_m, *strayed, 0.0)
-        self._gone = len(track)
-
-    def _is_false(self, value: Hypothesis) -> bool:
-        believed, true = value.world_from_robot(self._robot.world), self._body.truth.world_from_robot
-        turned = abs(wrap_angle(believed.heading_rad - true.heading_rad))
-        return believed.distance_to(true) > FALSE_M or turned > FALSE_RAD
+from world_models.task import Outcome
 
 
 def run_mission(
@@ -134,16 +45,20 @@ def run_mission(
     """
     began = time.perf_counter()
     scenario, robot, body = stage.scenario, robot_model(stage.scenario), stage.body(seed)
-    tally, diary = Tally(robot, body), _Diary(out, robot, scenario, seed, live)
+    referee, diary = Referee(robot, body), _Diary(out, robot, scenario, seed, live)
     scheduler = Scheduler(
-        sources(robot), ports=(BodyPort(body),), servoing=servoing(scenario.servo), sinks=(*diary.sinks, tally, *sinks)
+        sources(robot),
+        ports=(BodyPort(body),),
+        servoing=servoing(scenario.servo),
+        sinks=(*diary.sinks, referee, *sinks),
     )
-    scheduler.tell([Post(_command(scenario))], "user")
+    scheduler.tell([Post(command(scenario))], "user")
     try:
         outcome = _to_the_end(scheduler, scenario.limits, body, diary)
     finally:
         diary.close()
-    result = _result(stage, seed, scheduler, robot, body, tally, outcome, time.perf_counter() - began)
+    belief = scheduler.view.latest(Hypothesis, lambda h: h.is_held)
+    result = referee.result(stage, seed, outcome, None if belief is None else belief.value, time.perf_counter() - began)
     if out is not None:
         (out / "result.json").write_text(json.dumps(result.record(), indent=2) + "\n", encoding="utf-8")
     return result
@@ -178,13 +93,6 @@ class _Diary:
         for sink in (self._journal, self._recorder):
             if sink is not None:
                 sink.close()
-
-
-def _command(scenario: Scenario) -> Command:
-    start, arrival = scenario.start, scenario.arrival
-    covariance = diagonal(max(start.put_down_sigma_m, 0.005), max(start.put_down_sigma_rad, 0.005))
-    heading = arrival.heading_rad if arrival.matters else None
-    return Command(scenario.goal, start.heading_rad, heading, covariance_tuple(covariance))
 
 
 def _to_the_end(scheduler: Scheduler, limits: Limits, body: SimulatedBody, diary: _Diary) -> Outcome:
@@ -226,37 +134,3 @@ def _declared(scheduler: Scheduler, kind: str, reason: str) -> Outcome:
     scheduler.tell([Post(outcome)], "mission")
     scheduler.step()
     return outcome
-
-
-def _result(
-    stage: Stage, seed: int, scheduler: Scheduler, robot: RobotModel, body: SimulatedBody, tally: Tally,
-    outcome: Outcome, wall_s: float,
-) -> MissionResult:
-    score = stage.score(body.track)
-    return MissionResult(
-        scenario=stage.scenario.name,
-        seed=seed,
-        outcome=outcome.kind,
-        reason=outcome.reason,
-        goal=stage.scenario.goal,
-        final_error_m=score.position_error_m,
-        final_heading_error_rad=_heading_error(score.heading_error_rad, scheduler, robot, body),
-        path_length_m=score.path_m,
-        sim_time_s=score.time_s,
-        wall_time_s=wall_s,
-        frames=body.frames,
-        decisions=tally.decisions,
-        milestones=tally.milestones,
-        replans=tally.replans,
-        relocalizations=tally.relocalizations,
-        sketches=tally.sketches,
-        collisions=score.collisions,
-        max_cross_track_m=tally.max_cross_track_m,
-    )
-
-
-def _heading_error(wanted: float | None, scheduler: Scheduler, robot: RobotModel, body: SimulatedBody) -> float:
-    belief = scheduler.view.latest(Hypothesis, lambda h: h.is_held)
-    if wanted is not None or belief is None:
-        return wanted or 0.0
-    return wrap_angle(belief.value.world_from_robot(robot.world).heading_rad - body.truth.world_from_robot.heading_rad)

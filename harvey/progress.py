@@ -15,7 +15,7 @@ from harvey.tally import Tally
 from harvey.units import count
 
 if TYPE_CHECKING:
-    from harvey.mission import MissionResult
+    from harvey.referee import MissionResult
 
 
 class Bar:

@@ -17,7 +17,7 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import RAISED, Scheduler
-from harvey.wiring import knowledge_sources, robot_model
+from harvey.wiring import command, knowledge_sources, robot_model
 from knowledge_sources.methods.verification import LEAST_ACCOUNTED
 from knowledge_sources.methods.views import view_quality
 from knowledge_sources.milestone_selector import GOOD_PART, GOOD_RAD, LEAST_LINES, SIGMA_PX
@@ -26,7 +26,7 @@ from sim.scenario import Scenario
 from world_models.body import MotionReport, MotorCommand
 from world_models.location import Hypothesis, diagonal
 from world_models.robot import RobotModel
-from world_models.task import Command, Milestone, Outcome, PlanSketch
+from world_models.task import Milestone, Outcome, PlanSketch
 
 TAKING_PART = ("interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "mission_keeper")
 MOST_CYCLES = 20_000
@@ -90,7 +90,7 @@ def rehearse(scenario: Scenario) -> tuple[tuple[Prospect, ...], Outcome]:
     robot = robot_model(scenario)
     experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
     scheduler = Scheduler([*experts, Believer()], ports=(PerfectWheels(),))
-    scheduler.tell([Post(_command(scenario))], "user")
+    scheduler.tell([Post(replace(command(scenario), start_covariance=diagonal(SEEN_M, SEEN_RAD)))], "user")
     prospects: list[Prospect] = []
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < MOST_CYCLES:
         decision = scheduler.step()
@@ -133,8 +133,3 @@ def _tolerance_m(view: View, milestone: Milestone) -> float:
     if sketch is None or not isinstance(sketch.value, PlanSketch) or milestone.index < 1:
         return 0.1
     return float(sketch.value.subgoals[milestone.index - 1].tolerance_m)
-
-
-def _command(scenario: Scenario) -> Command:
-    arrival = scenario.arrival.heading_rad if scenario.arrival.matters else None
-    return Command(scenario.goal, scenario.start.heading_rad, arrival, diagonal(SEEN_M, SEEN_RAD))

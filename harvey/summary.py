@@ -11,7 +11,7 @@ from harvey.tables import table
 from harvey.units import INCH_M, count, degrees
 
 if TYPE_CHECKING:
-    from harvey.mission import MissionResult
+    from harvey.referee import MissionResult
     from harvey.rehearsal import Prospect
 
 COLUMNS = ("seed", "outcome", "error mm", "inches", "milestones", "refuted", "wrong", "sketches", "replans",

@@ -21,8 +21,10 @@ from knowledge_sources.relocalizer import Relocalizer
 from knowledge_sources.sketcher import Sketcher
 from sim.scenario import Scenario, Servo
 from world_models.actuator import ActuatorModel
+from world_models.location import diagonal
 from world_models.robot import RobotModel
 from world_models.store import load_world
+from world_models.task import Command
 
 
 def knowledge_sources(robot: RobotModel) -> tuple[KnowledgeSource, ...]:
@@ -55,3 +57,11 @@ def servoing(servo: Servo) -> Servoing:
     """The levels that a scenario leaves on."""
     on = {Level.ACTION: servo.action, Level.PLAN: servo.plan, Level.GOAL: servo.goal}
     return Servoing(frozenset(level for level, is_on in on.items() if not is_on))
+
+
+def command(scenario: Scenario) -> Command:
+    """What the user asks for in a scenario, and tells of how the robot was put down."""
+    start, arrival = scenario.start, scenario.arrival
+    covariance = diagonal(max(start.put_down_sigma_m, 0.005), max(start.put_down_sigma_rad, 0.005))
+    heading = arrival.heading_rad if arrival.matters else None
+    return Command(scenario.goal, start.heading_rad, heading, covariance)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 
-from harvey.campaign import one_thread
 from harvey.commands.command import Command
 from harvey.diff import describe
 from harvey.errors import BadInput
@@ -22,7 +20,6 @@ def _arguments(parser: ArgumentParser) -> None:
 
 def _run(args: Namespace) -> int:
     run = open_run(args.run, "recording.rrd")
-    os.environ.update(one_thread(os.environ))
     from blackboard.journal import decision_line, decision_record
     from harvey.replay import replayed, scenario_of, scheduler_of
     from logs.reader import read_frames

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from harvey.campaign import Task, one_thread, run_all, run_task, seeds_of, settings_of
+from harvey.campaign import Task, run_all, run_task, seeds_of, settings_of
 from harvey.commands.command import Command
 from harvey.errors import BadInput
 from harvey.run_directory import RUNS, vacant
@@ -25,7 +24,6 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    os.environ.update(one_thread(os.environ))
     seeds, settings = seeds_of(args.seed), settings_of(args.settings)
     tasks = tuple(Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1)) for seed in seeds)
     if args.check:

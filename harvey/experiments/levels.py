@@ -7,18 +7,17 @@ level the robot ends further off, or not at all; a robot that is carried away ne
 from __future__ import annotations
 
 import math
-import os
 import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from harvey.campaign import Task, one_thread, run_all
+from harvey.campaign import Task, run_all
 from harvey.experiments.report import Cell, Report
 from harvey.progress import counted
 from harvey.units import INCH_M
 
 if TYPE_CHECKING:
-    from harvey.mission import MissionResult
+    from harvey.referee import MissionResult
 
 SCENARIOS = ("lab-to-allens-office", "hallway-kidnap")
 LEVELS: tuple[tuple[str, tuple[str, ...]], ...] = (
@@ -29,13 +28,12 @@ LEVELS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("all off", ("action", "plan", "goal")),
 )
 SEEDS, QUICK_SEEDS = 20, 2
-COLUMNS = ("scenario", "levels", "reached", "<= 1 inch", "otherwise", "mean mm", "max mm", "strayed mm", "collisions", "wrong",
-           "replans", "relocated")
+COLUMNS = ("scenario", "levels", "reached", "<= 1 inch", "otherwise", "mean mm", "max mm", "strayed mm",
+           "collisions", "wrong", "replans", "relocated")
 
 
 def run(quick: bool, seed: int) -> Report:
     """Every scenario with every setting, over seeds ``seed``, ``seed + 1``, ..."""
-    os.environ.update(one_thread(os.environ))
     seeds = range(seed, seed + (QUICK_SEEDS if quick else SEEDS))
     tasks = [task for scenario in SCENARIOS for _, off in LEVELS for task in _tasks(scenario, off, seeds)]
     results = dict(counted(run_all(tasks), len(tasks), sys.stderr))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from harvey.mission import MissionResult, run_mission
+from harvey.referee import MissionResult, run_mission
 from sim.assembly import Stage
 
 INCH_M = 0.0254

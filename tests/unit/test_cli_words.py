@@ -17,8 +17,8 @@ from harvey.errors import BadInput
 from harvey.experiments.levels import _row
 from harvey.experiments.render_speed import edge_offsets_px
 from harvey.experiments.report import Report
-from harvey.mission import MissionResult
 from harvey.records import EntryRecord
+from harvey.referee import MissionResult
 from harvey.sentences import sentence
 from harvey.summary import one, several
 from harvey.tables import table

@@ -1,0 +1,49 @@
+"""The same scenario and seed decide the same on every supported Python, byte for byte."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from harvey.mission import run_mission
+from sim.assembly import Stage
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[2])
+from conftest import SHORT
+from harvey.mission import run_mission
+from sim.assembly import set_stage
+from sim.scenario import parse_scenario
+run_mission(set_stage(parse_scenario(SHORT, "across-allens-office")), 3, out=Path(sys.argv[1]))
+"""
+
+
+def _other_python() -> Path | None:
+    """A Python of another version, in an environment made by ``make environment PYTHON=... VENV=.venv-...``."""
+    own = f"{sys.version_info.major}.{sys.version_info.minor}"
+    others = [path for path in sorted(ROOT.glob(".venv*/bin/python")) if _version(path) not in ("", own)]
+    return others[0] if others else None
+
+
+def _version(python: Path) -> str:
+    asked = subprocess.run(
+        [python, "-c", "import sys, rerun, numba; print('%d.%d' % sys.version_info[:2])"],
+        capture_output=True, text=True, check=False,
+    )
+    return asked.stdout.strip()
+
+
+def test_another_python_writes_the_same_journal(short_stage: Stage, tmp_path: Path) -> None:
+    python = _other_python()
+    if python is None:
+        pytest.skip("no environment with another Python is here: make environment PYTHON=python3.13 VENV=.venv-3.13")
+    here, there = tmp_path / "here", tmp_path / "there"
+    run_mission(short_stage, 3, out=here)
+    subprocess.run([python, "-c", PROGRAM, there, Path(__file__).parent], cwd=ROOT, check=True, timeout=300)
+    assert (here / "journal.jsonl").read_bytes() == (there / "journal.jsonl").read_bytes()
