@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from harvey.referee import MissionResult, run_mission
+from harvey.mission import run_mission
+from harvey.referee import MissionResult
 from sim.assembly import Stage
 
 INCH_M = 0.0254
