@@ -18,9 +18,10 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import RAISED, Scheduler
 from harvey.wiring import command, knowledge_sources, robot_model
+from knowledge_sources.methods.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.verification import LEAST_ACCOUNTED
 from knowledge_sources.methods.views import view_quality
-from knowledge_sources.milestone_selector import GOOD_PART, GOOD_RAD, LEAST_LINES, SIGMA_PX
+from knowledge_sources.milestone_selector import GOOD_PART, GOOD_RAD, LEAST_LINES
 from knowledge_sources.questions import held
 from sim.scenario import Scenario
 from world_models.body import MotionReport, MotorCommand
@@ -117,7 +118,7 @@ def _prospects(robot: RobotModel, view: View, made: Sequence[Change]) -> list[Pr
 def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Milestone) -> Prospect:
     lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
     pose = belief.world_from_robot(robot.world)
-    quality = view_quality(lines, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_PX)
+    quality = view_quality(lines, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_ACROSS_PX)
     sharp = quality.sigma_m <= GOOD_PART * _tolerance_m(view, milestone) and quality.sigma_rad <= GOOD_RAD
     verdict = "clear" if sharp and len(lines) >= LEAST_LINES else "weak"
     return Prospect(

@@ -34,6 +34,7 @@ from knowledge_sources.methods.images import decode
 from knowledge_sources.methods.pose.planar import point_jacobian
 from knowledge_sources.methods.pose.planar_from_points import planar_from_points
 from knowledge_sources.questions import held, open_discrepancy
+from knowledge_sources.tolerances import PLAN_PX, action_px
 from world_models.body import Frame
 from world_models.camera import NEAR_M
 from world_models.frames import Pose2
@@ -62,10 +63,7 @@ LOST_PART = 1.0 / 3.0
 UNIQUE = 0.8
 """A landmark's patch must not look more like another place nearby than this (correlation)."""
 UNIQUE_PX = 14.0
-PLAN_BOUND_PX = 30.0
-"""What plan-level servoing may correct: the window of the matcher's Hough transform (§6.1.4)."""
 SIGMAS = 4.0
-FLOOR_PX = 4.0
 
 
 class Found(NamedTuple):
@@ -172,11 +170,6 @@ class CorrelatorTracker(KnowledgeSource):
         spread = np.einsum("nij,jk,nik->ni", jacobian, covariance, jacobian)
         return p[:, 2], camera.project(ahead), np.sqrt(np.max(spread, axis=1))
 
-    def _bound_px(self, belief: Hypothesis) -> float:
-        """What the actuator model lets a landmark 3 m ahead deviate in the image: the action level's bound (§3.2)."""
-        focal = self._robot.camera.fx
-        return FLOOR_PX + 3.0 * focal * math.hypot(belief.sigma_rad, belief.sigma_m / 3.0)
-
     def _corrected(self, belief: Hypothesis, seen: list[Track], anchors: tuple[Anchor, ...]) -> Corrected:
         """The belief after the landmarks were found."""
         world = self._robot.world
@@ -232,7 +225,7 @@ class CorrelatorTracker(KnowledgeSource):
     def _told(
         self, view: View, what: str, magnitude_px: float, belief: Hypothesis, because: tuple[object, ...]
     ) -> Iterable[Effect]:
-        bounds = (min(self._bound_px(belief), PLAN_BOUND_PX), PLAN_BOUND_PX)
+        bounds = (action_px(self._robot, belief), PLAN_PX)
         found = Discrepancy(Level.ACTION, what, magnitude_px, bounds, "px")
         last = open_discrepancy(view, Level.ACTION)
         yield Post(found, because) if last is None else Revise(last, found, because)

@@ -12,14 +12,13 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.questions import held
+from knowledge_sources.tolerances import PLAN_PX
 from world_models.body import Look, MotionReport, MotorCommand
 from world_models.location import Hypothesis
 from world_models.robot import RobotModel
 
 STOPPED = 0.7
 """A move of which the wheels claim less than this part was stopped by something."""
-PLAN_BOUND_PX = 30.0
-"""What plan-level servoing may correct, as in §6.1.4."""
 
 
 class DeadReckoner(KnowledgeSource):
@@ -54,5 +53,5 @@ class DeadReckoner(KnowledgeSource):
         command = view.latest(MotorCommand)
         if command is not None and report.move_m < STOPPED * command.value.move_m:
             what = f"something stopped the robot: {report.move_m:.2f} m of {command.value.move_m:.2f} m are claimed"
-            stopped = Discrepancy(Level.ACTION, what, math.inf, (PLAN_BOUND_PX, PLAN_BOUND_PX), "px")
+            stopped = Discrepancy(Level.ACTION, what, math.inf, (PLAN_PX, PLAN_PX), "px")
             yield Post(stopped, (trigger.entry,))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
+from dataclasses import replace
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
@@ -12,13 +12,9 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from world_models.frames import Pose2
 from world_models.location import Hypothesis, Place
+from world_models.ptrans import parse_ptrans
 from world_models.robot import RobotModel
 from world_models.task import Command, Goal, Outcome
-from world_models.units import FOOT_M
-
-_NUMBER = r"\s*([-+]?\d+(?:\.\d*)?)\s*"
-_PLACE = rf"\(\s*([\w'-]+)\s+\({_NUMBER},{_NUMBER},{_NUMBER}\)\s*\)"
-_PTRANS = re.compile(rf"\s*\(\s*ptrans\s+{_PLACE}\s*{_PLACE}\s*\)\s*")
 
 
 class Interpreter(KnowledgeSource):
@@ -47,15 +43,9 @@ class Interpreter(KnowledgeSource):
         yield Post(Goal(origin, destination), (trigger.entry,))
 
     def _places(self, command: Command) -> tuple[Place, Place]:
-        found = _PTRANS.fullmatch(command.text)
-        if found is None:
-            raise ValueError(f"expected (ptrans (locale (x,y,z)) (locale (x,y,z))), got {command.text!r}")
-        a, ax, ay, _, b, bx, by, _ = found.groups()
+        origin, destination = parse_ptrans(command.text)
         known = self._robot.world.locales
-        for name in (a, b):
+        for name in (origin.locale, destination.locale):
             if name not in known:
                 raise ValueError(f"expected one of the locales {', '.join(known)}, got {name!r}")
-        return (
-            Place(a, float(ax) * FOOT_M, float(ay) * FOOT_M),
-            Place(b, float(bx) * FOOT_M, float(by) * FOOT_M, command.arrival_heading_rad),
-        )
+        return origin, replace(destination, heading_rad=command.arrival_heading_rad)

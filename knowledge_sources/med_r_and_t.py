@@ -12,6 +12,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
+from knowledge_sources.methods.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.questions import held
 from world_models.frames import frozen
@@ -19,8 +20,6 @@ from world_models.percepts import LineMatch, PoseFix
 from world_models.robot import RobotModel
 from world_models.task import Milestone
 
-SIGMA_PX = 0.7
-"""Standard deviation of a segment's ends across the model line: finder, JPEG and model together."""
 LOOSER = 4.0
 DOUBT = (0.05, math.radians(1.5))
 """The belief enters as a prior that is looser by a factor and by these (m, rad): the lines shall decide."""
@@ -58,7 +57,7 @@ class MedRAndT(KnowledgeSource):
             belief.value.world_from_robot(self._robot.world),
             prior_covariance=prior,
             landmark_ids=[m.landmark_of[i] for i in match.value.pairs[:, 0]],
-            sigma_px=SIGMA_PX,
+            sigma_px=SIGMA_ACROSS_PX,
         )
         yield Post(
             PoseFix(

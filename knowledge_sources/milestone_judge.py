@@ -18,13 +18,12 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.verification import LEAST_ACCOUNTED, Verification, verify
 from knowledge_sources.questions import held, open_discrepancy
+from knowledge_sources.tolerances import PLAN_PX
 from world_models.frames import wrap_angle
 from world_models.percepts import LineMatch, PoseFix, Segments
 from world_models.robot import RobotModel
 from world_models.task import Certificate, Milestone
 
-TOLERANCE_PX = 30.0
-"""Up to where plan-level servoing may adjust: the window in which the matcher looks (§6.1.4)."""
 DARK = 6.0
 """A frame of less contrast (standard deviation of its grey values) shows nothing."""
 
@@ -56,7 +55,7 @@ class MilestoneJudge(KnowledgeSource):
         c = certificate
         magnitude = c.deviation_px if c.verdict == "verified" or c.deviation_px > c.tolerance_px else math.inf
         what = f"{milestone.value.what} is {c.verdict}"
-        found = Discrepancy(Level.PLAN, what, magnitude, (0.0, TOLERANCE_PX), "px")
+        found = Discrepancy(Level.PLAN, what, magnitude, (0.0, PLAN_PX), "px")
         last = open_discrepancy(view, Level.PLAN)
         yield Post(found, (verdict,)) if last is None else Revise(last, found, (verdict,))
 
@@ -85,7 +84,7 @@ class MilestoneJudge(KnowledgeSource):
             deviation_m=pose.distance_to(before),
             deviation_rad=wrap_angle(pose.heading_rad - before.heading_rad),
             deviation_px=deviation_px,
-            tolerance_px=TOLERANCE_PX,
+            tolerance_px=PLAN_PX,
             p_false=evidence.agreement.p_false,
         )
 
@@ -106,8 +105,8 @@ def _verdict(expected: int, contrast: float, evidence: Verification, deviation_p
     if not evidence.holds:
         return "refuted", f"{found} accounted for; at a wrong place {a.chance:.0%} are by chance"
     where = f"{found} accounted for, {deviation_px:.1f} px from where expected"
-    if deviation_px > TOLERANCE_PX:
-        return "refuted", f"{where}: more than the {TOLERANCE_PX:.0f} px that the plan may be adjusted by"
+    if deviation_px > PLAN_PX:
+        return "refuted", f"{where}: more than the {PLAN_PX:.0f} px that the plan may be adjusted by"
     return "verified", where
 
 

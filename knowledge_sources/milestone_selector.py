@@ -17,6 +17,7 @@ from blackboard.entry import Entry
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.methods.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.views import ViewQuality, view_quality
 from knowledge_sources.questions import deepest_sketch, held, is_over, is_settled, open_discrepancy, open_milestone
 from world_models.body import Look
@@ -31,7 +32,6 @@ LINES = 60
 """The most lines that one milestone expects."""
 LENGTH_PX = 12.0
 CONTRAST = 0.05
-SIGMA_PX = 0.7
 GOOD_PART = 0.3
 """A view is good enough when it tells the place to this part of the tolerance there."""
 GOOD_RAD = math.radians(0.25)
@@ -150,7 +150,7 @@ class MilestoneSelector(KnowledgeSource):
     def _quality(self, pose: Pose2) -> ViewQuality:
         robot = self._robot
         return view_quality(
-            self._seen_from(pose).lines_world, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_PX
+            self._seen_from(pose).lines_world, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_ACROSS_PX
         )
 
     def _seen_from(self, pose: Pose2) -> VisibleLines:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,12 +11,13 @@ from sim.body import SimulatedBody
 from sim.building import Building
 from sim.collision import ROBOT_RADIUS_M
 from sim.faults import Displacement, Fault, placed
-from sim.places import Place, places
 from sim.scenario import Scenario, ScenarioError
 from sim.settings import near
 from sim.truth import Score, Truth, score
 from world_models.frames import Pose2
+from world_models.location import Place
 from world_models.outlines import inside_polygon
+from world_models.ptrans import parse_ptrans
 from world_models.store import WorldError, load_world
 from world_models.world import World
 
@@ -63,7 +64,7 @@ def set_stage(scenario: Scenario) -> Stage:
     try:
         world = load_world(scenario.world, details=scenario.details)
         building = Building.of_faces(world.faces, _locale_finder(world), scenario.render.samples)
-        start, goal = places(scenario.goal)
+        start, goal = parse_ptrans(scenario.goal)
         heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
         start_world, goal_world = _pose(world, start, scenario.start.heading_rad), _pose(world, goal, heading)
     except WorldError as error:
@@ -93,7 +94,7 @@ def _locale_finder(world: World) -> Callable[[Pose2], str]:
 
 def _pose(world: World, place: Place, heading_rad: float) -> Pose2:
     try:
-        return place.pose_in_world(world, heading_rad)
+        return replace(place, heading_rad=heading_rad).in_world(world)
     except ValueError as error:
         raise WorldError(f"goal: {error}") from None
 

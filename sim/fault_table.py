@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sim.faults import Displacement, Fault, LightsOff, Moment
-from sim.places import Place
 from sim.settings import read_settings
+from world_models.location import Place
 from world_models.toml_source import Node
 
 
@@ -37,7 +37,7 @@ def read_fault(node: Node) -> Fault:
         return LightsOff(moment, table.duration_s)
     if table.kind not in ("bump", "kidnap"):
         raise node.fail("kind = bump, kidnap or lights_off", repr(table.kind))
-    there = Place(table.to_locale, table.to_x_m, table.to_y_m) if table.to_locale else None
+    there = Place(table.to_locale, table.to_x_m, table.to_y_m, table.to_heading_rad) if table.to_locale else None
     return Displacement(
-        table.kind, moment, table.forward_m, table.left_m, table.turn_rad, table.distance_m, there, table.to_heading_rad
+        table.kind, moment, table.forward_m, table.left_m, table.turn_rad, table.distance_m, there
     )

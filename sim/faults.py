@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim.places import Place, WorldLike
 from world_models.frames import Pose2
+from world_models.location import Frames, Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Displacement:
         moment: when.
         forward_m, left_m, turn_rad: where to, from the pose it has.
         distance_m: besides that, this far in a direction that is drawn; if it is above 0, the turn's sign is drawn too.
-        place, heading_rad: where to, instead: a place in a locale and the heading in its frame.
+        place: where to, instead: a place in a locale, with the heading there.
         absolute: that place in the world frame, once the world is known.
     """
 
@@ -47,7 +47,6 @@ class Displacement:
     turn_rad: float = 0.0
     distance_m: float = 0.0
     place: Place | None = None
-    heading_rad: float = 0.0
     absolute: Pose2 | None = None
 
     def drawn(self, rng: np.random.Generator) -> Pose2:
@@ -72,10 +71,10 @@ class LightsOff:
 Fault = Displacement | LightsOff
 
 
-def placed(fault: Fault, world: WorldLike) -> Fault:
+def placed(fault: Fault, world: Frames) -> Fault:
     """The fault with its place, if it has one, found in the world. ValueError where the world lacks its locale."""
     if isinstance(fault, Displacement) and fault.place is not None:
-        return replace(fault, absolute=fault.place.pose_in_world(world, fault.heading_rad))
+        return replace(fault, absolute=fault.place.in_world(world))
     return fault
 
 

@@ -11,11 +11,11 @@ from typing import Any
 from sim.actuator import ActuatorParameters
 from sim.fault_table import read_fault
 from sim.faults import Fault
-from sim.places import places
 from sim.rasterizer import sample_offsets
 from sim.sensor import SensorParameters
 from sim.settings import known_keys, merged, near, parsed, read_settings
 from world_models.camera import Camera, CameraMount
+from world_models.ptrans import parse_ptrans
 from world_models.toml_source import Node, Source, WorldError
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -233,7 +233,7 @@ def _file(text: str, shipped: Path, folder: Path) -> Path:
 
 def _goal(node: Node) -> str:
     try:
-        places(node.text())
+        parse_ptrans(node.text())
     except WorldError:
         raise
     except ValueError as error:

@@ -13,8 +13,8 @@ from dataclasses import fields
 from typing import Any, TypeVar, get_type_hints
 
 from world_models.toml_source import Node, WorldError
+from world_models.units import FOOT_M, INCH_M
 
-FOOT_M = 0.3048
 T = TypeVar("T")
 
 
@@ -24,7 +24,7 @@ def spellings(field: str) -> dict[str, float]:
     if "_rad" in field:
         out[field.replace("_rad", "_deg")] = math.pi / 180.0
     if field.endswith("_m") and not field.endswith("_per_m"):
-        out |= {field[:-1] + "ft": FOOT_M, field[:-1] + "in": FOOT_M / 12.0}
+        out |= {field[:-1] + "ft": FOOT_M, field[:-1] + "in": INCH_M}
     return out
 
 

@@ -9,8 +9,9 @@ from typing import Any
 from world_models.geometer import Box, Range
 from world_models.regions import TEXTURES, Finish
 from world_models.toml_source import Node
+from world_models.units import FOOT_M
 
-UNITS_M: Mapping[str, float] = {"feet": 0.3048, "metres": 1.0}
+UNITS_M: Mapping[str, float] = {"feet": FOOT_M, "metres": 1.0}
 FARTHEST_M = 10_000.0
 SMALLEST_M = 0.001
 

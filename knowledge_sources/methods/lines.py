@@ -22,6 +22,8 @@ LSD_OFFSET_PX = -0.123
 
 SIGMA_END_PX = 0.7
 """Standard deviation of an end along its segment [px]: samples are 2 px apart. Measured on rendered corners."""
+SIGMA_ACROSS_PX = 0.7
+"""Standard deviation of an end across its model line [px]: finder, JPEG, and what the model does not know."""
 
 _LEAST_SUPPORT = 0.5
 """Share of a segment's length that must lie on its refined line."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.chamfer import ChamferMaps, chamfer_maps, chamfer_score, sample_lines
+from knowledge_sources.methods.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.matching_floor import match_on_floor
 from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.methods.verification import Verification, verify
@@ -32,7 +33,6 @@ ROUNDS = (
     np.diag([0.03**2, 0.03**2, math.radians(0.5) ** 2]),
 )
 """How far off a candidate may be before each of the two rounds of matching that refine it: covariances (3, 3)."""
-SIGMA_PX = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,7 +130,7 @@ def _refined(robot: RobotModel, segments_px: Floats, pose: Pose2) -> Candidate |
         fix = planar_from_lines(
             lines.lines_world[model], segments_px[data], robot.camera, robot.mount.camera_from_robot,
             found.world_from_robot, prior_covariance=ROUNDS[0], landmark_ids=list(lines.landmark[model]),
-            sigma_px=SIGMA_PX,
+            sigma_px=SIGMA_ACROSS_PX,
         )
         pose, covariance = fix.world_from_robot, np.asarray(fix.covariance)
     lines = visible_lines(robot.world, robot.camera, robot.camera_from_world(pose), min_length_px=12.0,

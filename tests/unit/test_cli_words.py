@@ -91,7 +91,7 @@ def test_missions_are_summed_up() -> None:
 def test_a_row_of_the_levels_tells_outcomes_and_errors() -> None:
     row = _row("s", "all on", [result(0, "reached", 0.01), result(1, "reached", 0.04), result(2, "lost", 1.0)])
     assert row[2:5] == (2, 1, "1 lost")
-    assert row[5:8] == (pytest.approx(350.0), pytest.approx(1000.0), 0)
+    assert row[5:9] == (pytest.approx(350.0), pytest.approx(1000.0), pytest.approx(1000.0), 0)
 
 
 def test_a_report_holds_when_all_its_claims_do() -> None:
