@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
@@ -22,55 +20,23 @@ from blackboard.entry import Entry
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.methods.correlation import (
-    Template,
-    corner_strength,
-    correlate,
-    extract_template,
-    fits,
-    self_correlation,
-)
 from knowledge_sources.methods.images import decode
-from knowledge_sources.methods.pose.planar import point_jacobian
-from knowledge_sources.methods.pose.planar_from_points import planar_from_points
+from knowledge_sources.methods.tracking import HALF_PX, Followed, Image, begin, correct, follow
 from knowledge_sources.questions import held, open_discrepancy
 from knowledge_sources.tolerances import PLAN_PX, action_px
 from world_models.body import Frame
-from world_models.camera import NEAR_M
-from world_models.frames import Pose2
 from world_models.location import Hypothesis, covariance_tuple
 from world_models.percepts import Anchor, Track, Tracks
 from world_models.robot import RobotModel
-from world_models.visibility import visible_points
 
-HALF_PX = 10
-TRACKS = 14
-"""How many landmarks are followed."""
 FEW = 9
-"""With fewer than this, new ones are taken."""
-SPACING_PX = 28.0
-LEAST_PEAK = 0.7
-LEAST_MARGIN = 0.08
-"""How much better than the second best place in its window a landmark must correlate: is the peak unique?"""
-LEAST_CORNER = 3.0
-SEARCH_PX = (6.0, 48.0)
+"""With fewer landmarks than this, new ones are taken."""
 MISSES = 2
 """A landmark that is not found so often in a row is given up."""
 LEAST = 4
 """Fewer expected landmarks than this do not make a discrepancy."""
 LOST_PART = 1.0 / 3.0
 """When fewer than this part of the expected landmarks agree, tracking cannot explain what it sees."""
-UNIQUE = 0.8
-"""A landmark's patch must not look more like another place nearby than this (correlation)."""
-UNIQUE_PX = 14.0
-SIGMAS = 4.0
-
-
-class Found(NamedTuple):
-    """One track in the newest frame, and whether it should have been seen there."""
-
-    track: Track
-    expected: bool
 
 
 class Corrected(NamedTuple):
@@ -107,7 +73,7 @@ class CorrelatorTracker(KnowledgeSource):
             yield from self._begun_anew(frame, belief, old)
             return
         image = decode(frame.value.jpeg)
-        followed = [] if old is None else self._followed(view, old.value.items, image, belief.value)
+        followed = self._followed(view, None if old is None else old.value, image, belief.value)
         seen = [f.track for f in followed if f.track.found_px is not None]
         expected = sum(1 for f in followed if f.expected)
         because = (frame, belief) if old is None else (frame, belief, old)
@@ -136,91 +102,33 @@ class CorrelatorTracker(KnowledgeSource):
         fresh = self._renewed((), (), frame, decode(frame.value.jpeg), belief.value)
         yield from self._kept(old, fresh, (frame, belief))
 
-    def _followed(
-        self, view: View, tracks: tuple[Track, ...], image: NDArray[np.uint8], belief: Hypothesis
-    ) -> list[Found]:
-        if not tracks:
+    def _followed(self, view: View, tracks: Tracks | None, image: Image, belief: Hypothesis) -> list[Followed]:
+        if tracks is None:
             return []
-        pose = belief.world_from_robot(self._robot.world)
-        points = np.array([t.point_world for t in tracks])
-        depth, predicted, spread = self._predicted(points, pose, belief.covariance_world(self._robot.world))
-        pictures = {name: decode(view[name].value.jpeg) for name in sorted({t.template_frame for t in tracks})}
-        out = []
-        for t, z, at, sigma in zip(tracks, depth, predicted, spread, strict=True):
-            ahead = z > NEAR_M and fits(image.shape, at, HALF_PX + 2)
-            t = replace(t, predicted_px=(float(at[0]), float(at[1])), found_px=None)
-            scale = t.template_depth_m / max(float(z), NEAR_M)
-            if not ahead or not 0.55 <= scale <= 1.8:
-                out.append(Found(t, False))
-                continue
-            template = extract_template(pictures[t.template_frame], t.template_px, HALF_PX)
-            out.append(Found(_correlated(t, template, image, float(sigma), scale), True))
-        return out
-
-    def _predicted(
-        self, points: NDArray[np.float64], pose: Pose2, covariance: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Depths (n,), pixels (n, 2) and the standard deviation (n,) of the pixels [px]."""
-        camera = self._robot.camera
-        state = np.array([pose.x_m, pose.y_m, pose.heading_rad])
-        p, _, jacobian = point_jacobian(
-            points, np.array([camera.fx, camera.fy]), state, self._robot.mount.camera_from_robot
-        )
-        ahead = np.where(p[:, 2:] > NEAR_M, p, [0.0, 0.0, 1.0])
-        spread = np.einsum("nij,jk,nik->ni", jacobian, covariance, jacobian)
-        return p[:, 2], camera.project(ahead), np.sqrt(np.max(spread, axis=1))
+        pictures = {name: decode(view[name].value.jpeg) for name in sorted({t.template_frame for t in tracks.items})}
+        world = self._robot.world
+        return follow(self._robot, tracks.items, pictures, image, belief.world_from_robot(world),
+                      belief.covariance_world(world))
 
     def _corrected(self, belief: Hypothesis, seen: list[Track], anchors: tuple[Anchor, ...]) -> Corrected:
         """The belief after the landmarks were found."""
         world = self._robot.world
-        estimate = planar_from_points(
-            np.array([t.point_world for t in seen]),
-            np.array([t.found_px for t in seen]),
-            self._robot.camera,
-            self._robot.mount.camera_from_robot,
-            belief.world_from_robot(world),
-            belief.covariance_world(world),
-            sigma_px=np.array([t.sigma_px for t in seen]),
+        pose, covariance, agreeing = correct(
+            self._robot, seen, anchors, belief.world_from_robot(world), belief.covariance_world(world)
         )
-        pose = estimate.world_from_robot
-        covariance = estimate.covariance + _inherited(pose, seen, anchors)
         hypothesis = Hypothesis.of_world(world, belief.locale, pose, covariance, "tracks", motion=belief.motion)
-        return Corrected(hypothesis, int(np.count_nonzero(estimate.inliers)))
+        return Corrected(hypothesis, agreeing)
 
     def _renewed(
-        self, kept: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame], image: NDArray[np.uint8],
+        self, kept: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame], image: Image,
         belief: Hypothesis,
     ) -> Tracks:
-        """New landmarks as old ones leave: visible in the model, and a corner in the image."""
+        """New landmarks as old ones leave."""
         pose = belief.world_from_robot(self._robot.world)
-        new = self._chosen(kept, frame.id, image, pose) if len(kept) < FEW else ()
-        items = (*kept, *new)
+        items = (*kept, *begin(self._robot, kept, frame.id, image, pose)) if len(kept) < FEW else kept
         here = Anchor(frame.id, pose.x_m, pose.y_m, covariance_tuple(belief.covariance_world(self._robot.world)))
         used = {t.template_frame for t in items}
         return Tracks(frame.id, HALF_PX, items, tuple(a for a in (*anchors, here) if a.frame in used))
-
-    def _chosen(
-        self, kept: tuple[Track, ...], frame: str, image: NDArray[np.uint8], pose: Pose2
-    ) -> tuple[Track, ...]:
-        """Corners of the model that are visible, and distinctive in the image; well apart from each other."""
-        robot = self._robot
-        camera_from_world = robot.camera_from_world(pose)
-        points = visible_points(
-            robot.world, robot.camera, camera_from_world, margin_px=HALF_PX + 4.0, min_contrast=0.08,
-            max_distance_m=15.0,
-        )
-        strength = np.array([corner_strength(image, px, HALF_PX) for px in points.points_px])
-        taken = [np.array(t.found_px or t.predicted_px) for t in kept]
-        new: list[Track] = []
-        for i in np.argsort(-strength, kind="stable"):
-            if strength[i] < LEAST_CORNER or len(taken) >= TRACKS:
-                break
-            px, point = points.points_px[i], points.points_world[i]
-            if all(np.linalg.norm(px - other) >= SPACING_PX for other in taken) and _is_unique(image, px):
-                taken.append(px)
-                name = robot.world.landmarks[points.landmark[i]].name
-                new.append(_begun(point, px, float(camera_from_world.apply(point)[2]), name, frame))
-        return tuple(new)
 
     def _told(
         self, view: View, what: str, magnitude_px: float, belief: Hypothesis, because: tuple[object, ...]
@@ -235,34 +143,3 @@ class CorrelatorTracker(KnowledgeSource):
         old: Entry[Tracks] | None, tracks: Tracks, because: tuple[object, ...]
     ) -> Iterable[Effect]:
         yield Post(tracks, because) if old is None else Revise(old, tracks, because)
-
-
-def _is_unique(image: NDArray[np.uint8], px: NDArray[np.float64]) -> bool:
-    return bool(self_correlation(image, px, HALF_PX, UNIQUE_PX).second_peak < UNIQUE)
-
-
-def _correlated(track: Track, template: Template, image: NDArray[np.uint8], sigma: float, scale: float) -> Track:
-    search = min(max(SIGMAS * sigma + 2.0, SEARCH_PX[0]), SEARCH_PX[1])
-    found = correlate(template, image, np.array(track.predicted_px), search, scale=scale)
-    if found is None or found.peak < LEAST_PEAK or found.at_border or found.peak - found.second_peak < LEAST_MARGIN:
-        return replace(track, misses=track.misses + 1, peak=-1.0 if found is None else found.peak)
-    at = (float(found.position_px[0]), float(found.position_px[1]))
-    return replace(track, found_px=at, peak=float(found.peak), sigma_px=max(0.3, float(found.sigma_px)), misses=0)
-
-
-def _begun(point: NDArray[np.float64], px: NDArray[np.float64], depth_m: float, landmark: str, frame: str) -> Track:
-    x, y, z = (float(c) for c in point)
-    at = (float(px[0]), float(px[1]))
-    return Track(landmark, (x, y, z), frame, at, float(depth_m), at, at, 1.0, 0.3)
-
-
-def _inherited(pose: Pose2, seen: list[Track], anchors: tuple[Anchor, ...]) -> NDArray[np.float64]:
-    """(3, 3) mean covariance of the beliefs from which the templates were cut, carried over to here."""
-    share = {a.frame: a for a in anchors}
-    parts = []
-    for track in seen:
-        anchor = share[track.template_frame]
-        lever = np.eye(3)
-        lever[0, 2], lever[1, 2] = -(pose.y_m - anchor.y_m), pose.x_m - anchor.x_m
-        parts.append(lever @ np.array(anchor.covariance) @ lever.T)
-    return np.asarray(np.mean(parts, axis=0))
