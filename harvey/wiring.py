@@ -8,6 +8,7 @@ from blackboard.servoing import Servoing
 from knowledge_sources.correlator_tracker import CorrelatorTracker
 from knowledge_sources.dead_reckoner import DeadReckoner
 from knowledge_sources.escalator import Escalator
+from knowledge_sources.expert import Expert
 from knowledge_sources.interpreter import Interpreter
 from knowledge_sources.line_finder import LineFinder
 from knowledge_sources.matcher import Matcher
@@ -26,25 +27,28 @@ from world_models.robot import RobotModel
 from world_models.store import load_world
 from world_models.task import Command
 
+EXPERTS: tuple[type[Expert], ...] = (
+    Interpreter,
+    Sketcher,
+    MilestoneSelector,
+    Motor,
+    DeadReckoner,
+    CorrelatorTracker,
+    LineFinder,
+    Matcher,
+    MedRAndT,
+    MilestoneJudge,
+    PlanAdjuster,
+    Escalator,
+    Relocalizer,
+    MissionKeeper,
+)
+"""Every expert, in no order that matters: control comes from triggers, ratings and levels."""
+
 
 def knowledge_sources(robot: RobotModel) -> tuple[KnowledgeSource, ...]:
-    """Every expert, in no order that matters: control comes from triggers, ratings and levels."""
-    return (
-        Interpreter(robot),
-        Sketcher(robot),
-        MilestoneSelector(robot),
-        Motor(robot),
-        DeadReckoner(robot),
-        CorrelatorTracker(robot),
-        LineFinder(),
-        Matcher(robot),
-        MedRAndT(robot),
-        MilestoneJudge(robot),
-        PlanAdjuster(robot),
-        Escalator(),
-        Relocalizer(robot),
-        MissionKeeper(),
-    )
+    """The experts for a robot: each is built with what the robot knows of itself and its world, and nothing else."""
+    return tuple(expert(robot) for expert in EXPERTS)
 
 
 def robot_model(scenario: Scenario) -> RobotModel:

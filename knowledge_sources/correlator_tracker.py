@@ -17,9 +17,9 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.expert import Expert
 from knowledge_sources.methods.images import decode
 from knowledge_sources.methods.tracking import HALF_PX, Followed, Image, begin, correct, follow
 from knowledge_sources.questions import held, open_discrepancy
@@ -27,7 +27,6 @@ from knowledge_sources.tolerances import PLAN_PX, action_px
 from world_models.body import Frame
 from world_models.location import Hypothesis, covariance_tuple
 from world_models.percepts import Anchor, Track, Tracks
-from world_models.robot import RobotModel
 
 FEW = 9
 """With fewer landmarks than this, new ones are taken."""
@@ -46,7 +45,7 @@ class Corrected(NamedTuple):
     agreeing: int
 
 
-class CorrelatorTracker(KnowledgeSource):
+class CorrelatorTracker(Expert):
     """Follows landmarks from frame to frame; revises the held hypothesis; posts what it had to correct."""
 
     level = Level.ACTION
@@ -56,9 +55,6 @@ class CorrelatorTracker(KnowledgeSource):
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in ("milestone", "relocalization")),
     )
     writes = (Tracks, Hypothesis, Discrepancy)
-
-    def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
 
     def rate(self, view: View, trigger: Change) -> float | None:
         if held(view) is None or view.latest(Frame) is None or open_discrepancy(view, Level.GOAL) is not None:

@@ -8,28 +8,24 @@ from collections.abc import Iterable
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post, Revise
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.expert import Expert
 from knowledge_sources.questions import held
 from knowledge_sources.tolerances import PLAN_PX
 from world_models.body import Look, MotionReport, MotorCommand
 from world_models.location import Hypothesis
-from world_models.robot import RobotModel
 
 STOPPED = 0.7
 """A move of which the wheels claim less than this part was stopped by something."""
 
 
-class DeadReckoner(KnowledgeSource):
+class DeadReckoner(Expert):
     """Moves the held hypothesis by a motion report and asks for a picture to check it by."""
 
     level = Level.ACTION
     watches = (Watch(MotionReport, (Posted,)),)
     writes = (Hypothesis, Look, Discrepancy)
-
-    def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
 
     def rate(self, view: View, trigger: Change) -> float | None:
         belief = held(view)

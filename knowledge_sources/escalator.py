@@ -7,12 +7,12 @@ from collections.abc import Iterable
 from blackboard.board import View
 from blackboard.change import Change, Watch
 from blackboard.effect import Effect, Post, Revise
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.expert import Expert
 
 
-class Escalator(KnowledgeSource):
+class Escalator(Expert):
     """Closes a discrepancy beyond its bound and re-posts it one level up, to be measured anew there."""
 
     level = Level.PLAN

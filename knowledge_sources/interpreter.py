@@ -8,16 +8,15 @@ from dataclasses import replace
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
+from knowledge_sources.expert import Expert
 from world_models.frames import Pose2
 from world_models.location import Hypothesis, Place
 from world_models.ptrans import parse_ptrans
-from world_models.robot import RobotModel
 from world_models.task import Command, Goal, Outcome
 
 
-class Interpreter(KnowledgeSource):
+class Interpreter(Expert):
     """Reads ``(ptrans (locale (x,y,z)) (locale (x,y,z)))``: from where to where, feet in each locale's own frame.
 
     The command's first place is also where the robot is told that it stands: the first hypothesis. What cannot be
@@ -27,9 +26,6 @@ class Interpreter(KnowledgeSource):
     level = Level.GOAL
     watches = (Watch(Command, (Posted,)),)
     writes = (Goal, Hypothesis, Outcome)
-
-    def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         command: Command = trigger.entry.value

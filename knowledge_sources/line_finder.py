@@ -9,8 +9,8 @@ import numpy as np
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
+from knowledge_sources.expert import Expert
 from knowledge_sources.methods.images import decode
 from knowledge_sources.methods.lines import find_lines
 from knowledge_sources.questions import open_milestone
@@ -19,7 +19,7 @@ from world_models.frames import frozen
 from world_models.percepts import Segments
 
 
-class LineFinder(KnowledgeSource):
+class LineFinder(Expert):
     """Finds the segments of a frame in which a milestone, or the way back from being lost, is looked for.
 
     It looks at the whole frame, not only where lines are expected: how much agrees by chance must be known too.

@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
+from knowledge_sources.expert import Expert
 from knowledge_sources.methods.matching import Match, match_lines
 from knowledge_sources.methods.matching_floor import FloorMatch, match_on_floor
 from knowledge_sources.questions import held
 from world_models.frames import frozen
 from world_models.location import Hypothesis
 from world_models.percepts import LineMatch, Segments
-from world_models.robot import RobotModel
 from world_models.task import Milestone
 
 Floats = NDArray[np.float64]
@@ -31,7 +30,7 @@ NEAR_M = 2.5
 PAIR_PX = 4.0
 
 
-class Matcher(KnowledgeSource):
+class Matcher(Expert):
     """Matches the projected model to the data lines before any pose is solved for.
 
     The search, its objective and its start are §6.1's. Where the belief is sure enough the model is fitted as a rigid
@@ -41,9 +40,6 @@ class Matcher(KnowledgeSource):
     level = Level.PLAN
     watches = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
     writes = (LineMatch,)
-
-    def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
 
     def rate(self, view: View, trigger: Change) -> float | None:
         milestone = view.get(trigger.entry.value.milestone)

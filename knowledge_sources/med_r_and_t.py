@@ -10,14 +10,13 @@ import numpy as np
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
+from knowledge_sources.expert import Expert
 from knowledge_sources.methods.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.questions import held
 from world_models.frames import frozen
 from world_models.percepts import LineMatch, PoseFix
-from world_models.robot import RobotModel
 from world_models.task import Milestone
 
 LOOSER = 4.0
@@ -25,7 +24,7 @@ DOUBT = (0.05, math.radians(1.5))
 """The belief enters as a prior that is looser by a factor and by these (m, rad): the lines shall decide."""
 
 
-class MedRAndT(KnowledgeSource):
+class MedRAndT(Expert):
     """Solves for the pose on the floor, and says which pairs do not agree with it.
 
     The mounting of the camera is known (§3.2), so three of the six unknowns of §6.2 are left. Subsets of lines propose,
@@ -35,9 +34,6 @@ class MedRAndT(KnowledgeSource):
     level = Level.PLAN
     watches = (Watch(LineMatch, (Posted,)),)
     writes = (PoseFix,)
-
-    def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
 
     def rate(self, view: View, trigger: Change) -> float | None:
         return 0.8 if held(view) is not None else None

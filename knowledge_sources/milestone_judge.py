@@ -13,15 +13,14 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.expert import Expert
 from knowledge_sources.methods.verification import LEAST_ACCOUNTED, Verification, verify
 from knowledge_sources.questions import held, open_discrepancy
 from knowledge_sources.tolerances import PLAN_PX
 from world_models.frames import wrap_angle
 from world_models.percepts import LineMatch, PoseFix, Segments
-from world_models.robot import RobotModel
 from world_models.task import Certificate, Milestone
 
 DARK = 6.0
@@ -31,15 +30,12 @@ DARK = 6.0
 Floats = NDArray[np.float64]
 
 
-class MilestoneJudge(KnowledgeSource):
+class MilestoneJudge(Expert):
     """Certifies a milestone from a pose fix, and posts by how much what was expected and what was seen differ."""
 
     level = Level.PLAN
     watches = (Watch(PoseFix, (Posted,)),)
     writes = (Certificate, Milestone, Discrepancy)
-
-    def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
 
     def rate(self, view: View, trigger: Change) -> float | None:
         return 0.8 if _milestone_of(view, trigger.entry.value) is not None else None

@@ -14,16 +14,15 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.expert import Expert
 from knowledge_sources.methods.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.views import ViewQuality, view_quality
 from knowledge_sources.questions import deepest_sketch, held, is_over, is_settled, open_discrepancy, open_milestone
 from world_models.body import Look
 from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis
-from world_models.robot import RobotModel
 from world_models.task import Milestone, PlanSketch
 from world_models.visibility import VisibleLines, visible_lines
 
@@ -39,7 +38,7 @@ LEAST_LINES = 10
 GLANCES_RAD = tuple(math.radians(a) for a in (30, -30, 60, -60, 90, -90, 135, -135, 180))
 
 
-class MilestoneSelector(KnowledgeSource):
+class MilestoneSelector(Expert):
     """Says what should be seen before a subgoal (M0 first), and asks to look.
 
     It prefers the view that the robot has, then the one it will have next, then the one that would tell most. It also
@@ -54,9 +53,6 @@ class MilestoneSelector(KnowledgeSource):
         Watch(Milestone, (Revised,), lambda m: not m.is_open),
     )
     writes = (Milestone, Look)
-
-    def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
 
     def rate(self, view: View, trigger: Change) -> float | None:
         task = self._task(view)

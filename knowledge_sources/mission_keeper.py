@@ -7,13 +7,13 @@ from collections.abc import Iterable
 from blackboard.board import View
 from blackboard.change import Change, Posted, Quiescence, Revised, Watch
 from blackboard.effect import Effect, Post
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
+from knowledge_sources.expert import Expert
 from knowledge_sources.questions import is_over, open_discrepancy, open_milestone
 from world_models.task import Goal, Outcome
 
 
-class MissionKeeper(KnowledgeSource):
+class MissionKeeper(Expert):
     """Declares ``reached`` when the goal is, and ``lost`` or ``failed`` when the board falls still before that."""
 
     level = Level.GOAL

@@ -10,9 +10,9 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.expert import Expert
 from knowledge_sources.questions import (
     deepest_sketch,
     held,
@@ -25,7 +25,6 @@ from knowledge_sources.questions import (
 from world_models.body import MotorCommand
 from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis
-from world_models.robot import RobotModel
 from world_models.task import Leg, Milestone, PlanSketch
 
 LOOKAHEAD_M = 1.5
@@ -37,7 +36,7 @@ CREEP_M = 0.25
 """Nearer than this it steers straight at the end."""
 
 
-class Motor(KnowledgeSource):
+class Motor(Expert):
     """Commands the next increment of a leg from where the robot believes it is: this closes the action-level loop.
 
     It begins a leg when a verified sketch has a primitive subgoal; it turns where a milestone is to be looked for; it
@@ -53,9 +52,6 @@ class Motor(KnowledgeSource):
         Watch(Discrepancy, (Revised,)),
     )
     writes = (MotorCommand, Leg, Discrepancy)
-
-    def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
 
     def rate(self, view: View, trigger: Change) -> float | None:
         if is_over(view) or not is_settled(view) or _is_in_doubt(view):

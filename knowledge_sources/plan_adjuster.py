@@ -7,26 +7,22 @@ from collections.abc import Iterable
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Revise
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.expert import Expert
 from knowledge_sources.questions import held, open_discrepancy
 from world_models.location import Hypothesis
 from world_models.percepts import PoseFix
-from world_models.robot import RobotModel
 from world_models.task import Certificate
 
 
-class PlanAdjuster(KnowledgeSource):
+class PlanAdjuster(Expert):
     """Takes over the pose of a verified milestone that deviates within the plan level's bound: closes the plan loop."""
 
     level = Level.PLAN
     closes = Level.PLAN
     watches = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
     writes = (Hypothesis, Discrepancy)
-
-    def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
 
     def rate(self, view: View, trigger: Change) -> float | None:
         found = open_discrepancy(view, Level.PLAN)

@@ -10,15 +10,14 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.expert import Expert
 from knowledge_sources.methods.relocation import Candidate, Region, candidates
 from knowledge_sources.questions import active_goal, held, is_over, is_settled, open_discrepancy
 from world_models.body import Look, MotorCommand
 from world_models.location import Hypothesis, Place
 from world_models.percepts import Segments
-from world_models.robot import RobotModel
 from world_models.task import Goal
 
 REGIONS = ((1.75, math.radians(45.0)), (1.75, math.radians(45.0)), (3.0, math.radians(90.0)), (6.0, math.pi))
@@ -32,7 +31,7 @@ CLEARER = 1.3
 """The best candidate must explain so much more than the next, or the place is ambiguous."""
 
 
-class Relocalizer(KnowledgeSource):
+class Relocalizer(Expert):
     """Generates hypotheses round the last belief, verifies each against the picture, and probes until one stands alone.
 
     A probe is a look; where that is not enough, a turn and another look. When it knows, a new top-level goal follows
@@ -47,9 +46,6 @@ class Relocalizer(KnowledgeSource):
         Watch(Segments, (Posted,), lambda s: s.milestone == ""),
     )
     writes = (Look, MotorCommand, Hypothesis, Goal, Discrepancy)
-
-    def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
 
     def rate(self, view: View, trigger: Change) -> float | None:
         lost = open_discrepancy(view, Level.GOAL)

@@ -16,8 +16,8 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
+from knowledge_sources.expert import Expert
 from knowledge_sources.methods.routes import free_space, is_clear, shortest_route
 from knowledge_sources.questions import held
 from world_models.frames import wrap_angle
@@ -39,7 +39,7 @@ ADJUSTMENTS = 8
 """How often one sketch is adjusted at one milestone before it is said to be blocked."""
 
 
-class Sketcher(KnowledgeSource):
+class Sketcher(Expert):
     """Draws (M0 (ptrans a b) M1 ... Mg) for a goal, then for the subgoal at hand, until that is primitive (Figure 9).
 
     Triggers: a new goal; a verified milestone (go on, refine, or repeat a subgoal whose end is slightly off); a leg
@@ -56,7 +56,7 @@ class Sketcher(KnowledgeSource):
     writes = (PlanSketch, Goal, Outcome)
 
     def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
+        super().__init__(robot)
         self._world = robot.world
 
     def rate(self, view: View, trigger: Change) -> float | None:

@@ -37,7 +37,7 @@ FROM_OUTSIDE = {Command, MotionReport, Frame, Quiescence}
 def experts_in(stem: str) -> list[type[KnowledgeSource]]:
     module = importlib.import_module(f"knowledge_sources.{stem}")
     found = [c for _, c in inspect.getmembers(module, inspect.isclass) if c.__module__ == module.__name__]
-    return [c for c in found if issubclass(c, KnowledgeSource)]
+    return [c for c in found if issubclass(c, KnowledgeSource) and not inspect.isabstract(c)]
 
 
 EXPERTS = {stem: found[0] for stem in FILES if (found := experts_in(stem))}
