@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from harvey.experiments.report import Report
 
 PLANNED: Mapping[str, str] = {
+    "corridor": "Real photographs: edges found, poses recovered from perturbed ones, failures known as such.",
+    "figure12": "The trace of the 2D matcher's local search (Figure 12).",
     "levels": "What the three levels of perceptual servoing do: missions with each of them switched off (Figure 2).",
+    "matcher": "2D matching of 4 to 40 model lines: success within a pixel, and time as problems grow.",
     "render-speed": "The simulator's camera: frames per second on one core, and where its edges lie.",
     "table2": "Pose from lines, R-then-T against R-and-T (Table 2), and the physical limit.",
     "table3": "Pose from lines with outliers (Table 3), Med-R-and-T and beyond.",

@@ -1,0 +1,56 @@
+"""The matching experiments in their small versions: Figure 12's trace, the matcher's growth, the photographs."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from harvey.experiments import corridor, figure12, matcher
+from harvey.experiments.corridor_data import FOLDER, load_corridor
+from harvey.experiments.report import Report
+
+needs_photographs = pytest.mark.skipif(
+    not (FOLDER / "corridor.json").is_file(), reason="the corridor photographs are not beside the repository"
+)
+
+
+def failing(report: Report) -> list[str]:
+    return [claim for claim, held in report.claims if not held]
+
+
+def test_figure_12_falls_at_each_step_and_ends_where_the_figure_does() -> None:
+    report = figure12.run(quick=True, seed=0)
+    ours = [row[-1] for row in report.rows if row[-1] is not None]
+    assert all(float(after) < float(before) for before, after in pairwise(ours))
+    assert report.rows[-1][1] == "A1 A2 B3 C4 D5 D6" and report.rows[0][4] == "C8 D7"
+    assert failing(report) == []
+
+
+def test_the_matcher_keeps_to_the_truth_as_problems_grow() -> None:
+    """Whatever else the machine does: times are not asserted."""
+    report = matcher.run(quick=True, seed=0, trials=3)
+    assert [row[0] for row in report.rows] == [f"{m} model x {k} data lines" for m, k in matcher.SIZES]
+    assert [claim for claim in failing(report) if "median" not in claim] == []
+
+
+def test_the_matcher_s_figures_come_from_the_seed() -> None:
+    def figures(seed: int) -> list[list[str]]:
+        """All but the times, which are what they are."""
+        rows = matcher.run(quick=True, seed=seed, trials=2).rows
+        return [[str(cell).split("  ")[0] for cell in row] for row in rows]
+
+    assert figures(1) == figures(1)
+
+
+@needs_photographs
+def test_poses_in_the_photographs_come_back() -> None:
+    assert failing(corridor.run(quick=True, seed=0, seeds=1)) == []
+
+
+def test_without_photographs_the_report_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(corridor, "load_corridor", lambda: load_corridor(tmp_path))
+    report = corridor.run(quick=True, seed=0)
+    assert report.rows == () and report.claims == ()
+    assert "not there" in report.text()
