@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import cast
 
 import pytest
 from hypothesis import given, settings
@@ -20,6 +21,7 @@ from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
 from knowledge_sources.escalator import Escalator
 from strategies import Expert, Note, levels, magnitudes, run
+from world_models.robot import RobotModel
 
 bounds = st.tuples(st.floats(0.0, 5.0), st.floats(0.0, 8.0))
 
@@ -68,6 +70,11 @@ def measure(_view: View, trigger: Change) -> Iterable[Effect]:
     yield Revise(trigger.entry, Discrepancy(value.level, value.what, float(value.what), value.bounds, value.unit))
 
 
+def escalator() -> Escalator:
+    """It asks nothing of the robot that it is built with."""
+    return Escalator(cast(RobotModel, None))
+
+
 def corrector(level: Level) -> Expert:
     return Expert(
         f"{level}_corrector", Discrepancy, correct, level=level, writes=(Discrepancy,),
@@ -94,7 +101,7 @@ class ServoMachine(RuleBasedStateMachine):
         self.decisions: list[Decision] = []
         self.found: dict[Ref, Discrepancy] = {}
         self.scheduler = Scheduler(
-            [*map(worker, Level), *map(corrector, Level), *map(measurer, (Level.PLAN, Level.GOAL)), Escalator()],
+            [*map(worker, Level), *map(corrector, Level), *map(measurer, (Level.PLAN, Level.GOAL)), escalator()],
             sinks=[self.decisions.append],
         )
 
@@ -162,7 +169,7 @@ def test_action_work_goes_before_plan_work_while_only_action_discrepancies_are_o
     plan = Expert("planner", Note, level=Level.PLAN, rate=1.0)
     act = Expert("driver", Discrepancy, correct, level=Level.ACTION, rate=0.1, writes=(Discrepancy,),
                  where=lambda d: d.is_open)
-    scheduler = Scheduler([plan, act, Escalator()])
+    scheduler = Scheduler([plan, act, escalator()])
     small = Discrepancy(Level.ACTION, "slightly off", 1.0, (2.0, 3.0), "px")
     scheduler.tell([Post(Note("a")), Post(small)], "user")
     decisions = run(scheduler)
@@ -171,7 +178,7 @@ def test_action_work_goes_before_plan_work_while_only_action_discrepancies_are_o
 
 
 def test_an_action_discrepancy_beyond_its_bound_brings_the_plan_level_into_focus_once_it_is_raised() -> None:
-    scheduler = Scheduler([corrector(Level.PLAN), measurer(Level.PLAN), Escalator()])
+    scheduler = Scheduler([corrector(Level.PLAN), measurer(Level.PLAN), escalator()])
     scheduler.tell([Post(Discrepancy(Level.ACTION, "2.5", 2.5, (2.0, 3.0), "px"))], "user")
     decisions = run(scheduler)
     assert [(str(d.focus), d.chosen and d.chosen.source.name) for d in decisions] == [
