@@ -16,23 +16,16 @@ from blackboard.journal import Decision, plain
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from harvey.mission import run_mission
-from harvey.wiring import knowledge_sources, robot_model
+from harvey.wiring import EXPERTS, knowledge_sources, robot_model
 from sim.assembly import Stage
 from sim.body import SimulatedBody
 from sim.truth import Truth
 from world_models.body import MotionReport
 from world_models.robot import RobotModel
 
-NAMES = [
-    "interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "correlator_tracker", "line_finder",
-    "matcher", "med_r_and_t", "milestone_judge", "plan_adjuster", "escalator", "relocalizer", "mission_keeper",
-]
+NAMES = [expert.__module__.rpartition(".")[2] for expert in EXPERTS]
 NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer"}
 """Where nothing goes wrong, the mission may be reached without these: they close the servo loops."""
-
-
-def test_these_are_the_experts(short_stage: Stage) -> None:
-    assert [ks.name for ks in knowledge_sources(robot_model(short_stage.scenario))] == NAMES
 
 
 @pytest.mark.parametrize("missing", NAMES)
