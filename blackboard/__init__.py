@@ -1,5 +1,6 @@
 """The mechanism: entries, changes, effects, knowledge sources, agenda, servo levels and journal.
 
 Standard library only. It knows no robot and no pixel. One idea a file; read them in this order:
-entry, change, effect, board, level, knowledge_source, activation, agenda, servoing, journal, scheduler.
+entry, change, effect, index, shelf, board, level, knowledge_source, activation, agenda, servoing, encoding, journal,
+retention, scheduler, archive.
 """

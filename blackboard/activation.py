@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from blackboard.change import Change
 from blackboard.knowledge_source import KnowledgeSource
 
 
-@dataclass(frozen=True, slots=True)
-class Activation:
+class Activation(NamedTuple):
     """One knowledge source x one trigger.
 
     Attributes:
@@ -26,14 +25,8 @@ class Activation:
     rating: float
     cycle: int
 
-    @property
-    def key(self) -> tuple[str, str]:
-        """A newer trigger on the same entry replaces the pending one of the same source."""
-        return self.source.name, self.trigger.entry.id
 
-
-@dataclass(frozen=True, slots=True)
-class Obviated:
+class Obviated(NamedTuple):
     """An activation that was dropped, and why."""
 
     activation: Activation

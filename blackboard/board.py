@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
 from blackboard.change import Change, Posted, Retracted, Revised, always
-from blackboard.effect import Effect, Post, Revise
+from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref
+from blackboard.index import Index
+from blackboard.shelf import Shelf
 
 T = TypeVar("T")
+NAMED = (Ref, Entry)
+"""What names a revision that is there already."""
 
 
 class StaleError(Exception):
@@ -17,12 +21,13 @@ class StaleError(Exception):
 
 
 class Blackboard:
-    """The current revision of every entry, indexed by the type of its value."""
+    """The current revision of every entry; a shelf for each type of value."""
 
     def __init__(self) -> None:
         self._current: dict[str, Entry[Any]] = {}
-        self._by_type: dict[type[Any], dict[str, Entry[Any]]] = {}
+        self._shelves: dict[type[Any], Shelf] = {}
         self._numbers: dict[type[Any], int] = {}
+        self.view = View(self)
 
     def apply(self, effects: Iterable[Effect], *, author: str, cycle: int) -> tuple[Change, ...]:
         """Carry out the effects of one act, all or none.
@@ -32,68 +37,73 @@ class Blackboard:
             ValueError: a value of another type than the entry's, or a reason that is no entry and no earlier effect.
         """
         acts = tuple(effects)
-        self._refuse_stale(acts)
-        self._refuse_malformed(acts)
-        made: dict[int, Ref] = {}
+        self._refuse_faulty(acts)
+        made: dict[int, Change] = {}
         changes = []
         for effect in acts:
-            change = self._apply_one(effect, author, cycle, self._reasons(effect, made))
-            made[id(effect)] = change.entry.ref
+            because = self._reasons(effect, made) if effect.because else ()
+            change = made[id(effect)] = self._apply_one(effect, author, cycle, because)
             changes.append(change)
         return tuple(changes)
 
-    def _refuse_stale(self, acts: tuple[Effect, ...]) -> None:
+    def _refuse_faulty(self, acts: tuple[Effect, ...]) -> None:
+        earlier: set[int] = set()
         touched: set[str] = set()
         for effect in acts:
-            if isinstance(effect, Post):
-                continue
-            now = self._current.get(effect.entry.id)
-            if now is None or now.revision != effect.entry.revision or effect.entry.id in touched:
-                again = effect.entry.id in touched
-                state = "touched twice by this act" if again else f"now {now.ref}" if now else "retracted"
-                raise StaleError(f"{effect.entry.ref} is {state}")
-            touched.add(effect.entry.id)
-
-    @staticmethod
-    def _refuse_malformed(acts: tuple[Effect, ...]) -> None:
-        earlier: set[int] = set()
-        for effect in acts:
             for reason in effect.because:
-                if not isinstance(reason, Ref | Entry) and id(reason) not in earlier:
+                if not isinstance(reason, NAMED) and id(reason) not in earlier:
                     expected = "because to hold entries or earlier effects of the same act"
                     raise ValueError(f"expected {expected}, got {reason!r}")
+            earlier.add(id(effect))
+            if not isinstance(effect, Post):
+                self._refuse_stale(effect.entry, touched)
+                touched.add(effect.entry.id)
             if isinstance(effect, Revise) and type(effect.value) is not type(effect.entry.value):
                 raise ValueError(f"expected {effect.entry.ref} to stay a {type(effect.entry.value).__name__}, "
                                  f"got a {type(effect.value).__name__}")
-            earlier.add(id(effect))
+
+    def _refuse_stale(self, seen: Entry[Any], touched: Collection[str]) -> None:
+        now = self._current.get(seen.id)
+        if now is None or now.revision != seen.revision or seen.id in touched:
+            state = f"now {now.ref}" if now else "retracted"
+            raise StaleError(f"{seen.ref} is {'touched twice by this act' if seen.id in touched else state}")
 
     @staticmethod
-    def _reasons(effect: Effect, made: dict[int, Ref]) -> tuple[Ref, ...]:
-        named = (r if isinstance(r, Ref) else r.ref if isinstance(r, Entry) else made[id(r)] for r in effect.because)
-        return tuple(dict.fromkeys(named))
+    def _reasons(effect: Effect, made: Mapping[int, Change]) -> tuple[Ref, ...]:
+        named = [r.ref if isinstance(r, Entry) else r if isinstance(r, Ref) else made[id(r)].entry.ref
+                 for r in effect.because]
+        return tuple(dict.fromkeys(named)) if len(named) > 1 else (named[0],)
 
     def _apply_one(self, effect: Effect, author: str, cycle: int, because: tuple[Ref, ...]) -> Change:
-        if isinstance(effect, Post):
-            kind = type(effect.value)
-            number = self._numbers[kind] = self._numbers.get(kind, 0) + 1
-            entry = Entry(f"{kind.__name__}-{number}", 0, effect.value, author, cycle, because)
-            self._store(entry)
-            return Posted(entry)
+        if isinstance(effect, Retract):
+            return Retracted(self._remove(effect.entry.id), because)
+        kind = type(effect.value)
         if isinstance(effect, Revise):
-            entry = Entry(effect.entry.id, effect.entry.revision + 1, effect.value, author, cycle, because)
-            self._store(entry)
-            return Revised(entry)
-        last = self._current.pop(effect.entry.id)
-        del self._by_type[type(last.value)][last.id]
-        return Retracted(last)
+            id, revision = effect.entry.id, effect.entry.revision + 1
+        else:
+            number = self._numbers[kind] = self._numbers.get(kind, 0) + 1
+            id, revision = f"{kind.__name__}-{number}", 0
+        entry = self._current[id] = Entry(id, revision, effect.value, author, cycle, because)
+        self._shelf(kind).store(entry)
+        return Revised(entry) if revision else Posted(entry)
 
-    def _store(self, entry: Entry[Any]) -> None:
-        self._current[entry.id] = entry
-        self._by_type.setdefault(type(entry.value), {})[entry.id] = entry
+    def forget(self, id: str) -> None:
+        """Let go of an entry that nobody can need any more. That is no change: nobody is told.
 
-    @property
-    def view(self) -> View:
-        return View(self)
+        Raises:
+            KeyError: it is not on the board.
+        """
+        self._remove(id)
+
+    def _remove(self, id: str) -> Entry[Any]:
+        last = self._current.pop(id)
+        return self._shelf(type(last.value)).remove(id)
+
+    def _shelf(self, kind: type[Any]) -> Shelf:
+        shelf = self._shelves.get(kind)
+        if shelf is None:
+            shelf = self._shelves[kind] = Shelf()
+        return shelf
 
 
 class View:
@@ -117,24 +127,39 @@ class View:
         return self._board._current[id]
 
     def is_current(self, entry: Entry[Any]) -> bool:
-        now = self.get(entry.id)
+        now = self._board._current.get(entry.id)
         return now is not None and now.revision == entry.revision
 
     def all(self, kind: type[T]) -> tuple[Entry[T], ...]:
         """Current entries of a type, oldest first."""
-        return tuple(self._board._by_type.get(kind, {}).values())
+        return tuple(self._board._shelf(kind).entries.values())
 
     def newest_first(self, kind: type[T]) -> Iterator[Entry[T]]:
         """Current entries of a type, newest posting first, read one by one."""
-        return reversed(self._board._by_type.get(kind, {}).values())
+        return reversed(self._board._shelf(kind).entries.values())
 
     def latest(self, kind: type[T], where: Callable[[T], bool] = always) -> Entry[T] | None:
-        """The newest posting of a type that satisfies a predicate, or None."""
+        """The newest posting of a type that satisfies a predicate, or None; :meth:`newest` asks no other."""
         return next((entry for entry in self.newest_first(kind) if where(entry.value)), None)
 
     def where(self, kind: type[T], predicate: Callable[[T], bool]) -> tuple[Entry[T], ...]:
-        """Current entries of a type that satisfy a predicate, oldest first."""
+        """Current entries of a type that satisfy a predicate, oldest first; :meth:`having` asks no other."""
         return tuple(entry for entry in self.all(kind) if predicate(entry.value))
+
+    def having(self, index: Index[T], key: Hashable) -> tuple[Entry[T], ...]:
+        """Current entries that an index files under a key, oldest first; takes as long as there are any."""
+        found = self._board._shelf(index.kind).having(index, key)
+        return () if found is None else tuple(found)
+
+    def newest(self, index: Index[T], key: Hashable) -> Entry[T] | None:
+        """The newest posting that an index files under a key, or None; takes the same time however many there are."""
+        shelf = self._board._shelves.get(index.kind)
+        found = None if shelf is None else shelf.having(index, key)
+        return None if found is None else found.newest()
+
+    def since(self, kind: type[T], cycle: int) -> tuple[Entry[T], ...]:
+        """Current entries of a type whose current revision was written in a cycle or later, in that order."""
+        return self._board._shelf(kind).since(cycle)
 
     def __len__(self) -> int:
         return len(self._board._current)

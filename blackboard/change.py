@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from blackboard.entry import Entry
+from blackboard.entry import Entry, Ref
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,13 @@ class Revised(Change):
 
 @dataclass(frozen=True, slots=True)
 class Retracted(Change):
-    """An entry is no longer believed; ``entry`` is its last revision."""
+    """An entry is no longer believed; ``entry`` is its last revision.
+
+    Attributes:
+        because: what the retraction rests on; what the entry rested on stands in the entry.
+    """
+
+    because: tuple[Ref, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +70,10 @@ class Watch:
     kinds: tuple[type[Change], ...] = (Posted, Revised)
     where: Callable[[Any], bool] = always
 
+    def is_for(self, change: type[Change], value: type[Any]) -> bool:
+        """Whether it asks its predicate of such a change of such a value at all."""
+        return issubclass(change, self.kinds) and issubclass(value, self.value_type)
+
     def sees(self, change: Change) -> bool:
         value = change.entry.value
-        return isinstance(change, self.kinds) and isinstance(value, self.value_type) and self.where(value)
+        return self.is_for(type(change), type(value)) and self.where(value)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 T_co = TypeVar("T_co", covariant=True)
@@ -18,8 +17,7 @@ class Ref(NamedTuple):
         return f"{self.id}.{self.revision}"
 
 
-@dataclass(frozen=True, slots=True)
-class Entry(Generic[T_co]):
+class Entry(NamedTuple, Generic[T_co]):
     """One revision on the board.
 
     Attributes:

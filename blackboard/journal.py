@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
-import json
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from enum import Enum
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
 
 from blackboard.activation import Activation, Obviated
-from blackboard.change import Change
-from blackboard.entry import Entry
-from blackboard.level import Level
+from blackboard.change import Change, Retracted
+from blackboard.encoding import encoder_of, plain, quoted
+from blackboard.entry import Entry, Ref
+from blackboard.level import WORDS, Level
 
 
-@dataclass(frozen=True, slots=True)
-class Decision:
+class Decision(NamedTuple):
     """What one cycle saw, weighed and did.
 
     Attributes:
@@ -50,27 +44,6 @@ class Decision:
 Sink = Callable[[Decision], None]
 
 
-def plain(value: Any) -> Any:
-    """A value as JSON types: dataclasses and mappings become objects, arrays lists, bytes their length and SHA-256."""
-    if isinstance(value, Enum):
-        return value.name.lower()
-    if value is None or isinstance(value, bool | int | str):
-        return value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else repr(value)
-    if isinstance(value, bytes):
-        return {"bytes": len(value), "sha256": hashlib.sha256(value).hexdigest()}
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, tuple | list):
-        return [plain(v) for v in value]
-    if hasattr(value, "tolist"):
-        return plain(value.tolist())
-    raise ValueError(f"expected a value of plain data, got a {type(value).__name__}")
-
-
 def entry_record(entry: Entry[Any]) -> dict[str, Any]:
     """An entry as JSON types."""
     return {
@@ -83,7 +56,11 @@ def entry_record(entry: Entry[Any]) -> dict[str, Any]:
 
 
 def change_record(change: Change) -> dict[str, Any]:
-    return {"change": change.kind, **entry_record(change.entry)}
+    """A change as JSON types; a retraction that rests on something says so under ``retracted_because``."""
+    record = {"change": change.kind, **entry_record(change.entry)}
+    if isinstance(change, Retracted) and change.because:
+        record["retracted_because"] = [str(ref) for ref in change.because]
+    return record
 
 
 def activation_record(a: Activation | None) -> dict[str, Any] | None:
@@ -119,4 +96,73 @@ def decision_record(d: Decision) -> dict[str, Any]:
 
 def decision_line(d: Decision) -> str:
     """One line of ``journal.jsonl``, without its newline: the same decision gives the same bytes."""
-    return json.dumps(decision_record(d), separators=(",", ":"), allow_nan=False)
+    return JournalLines()(d)
+
+
+class JournalLines:
+    """The decisions of one run as lines of its journal, one after the other.
+
+    A line is the JSON text of :func:`decision_record`, written without making that first. An activation stands in
+    several lines, as activated, as runner-up and as chosen or obviated; its text is made once and kept until then.
+    """
+
+    def __init__(self) -> None:
+        self._texts: dict[int, tuple[Activation, str]] = {}
+
+    def __call__(self, d: Decision) -> str:
+        """A decision's line, without its newline."""
+        activated = ",".join([self._text(a) for a in d.activated])
+        runner_up = self._text(d.runner_up) if d.runner_up else "null"
+        obviated = ",".join([f'{self._last_text(o.activation)[:-1]},"reason":{quoted(o.reason)}}}' for o in d.obviated])
+        chosen = self._last_text(d.chosen) if d.chosen else "null"
+        return (
+            f'{{"cycle":{d.cycle},"focus":"{WORDS[d.focus]}","observed":[{_changes(d.observed)}],"seen":[{_seen(d.seen)}],'
+            f'"activated":[{activated}],"obviated":[{obviated}],"chosen":{chosen},"runner_up":{runner_up},'
+            f'"pending":{d.pending},"made":[{_changes(d.made)}],"refused":{quoted(d.refused)}}}'
+        )
+
+    def _text(self, a: Activation) -> str:
+        known = self._texts.get(a.number)
+        if known is not None and known[0] is a:
+            return known[1]
+        text = _activation(a)
+        self._texts[a.number] = a, text
+        return text
+
+    def _last_text(self, a: Activation) -> str:
+        known = self._texts.pop(a.number, None)
+        return known[1] if known is not None and known[0] is a else _activation(a)
+
+
+def _activation(a: Activation) -> str:
+    source, trigger, rating = a.source, a.trigger, a.rating
+    entry = trigger.entry
+    return (
+        f'{{"number":{a.number},"source":{quoted(source.name)},"level":"{WORDS[source.level]}",'
+        f'"trigger":{quoted(f"{entry.id}.{entry.revision}")},"kind":"{type(trigger).__name__}",'
+        f'"rating":{encoder_of(type(rating))(rating)},"since":{a.cycle}}}'
+    )
+
+
+def _changes(changes: tuple[Change, ...]) -> str:
+    return ",".join([_change(c) for c in changes]) if changes else ""
+
+
+def _change(change: Change) -> str:
+    e = change.entry
+    kind = type(e.value)
+    reasons = ""
+    if isinstance(change, Retracted) and change.because:
+        reasons = f',"retracted_because":[{_refs(change.because)}]'
+    return (
+        f'{{"change":"{type(change).__name__}","entry":{quoted(f"{e.id}.{e.revision}")},"type":{quoted(kind.__name__)},'
+        f'"author":{quoted(e.author)},"because":[{_refs(e.because)}],"value":{encoder_of(kind)(e.value)}{reasons}}}'
+    )
+
+
+def _refs(refs: Iterable[Ref]) -> str:
+    return ",".join([quoted(f"{id}.{revision}") for id, revision in refs])
+
+
+def _seen(changes: Iterable[Change]) -> str:
+    return ",".join([quoted(f"{c.entry.id}.{c.entry.revision}") for c in changes])

@@ -28,22 +28,28 @@ class KnowledgeSource(ABC):
     watches: ClassVar[tuple[Watch, ...]]
     writes: ClassVar[tuple[type[Any], ...]]
 
+    _called: ClassVar[str]
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        cls._called = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+
     @property
     def name(self) -> str:
         """Its class name in snake case, as in the folder listing."""
-        return re.sub(r"(?<!^)(?=[A-Z])", "_", type(self).__name__).lower()
+        return self._called
 
     def rate(self, view: View, trigger: Change) -> float | None:
         """How well it could answer this trigger, 0..1; None when it could not. Pure."""
         return 0.5
 
     def still_valid(self, view: View, trigger: Change) -> bool:
-        """Asked again each cycle until it acts: does the trigger still stand, and could it still answer? Pure.
+        """Whether the trigger still stands; :meth:`rate` then tells whether it could be answered. Pure.
 
-        A trigger stands while its entry is the current revision; a retraction stands for good.
+        A trigger stands while its entry is the current revision; a retraction stands for good. It is asked when the
+        trigger's entry has changed, and again, with ``rate``, when the knowledge source is about to be chosen.
         """
-        stands = isinstance(trigger, Retracted) or view.is_current(trigger.entry)
-        return stands and self.rate(view, trigger) is not None
+        return isinstance(trigger, Retracted) or view.is_current(trigger.entry)
 
     @abstractmethod
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:

@@ -18,4 +18,7 @@ class Level(IntEnum):
         return Level(self + 1)
 
     def __str__(self) -> str:
-        return self.name.lower()
+        return WORDS[self]
+
+
+WORDS = tuple(level.name.lower() for level in Level)

@@ -1,23 +1,26 @@
 """Scheduler: one cycle takes the changes, lets the experts bid, executes one act and journals it.
 
-Order of a cycle: changes of the last cycle -> ask all that is pending ``still_valid`` again, and obviate what is not ->
-activate the watchers -> choose (pure) -> act -> apply -> journal -> ports. The journal has the decision before any port
-sees it, so that nothing reaches the motors that is not written down.
+Order of a cycle: changes of the last cycle -> obviate what they made stale -> activate the watchers -> choose (pure),
+asking the best whether it still holds, and obviating it if not -> act -> apply -> journal -> ports. The journal has the
+decision before any port sees it, so that nothing reaches the motors that is not written down. What a cycle costs does
+not depend on how much is pending.
 """
 
 from __future__ import annotations
 
 import traceback
-from collections.abc import Iterable, Sequence
-from typing import Protocol
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Protocol
 
 from blackboard.activation import Activation, Obviated
 from blackboard.agenda import Agenda
 from blackboard.board import Blackboard, StaleError, View
-from blackboard.change import Change
+from blackboard.change import Change, Posted, always
 from blackboard.effect import Effect, kind_of
 from blackboard.journal import Decision, Sink
 from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from blackboard.retention import Forget, Retention
 from blackboard.servoing import Servoing
 
 RAISED = "raised: "
@@ -34,6 +37,10 @@ class Port(Protocol):
         """The observations that follow from a change; nothing for changes that do not concern it."""
 
 
+Watchers = tuple[tuple[KnowledgeSource, tuple[Callable[[Any], bool], ...]], ...]
+"""Who watches for a kind of change, each with the predicates of which one must hold; none where any value will do."""
+
+
 class Scheduler:
     """Runs knowledge sources round a board."""
 
@@ -44,24 +51,24 @@ class Scheduler:
         ports: Sequence[Port] = (),
         servoing: Servoing | None = None,
         sinks: Sequence[Sink] = (),
+        retention: Sequence[Forget[Any]] = (),
     ) -> None:
         names = [source.name for source in sources]
         if len(set(names)) != len(names):
             raise ValueError(f"expected knowledge sources of different names, got {names}")
         self.board = Blackboard()
+        self.view: View = self.board.view
         self.cycle = 0
         self._servoing = servoing or Servoing()
         self._sources = tuple(s for s in sources if self._servoing.allows(s.closes))
+        self._watchers: dict[tuple[type[Change], type[Any]], Watchers] = {}
         self._ports = tuple(ports)
         self._sinks = tuple(sinks)
         self._agenda = Agenda()
+        self._retention = Retention(retention) if retention else None
         self._numbers = 0
         self._unseen: tuple[Change, ...] = ()
         self._observed: tuple[Change, ...] = ()
-
-    @property
-    def view(self) -> View:
-        return self.board.view
 
     def tell(self, effects: Iterable[Effect], author: str) -> tuple[Change, ...]:
         """Put something on the board from outside (a command, an observation); it is seen in the next cycle."""
@@ -72,21 +79,22 @@ class Scheduler:
 
     def step(self) -> Decision | None:
         """Run one cycle; None when nothing is left to see and nothing to do."""
-        if not self._unseen and not len(self._agenda):
+        seen, observed = self._unseen, self._observed
+        if not seen and not len(self._agenda):
             return None
+        self._unseen = self._observed = ()
         self.cycle += 1
-        seen, self._unseen = self._unseen, ()
-        observed, self._observed = self._observed, ()
         obviated: list[Obviated] = []
         activated: list[Activation] = []
         fault = self._hear_bids(seen, activated, obviated)
+        if self._retention is not None:
+            self._retention.sweep(seen, self.board, self._agenda)
         focus = self._servoing.focus(self.view)
-        ranked = () if fault else self._servoing.choose(self._agenda, focus)
-        chosen = ranked[0] if ranked else None
+        chosen, runner_up, fault = (None, None, fault) if fault else self._two_best(focus, obviated)
         made, refused = self._execute(chosen) if chosen else ((), fault)
         decision = Decision(
-            self.cycle, seen, observed, focus, tuple(activated), tuple(obviated), chosen,
-            ranked[1] if len(ranked) > 1 else None, len(self._agenda), made, refused,
+            self.cycle, seen, observed, focus, tuple(activated), tuple(obviated), chosen, runner_up,
+            len(self._agenda), made, refused,
         )
         self._unseen = made
         for sink in self._sinks:
@@ -94,42 +102,103 @@ class Scheduler:
         self._tell_ports(made)
         return decision
 
-    def _holds(self, activation: Activation) -> bool:
-        return activation.source.still_valid(self.view, activation.trigger)
-
     def _hear_bids(self, seen: tuple[Change, ...], activated: list[Activation], obviated: list[Obviated]) -> str:
-        """Drops what no longer holds, activates the watchers; tells how an expert raised, if so: then nobody acts."""
+        """Drops what is stale, activates the watchers; tells how an expert raised, if so: then nobody acts."""
         try:
-            obviated += self._agenda.obviate(self._holds)
-            bids = (self._activation(source, change, obviated) for change in seen for source in self._sources)
-            activated += (bid for bid in bids if bid is not None)
+            for change in seen:
+                if not isinstance(change, Posted):
+                    self._drop_stale(change.entry.id, obviated)
+            for change in seen:
+                value = change.entry.value
+                for source, wheres in self._watching(type(change), type(value)):
+                    if not wheres or any(where(value) for where in wheres):
+                        self._activate(source, change, activated, obviated)
         except Exception:  # whatever an expert does wrong is journalled, never lost
             return RAISED + traceback.format_exc(limit=-4)
         return ""
 
-    def _activation(self, source: KnowledgeSource, change: Change, obviated: list[Obviated]) -> Activation | None:
-        if not any(watch.sees(change) for watch in source.watches) or not source.still_valid(self.view, change):
-            return None
-        rating = source.rate(self.view, change)
+    def _drop_stale(self, id: str, obviated: list[Obviated]) -> None:
+        """What was triggered by an earlier revision of an entry that changed goes."""
+        for activation in self._agenda.triggered_by(id):
+            if not activation.source.still_valid(self.view, activation.trigger):
+                self._agenda.take(activation)
+                obviated.append(Obviated(activation, self._staleness(activation.trigger)))
+
+    def _staleness(self, trigger: Change) -> str:
+        now = self.view.get(trigger.entry.id)
+        return f"stale trigger: {trigger.entry.ref} is {f'now {now.ref}' if now else 'retracted'}"
+
+    def _watching(self, change: type[Change], value: type[Any]) -> Watchers:
+        watchers = self._watchers.get((change, value))
+        if watchers is None:
+            watchers = self._watchers[change, value] = self._watchers_of(change, value)
+        return watchers
+
+    def _watchers_of(self, change: type[Change], value: type[Any]) -> Watchers:
+        found = ((source, [w.where for w in source.watches if w.is_for(change, value)]) for source in self._sources)
+        return tuple((source, () if always in wheres else tuple(wheres)) for source, wheres in found if wheres)
+
+    def _activate(
+        self, source: KnowledgeSource, change: Change, activated: list[Activation], obviated: list[Obviated]
+    ) -> None:
+        rating = source.rate(self.view, change) if source.still_valid(self.view, change) else None
         if rating is None:
-            return None
+            return
         if not 0.0 <= rating <= 1.0:
             raise ValueError(f"expected a rating of 0..1 from {source.name}, got {rating}")
         self._numbers += 1
         activation = Activation(self._numbers, source, change, rating, self.cycle)
+        activated.append(activation)
         replaced = self._agenda.add(activation)
-        if replaced:
+        if replaced is not None:
             obviated.append(replaced)
-        return activation
+
+    def _two_best(
+        self, focus: Level, obviated: list[Obviated]
+    ) -> tuple[Activation | None, Activation | None, str]:
+        """The activation to be executed, taken from the agenda, and the next best; or how an expert raised."""
+        chosen: Activation | None = None
+        try:
+            chosen = self._best(focus, obviated)
+            if chosen is None:
+                return None, None, ""
+            self._agenda.take(chosen)
+            return chosen, self._best(focus, obviated), ""
+        except Exception:
+            if chosen is not None:
+                self._agenda.add(chosen)
+            return None, None, RAISED + traceback.format_exc(limit=-4)
+
+    def _best(self, focus: Level, obviated: list[Obviated]) -> Activation | None:
+        """The best that is pending and still holds; what is better and does not is obviated."""
+        while (best := self._agenda.best(self._servoing.nearest(focus))) is not None:
+            if best.cycle == self.cycle:  # it was asked in this cycle, and the board is as it was then
+                return best
+            reason = "raised when it was asked"
+            try:
+                reason = self._objection(best)
+            finally:
+                if reason:
+                    self._agenda.take(best)
+                    obviated.append(Obviated(best, reason))
+            if not reason:
+                return best
+        return None
+
+    def _objection(self, activation: Activation) -> str:
+        """Why an activation no longer holds, or ""."""
+        source, trigger = activation.source, activation.trigger
+        if not source.still_valid(self.view, trigger):
+            return self._staleness(trigger)
+        return "could not answer any more" if source.rate(self.view, trigger) is None else ""
 
     def _execute(self, chosen: Activation) -> tuple[tuple[Change, ...], str]:
-        self._agenda.take(chosen)
         source = chosen.source
         try:
             effects = tuple(source.act(self.view, chosen.trigger))
-            alien = sorted({kind_of(e).__name__ for e in effects if kind_of(e) not in source.writes})
+            alien = [kind.__name__ for kind in map(kind_of, effects) if kind not in source.writes]
             if alien:
-                return (), f"{source.name} may not write {', '.join(alien)}"
+                return (), f"{source.name} may not write {', '.join(sorted(set(alien)))}"
             return self.board.apply(effects, author=source.name, cycle=self.cycle), ""
         except StaleError as error:
             return (), f"stale: {error}"

@@ -11,11 +11,12 @@ level is in focus while all open discrepancies belong to it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 
-from blackboard.activation import Activation
 from blackboard.board import View
+from blackboard.index import Index
 from blackboard.level import Level
 
 
@@ -71,6 +72,21 @@ class Discrepancy:
         return replace(self, status="escalated"), replace(self, level=self.level.above, magnitude=None)
 
 
+OPEN: Index[Discrepancy] = Index(Discrepancy, lambda found: found.level if found.is_open else None)
+"""Open discrepancies by their level."""
+
+
+def _nearest(focus: Level) -> tuple[tuple[Level, ...], ...]:
+    def distance(level: Level) -> int:
+        return abs(level - focus)
+
+    return tuple(tuple(group) for _, group in groupby(sorted(Level, key=distance), key=distance))
+
+
+NEAREST: Mapping[Level, tuple[tuple[Level, ...], ...]] = {focus: _nearest(focus) for focus in Level}
+"""For each level in focus: all levels in groups, nearest first."""
+
+
 @dataclass(frozen=True, slots=True)
 class Servoing:
     """Which levels are switched on, and how the next activation is chosen."""
@@ -83,13 +99,15 @@ class Servoing:
 
     def focus(self, view: View) -> Level:
         """The highest level with an open discrepancy; action where there is none."""
-        levels = (e.value.level for e in view.newest_first(Discrepancy) if e.value.is_open)
-        return max(levels, default=Level.ACTION)
+        for level in (Level.GOAL, Level.PLAN):
+            if view.newest(OPEN, level) is not None:
+                return level
+        return Level.ACTION
 
-    def key(self, activation: Activation, focus: Level) -> tuple[int, float, int]:
-        """Sorts first what is nearest to the focus, then the best rated, then the oldest."""
-        return abs(activation.source.level - focus), -activation.rating, activation.number
+    def nearest(self, focus: Level) -> tuple[tuple[Level, ...], ...]:
+        """The levels, nearest to the focus first; two that are equally near stand together. Pure.
 
-    def choose(self, pending: Iterable[Activation], focus: Level) -> tuple[Activation, ...]:
-        """Pending activations, the chosen one first, the runner-up second. Pure."""
-        return tuple(sorted(pending, key=lambda a: self.key(a, focus)))
+        This is the choice rule: the best rated activation of the nearest level that has any is executed, and of equally
+        rated ones the oldest.
+        """
+        return NEAREST[focus]

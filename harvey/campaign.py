@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import os
 import re
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from blackboard.journal import Sink
 from harvey.errors import BadInput
-from harvey.run_directory import new_run
-from harvey.tally import Tally
+from harvey.run_directory import RunDirectory, new_run
 
 if TYPE_CHECKING:
     from harvey.referee import MissionResult
+    from harvey.tally import Tally
     from sim.assembly import Stage
 
-Follow = Callable[[Tally], Sink]
+Follow = Callable[["Tally"], Sink]
 """Makes the sink that shows what a tally counts; it is called after the tally."""
 
 WORKERS = 2
@@ -41,12 +40,16 @@ class Task:
         settings: (key, value) as in ``--set key=value``.
         seed: of all chance.
         out: its run directory; None keeps nothing.
+        body: how the simulated body is reached.
+        go_on: keep what is in ``out`` of this mission already, and go on where it was cut off.
     """
 
     scenario: str
     settings: tuple[tuple[str, str], ...]
     seed: int
     out: Path | None = None
+    body: str = "simulated"
+    go_on: bool = False
 
     @property
     def named(self) -> str:
@@ -91,16 +94,32 @@ def run_task(
     """Run one mission; ``follow`` makes a sink that shows what is counted. Raises BadInput for what the user gave."""
     stage = task.stage()
     from harvey.mission import run_mission
+    from harvey.tally import Tally
 
-    out = None if task.out is None else new_run(task.out)
     tally = Tally(stage)
     shown = (tally, follow(tally)) if follow else ()
-    if out is not None:
-        write_origin(out, {"scenario": stage.scenario.name, "seed": task.seed, "outcome": "unfinished"}, task)
-    result = run_mission(stage, task.seed, out=out, sinks=(*shown, *sinks), live=live)
-    if out is not None:
-        write_origin(out, result.record(), task)
-    return result
+    if task.go_on and task.out is not None and (task.out / "run.json").exists():
+        return _kept_or_resumed(RunDirectory(task.out), task, stage, (*shown, *sinks), live)
+    out = None if task.out is None else new_run(task.out)
+    return run_mission(stage, task.seed, out=out, sinks=(*shown, *sinks), live=live, body=task.body)
+
+
+def _kept_or_resumed(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence[Sink], live: bool) -> MissionResult:
+    """What an earlier campaign did of this mission. Raises BadInput where another mission is there."""
+    from harvey.mission import head_of
+    from harvey.referee import MissionResult
+    from harvey.resume import remains_of, resume
+    from harvey.run_head import RunHead
+
+    if not RunHead.read(run.path).is_like(head_of(stage, task.seed, task.body)):
+        raise BadInput(f"{run.path}: expected a run of {task.named}, got one that began otherwise")
+    remains, record = remains_of(run), run.read_result()
+    if remains.outcome is None or record.get("outcome") != remains.outcome.kind:
+        return resume(run, remains, sinks=sinks, live=live, stage=stage)
+    try:
+        return MissionResult(**record)
+    except TypeError as error:
+        raise BadInput(f"{run.result}: {error}") from None
 
 
 def run_all(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Task, MissionResult]]:
@@ -123,14 +142,6 @@ def run_all(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Tas
         raise
     finally:
         pool.shutdown()
-
-
-def write_origin(out: Path, record: Mapping[str, Any], task: Task) -> None:
-    """Write ``result.json`` with the file and settings that the run came from, so that it can be decided again."""
-    origin = {"file": str(Path(task.scenario).resolve()) if task.scenario.endswith(".toml") else task.scenario,
-              "settings": dict(task.settings)}
-    text = json.dumps({**record, "origin": origin}, indent=2) + "\n"
-    (out / "result.json").write_text(text, encoding="utf-8")
 
 
 def _become_worker() -> None:

@@ -90,8 +90,8 @@ def _same(a: EntryRecord, b: EntryRecord) -> bool:
 def _values(a: EntryRecord, b: EntryRecord) -> list[str]:
     """The differing leaves of two records of the same entry."""
     pairs = (("author", a.author, b.author), ("change", a.change, b.change), ("rests on", a.because, b.because))
-    lines = [f"{name}: {_short(x)} against {_short(y)}" for name, x, y in pairs if x != y]
-    leaves = [f"{path}: {_short(x)} against {_short(y)}" for path, x, y in differing_leaves(a.value, b.value)]
+    lines = [f"{name}: {short(x)} against {short(y)}" for name, x, y in pairs if x != y]
+    leaves = [f"{path}: {short(x)} against {short(y)}" for path, x, y in differing_leaves(a.value, b.value)]
     more = [f"and {len(leaves) - MOST} more values"] if len(leaves) > MOST else []
     return lines + leaves[:MOST] + more
 
@@ -108,7 +108,8 @@ def differing_leaves(a: Any, b: Any, path: str = "") -> Iterator[tuple[str, Any,
         yield path or "value", a, b
 
 
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
+    """A value in a few words."""
     text = f"{len(value)} values" if isinstance(value, list) and len(value) > 4 else str(value)
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 

@@ -2,28 +2,40 @@
 
 from __future__ import annotations
 
-import json
+import shutil
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import replace
 from pathlib import Path
 
-from blackboard.change import Quiescence
 from blackboard.effect import Post
-from blackboard.journal import Sink, decision_line
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.scheduler import RAISED, Scheduler
-from harvey.ports import BodyPort
+from blackboard.journal import Decision, Sink
+from blackboard.scheduler import Scheduler
+from harvey.diary import Diary
+from harvey.loop import until_outcome
+from harvey.minds import Mind, Sources, mind_of
+from harvey.ports import Body, BodyPort
 from harvey.referee import MissionResult, Referee
-from harvey.wiring import command, knowledge_sources, robot_model, servoing
-from logs.journal_file import JournalFile
-from logs.sink import Recorder
+from harvey.run_directory import RunDirectory
+from harvey.run_head import SIMULATOR, RunHead
+from harvey.serial_body import IN_PROCESS, reached
+from harvey.wiring import command, knowledge_sources, robot_model
+from logs.disk import CannotWriteError
+from logs.errors import RecordingError
 from sim.assembly import Stage
 from sim.body import SimulatedBody
-from sim.scenario import Limits, Scenario
-from world_models.frames import Pose2
+from sim.scenario import Limits
 from world_models.location import Hypothesis
-from world_models.robot import RobotModel
 from world_models.task import Outcome
+
+Around = Callable[[Body, Callable[[], bool]], Body]
+"""Puts something between the mind and the body; the second argument tells whether the run is only told again."""
+
+LEAST_FREE = 1 << 18
+"""A disk with less room than this is full [bytes]."""
+UNFINISHED = "unfinished"
+"""The outcome in ``result.json`` of a run that has none yet."""
 
 
 def run_mission(
@@ -33,86 +45,123 @@ def run_mission(
     out: Path | None = None,
     sinks: Sequence[Sink] = (),
     live: bool = False,
-    sources: Callable[[RobotModel], Sequence[KnowledgeSource]] = knowledge_sources,
+    sources: Sources = knowledge_sources,
+    head: RunHead | None = None,
+    body: str = IN_PROCESS,
+    around: Around = lambda body, _retelling: body,
 ) -> MissionResult:
     """Run a scenario's mission to its outcome.
 
     Args:
-        out: directory for ``recording.rrd``, ``journal.jsonl`` and ``result.json``; None keeps nothing.
+        out: directory for the files of :mod:`harvey.run_directory`; None keeps nothing.
         sinks: told of every decision.
         live: let a viewer watch.
         sources: which experts sit round the board.
+        head: how the run begins, if otherwise than the scenario says.
+        body: how the body is reached (:func:`harvey.serial_body.reached`), where ``head`` does not say it.
+        around: puts something between the mind and the body.
     """
-    began = time.perf_counter()
-    scenario, robot, body = stage.scenario, robot_model(stage.scenario), stage.body(seed)
-    referee, diary = Referee(robot, body), _Diary(out, robot, scenario, seed, live)
-    scheduler = Scheduler(
-        sources(robot),
-        ports=(BodyPort(body),),
-        servoing=servoing(scenario.servo),
-        sinks=(*diary.sinks, referee, *sinks),
-    )
-    scheduler.tell([Post(command(scenario))], "user")
-    try:
-        outcome = _to_the_end(scheduler, scenario.limits, body, diary)
-    finally:
-        diary.close()
-    belief = scheduler.view.latest(Hypothesis, lambda h: h.is_held)
-    result = referee.result(stage, seed, outcome, None if belief is None else belief.value, time.perf_counter() - began)
-    if out is not None:
-        (out / "result.json").write_text(json.dumps(result.record(), indent=2) + "\n", encoding="utf-8")
-    return result
+    head = head or head_of(stage, seed, body)
+    run = None if out is None else RunDirectory(out)
+    with mind_of(head, sources) as mind:
+        diary = Diary(run, head, mind.robot, live=live)
+        mission = Mission(stage, head, mind, diary, sinks, around)
+        return mission.driven(run, mission.begin)
 
 
-class _Diary:
-    """The files of a run."""
-
-    def __init__(self, out: Path | None, robot: RobotModel, scenario: Scenario, seed: int, live: bool) -> None:
-        self._journal: JournalFile | None = None
-        self._recorder: Recorder | None = None
-        if out is not None:
-            out.mkdir(parents=True, exist_ok=True)
-            self._journal = JournalFile(out / "journal.jsonl")
-        if out is not None or live:
-            self._recorder = Recorder(
-                None if out is None else out / "recording.rrd",
-                world=robot.world, camera=robot.camera, mount=robot.mount, live=live,
-                title=f"harvey {scenario.name}", recording_id=f"{scenario.name}-{seed}",
-                line_of=decision_line if self._journal is None else self._journal.line,
-            )
-
-    @property
-    def sinks(self) -> tuple[Sink, ...]:
-        return tuple(sink for sink in (self._journal, self._recorder) if sink is not None)
-
-    def truth(self, pose: Pose2, sim_time_s: float) -> None:
-        if self._recorder is not None:
-            self._recorder.truth(pose, sim_time_s)
-
-    def close(self) -> None:
-        for sink in (self._journal, self._recorder):
-            if sink is not None:
-                sink.close()
+def head_of(stage: Stage, seed: int, body: str = IN_PROCESS) -> RunHead:
+    """How a run of a scenario begins."""
+    s = stage.scenario
+    return RunHead.of(SIMULATOR, s.name, seed, s.world, robot_model(s), s.servo, command(s), scenario=s.data,
+                      folder=str(s.folder), body=body)
 
 
-def _to_the_end(scheduler: Scheduler, limits: Limits, body: SimulatedBody, diary: _Diary) -> Outcome:
-    """Cycle until an outcome is on the board, a limit is reached, or the board falls still for good."""
-    told_still = -1
-    while (declared := scheduler.view.latest(Outcome)) is None:
-        diary.truth(body.truth.world_from_robot, body.truth.time_s)
-        decision = scheduler.step()
-        if decision is None:
-            if told_still == scheduler.cycle:
-                return _declared(scheduler, "failed", "the board fell still and nobody declared an outcome")
-            scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
-            told_still = scheduler.cycle + 1
-        elif decision.refused.startswith(RAISED):
-            who = decision.chosen.source.name if decision.chosen else "an expert that was asked"
-            return _declared(scheduler, "failed", f"{who} raised {decision.refused.strip().splitlines()[-1]}")
-        elif (over := _over(limits, scheduler, body)) is not None:
-            return _declared(scheduler, "failed", over)
-    scheduler.step()  # the outcome itself is seen, so that it stands in the journal
-    return declared.value
+class Mission:
+    """One run: mind, simulated body and diary put together.
+
+    Attributes:
+        port: the body's, as the mind has it, but without the diary.
+        body: what is behind it; seed: of all its chance.
+        scheduler: the mind at work.
+    """
+
+    def __init__(
+        self, stage: Stage, head: RunHead, mind: Mind, diary: Diary, sinks: Sequence[Sink] = (),
+        around: Around = lambda body, _retelling: body,
+    ) -> None:
+        self._began, self._stage, self._head, self._mind = time.perf_counter(), stage, head, mind
+        self.seed = head.seed
+        self.body = stage.body(head.seed)
+        self._opened = ExitStack()
+        self.port = BodyPort(around(
+            self._opened.enter_context(reached(self.body, head.body)), lambda: diary.retelling))
+        self.diary = diary
+        self.kept = diary.kept(self.port)
+        self._referee = Referee(mind.robot, self.body)
+        self.scheduler: Scheduler = mind.scheduler(ports=(self.kept,), sinks=(*diary.sinks, self._referee, *sinks))
+
+    def begin(self) -> Outcome:
+        """From the command to the outcome."""
+        self.scheduler.tell([Post(self._head.task())], "user")
+        return self.go_on()
+
+    def go_on(self, last: Decision | None = None) -> Outcome:
+        """To the outcome, from wherever the board is; ``last`` is the last decision of a run that was cut off."""
+        return until_outcome(self.scheduler, over=self.over, before=self.tell_truth, last=last)
+
+    def over(self, scheduler: Scheduler) -> str | None:
+        """Why it has to end now, if it has."""
+        return _over(self._stage.scenario.limits, scheduler, self.body)
+
+    def tell_truth(self) -> None:
+        """Where the robot is, for the drawing."""
+        self.diary.truth(self.body.truth.world_from_robot, self.body.truth.time_s)
+
+    def driven(self, run: RunDirectory | None, drive: Callable[[], Outcome]) -> MissionResult:
+        """Drive, keep the result, and close the diary however it ends.
+
+        A disk that takes no more stops the run: the simulated robot stands by then, as nobody commands it, and what was
+        written before is whole, so that the run may go on when there is room.
+        """
+        try:
+            if run is not None:
+                run.write_result({"scenario": self._head.name, "seed": self._head.seed, "outcome": UNFINISHED})
+            outcome = drive()
+        except (CannotWriteError, RecordingError) as error:
+            outcome = stopped(run, error)
+        except BaseException:
+            self._close()
+            raise
+        undrawn = self._close()
+        result = self.result(replace(outcome, reason=outcome.reason + undrawn))
+        if run is not None:
+            with suppress(OSError):  # where the disk is full, the outcome that is there, unfinished, is true as well
+                run.write_result(result.record())
+        return result
+
+    def _close(self) -> str:
+        """Close the files; what to say where the recording's last part could not be written: it can be drawn anew."""
+        self._opened.close()
+        try:
+            self.diary.close()
+        except RecordingError:
+            return "; the last part of its recording is not written (harvey repair draws it anew)"
+        return ""
+
+    def result(self, outcome: Outcome) -> MissionResult:
+        """How it went, by the truth."""
+        belief = self.scheduler.view.latest(Hypothesis, lambda h: h.is_held)
+        took_s = time.perf_counter() - self._began
+        return self._referee.result(
+            self._stage, self._head.seed, outcome, None if belief is None else belief.value, took_s)
+
+
+def stopped(run: RunDirectory | None, error: Exception) -> Outcome:
+    """How a run ends whose diary cannot be written any more."""
+    full = run is not None and shutil.disk_usage(run.path).free < LEAST_FREE
+    why = f"{error} (the disk is full)" if full else str(error)
+    go_on = "" if run is None else f"; harvey resume {run.path} goes on with it"
+    return Outcome("failed", f"stopped, because nothing more can be written down: {why}{go_on}")
 
 
 def _over(limits: Limits, scheduler: Scheduler, body: SimulatedBody) -> str | None:
@@ -126,11 +175,3 @@ def _over(limits: Limits, scheduler: Scheduler, body: SimulatedBody) -> str | No
     if scheduler.cycle >= limits.max_cycles:
         return f"not there after {scheduler.cycle} cycles"
     return None
-
-
-def _declared(scheduler: Scheduler, kind: str, reason: str) -> Outcome:
-    """An outcome that nobody on the board declared; it is put there, and so into the journal."""
-    outcome = Outcome(kind, reason)
-    scheduler.tell([Post(outcome)], "mission")
-    scheduler.step()
-    return outcome

@@ -1,7 +1,8 @@
-"""What was observed, as values again: from the journal's JSON and, for pictures, the recording's bytes."""
+"""What was observed, as values again: from the journal's JSON and, for pictures, the camera's bytes."""
 
 from __future__ import annotations
 
+import collections.abc
 import dataclasses
 import hashlib
 import types
@@ -14,10 +15,12 @@ from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref
 from harvey.errors import BadInput
 from harvey.records import EntryRecord
-from world_models.body import Frame, MotionReport
-from world_models.task import Command, Outcome
+from world_models.body import BodyFault, Frame, MotionReport, Recovery
+from world_models.task import Command, Outcome, Resumed
 
-OBSERVED: Mapping[str, type[Any]] = {t.__name__: t for t in (Command, MotionReport, Frame, Quiescence, Outcome)}
+OBSERVED: Mapping[str, type[Any]] = {
+    t.__name__: t for t in (Command, MotionReport, Frame, BodyFault, Recovery, Quiescence, Outcome, Resumed)
+}
 """The types of value that come from outside."""
 
 
@@ -37,7 +40,9 @@ def effect_of(record: EntryRecord, frames: Mapping[int, bytes], current: Callabl
     entry = current(record.id)
     if entry is None:
         raise BadInput(f"{record.ref}: expected an entry on the board, got none")
-    return Retract(entry, because) if record.change == "Retracted" else Revise(entry, value_of(record, frames), because)
+    if record.change == "Retracted":
+        return Retract(entry, tuple(_ref(text) for text in record.retracted_because))
+    return Revise(entry, value_of(record, frames), because)
 
 
 def value_of(record: EntryRecord, frames: Mapping[int, bytes]) -> Any:
@@ -48,7 +53,7 @@ def value_of(record: EntryRecord, frames: Mapping[int, bytes]) -> Any:
     if record.type == "Frame" and isinstance(value, dict):
         value["jpeg"] = _picture(record, value, frames)
     try:
-        return _decoded(value, OBSERVED[record.type])
+        return decoded(value, OBSERVED[record.type])
     except (ValueError, TypeError) as error:
         raise BadInput(f"{record.ref}: {error}") from None
 
@@ -57,18 +62,26 @@ def _picture(record: EntryRecord, value: Mapping[str, Any], frames: Mapping[int,
     """The bytes of a frame, after checking that they are those that the journal saw."""
     number, seen = value.get("number"), value.get("jpeg")
     if not isinstance(number, int) or number not in frames:
-        raise BadInput(f"{record.ref}: expected picture {number} in the recording, which has {len(frames)} pictures")
+        raise BadInput(f"{record.ref}: expected picture {number} among those that were kept, which are {len(frames)}")
     jpeg = frames[number]
     if not isinstance(seen, dict) or hashlib.sha256(jpeg).hexdigest() != seen.get("sha256"):
         raise BadInput(f"{record.ref}: expected the picture that the journal saw, got another one for number {number}")
     return jpeg
 
 
-def _decoded(value: Any, hint: Any) -> Any:
-    """A value of the type that a hint names, from JSON types. Numbers stay as they were written."""
+def decoded(value: Any, hint: Any) -> Any:
+    """A value of the type that a hint names, from JSON types. Numbers stay as they were written.
+
+    Raises:
+        ValueError: it is of another type; names what was expected and what came.
+    """
     origin = typing.get_origin(hint)
     if origin in (types.UnionType, typing.Union):
-        return None if value is None else _decoded(value, next(a for a in typing.get_args(hint) if a is not type(None)))
+        return None if value is None else decoded(value, next(a for a in typing.get_args(hint) if a is not type(None)))
+    if origin is collections.abc.Mapping:
+        if not isinstance(value, dict):
+            raise ValueError(f"expected an object, got {value!r}")
+        return value
     if origin is tuple:
         return _tuple(value, typing.get_args(hint))
     if dataclasses.is_dataclass(hint) and isinstance(hint, type):
@@ -86,15 +99,20 @@ def _tuple(value: Any, hints: tuple[Any, ...]) -> tuple[Any, ...]:
     kinds = hints[:1] * len(value) if Ellipsis in hints else hints
     if len(kinds) != len(value):
         raise ValueError(f"expected {len(kinds)} items, got {value!r}")
-    return tuple(_decoded(item, kind) for item, kind in zip(value, kinds, strict=True))
+    return tuple(decoded(item, kind) for item, kind in zip(value, kinds, strict=True))
 
 
 def _dataclass(value: Any, kind: type[Any]) -> Any:
     hints = typing.get_type_hints(kind)
     names = [field.name for field in dataclasses.fields(kind)]
     if not isinstance(value, dict) or sorted(value) != sorted(names):
-        raise ValueError(f"expected {kind.__name__} with {', '.join(names)}, got {value!r}")
-    return kind(**{name: _decoded(value[name], hints[name]) for name in names})
+        raise ValueError(f"expected {kind.__name__} with {', '.join(names)}, got {_brief(value)}")
+    return kind(**{name: decoded(value[name], hints[name]) for name in names})
+
+
+def _brief(value: Any) -> str:
+    text = f"the keys {', '.join(value)}" if isinstance(value, dict) else repr(value)
+    return text if len(text) < 300 else text[:297] + "..."
 
 
 def _ref(text: str) -> Ref:

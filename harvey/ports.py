@@ -3,39 +3,82 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Protocol
+from dataclasses import replace
+from typing import Any, Protocol
 
 from blackboard.change import Change, Posted
-from blackboard.effect import Effect, Post
-from world_models.body import Frame, Look, MotionReport, MotorCommand
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from world_models.body import BodyFault, Frame, Look, MotionReport, MotorCommand, Recovery
 
 
 class Body(Protocol):
-    """A robot, simulated or of metal."""
+    """A robot, simulated or of metal. What goes wrong is a value too, never an exception; the robot stands then."""
 
-    def execute(self, command: MotorCommand, /) -> MotionReport:
+    def execute(self, command: MotorCommand, /) -> MotionReport | BodyFault:
         """Carry out a command and report what the wheels claim."""
         ...
 
-    def look(self, purpose: str, /) -> Frame:
+    def claim(self) -> MotionReport | BodyFault:
+        """What the wheels claim of the last command, asked anew after a fault broke it off."""
+        ...
+
+    def look(self, purpose: str, /) -> Frame | BodyFault:
         """Take a picture for a purpose."""
+        ...
+
+    def wait(self, duration_s: float, /) -> float:
+        """Stand still for a while; returns the time after it, by the body's clock [s]."""
+        ...
+
+    def stop(self) -> None:
+        """Stand still, at once and for good."""
         ...
 
 
 class BodyPort:
-    """Carries out motor commands and takes pictures."""
+    """Carries out motor commands and takes pictures.
+
+    A request that a fault keeps from being answered stays open here until somebody on the board asks for a recovery
+    and that succeeds; then it is answered as if nothing had been, only later.
+    """
 
     name = "body"
 
     def __init__(self, body: Body) -> None:
         self._body = body
+        self._unanswered: dict[str, Entry[Any]] = {}
 
     def answer(self, change: Change) -> Iterable[Effect]:
-        """A motion report for a command, a frame for a look."""
-        if not isinstance(change, Posted):
+        """A motion report for a command, a frame for a look, the answer to an older request for a recovery."""
+        entry = change.entry
+        if isinstance(entry.value, Recovery) and entry.value.status == "asked":
+            yield from self._tried_again(entry)
+        elif isinstance(change, Posted) and isinstance(entry.value, MotorCommand):
+            yield self._told(entry, self._body.execute(entry.value))
+        elif isinstance(change, Posted) and isinstance(entry.value, Look):
+            yield self._told(entry, self._body.look(entry.value.purpose))
+
+    def _told(self, request: Entry[Any], found: MotionReport | Frame | BodyFault) -> Effect:
+        if isinstance(found, BodyFault):
+            self._unanswered[request.id] = request
+            return Post(replace(found, request=request.id), (request,))
+        return Post(found, (request,))
+
+    def _tried_again(self, recovery: Entry[Recovery]) -> Iterable[Effect]:
+        asked = recovery.value
+        now_s = self._body.wait(asked.wait_s)
+        tried = replace(asked, tries=asked.tries + 1, waited_s=now_s - asked.since_s)
+        request = self._unanswered.get(asked.request)
+        if request is None:  # the process that it was asked of is gone
+            yield Revise(recovery, replace(tried, status="in vain", what="the request is gone"), (recovery,))
             return
-        value = change.entry.value
-        if isinstance(value, MotorCommand):
-            yield Post(self._body.execute(value), (change.entry,))
-        elif isinstance(value, Look):
-            yield Post(self._body.look(value.purpose), (change.entry,))
+        wanted = request.value
+        found = self._body.claim() if isinstance(wanted, MotorCommand) else self._body.look(wanted.purpose)
+        if isinstance(found, BodyFault):
+            vain = replace(tried, status="in vain", what=found.what, detail=found.detail)
+            yield Revise(recovery, vain, (recovery,))
+            return
+        del self._unanswered[asked.request]
+        yield Revise(recovery, replace(tried, status="over", what="", detail=""), (recovery,))
+        yield Post(found, (request,))

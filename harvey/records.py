@@ -25,6 +25,7 @@ class EntryRecord:
         value: the value's fields as JSON types.
         cycle: of the decision that made it, or that took it up where it came from outside.
         observed: whether it came from outside.
+        retracted_because: of a retraction: what it rests on itself.
     """
 
     change: str
@@ -35,6 +36,7 @@ class EntryRecord:
     value: Any
     cycle: int
     observed: bool
+    retracted_because: tuple[str, ...] = ()
 
     @property
     def id(self) -> str:
@@ -133,6 +135,7 @@ def _entry(item: Any, cycle: int, observed: bool) -> EntryRecord:
     return EntryRecord(
         _get(item, "change", str), _get(item, "entry", str), _get(item, "type", str), _get(item, "author", str),
         _texts(item, "because"), _get(item, "value", object), cycle, observed,
+        _texts(item, "retracted_because") if "retracted_because" in item else (),
     )
 
 

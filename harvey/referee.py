@@ -57,25 +57,18 @@ class MissionResult:
         return {name: getattr(self, name) for name in self.__slots__}
 
 
-class Referee:
-    """A sink that counts, and compares what is believed with the truth; nobody on the board hears of it."""
+class Counts:
+    """A sink that counts what was decided."""
 
-    def __init__(self, robot: RobotModel, body: SimulatedBody) -> None:
-        self._robot, self._body = robot, body
+    def __init__(self) -> None:
         self.decisions = self.replans = self.relocalizations = self.sketches = 0
-        self.milestones = {"verified": 0, "refuted": 0, "not_testable": 0, "false_accepts": 0}
-        self.max_cross_track_m = 0.0
-        self._leg: Leg | None = None
-        self._gone = 0
+        self.milestones = {"verified": 0, "refuted": 0, "not_testable": 0}
 
     def __call__(self, decision: Decision) -> None:
         self.decisions += 1
-        self._follow()
         for change in decision.made:
             value, revision = change.entry.value, change.entry.revision
-            if isinstance(value, Leg):
-                self._leg = value if value.status == "moving" else None
-            elif isinstance(value, Milestone) and value.status.replace(" ", "_") in self.milestones:
+            if isinstance(value, Milestone) and value.status.replace(" ", "_") in self.milestones:
                 self.milestones[value.status.replace(" ", "_")] += 1
             elif isinstance(value, PlanSketch):
                 self.sketches += revision == 0
@@ -84,8 +77,28 @@ class Referee:
                 self.replans += value.status == "abandoned"
             elif isinstance(value, Hypothesis) and value.is_held:
                 self.relocalizations += value.basis == "relocalization"
-                if value.basis == "milestone":
-                    self.milestones["false_accepts"] += self._is_false(value)
+
+
+class Referee(Counts):
+    """Counts, and compares what is believed with the truth; nobody on the board hears of it."""
+
+    def __init__(self, robot: RobotModel, body: SimulatedBody) -> None:
+        super().__init__()
+        self._robot, self._body = robot, body
+        self.milestones["false_accepts"] = 0
+        self.max_cross_track_m = 0.0
+        self._leg: Leg | None = None
+        self._gone = 0
+
+    def __call__(self, decision: Decision) -> None:
+        self._follow()
+        super().__call__(decision)
+        for change in decision.made:
+            value = change.entry.value
+            if isinstance(value, Leg):
+                self._leg = value if value.status == "moving" else None
+            elif isinstance(value, Hypothesis) and value.is_held and value.basis == "milestone":
+                self.milestones["false_accepts"] += self._is_false(value)
 
     def _follow(self) -> None:
         """How far the robot truly strayed from the leg that it was driving since the last decision."""

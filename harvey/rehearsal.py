@@ -27,7 +27,7 @@ from sim.scenario import Scenario
 from world_models.body import MotionReport, MotorCommand
 from world_models.location import Hypothesis, diagonal
 from world_models.robot import RobotModel
-from world_models.task import Milestone, Outcome, PlanSketch
+from world_models.task import Command, Milestone, Outcome, PlanSketch
 
 TAKING_PART = ("interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "mission_keeper")
 MOST_CYCLES = 20_000
@@ -88,10 +88,14 @@ class PerfectWheels:
 
 def rehearse(scenario: Scenario) -> tuple[tuple[Prospect, ...], Outcome]:
     """The milestones in the order in which they will come, and how the mission ends in thought."""
-    robot = robot_model(scenario)
+    return rehearsed(robot_model(scenario), command(scenario))
+
+
+def rehearsed(robot: RobotModel, task: Command) -> tuple[tuple[Prospect, ...], Outcome]:
+    """The same for any robot and whatever is asked of it."""
     experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
     scheduler = Scheduler([*experts, Believer()], ports=(PerfectWheels(),))
-    scheduler.tell([Post(replace(command(scenario), start_covariance=diagonal(SEEN_M, SEEN_RAD)))], "user")
+    scheduler.tell([Post(replace(task, start_covariance=diagonal(SEEN_M, SEEN_RAD)))], "user")
     prospects: list[Prospect] = []
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < MOST_CYCLES:
         decision = scheduler.step()

@@ -1,63 +1,102 @@
-"""Replay: a recorded run decided again from its observations, without simulator or robot.
+"""Replay: a recorded run told again from its observations.
 
 A run is what it observed and nothing else: whatever came from outside is put on the board where the journal says it
-came, and every decision must come out as it stands in the journal, to the byte.
+came, and every decision must come out as it stands in the journal, to the byte. So a replay needs neither simulator nor
+robot; and a run that was cut off gets its board, its agenda and all that is pending back by being told again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
-from blackboard.journal import Decision
+from blackboard.change import Change
+from blackboard.journal import Decision, decision_line
 from blackboard.scheduler import Scheduler
 from harvey.errors import BadInput
 from harvey.observations import effect_of
-from harvey.records import DecisionRecord
+from harvey.records import DecisionRecord, EntryRecord, read_records
 from harvey.run_directory import RunDirectory
+from logs.camera_file import Pictures
+from logs.reader import read_frames
 
-if TYPE_CHECKING:
-    from sim.scenario import Scenario
+Live = Callable[[Sequence[Change], Sequence[EntryRecord]], None]
+"""Told of the changes that a decision made and of what was observed next."""
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
-    """A decision as recorded, and as it is decided now; None where nothing is left to decide."""
+class Told:
+    """A decision as recorded, and as it is decided now; None where nothing is left to decide.
+
+    Attributes:
+        line: as it stands in the journal, without its newline.
+    """
 
     recorded: DecisionRecord
+    line: bytes
     now: Decision | None
 
-
-def scheduler_of(scenario: Scenario) -> Scheduler:
-    """The experts round a board, as for a run, but with no body."""
-    from harvey.wiring import knowledge_sources, robot_model, servoing
-
-    return Scheduler(knowledge_sources(robot_model(scenario)), servoing=servoing(scenario.servo))
+    @property
+    def same(self) -> bool:
+        """To the byte."""
+        return self.now is not None and decision_line(self.now).encode() == self.line
 
 
-def replayed(decisions: Iterable[DecisionRecord], frames: Mapping[int, bytes], scheduler: Scheduler) -> Iterator[Pair]:
+def replayed(
+    run: RunDirectory, pictures: Mapping[int, bytes], scheduler: Scheduler, *,
+    live: Live = lambda made, observed: None, before: Callable[[], None] = lambda: None,
+) -> Iterator[Told]:
     """Each decision beside its record.
 
+    Args:
+        live: lets a simulated body live through it again.
+        before: called before each decision.
+
     Raises:
-        BadInput: an observation cannot be told again.
+        BadInput: the journal cannot be read, or an observation cannot be told again.
     """
-    for recorded in decisions:
+    made: Sequence[Change] = ()
+    for recorded, line in zip(read_records(run.journal), _lines(run), strict=False):
+        live(made, recorded.observed)
         for observation in recorded.observed:
-            scheduler.tell([effect_of(observation, frames, scheduler.view.get)], observation.author)
-        yield Pair(recorded, scheduler.step())
+            scheduler.tell([effect_of(observation, pictures, scheduler.view.get)], observation.author)
+        before()
+        told = Told(recorded, line, scheduler.step())
+        made = () if told.now is None else told.now.made
+        yield told
 
 
-def scenario_of(run: RunDirectory) -> Scenario:
-    """The scenario with the settings that a run was made with. Raises BadInput where the result does not say."""
-    from sim.scenario import ScenarioError, load_scenario, with_settings
+def checked(run: RunDirectory, told: Told) -> Told:
+    """The same; raises BadInput where it was not decided as it was."""
+    if not told.same:
+        raise BadInput(f"{run.journal}: cycle {told.recorded.cycle} is not decided again as it was (harvey replay "
+                       f"{run.path} tells how); it takes the program that made the run")
+    return told
 
-    origin: Any = run.read_result().get("origin")
-    try:
-        file, settings = str(origin["file"]), dict(origin["settings"])
-    except (TypeError, KeyError, ValueError):
-        raise BadInput(f"{run.result}: expected an origin with file and settings, got {origin!r}") from None
-    try:
-        return with_settings(load_scenario(file), settings)
-    except ScenarioError as error:
-        raise BadInput(f"{run.result}: origin: {error}") from None
+
+def pictures_of(run: RunDirectory) -> Mapping[int, bytes]:
+    """The pictures of a run: from its camera file or, where it has none, from its recording.
+
+    Raises:
+        BadInput: the journal cannot be read.
+        RecordingError: there is no camera file, and the recording cannot be read.
+    """
+    sizes = list(_sizes(read_records(run.journal)))
+    return Pictures(run.camera, sizes) if run.camera.is_file() or not sizes else read_frames(run.recording)
+
+
+def _sizes(decisions: Iterable[DecisionRecord]) -> Iterator[tuple[int, int]]:
+    """(number, bytes) of every picture that was seen, in the order in which they came."""
+    for decision in decisions:
+        for record in decision.observed:
+            if record.type == "Frame":
+                try:
+                    yield int(record.value["number"]), int(record.value["jpeg"]["bytes"])
+                except (KeyError, TypeError, ValueError):
+                    raise BadInput(f"{record.ref}: expected a picture's number and length, got {record.value!r}"
+                                   ) from None
+
+
+def _lines(run: RunDirectory) -> Iterator[bytes]:
+    with run.journal.open("rb") as lines:
+        yield from (line.removesuffix(b"\n") for line in lines)

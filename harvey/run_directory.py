@@ -1,9 +1,16 @@
-"""A run directory: ``recording.rrd``, ``journal.jsonl`` and ``result.json``."""
+"""A run directory.
+
+``run.json`` tells how the run began, ``journal.jsonl`` what was decided, ``camera.mjpeg`` what the camera delivered:
+from these three a run is decided again, goes on after a crash, and is drawn anew. ``recording.rrd`` is the drawing, and
+``result.json`` tells how it ended.
+"""
 
 from __future__ import annotations
 
 import difflib
 import json
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +20,7 @@ from harvey.errors import BadInput
 RUNS = Path("runs")
 """Where runs are kept unless ``--out`` says otherwise."""
 
-FILES = ("recording.rrd", "journal.jsonl", "result.json")
+FILES = ("run.json", "journal.jsonl", "camera.mjpeg", "recording.rrd", "result.json")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +36,10 @@ class RunDirectory:
     @property
     def journal(self) -> Path:
         return self.path / "journal.jsonl"
+
+    @property
+    def camera(self) -> Path:
+        return self.path / "camera.mjpeg"
 
     @property
     def result(self) -> Path:
@@ -47,6 +58,16 @@ class RunDirectory:
         if not isinstance(data, dict):
             raise BadInput(f"{self.result}: expected a JSON object, got {type(data).__name__}")
         return data
+
+    def write_result(self, record: Mapping[str, Any]) -> None:
+        """Write ``result.json``; an older one stays as it is until the new one is whole. Raises OSError."""
+        part = self.path / "result.json.part"
+        try:
+            part.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+            os.replace(part, self.result)
+        except OSError:
+            part.unlink(missing_ok=True)
+            raise
 
 
 def vacant(path: Path) -> Path:

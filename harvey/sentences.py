@@ -6,7 +6,7 @@ They read the journal's JSON, so that a recorded run is explained without the co
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from harvey.records import EntryRecord
@@ -14,6 +14,10 @@ from harvey.units import count, degrees, metres, number, point, quantity, turn
 
 Value = Mapping[str, Any]
 LONGEST = 160
+PURPOSES: Mapping[str, str] = {
+    "track": "to follow landmarks", "milestone": "to verify a milestone", "probe": "to find out where it is",
+}
+"""What a picture is taken for."""
 
 
 def sentence(record: EntryRecord) -> str:
@@ -28,7 +32,7 @@ def sentence(record: EntryRecord) -> str:
 
 def _anything(value: Any) -> str:
     fields = value.items() if isinstance(value, Mapping) else [("value", value)]
-    text = ", ".join(f"{key} = {item}" for key, item in fields)
+    text = ", ".join(f"{key} = {item}" for key, item in fields) or "it says nothing"
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 
@@ -71,7 +75,7 @@ def _leg(v: Value) -> str:
 def _milestone(v: Value) -> str:
     of = f"of {v['sketch']}" if v["sketch"] else "in between"
     names = list(v["landmarks"])
-    shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+    shown = listed([landmark(name) for name in names], 4)
     seen = f" should show {count(len(v['expected']), 'model line')} of {shown}" if names else ""
     return f"milestone {v['what']} ({of}): looking along {degrees(v['look_heading_rad'])}{seen}; {v['status']}"
 
@@ -92,14 +96,30 @@ def _outcome(v: Value) -> str:
 
 
 def _tracks(v: Value) -> str:
-    found = [t for t in v["items"] if t["found_px"] is not None]
-    head = f"{len(found)} of {count(len(v['items']), 'landmark')} found in {v['frame']}"
+    fresh = sum(1 for t in v["items"] if t["template_frame"] == v["frame"])
+    found = followed(v)
+    old = len(v["items"]) - fresh
+    parts = [f"{len(found)} of {count(old, 'landmark')} found in {v['frame']}"] if old else []
+    parts += [f"{count(fresh, 'landmark')} taken anew from {v['frame']}"] if fresh else []
+    head = " and ".join(parts) or f"no landmark is followed as of {v['frame']}"
     return head + "".join(f"; {_track(t)}" for t in found[:3]) + ("; ..." if len(found) > 3 else "")
 
 
+def followed(tracks: Value) -> list[Value]:
+    """The landmarks that were found again, the one that is furthest from its prediction first."""
+    again = (t for t in tracks["items"] if t["found_px"] is not None and t["template_frame"] != tracks["frame"])
+    return sorted(again, key=lambda t: -math.hypot(*shift_px(t)))
+
+
+def shift_px(t: Value) -> tuple[float, float]:
+    """How far right of and below its prediction a landmark was found."""
+    du, dv = (number(f) - number(p) for f, p in zip(t["found_px"], t["predicted_px"], strict=True))
+    return du, dv
+
+
 def _track(t: Value) -> str:
-    du, dv = (f - p for f, p in zip(t["found_px"], t["predicted_px"], strict=True))
-    return (f"{t['landmark']} {abs(du):.1f} px {'right' if du >= 0 else 'left'} and {abs(dv):.1f} px"
+    du, dv = shift_px(t)
+    return (f"{landmark(t['landmark'])} {abs(du):.1f} px {'right' if du >= 0 else 'left'} and {abs(dv):.1f} px"
             f" {'below' if dv >= 0 else 'above'} its prediction (correlation {number(t['peak']):.2f})")
 
 
@@ -125,7 +145,8 @@ def _pose_fix(v: Value) -> str:
 
 def _hypothesis(v: Value) -> str:
     where = f"{_pose(v['locale_from_robot'])}{_sigma(v['covariance'])}"
-    return f"{v['status']}: in {v['locale']} at {where}, by {v['basis']}"
+    evidence = f" ({v['evidence']})" if v.get("evidence") else ""
+    return f"{v['status']}: in {v['locale']} at {where}, by {v['basis']}{evidence}"
 
 
 def _pose(p: Value) -> str:
@@ -154,20 +175,65 @@ def _motion_report(v: Value) -> str:
 
 
 def _look(v: Value) -> str:
-    return f"asked for a picture ({v['purpose']})"
+    return f"asked for a picture {_for(v['purpose'])}"
 
 
 def _frame(v: Value) -> str:
-    purpose = v["purpose"] or "no purpose"
-    return f"camera frame {v['number']} at {number(v['sim_time_s']):.1f} s ({purpose}, {v['jpeg']['bytes']} bytes)"
+    at = f"camera frame {v['number']} at {number(v['sim_time_s']):.1f} s"
+    return f"{at} {_for(v['purpose'])} ({v['jpeg']['bytes'] / 1000.0:.0f} kB)"
+
+
+def _for(purpose: str) -> str:
+    return PURPOSES.get(purpose, f"for {purpose}" if purpose else "for no purpose")
+
+
+def _body_fault(v: Value) -> str:
+    claims = [turn(v["turn_rad"])] if v["turn_rad"] else []
+    claims += [f"{metres(v['move_m'])} ahead"] if v["move_m"] else []
+    done = f"; of {v['request']} the wheels claim {' and '.join(claims)}" if claims else ""
+    how = "" if v["status"] == "open" else f"; {v['status']}"
+    return f"the {v['part']} is at fault since {number(v['when_s']):.1f} s: {v['what']} ({v['detail']}){done}{how}"
+
+
+def _recovery(v: Value) -> str:
+    about = f"have {v['request']} answered after {v['fault']}"
+    if v["status"] == "asked":
+        so_far = f"{count(int(v['tries']), 'try', 'tries')} so far"
+        return f"to wait {number(v['wait_s']):.2f} s, then try again to {about} ({so_far})"
+    ended = "it worked" if v["status"] == "over" else f"in vain: {v['what']} ({v['detail']})"
+    return f"tried to {about}: {ended} after {number(v['waited_s']):.1f} s"
 
 
 def _discrepancy(v: Value) -> str:
     unit, level = v["unit"], v["level"]
-    size = "not yet measured there" if v["magnitude"] is None else quantity(v["magnitude"], unit)
+    size = "not yet measured there" if v["magnitude"] is None else size_of(v["magnitude"], unit)
     bounds = dict(zip(("action", "plan"), v["bounds"], strict=True))
     bound = f", where up to {quantity(bounds[level], unit)} may be corrected" if level in bounds else ""
     return f"{level}-level discrepancy, {v['what']}: {size}{bound}; {v['status']}"
+
+
+def size_of(magnitude: Any, unit: str) -> str:
+    """How large a discrepancy is."""
+    return quantity(magnitude, unit) if math.isfinite(number(magnitude)) else "too large to be measured"
+
+
+def landmark(name: str) -> str:
+    """``hallway/pillar-4`` as people say it."""
+    locale, _, thing = str(name).rpartition("/")
+    return f"{thing} of {locale}" if locale else thing
+
+
+def listed(items: Sequence[Any], most: int = 3) -> str:
+    """``a, b and c``; ``a, b, c and 4 more`` where there are more than told."""
+    texts = [str(item) for item in items]
+    if len(texts) > most:
+        return f"{', '.join(texts[:most])} and {len(texts) - most} more"
+    return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
+
+
+def _resumed(v: Value) -> str:
+    cut_off = f"the run was cut off after cycle {v['after_cycle']} and goes on; the robot was stopped in between"
+    return cut_off + "".join(f"; nobody heard how far {ref} was carried out" for ref in v["interrupted"])
 
 
 def _quiescence(v: Value) -> str:
@@ -183,5 +249,6 @@ MAKERS: Mapping[str, Callable[[Value], str]] = {
     "Certificate": _certificate, "Outcome": _outcome, "Tracks": _tracks, "Segments": _segments,
     "LineMatch": _line_match, "PoseFix": _pose_fix, "Hypothesis": _hypothesis,
     "MotorCommand": _motion, "MotionReport": _motion_report, "Look": _look, "Frame": _frame,
-    "Discrepancy": _discrepancy, "Quiescence": _quiescence,
+    "Discrepancy": _discrepancy, "Quiescence": _quiescence, "Resumed": _resumed, "BodyFault": _body_fault,
+    "Recovery": _recovery,
 }

@@ -36,16 +36,6 @@ class Trace:
         self._pending = {n: c for n, c in candidates.items() if chosen is None or n != chosen.number}
 
 
-def trace_of(decisions: Iterable[DecisionRecord], cycle: int) -> tuple[str, ...]:
-    """The printed form of one cycle of a recorded run; empty where it has no such cycle."""
-    trace = Trace()
-    for decision in decisions:
-        lines = tuple(trace.lines(decision))
-        if decision.cycle == cycle:
-            return lines
-    return ()
-
-
 def cycle_lines(decision: DecisionRecord, candidates: Iterable[Candidate]) -> Iterator[str]:
     """One cycle; the candidates are those among which was chosen."""
     yield f"cycle {decision.cycle}, focus {decision.focus}"

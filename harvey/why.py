@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import difflib
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from textwrap import fill
 
 from harvey.diff import differing_leaves
-from harvey.errors import BadInput
-from harvey.records import Candidate, DecisionRecord, EntryRecord
+from harvey.records import DecisionRecord, EntryRecord
 from harvey.sentences import sentence
 from harvey.units import count
+from harvey.why_history import History
+from harvey.why_story import decided
 
 WIDTH = 120
 DEEPEST_INDENT = 20
@@ -40,56 +40,6 @@ class Reason:
     after: EntryRecord | None = None
     known: str = ""
     hidden: int = 0
-
-
-class History:
-    """Every revision of every entry of a run, and the decision that made it."""
-
-    def __init__(self, decisions: Iterable[DecisionRecord]) -> None:
-        """Raises BadInput where a line of the journal is malformed."""
-        self._entries: dict[str, EntryRecord] = {}
-        self._newest: dict[str, str] = {}
-        self._decisions: dict[int, DecisionRecord] = {}
-        for decision in decisions:
-            self._decisions[decision.cycle] = decision
-            for record in (*decision.observed, *decision.made):
-                if record.change != "Retracted" or record.ref not in self._entries:
-                    self._entries[record.ref] = record
-                self._newest[record.id] = record.ref
-
-    def entry(self, ref: str) -> EntryRecord | None:
-        return self._entries.get(ref)
-
-    def decision(self, cycle: int) -> DecisionRecord:
-        """Raises BadInput where the run has no such cycle."""
-        if cycle not in self._decisions:
-            have = f"cycles {min(self._decisions)} to {max(self._decisions)}" if self._decisions else "none"
-            raise BadInput(f"--at: expected a cycle of the run, which has {have}, got {cycle}")
-        return self._decisions[cycle]
-
-    def outcome(self) -> str:
-        """Ref of how the mission ended, or, where it did not come to that, of the last entry.
-
-        Raises:
-            BadInput: the journal is empty.
-        """
-        outcomes = [id for id in self._newest if id.startswith("Outcome-")]
-        if not self._newest:
-            raise BadInput("expected a run with at least one entry in its journal, got none")
-        return self._newest[outcomes[-1]] if outcomes else next(reversed(self._entries))
-
-    def named(self, text: str) -> str:
-        """The ref that a user means: ``MotorCommand-12.3``, or ``MotorCommand-12`` for its last revision.
-
-        Raises:
-            BadInput: the run has no such entry; near ones are named.
-        """
-        names = {name.lower(): ref for name, ref in self._newest.items()} | {ref.lower(): ref for ref in self._entries}
-        if text.lower() in names:
-            return names[text.lower()]
-        ids = list(self._newest)
-        near = difflib.get_close_matches(text, ids, n=4, cutoff=0.6) or [ids[0], ids[-1]] if ids else []
-        raise BadInput(f"expected an entry of the run, as {', '.join(near) or 'none'}, got {text!r}")
 
 
 def walk(history: History, refs: Sequence[str], depth: int = DEPTH) -> Iterator[Reason]:
@@ -128,8 +78,14 @@ def _distances(history: History, refs: Sequence[str], depth: int) -> dict[str, i
 
 
 def explain(history: History, refs: Sequence[str], depth: int = DEPTH) -> Iterator[str]:
-    """The walk in plain sentences, indented."""
+    """The walk in plain sentences, indented.
+
+    Raises:
+        BadInput: a reason is missing, and so is a line of the journal, or a part of one.
+    """
     reasons = list(walk(history, refs, depth))
+    if any(reason.record is None for reason in reasons):
+        history.verify()
     for index, reason in enumerate(reasons):
         if reason.depth == 0 and reason.record is not None:
             yield from ["", _who(reason.record, history)] if index else [_who(reason.record, history)]
@@ -163,15 +119,21 @@ def _said(record: EntryRecord, after: EntryRecord | None) -> str:
 
 
 def _who(record: EntryRecord, history: History) -> str:
-    if record.observed:
-        return f"{record.ref} came from outside, from {record.author}, and was taken up in cycle {record.cycle}."
-    decision = history.decision(record.cycle)
-    head = f"{record.ref} was made in cycle {record.cycle} by {record.author}"
-    if decision.chosen is None:
-        return head + "."
-    second = f"; next was {_rated(decision.runner_up)}" if decision.runner_up else "; nothing else was pending"
-    return f"{head}, chosen as {_rated(decision.chosen)}, with the {decision.focus} level in focus{second}."
+    return fill(f"{record.ref}: {decided(history, record)}", WIDTH, break_on_hyphens=False)
 
 
-def _rated(c: Candidate) -> str:
-    return f"{c.source} ({c.level} level, rated {c.rating:.2f}) on {c.trigger}"
+PRINCIPAL = (
+    "Outcome", "MotorCommand", "Goal", "PlanSketch", "Recovery", "Hypothesis", "Certificate", "Milestone", "Leg",
+    "Look",
+)
+"""Of what one act makes, the first of these is what it was done for."""
+
+
+def principal(decision: DecisionRecord) -> list[str]:
+    """What to explain of a decision: the chief entry that it made, or what woke those who made nothing."""
+    made = sorted(decision.made, key=lambda r: PRINCIPAL.index(r.type) if r.type in PRINCIPAL else len(PRINCIPAL))
+    if made:
+        return [made[0].ref]
+    if decision.chosen is not None:
+        return [decision.chosen.trigger]
+    return list(decision.seen[:1])

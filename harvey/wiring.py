@@ -19,6 +19,7 @@ from knowledge_sources.mission_keeper import MissionKeeper
 from knowledge_sources.motor import Motor
 from knowledge_sources.plan_adjuster import PlanAdjuster
 from knowledge_sources.relocalizer import Relocalizer
+from knowledge_sources.safekeeper import Safekeeper
 from knowledge_sources.sketcher import Sketcher
 from sim.scenario import Scenario, Servo
 from world_models.actuator import ActuatorModel
@@ -41,6 +42,7 @@ EXPERTS: tuple[type[Expert], ...] = (
     PlanAdjuster,
     Escalator,
     Relocalizer,
+    Safekeeper,
     MissionKeeper,
 )
 """Every expert, in no order that matters: control comes from triggers, ratings and levels."""

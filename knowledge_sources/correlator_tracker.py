@@ -20,13 +20,14 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
-from knowledge_sources.methods.images import decode
+from knowledge_sources.methods.rectified import Rectified
 from knowledge_sources.methods.tracking import HALF_PX, Followed, Image, begin, correct, follow
 from knowledge_sources.questions import held, open_discrepancy
 from knowledge_sources.tolerances import PLAN_PX, action_px
 from world_models.body import Frame
 from world_models.location import Hypothesis, covariance_tuple
 from world_models.percepts import Anchor, Track, Tracks
+from world_models.robot import RobotModel
 
 FEW = 9
 """With fewer landmarks than this, new ones are taken."""
@@ -56,6 +57,10 @@ class CorrelatorTracker(Expert):
     )
     writes = (Tracks, Hypothesis, Discrepancy)
 
+    def __init__(self, robot: RobotModel) -> None:
+        super().__init__(robot)
+        self._picture = Rectified(robot.lens, robot.camera)
+
     def rate(self, view: View, trigger: Change) -> float | None:
         if held(view) is None or view.latest(Frame) is None or open_discrepancy(view, Level.GOAL) is not None:
             return None
@@ -68,7 +73,7 @@ class CorrelatorTracker(Expert):
         if isinstance(trigger.entry.value, Hypothesis):
             yield from self._begun_anew(frame, belief, old)
             return
-        image = decode(frame.value.jpeg)
+        image = self._picture(frame.value.jpeg)
         followed = self._followed(view, None if old is None else old.value, image, belief.value)
         seen = [f.track for f in followed if f.track.found_px is not None]
         expected = sum(1 for f in followed if f.expected)
@@ -76,32 +81,34 @@ class CorrelatorTracker(Expert):
         corrected = self._corrected(belief.value, seen, old.value.anchors) if seen and old is not None else None
         agreeing = 0 if corrected is None else corrected.agreeing
         if expected >= LEAST and agreeing < LOST_PART * expected:
-            what = f"{expected - agreeing} of {expected} landmarks are not where they were expected"
+            what = f"{expected - agreeing} of {expected} landmarks are not where they were expected{_furthest(seen)}"
             yield from self._told(view, what, math.inf, belief.value, because)
-            yield from self._kept(old, Tracks(frame.id, HALF_PX, ()), because)
+            yield self._kept(old, Tracks(frame.id, HALF_PX, ()), because)
             return
-        now = belief.value
+        now = belief.value if corrected is None else corrected.hypothesis
+        kept = tuple(f.track for f in followed if f.expected and f.track.misses < MISSES)
+        renewed = self._renewed(kept, old.value.anchors if old else (), frame, image, now)
+        tracks = self._kept(old, renewed, because)
+        yield tracks
         if corrected is not None:
-            now = corrected.hypothesis
-            correction = Revise(belief, now, because)
+            correction = Revise(belief, now, (frame, belief, tracks))
             yield correction
             shift = float(np.median([math.dist(t.predicted_px, t.found_px) for t in seen if t.found_px is not None]))
             what = f"{len(seen)} landmarks are {shift:.1f} px from where they were expected"
             yield from self._told(view, what, shift, belief.value, (correction,))
-        kept = tuple(f.track for f in followed if f.expected and f.track.misses < MISSES)
-        yield from self._kept(old, self._renewed(kept, old.value.anchors if old else (), frame, image, now), because)
 
     def _begun_anew(
         self, frame: Entry[Frame], belief: Entry[Hypothesis], old: Entry[Tracks] | None
     ) -> Iterable[Effect]:
         """A milestone or a relocalization said anew where we are: landmarks are taken from there."""
-        fresh = self._renewed((), (), frame, decode(frame.value.jpeg), belief.value)
-        yield from self._kept(old, fresh, (frame, belief))
+        fresh = self._renewed((), (), frame, self._picture(frame.value.jpeg), belief.value)
+        yield self._kept(old, fresh, (frame, belief))
 
     def _followed(self, view: View, tracks: Tracks | None, image: Image, belief: Hypothesis) -> list[Followed]:
         if tracks is None:
             return []
-        pictures = {name: decode(view[name].value.jpeg) for name in sorted({t.template_frame for t in tracks.items})}
+        frames = sorted({t.template_frame for t in tracks.items})
+        pictures = {name: self._picture(view[name].value.jpeg) for name in frames}
         world = self._robot.world
         return follow(self._robot, tracks.items, pictures, image, belief.world_from_robot(world),
                       belief.covariance_world(world))
@@ -135,7 +142,11 @@ class CorrelatorTracker(Expert):
         yield Post(found, because) if last is None else Revise(last, found, because)
 
     @staticmethod
-    def _kept(
-        old: Entry[Tracks] | None, tracks: Tracks, because: tuple[object, ...]
-    ) -> Iterable[Effect]:
-        yield Post(tracks, because) if old is None else Revise(old, tracks, because)
+    def _kept(old: Entry[Tracks] | None, tracks: Tracks, because: tuple[object, ...]) -> Effect:
+        return Post(tracks, because) if old is None else Revise(old, tracks, because)
+
+
+def _furthest(seen: list[Track]) -> str:
+    """The landmark that is furthest from where it was expected, in words."""
+    off = [(math.dist(t.predicted_px, t.found_px), t.landmark) for t in seen if t.found_px is not None]
+    return f" ({max(off)[1]} is {max(off)[0]:.1f} px off)" if off else " (none of them is found)"

@@ -12,14 +12,15 @@ from blackboard.level import Level
 from knowledge_sources.expert import Expert
 from world_models.frames import Pose2
 from world_models.location import Hypothesis, Place
-from world_models.ptrans import parse_ptrans
+from world_models.phrases import places_of
 from world_models.task import Command, Goal, Outcome
 
 
 class Interpreter(Expert):
     """Reads ``(ptrans (locale (x,y,z)) (locale (x,y,z)))``: from where to where, feet in each locale's own frame.
 
-    The command's first place is also where the robot is told that it stands: the first hypothesis. What cannot be
+    It also understands "Go from the laboratory to Allen's office", from the middle of one room to that of another. The
+    command's first place is also where the robot is told that it stands: the first hypothesis. What cannot be
     understood ends the mission with the reason.
     """
 
@@ -39,9 +40,5 @@ class Interpreter(Expert):
         yield Post(Goal(origin, destination), (trigger.entry,))
 
     def _places(self, command: Command) -> tuple[Place, Place]:
-        origin, destination = parse_ptrans(command.text)
-        known = self._robot.world.locales
-        for name in (origin.locale, destination.locale):
-            if name not in known:
-                raise ValueError(f"expected one of the locales {', '.join(known)}, got {name!r}")
+        origin, destination = places_of(command.text, self._robot.world)
         return origin, replace(destination, heading_rad=command.arrival_heading_rad)

@@ -11,12 +11,13 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
 from knowledge_sources.expert import Expert
-from knowledge_sources.methods.images import decode
 from knowledge_sources.methods.lines import find_lines
+from knowledge_sources.methods.rectified import Rectified
 from knowledge_sources.questions import open_milestone
 from world_models.body import Frame
 from world_models.frames import frozen
 from world_models.percepts import Segments
+from world_models.robot import RobotModel
 
 
 class LineFinder(Expert):
@@ -29,12 +30,16 @@ class LineFinder(Expert):
     watches = (Watch(Frame, (Posted,), lambda f: f.purpose in ("milestone", "probe")),)
     writes = (Segments,)
 
+    def __init__(self, robot: RobotModel) -> None:
+        super().__init__(robot)
+        self._picture = Rectified(robot.lens, robot.camera)
+
     def rate(self, view: View, trigger: Change) -> float | None:
         return 0.8
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         frame = trigger.entry
-        image = decode(frame.value.jpeg)
+        image = self._picture(frame.value.jpeg)
         found = find_lines(image)
         waiting = open_milestone(view) if frame.value.purpose == "milestone" else None
         yield Post(

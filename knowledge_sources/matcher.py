@@ -60,7 +60,7 @@ class Matcher(Expert):
                 milestone.id, segments.id, pairs, frozen(lines_world[pairs[:, 0]]), frozen(data_px[pairs[:, 1]]),
                 float(found.e_match), frozen(found.coverage),
             ),
-            (segments, milestone),
+            (segments, milestone, belief),
         )
 
     def _found(

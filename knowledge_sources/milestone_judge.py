@@ -50,7 +50,7 @@ class MilestoneJudge(Expert):
         yield Revise(milestone, replace(milestone.value, status=certificate.verdict), (verdict,))
         c = certificate
         magnitude = c.deviation_px if c.verdict == "verified" or c.deviation_px > c.tolerance_px else math.inf
-        what = f"{milestone.value.what} is {c.verdict}"
+        what = f"{milestone.value.what.partition(', because')[0]} is {c.verdict}"
         found = Discrepancy(Level.PLAN, what, magnitude, (0.0, PLAN_PX), "px")
         last = open_discrepancy(view, Level.PLAN)
         yield Post(found, (verdict,)) if last is None else Revise(last, found, (verdict,))

@@ -35,8 +35,9 @@ class MissionKeeper(Expert):
         if lost is not None:
             yield Post(Outcome("lost", f"{lost.value.what}, and nobody could tell where"), (trigger.entry, lost))
             return
-        waiting = open_milestone(view)
+        waiting, goal = open_milestone(view), view.latest(Goal)
         what = "nobody had anything left to do"
         if waiting is not None:
             what = f"nobody answered for {waiting.id} ({waiting.value.what})"
-        yield Post(Outcome("failed", what), (trigger.entry,))
+        unmet = tuple(entry for entry in (waiting, goal) if entry is not None)
+        yield Post(Outcome("failed", what), (trigger.entry, *unmet))

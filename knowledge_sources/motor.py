@@ -19,10 +19,11 @@ from knowledge_sources.questions import (
     is_over,
     is_settled,
     open_discrepancy,
+    open_fault,
     open_milestone,
     under_way,
 )
-from world_models.body import MotorCommand
+from world_models.body import BodyFault, MotorCommand
 from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis
 from world_models.task import Leg, Milestone, PlanSketch
@@ -40,7 +41,7 @@ class Motor(Expert):
     """Commands the next increment of a leg from where the robot believes it is: this closes the action-level loop.
 
     It begins a leg when a verified sketch has a primitive subgoal; it turns where a milestone is to be looked for; it
-    keeps still while anything above the action level is in doubt, or while a command is under way.
+    keeps still while anything above the action level is in doubt, a command is under way, or the body is at fault.
     """
 
     level = Level.ACTION
@@ -50,11 +51,12 @@ class Motor(Expert):
         Watch(Hypothesis, (Posted, Revised), lambda h: h.is_held),
         Watch(Milestone),
         Watch(Discrepancy, (Revised,)),
+        Watch(BodyFault, (Revised,)),
     )
     writes = (MotorCommand, Leg, Discrepancy)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        if is_over(view) or not is_settled(view) or _is_in_doubt(view):
+        if is_over(view) or open_fault(view) is not None or not is_settled(view) or _is_in_doubt(view):
             return None
         milestone = open_milestone(view)
         if milestone is not None:
@@ -99,13 +101,14 @@ class Motor(Expert):
     def _increment(self, view: View, leg: Entry[Leg], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         here = belief.value.world_from_robot(self._robot.world)
         command = self._next(leg.value, here)
+        seen = _as_seen(leg.value, here)
         discrepancy = open_discrepancy(view, Level.ACTION)
         corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
         yield from corrected
         if command is None:
-            yield Revise(leg, replace(leg.value, status="arrived"), (leg, belief, *corrected))
+            yield Revise(leg, replace(seen, status="arrived"), (leg, belief, *corrected))
             return
-        step = Revise(leg, replace(leg.value, increments=leg.value.increments + 1), (leg, belief, *corrected))
+        step = Revise(leg, replace(seen, increments=seen.increments + 1), (leg, belief, *corrected))
         yield step
         yield Post(command, (step, belief))
 
@@ -115,8 +118,7 @@ class Motor(Expert):
         away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
         if away <= leg.tolerance_m * 0.8 or (along <= 0.0 and abs(left) <= leg.tolerance_m * 0.8):
             return self._final_turn(leg, here)
-        aim = _aim(leg, along)
-        turn = wrap_angle(math.atan2(aim[1] - here.y_m, aim[0] - here.x_m) - here.heading_rad)
+        turn = _bearing(_aim(leg, along), here)
         if abs(turn) > FACING_RAD:
             return MotorCommand(self._bounded(turn), 0.0)
         actuator = self._robot.actuator
@@ -160,6 +162,17 @@ def _progress(leg: Leg, here: Pose2) -> tuple[float, float]:
     length = math.hypot(dx, dy) or 1.0
     rx, ry = leg.x1_m - here.x_m, leg.y1_m - here.y_m
     return (rx * dx + ry * dy) / length, (rx * dy - ry * dx) / length
+
+
+def _as_seen(leg: Leg, here: Pose2) -> Leg:
+    """The leg with where the robot is beside it: the numbers from which the next increment follows."""
+    along, left = _progress(leg, here)
+    return replace(leg, to_go_m=along, left_m=left, aim_rad=_bearing(_aim(leg, along), here))
+
+
+def _bearing(point: tuple[float, float], here: Pose2) -> float:
+    """How far to the left of the robot's heading a point lies [rad]."""
+    return wrap_angle(math.atan2(point[1] - here.y_m, point[0] - here.x_m) - here.heading_rad)
 
 
 def _aim(leg: Leg, along: float) -> tuple[float, float]:

@@ -37,6 +37,6 @@ class PlanAdjuster(Expert):
             self._robot.world, belief.value.locale, pose_fix.world_from_robot, pose_fix.covariance, "milestone",
             motion=belief.value.motion,
         )
-        correction = Revise(belief, here, (trigger.entry, fix))
+        correction = Revise(belief, here, (trigger.entry, fix, belief))
         yield correction
         yield Revise(found, found.value.corrected(), (correction,))

@@ -89,7 +89,7 @@ class Relocalizer(Expert):
         candidate: Candidate,
     ) -> Iterable[Effect]:
         """The belief is corrected, and a new top-level goal takes the place of the old one (§2)."""
-        here = Revise(belief, self._hypothesis(candidate, belief.value, "held", 1.0), (segments, lost))
+        here = Revise(belief, self._hypothesis(candidate, belief.value, "held", 1.0), (segments, lost, belief))
         yield here
         yield Revise(lost, lost.value.corrected(), (here,))
         for level in (Level.ACTION, Level.PLAN):
@@ -108,8 +108,14 @@ class Relocalizer(Expert):
     def _hypothesis(self, candidate: Candidate, belief: Hypothesis, status: str, weight: float) -> Hypothesis:
         return Hypothesis.of_world(
             self._robot.world, belief.locale, candidate.world_from_robot, candidate.covariance, "relocalization",
-            status=status, weight=weight, motion=belief.motion,
+            status=status, weight=weight, motion=belief.motion, evidence=_evidence(candidate),
         )
+
+
+def _evidence(candidate: Candidate) -> str:
+    a = candidate.evidence.agreement
+    return (f"{a.accounted} of {a.seen} model lines that should be seen from there are in the picture,"
+            f" {candidate.evidence.coverage:.0%} of their length")
 
 
 def _stands_alone(found: tuple[Candidate, ...]) -> bool:
@@ -120,4 +126,4 @@ def _stands_alone(found: tuple[Candidate, ...]) -> bool:
 
 def _probes_since(view: View, lost: Entry[Discrepancy]) -> tuple[Entry[Segments], ...]:
     """The probes that were looked at since the robot is lost, this one included."""
-    return tuple(s for s in view.where(Segments, lambda s: s.milestone == "") if s.cycle >= lost.cycle)
+    return tuple(s for s in view.since(Segments, lost.cycle) if s.value.milestone == "")

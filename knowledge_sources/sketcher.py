@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 from shapely import Geometry
@@ -21,7 +20,7 @@ from knowledge_sources.expert import Expert
 from knowledge_sources.methods.routes import free_space, is_clear, shortest_route
 from knowledge_sources.questions import held
 from world_models.frames import wrap_angle
-from world_models.locales import Doorway
+from world_models.locales import Link, Passage
 from world_models.location import Hypothesis, Place
 from world_models.robot import RobotModel
 from world_models.task import Goal, Leg, Milestone, Outcome, PlanSketch, Subgoal
@@ -94,8 +93,8 @@ class Sketcher(Expert):
         belief = held(view)
         if belief is None:
             return
-        here = Place(belief.value.locale, belief.value.locale_from_robot.x_m, belief.value.locale_from_robot.y_m)
-        subgoals = self._between_locales(here, goal.value.destination)
+        here = _place(belief.value)
+        subgoals = self._between_locales(here, goal.value.destination, END_TOLERANCE_M)
         if subgoals is None:
             reason = f"no passage leads from {here.locale} to {goal.value.destination.locale}"
             yield Post(Outcome("blocked", reason), (goal, belief))
@@ -110,9 +109,9 @@ class Sketcher(Expert):
         if s.at > 0 and self._is_off(belief.value, s.subgoals[s.at - 1]):
             yield from self._adjusted(milestone, sketch, belief)
         elif s.at_end:
-            yield Revise(sketch, replace(s, status="done", verified=True), (milestone,))
+            yield Revise(sketch, replace(s, status="done", verified=True), (milestone, belief))
         else:
-            go = Revise(sketch, replace(s, verified=True, adjustments=0), (milestone,))
+            go = Revise(sketch, replace(s, verified=True, adjustments=0), (milestone, belief))
             yield go
             current = s.subgoals[s.at]
             if not current.primitive:
@@ -144,13 +143,15 @@ class Sketcher(Expert):
         self, sketch: Entry[PlanSketch], subgoal: Subgoal, belief: Entry[Hypothesis], go: Revise
     ) -> Iterable[Effect]:
         """A more detailed sketch for the subgoal at hand, drawn only now that its locale is entered."""
-        s = sketch.value
-        legs = self._across(subgoal, belief.value)
-        if legs is None:
-            reason = f"no way through {subgoal.destination.locale} to {subgoal.destination}"
-            yield Post(Outcome("blocked", reason), (go,))
+        s, locale = sketch.value, self._world.common(subgoal.origin.locale, subgoal.destination.locale)
+        if subgoal.origin.locale == subgoal.destination.locale:
+            parts = self._across(subgoal, belief.value)
         else:
-            yield Post(PlanSketch(s.goal, (*s.path, s.at), subgoal.destination.locale, legs), (go, belief))
+            parts = self._between_locales(_place(belief.value), subgoal.destination, subgoal.tolerance_m)
+        if parts is None:
+            yield Post(Outcome("blocked", f"no way through {locale} to {subgoal.destination}"), (go,))
+        else:
+            yield Post(PlanSketch(s.goal, (*s.path, s.at), locale, parts), (go, belief))
 
     def _close(self, view: View, done: Entry[PlanSketch]) -> Iterable[Effect]:
         """A sketch is done: so is the subgoal of its parent, or the goal itself."""
@@ -163,27 +164,31 @@ class Sketcher(Expert):
         if goal is not None and goal.value.is_active:
             yield Revise(goal, replace(goal.value, status="reached"), (done,))
 
-    def _between_locales(self, here: Place, destination: Place) -> tuple[Subgoal, ...] | None:
-        """Across each locale to its doorway, through it, and so on to the destination (Figure 8's passage arcs)."""
-        try:
-            route = nx.shortest_path(self._world.passages, here.locale, destination.locale)
-        except (nx.NetworkXNoPath, nx.NodeNotFound):
+    def _between_locales(self, here: Place, destination: Place, tolerance_m: float) -> tuple[Subgoal, ...] | None:
+        """To a passage, through it, and so on to the destination, at the highest level where they differ (Figure 9)."""
+        route = self._world.route(here.locale, destination.locale)
+        if route is None:
             return None
         subgoals: list[Subgoal] = []
-        for a, b in pairwise(route):
-            doorway = self._world.passages.edges[a, b]["doorways"][0]
-            before, behind = self._before(doorway, a), self._before(doorway, b)
+        for step in route.steps:
+            before, behind = (self._before(step.passage, locale) for locale in (step.origin, step.destination))
             subgoals.append(self._subgoal(here, before, WAY_TOLERANCE_M))
-            subgoals.append(Subgoal(before, behind, True, doorway.name, WAY_TOLERANCE_M))
+            subgoals.append(Subgoal(before, behind, True, step.passage.name, WAY_TOLERANCE_M))
             here = behind
-        subgoals.append(self._subgoal(here, destination, END_TOLERANCE_M))
+        subgoals.append(self._subgoal(here, destination, tolerance_m))
         return tuple(subgoals)
 
-    def _before(self, doorway: Doorway, locale: str) -> Place:
-        x, y = doorway.threshold_of(locale).mean(axis=0) - THRESHOLD_M * doorway.outward_from(locale)
+    def _before(self, passage: Passage, locale: str) -> Place:
+        if isinstance(passage, Link):
+            x, y, heading = passage.stop_of(locale)
+            return Place.of_world(self._world, locale, float(x), float(y), float(heading))
+        x, y = passage.threshold_of(locale).mean(axis=0) - THRESHOLD_M * passage.outward_from(locale)
         return Place.of_world(self._world, locale, float(x), float(y))
 
     def _subgoal(self, origin: Place, destination: Place, tolerance_m: float) -> Subgoal:
+        """Primitive where a straight line leads there; between locales it is left to a sketch drawn on the way."""
+        if origin.locale != destination.locale:
+            return Subgoal(origin, destination, False, tolerance_m=tolerance_m)
         a, b = origin.in_world(self._world), destination.in_world(self._world)
         free = self._free(destination.locale, CLEARANCES_M[-1])
         straight = a.distance_to(b) <= LEG_M and is_clear(free, a.position, b.position)
@@ -210,6 +215,11 @@ class Sketcher(Expert):
     def _free(self, locale: str, margin_m: float) -> Geometry:
         clearance = self._robot.radius_m + margin_m
         return free_space(self._world.outline(locale), self._world.obstacles(locale), clearance)
+
+
+def _place(belief: Hypothesis) -> Place:
+    """Where the robot believes it is, any heading."""
+    return Place(belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m)
 
 
 def _divided(route: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:

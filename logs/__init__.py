@@ -1,4 +1,4 @@
 """The diary: everything that a person sees of a run. The only importer of rerun.
 
-Read in this order: journal_file, mirror, tape, paths, loggers/, blueprint, sink, reader, look.
+Read in this order: journal_file, mirror, mood, deeds, tape, paths, loggers/, blueprint, sink, reader, overview, look.
 """

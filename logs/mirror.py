@@ -13,11 +13,15 @@ from world_models.frames import Pose2
 
 T = TypeVar("T")
 
+KEPT = 64
+"""So many entries of a type are remembered, the newest ones: nothing older is drawn, and a long run does not grow."""
+
 
 class Mirror:
-    """The current revision of every entry, as far as the changes tell."""
+    """The current revision of the newest entries, as far as the changes tell."""
 
-    def __init__(self) -> None:
+    def __init__(self, kept: int = KEPT) -> None:
+        self._kept = kept
         self._by_type: dict[type[Any], dict[str, Entry[Any]]] = {}
         self._by_id: dict[str, Entry[Any]] = {}
 
@@ -30,6 +34,9 @@ class Mirror:
             self._by_id.pop(entry.id, None)
         else:
             same[entry.id] = self._by_id[entry.id] = entry
+            if len(same) > self._kept:
+                oldest = next(iter(same))
+                del same[oldest], self._by_id[oldest]
 
     def get(self, id: str) -> Entry[Any] | None:
         """The current revision of an entry, or None."""
@@ -59,9 +66,11 @@ class Moment:
     mirror: Mirror
     truth: tuple[Pose2, ...] = ()
     _changes: tuple[Change, ...] = field(init=False)
+    _kinds: frozenset[type[Any]] = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_changes", (*self.decision.observed, *self.decision.made))
+        object.__setattr__(self, "_kinds", frozenset(type(change.entry.value) for change in self._changes))
 
     @property
     def changes(self) -> tuple[Change, ...]:
@@ -70,8 +79,10 @@ class Moment:
 
     def changed(self, kind: type[T]) -> tuple[Entry[T], ...]:
         """Entries of a type that were posted or revised."""
+        if kind not in self._kinds:
+            return ()
         return tuple(c.entry for c in self._changes if isinstance(c.entry.value, kind) and not isinstance(c, Retracted))
 
     def touched(self, *kinds: type[Any]) -> bool:
         """Whether any entry of these types changed or went."""
-        return any(isinstance(c.entry.value, kinds) for c in self._changes)
+        return not self._kinds.isdisjoint(kinds)

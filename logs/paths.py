@@ -6,25 +6,32 @@ DESCRIPTION = "description"
 
 WORLD = "world"
 BUILDING = f"{WORLD}/building"
-FLOORS, WALLS, THINGS = f"{BUILDING}/floors", f"{BUILDING}/walls", f"{BUILDING}/things"
 NAMES, DOORWAYS = f"{BUILDING}/names", f"{BUILDING}/doorways"
 TRUE_ROBOT, TRUE_TRAIL = f"{WORLD}/robot/true", f"{WORLD}/robot/true_trail"
 BELIEVED_ROBOT, BELIEVED_TRAIL = f"{WORLD}/robot/believed", f"{WORLD}/robot/believed_trail"
+BELIEVED_BODY = f"{BELIEVED_ROBOT}/body"
 CANDIDATES = f"{WORLD}/robot/candidates"
 GOAL, PATH, LEG, LANDMARKS = f"{WORLD}/plan/goal", f"{WORLD}/plan/path", f"{WORLD}/plan/leg", f"{WORLD}/plan/landmarks"
 
 CAMERA = "camera"
 IMAGE = f"{CAMERA}/image"
 EXPECTED, SEGMENTS, MATCHED = f"{IMAGE}/expected", f"{IMAGE}/segments", f"{IMAGE}/matched"
+REJECTED, LANDMARK_NAMES = f"{IMAGE}/rejected", f"{IMAGE}/names"
 WINDOWS, DRIFTS = f"{IMAGE}/windows", f"{IMAGE}/drifts"
 
 SKETCH = "sketch"
-LANES = "lanes"
-FOCUS = f"{LANES}/focus"
+
+HARVEY, FOCUS, FAULTS, WHO = "harvey", "level", "robot", "who"
+"""Lanes are labelled with their whole path and sorted by it: so these are short, and who acts comes last."""
+
 WHY = "why"
+CHAPTERS = "chapters"
 
 DECISION = "decision"
 TABLE, RECORDS = f"{DECISION}/table", f"{DECISION}/records"
 
 ERRORS = "errors"
 POSITION, HEADING, DEVIATION = f"{ERRORS}/position", f"{ERRORS}/heading", f"{ERRORS}/deviation"
+
+SUMMARY, MOODS_OF, MILESTONES, OFF, FLEET = "summary", "run", "milestones", "off", f"{WORLD}/fleet"
+"""Of the overview of several runs: each has one entity a run below it, but the summary."""

@@ -38,6 +38,19 @@ def read_frames(path: Path) -> dict[int, bytes]:
     return {row[NUMBER].as_py(): row[JPEG].values.to_numpy().tobytes() for row in _rows(path, IMAGE, (NUMBER, JPEG))}
 
 
+def damage_of(path: Path) -> str | None:
+    """What is wrong with a recording, as where a crash cut it off; None for a whole one. Its contents are not read."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RerunWarning)
+            RrdReader(path).stream()
+    except RerunWarning:
+        return "it has no end"
+    except Exception as error:  # the reader's errors have no common type; the cause is in the file in any case
+        return str(error)
+    return None
+
+
 def _decision(path: Path, line: str) -> dict[str, Any]:
     try:
         record = json.loads(line)
@@ -54,8 +67,9 @@ def _rows(path: Path, entity: str, components: tuple[str, ...]) -> list[dict[str
         raise RecordingError(f"{path}: expected a recording, got no such file")
     try:
         rows = [row for batch in _batches(path, entity) for row in _complete(batch, components)]
-    except Exception as error:  # the reader's errors have no common type; the cause is in the file in any case
-        raise RecordingError(f"{path}: expected a whole Rerun recording, got: {error}") from None
+    except Exception as error:  # as above
+        raise RecordingError(f"{path}: expected a whole Rerun recording, got: {error} (harvey repair {path.parent} "
+                             "draws it anew)") from None
     return [row for _, row in sorted(rows, key=lambda pair: pair[0])]
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from blackboard.journal import Decision, decision_line
+from logs.belief import Belief
 from logs.blueprint import blueprint, describe
 from logs.loggers import Logger
 from logs.loggers.building import Building
+from logs.loggers.chapters import Chapters
 from logs.loggers.decisions import Decisions
 from logs.loggers.errors import Errors
 from logs.loggers.frames import Frames
@@ -20,11 +22,22 @@ from logs.loggers.sketch_tree import SketchTree
 from logs.loggers.why import Why
 from logs.mirror import Mirror, Moment
 from logs.paths import DESCRIPTION
-from logs.tape import Tape
+from logs.tape import LIVE_PORT, Tape
 from world_models.body import Frame, MotionReport
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 from world_models.world import World
+
+
+def all_loggers(
+    world: World, camera: Camera, mount: CameraMount, line_of: Callable[[Decision], str] = decision_line,
+) -> tuple[Logger, ...]:
+    """Everything that a recording shows."""
+    belief = Belief(world)
+    return (
+        Building(world), Robots(world, camera, mount, belief), Plan(world), Frames(camera), Image(camera),
+        SketchTree(), Lanes(), Decisions(line_of), Errors(belief), Chapters(belief), Why(belief),
+    )
 
 
 class Recorder:
@@ -36,24 +49,24 @@ class Recorder:
 
     def __init__(
         self, path: Path | None, *, world: World, camera: Camera, mount: CameraMount, title: str, recording_id: str,
-        live: bool = False, line_of: Callable[[Decision], str] = decision_line,
+        live: bool = False, live_port: int = LIVE_PORT, line_of: Callable[[Decision], str] = decision_line,
+        loggers: Sequence[Logger] | None = None,
     ) -> None:
         """Begin a recording in a file (``path``), for a viewer that connects now (``live``), or both.
 
-        ``line_of`` gives a decision's line in the journal; :meth:`JournalFile.line` spares making it twice.
+        Args:
+            line_of: gives a decision's line in the journal; :meth:`JournalFile.line` spares making it twice.
+            loggers: what is drawn; all of it unless said.
 
         Raises:
             RecordingError: the file cannot be written.
             ValueError: neither path nor live.
         """
-        self._tape = Tape(path, recording_id, title, blueprint(world, camera), live=live)
+        self._tape = Tape(path, recording_id, title, blueprint(world, camera), live=live, live_port=live_port)
         self._mirror = Mirror()
         self._sim_time_s = 0.0
         self._truth: list[Pose2] = []
-        self._loggers: tuple[Logger, ...] = (
-            Building(world), Robots(world, camera, mount), Plan(world), Frames(camera), Image(camera),
-            SketchTree(), Lanes(), Decisions(line_of), Errors(world), Why(),
-        )
+        self._loggers = all_loggers(world, camera, mount, line_of) if loggers is None else tuple(loggers)
         self._tape.fix(DESCRIPTION, describe(title))
         for logger in self._loggers:
             logger.begin(self._tape)
@@ -74,6 +87,14 @@ class Recorder:
         for logger in self._loggers:
             logger.log(self._tape, moment)
         self._tape.end_cycle()
+
+    def flush(self) -> None:
+        """Bring everything to the disk, and to whoever watches, now.
+
+        Raises:
+            RecordingError: the recording cannot be written any more.
+        """
+        self._tape.flush()
 
     def close(self) -> None:
         """End the recording.

@@ -3,67 +3,67 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import rerun as rr
+from rerun.chunk import RrdReader
 
+from logs.columns import Batch, Columnar, Columns, Row
 from logs.errors import RecordingError
 
 APPLICATION = "harvey"
 
-FLUSH_CYCLES = 15
-"""A crash loses at most so many cycles of the recording (the journal loses none)."""
-
-Row = tuple[int, float, dict[str, Any]]
-"""Cycle, simulated time and fields."""
+FLUSH_CYCLES, LIVE_FLUSH_CYCLES = 64, 4
+"""A crash loses at most so many cycles of the recording (the journal loses none, so they can be drawn again); whoever
+watches sees it so late."""
 
 LOCALHOST, LIVE_PORT = "127.0.0.1", 9876
 
 BATCHING = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1 << 30, flush_num_rows=1 << 40)
 """The stream itself never flushes: what is in a chunk then follows from the cycles alone, and equal runs are equal."""
 
-
 class Tape:
-    """One recording: a file, a live server for a viewer, or both."""
+    """One recording: a file, a live server for a viewer, or both.
 
-    def __init__(self, path: Path | None, recording_id: str, title: str, blueprint: Any, *, live: bool = False) -> None:
+    Rows are kept and sent as columns once in a while: that costs a tenth of logging them one by one.
+    """
+
+    def __init__(
+        self, path: Path | None, recording_id: str, title: str, blueprint: Any, *, live: bool = False,
+        live_port: int = LIVE_PORT,
+    ) -> None:
         if path is None and not live:
             raise ValueError("expected a path or live=True, got neither")
         if live:
-            _expect_free_port()
+            _expect_free_port(live_port)
         self._path = path
         self._stream = rr.RecordingStream(
             APPLICATION, recording_id=recording_id, send_properties=False, batcher_config=BATCHING)
         self._stream.set_log_time_enabled(False)
         self._stream.set_log_tick_enabled(False)
-        self._guarded(lambda: self._stream.set_sinks(*_sinks(path, live), default_blueprint=blueprint))
+        self._guarded(lambda: self._stream.set_sinks(*_sinks(path, live, live_port), default_blueprint=blueprint))
         self._stream.send_recording_name(title)
-        self._cycles = 0
+        self._cycles, self._flush_cycles = 0, LIVE_FLUSH_CYCLES if live else FLUSH_CYCLES
         self._now = (0, 0.0)
-        self._rows: dict[str, list[Row]] = {}
+        self._columns = Columns()
+        self._rows: dict[tuple[str, type[Columnar], tuple[str, ...]], list[Row]] = {}
 
     def at(self, cycle: int, sim_time_s: float) -> None:
         """What is logged from now on happened then."""
         self._now = cycle, sim_time_s
-        self._stream.set_time("cycle", sequence=cycle)
-        self._stream.set_time("sim_time", duration=sim_time_s)
 
-    def log(self, path: str, *what: Any) -> None:
-        """Log archetypes at an entity path, now."""
-        self._stream.log(path, what[0], *what[1:])
-
-    def add(self, path: str, **fields: Any) -> None:
-        """Log one row of a table, now; rows are sent together, which costs a fraction of logging them one by one.
-
-        ``fields`` have the same names in each row of an entity; ``text`` and ``level`` make a text log.
-        """
-        self._rows.setdefault(path, []).append((*self._now, fields))
+    def log(self, path: str, kind: type[Columnar], **components: Batch) -> None:
+        """Log one row at an entity path, now; each component is a batch of values, which may be empty."""
+        self._rows.setdefault((path, kind, tuple(components)), []).append((*self._now, components))
 
     def fix(self, path: str, *what: Any) -> None:
         """Log archetypes that hold at all times."""
         self._stream.log(path, what[0], *what[1:], static=True)
+
+    def copy(self, recording: Path, content: str) -> None:
+        """Take over what another recording holds at all times, as ``/world/building/**``."""
+        self._stream.send_chunks(RrdReader(recording).stream().filter(content=content, is_static=True))
 
     def end_cycle(self) -> None:
         """Bring what was logged to the disk once in a while.
@@ -72,15 +72,14 @@ class Tape:
             RecordingError: the disk is full or gone.
         """
         self._cycles += 1
-        if self._cycles % FLUSH_CYCLES == 0:
+        if self._cycles % self._flush_cycles == 0:
             self.flush()
 
     def flush(self) -> None:
         """Bring what was logged to the disk; raises RecordingError where that fails."""
-        for path, rows in self._rows.items():
-            cycles, times, fields = zip(*rows, strict=True)
-            index = [rr.TimeColumn("cycle", sequence=cycles), rr.TimeColumn("sim_time", duration=times)]
-            self._stream.send_columns(path, index, list(_columns(fields)))
+        for (path, kind, names), rows in self._rows.items():
+            index, columns = self._columns.of(kind, names, rows)
+            self._stream.send_columns(path, index, columns)
         self._rows.clear()
         self._guarded(self._stream.flush)
 
@@ -98,26 +97,17 @@ class Tape:
             raise RecordingError(f"{self._path or 'live recording'}: cannot be written: {error}") from None
 
 
-def _columns(rows: Sequence[dict[str, Any]]) -> Iterator[Any]:
-    """Rows as columns."""
-    fields = {name: [row[name] for row in rows] for name in rows[0]}
-    if "text" in fields:
-        yield from rr.TextLog.columns(text=fields.pop("text"), level=fields.pop("level"))
-    if fields:
-        yield from rr.AnyValues.columns(True, **fields)
-
-
-def _expect_free_port() -> None:
+def _expect_free_port(port: int) -> None:
     """The live server itself does not tell when somebody else listens there."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            probe.bind((LOCALHOST, LIVE_PORT))
+            probe.bind((LOCALHOST, port))
         except OSError as error:
-            address = f"{LOCALHOST}:{LIVE_PORT}"
+            address = f"{LOCALHOST}:{port}"
             raise RecordingError(f"live recording: {address} cannot be served: {error.strerror}") from None
 
 
-def _sinks(path: Path | None, live: bool) -> list[Any]:
+def _sinks(path: Path | None, live: bool, port: int) -> list[Any]:
     file = [rr.FileSink(path)] if path is not None else []
-    return [*file, *([rr.GrpcServerSink(bind_ip=LOCALHOST, port=LIVE_PORT)] if live else [])]
+    return [*file, *([rr.GrpcServerSink(bind_ip=LOCALHOST, port=port)] if live else [])]

@@ -101,6 +101,22 @@ class Wheels:
         length = move_m * self.length_factor * (1.0 + p.distance_sigma * float(stretch))
         return length, self.curvature_per_m + p.curvature_sigma_per_m * float(bend)
 
+    def slip(self, rng: np.random.Generator) -> Slip:
+        """How one motion errs whose length is not known yet; always three draws from ``rng``."""
+        scale, stretch, bend = rng.standard_normal(3)
+        p = self.parameters
+        return Slip(
+            turn_factor=1.0 + p.turn_scale_sigma * float(scale),
+            length_factor=self.length_factor * (1.0 + p.distance_sigma * float(stretch)),
+            curvature_per_m=self.curvature_per_m + p.curvature_sigma_per_m * float(bend),
+        )
+
+    def skittered(self, turn_rad: float, rng: np.random.Generator) -> tuple[float, float]:
+        """Sideways motion (x, y) of a part of a turn; parts add up to what a whole turn of 90 degrees does."""
+        x, y = rng.standard_normal(2)
+        size = self.parameters.skitter_sigma_m * math.sqrt(abs(turn_rad) / (math.pi / 2.0))
+        return size * float(x), size * float(y)
+
     def claimed(self, turn_rad: float, move_m: float) -> tuple[float, float]:
         """What the encoders say of a motion that the wheels, knowing no better, made as commanded."""
         p = self.parameters
@@ -113,6 +129,21 @@ class Wheels:
     def move_s(self, move_m: float) -> float:
         """Time that a move takes."""
         return abs(move_m) / self.parameters.speed_m_per_s
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """How one motion errs, however long it gets: what is really done per part of it that the wheels roll.
+
+    Attributes:
+        turn_factor: radians per radian.
+        length_factor: metres per metre.
+        curvature_per_m: of the arc that a move is.
+    """
+
+    turn_factor: float
+    length_factor: float
+    curvature_per_m: float
 
 
 def arc_steps(length_m: float, curvature_per_m: float) -> Iterator[Pose2]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from sim.truth import Score, Truth, score
 from world_models.frames import Pose2
 from world_models.location import Place
 from world_models.outlines import inside_polygon
-from world_models.ptrans import parse_ptrans
+from world_models.phrases import places_of
 from world_models.store import WorldError, load_world
 from world_models.world import World
 
@@ -63,14 +63,15 @@ def set_stage(scenario: Scenario) -> Stage:
     """
     try:
         world = load_world(scenario.world, details=scenario.details)
-        building = Building.of_faces(world.faces, _locale_finder(world), scenario.render.samples)
-        start, goal = parse_ptrans(scenario.goal)
+        for fault in scenario.faults:
+            _check_fault(scenario, world, fault)
+        start, goal = _ends(scenario, world)
+        around = _around(world, (start.locale, goal.locale, *_named(scenario)))
+        building = Building.of_faces(world.faces_within(around), _locale_finder(world, around), scenario.render.samples)
         heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
         start_world, goal_world = _pose(world, start, scenario.start.heading_rad), _pose(world, goal, heading)
     except WorldError as error:
         raise ScenarioError(f"{scenario.name}: {error}") from None
-    for fault in scenario.faults:
-        _check_fault(scenario, world, fault)
     room_m = ROBOT_RADIUS_M + building.obstacles.clearance_m(start_world)
     if room_m < ROBOT_RADIUS_M:
         expected = f"expected {ROBOT_RADIUS_M} m of room at the start"
@@ -78,9 +79,23 @@ def set_stage(scenario: Scenario) -> Stage:
     return Stage(scenario, world, building, start_world, goal_world)
 
 
-def _locale_finder(world: World) -> Callable[[Pose2], str]:
+def _ends(scenario: Scenario, world: World) -> tuple[Place, Place]:
+    """Where a scenario's mission begins and ends. Raises WorldError where the world has no such place."""
+    try:
+        return places_of(scenario.goal, world)
+    except ValueError as error:
+        raise WorldError(f"goal: {error}") from None
+
+
+def _around(world: World, locales: Sequence[str]) -> str:
+    """The smallest locale with all that a scenario names in it, and more than one room: what need be built of it."""
+    around = world.common(*locales)
+    return world.locale(around).parent or around if world.is_room(around) else around
+
+
+def _locale_finder(world: World, around: str) -> Callable[[Pose2], str]:
     """As ``world.locale_at``, but quick in the middle of a room: it is asked every two centimetres."""
-    outlines = [(name, world.outline(name)) for name in world.rooms]
+    outlines = [(name, world.outline(name)) for name in world.rooms_in(around)]
     boxes = np.array([[*outline.min(axis=0), *outline.max(axis=0)] for _, outline in outlines])
 
     def locale_at(pose: Pose2) -> str:
@@ -99,10 +114,19 @@ def _pose(world: World, place: Place, heading_rad: float) -> Pose2:
         raise WorldError(f"goal: {error}") from None
 
 
-def _check_fault(scenario: Scenario, world: World, fault: Fault) -> None:
+def _named(scenario: Scenario) -> list[str]:
+    """The locales that the faults of a scenario name."""
+    return [name for fault in scenario.faults for name in _named_by(fault)]
+
+
+def _named_by(fault: Fault) -> list[str]:
     named = [fault.moment.in_locale]
     if isinstance(fault, Displacement) and fault.place is not None:
         named.append(fault.place.locale)
-    for name in named:
-        if name and name not in world.locales:
+    return [name for name in named if name]
+
+
+def _check_fault(scenario: Scenario, world: World, fault: Fault) -> None:
+    for name in _named_by(fault):
+        if name not in world.locales:
             raise ScenarioError(f"{scenario.name}: faults: expected {near(name, world.locales)}, got {name!r}")

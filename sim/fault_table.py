@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sim.faults import Displacement, Fault, LightsOff, Moment
+from sim.ailments import AILMENTS
+from sim.faults import Ailment, Displacement, Fault, LightsOff, Moment
 from sim.settings import read_settings
 from world_models.location import Place
 from world_models.toml_source import Node
@@ -35,8 +36,10 @@ def read_fault(node: Node) -> Fault:
     moment = Moment(table.in_locale, table.after_m, table.after_s)
     if table.kind == "lights_off":
         return LightsOff(moment, table.duration_s)
+    if table.kind in AILMENTS:
+        return Ailment(table.kind, moment, table.duration_s)
     if table.kind not in ("bump", "kidnap"):
-        raise node.fail("kind = bump, kidnap or lights_off", repr(table.kind))
+        raise node.fail(f"kind = bump, kidnap, lights_off or one of {', '.join(AILMENTS)}", repr(table.kind))
     there = Place(table.to_locale, table.to_x_m, table.to_y_m, table.to_heading_rad) if table.to_locale else None
     return Displacement(
         table.kind, moment, table.forward_m, table.left_m, table.turn_rad, table.distance_m, there

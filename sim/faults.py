@@ -1,4 +1,4 @@
-"""What goes wrong from outside: bumps, kidnaps, and the lights going off. Each happens once, at its moment."""
+"""What goes wrong from outside: bumps, kidnaps, the lights, the line, the camera. Each happens once, at its moment."""
 
 from __future__ import annotations
 
@@ -68,7 +68,20 @@ class LightsOff:
     duration_s: float = 10.0
 
 
-Fault = Displacement | LightsOff
+@dataclass(frozen=True, slots=True)
+class Ailment:
+    """Something between the mind and the body does not work for a while.
+
+    Attributes:
+        kind: one of :data:`sim.ailments.AILMENTS`.
+    """
+
+    kind: str
+    moment: Moment = Moment()
+    duration_s: float = 10.0
+
+
+Fault = Displacement | LightsOff | Ailment
 
 
 def placed(fault: Fault, world: Frames) -> Fault:

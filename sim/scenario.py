@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from sim.actuator import ActuatorParameters
 from sim.fault_table import read_fault
 from sim.faults import Fault
+from sim.optics import check_lens
 from sim.rasterizer import sample_offsets
 from sim.sensor import SensorParameters
 from sim.settings import known_keys, merged, near, parsed, read_settings
 from world_models.camera import Camera, CameraMount
-from world_models.ptrans import parse_ptrans
+from world_models.phrases import check_command
+from world_models.store_schema import SUFFIXES
 from world_models.toml_source import Node, Source, WorldError
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -48,7 +50,7 @@ class Arrival:
 
 @dataclass(frozen=True, slots=True)
 class CameraSettings:
-    """The camera and how it is mounted."""
+    """The camera and how it is mounted; distortion: none, or k1, k2, p1, p2[, k3] as OpenCV has them."""
 
     width_px: int = 512
     height_px: int = 512
@@ -56,16 +58,20 @@ class CameraSettings:
     mount_height_m: float = 1.0
     mount_forward_m: float = 0.1
     mount_tilt_rad: float = 0.0
+    distortion: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         small, large = sorted((self.width_px, self.height_px))
         if not (0.05 <= self.field_of_view_rad <= 2.6 and small >= 16 and large <= 4096):
             raise ValueError("expected a field of view of 3 to 149 degrees and 16 to 4096 px, got "
                              f"{math.degrees(self.field_of_view_rad):g} degrees, {self.width_px} x {self.height_px} px")
+        if self.distortion:
+            check_lens(self.camera)
 
     @property
     def camera(self) -> Camera:
-        return Camera.from_field_of_view(self.field_of_view_rad, self.width_px, self.height_px)
+        plain = Camera.from_field_of_view(self.field_of_view_rad, self.width_px, self.height_px)
+        return replace(plain, distortion=self.distortion) if self.distortion else plain
 
     @property
     def mount(self) -> CameraMount:
@@ -178,6 +184,14 @@ def parse_scenario(text: str, name: str = "scenario", folder: Path = SCENARIOS) 
         raise ScenarioError(str(error)) from None
 
 
+def scenario_from_tables(data: Mapping[str, Any], name: str, folder: Path) -> Scenario:
+    """The scenario of tables as :attr:`Scenario.data` holds them. Raises ScenarioError."""
+    try:
+        return _scenario(Source(name, data, {}), name, folder)
+    except WorldError as error:
+        raise ScenarioError(str(error)) from None
+
+
 def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     """The scenario with some settings replaced, as ``{"servo.action": "off", "start.heading_deg": 90}``.
 
@@ -228,12 +242,12 @@ def _scenario(source: Source, name: str, folder: Path) -> Scenario:
 
 def _file(text: str, shipped: Path, folder: Path) -> Path:
     """A file that comes with the project, by its bare name, or any file, relative to the scenario's folder."""
-    return folder / text if text.endswith(".toml") else shipped / f"{text}.toml"
+    return folder / text if text.endswith((".toml", *SUFFIXES)) else shipped / f"{text}.toml"
 
 
 def _goal(node: Node) -> str:
     try:
-        parse_ptrans(node.text())
+        check_command(node.text())
     except WorldError:
         raise
     except ValueError as error:

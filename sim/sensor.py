@@ -62,6 +62,12 @@ def exposed(
     return image
 
 
+def pass_over(rng: np.random.Generator) -> None:
+    """Draw from ``rng`` what :func:`exposed` draws, for a picture that is known already."""
+    rng.standard_normal()
+    rng.integers(0, 2**62)
+
+
 def compressed(image_rgb: NDArray[np.uint8], quality: int) -> bytes:
     """JPEG bytes of an RGB image (h, w, 3)."""
     done, data = cv2.imencode(".jpg", cv2.cvtColor(image_rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality])

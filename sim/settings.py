@@ -66,6 +66,8 @@ def _value(item: Node, hint: Any, factor: float) -> Any:
         if isinstance(item.value, bool) or not isinstance(item.value, int) or abs(item.value) > 10**9:
             raise item.fail("a whole number")
         return item.value
+    if hint == tuple[float, ...]:
+        return tuple(number.number(-1e9, 1e9) for number in item.items())
     return item.number(-1e9, 1e9) * factor
 
 

@@ -42,6 +42,8 @@ class LocaleSpec:
     look: RoomLook
     properties: Mapping[str, Any]
     source: str
+    survey_m: float = 0.0
+    survey_rad: float = 0.0
 
 
 @dataclass(frozen=True)

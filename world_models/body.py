@@ -58,3 +58,75 @@ class Frame:
     number: int
     sim_time_s: float
     purpose: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Where the wheels count that the robot is, from wherever the count began.
+
+    Attributes:
+        x_m, y_m, heading_rad: of the robot in the frame of the count, -pi <= heading <= pi.
+        time_s: when it was so, by the clock of the base or, where it has none, of its driver.
+    """
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    time_s: float
+
+
+STOP_KEY = "stop key"
+"""What a fault is called that is none: somebody wanted the robot to stand still."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodyFault:
+    """Something is wrong between the mind and the body: a request stays unanswered until it is over.
+
+    Attributes:
+        part: base, camera, or user for the stop key.
+        what: link lost, base answers nonsense, stalled, camera unplugged, frame late, frame dropped, stop key ...
+        detail: in words.
+        request: id of the motor command or the look that was not answered.
+        when_s: when it was noticed, by the body's clock.
+        turn_rad, move_m: what the wheels claim to have done of a motor command by then; None where nothing is known.
+        status: open, or over.
+    """
+
+    part: str
+    what: str
+    detail: str
+    request: str
+    when_s: float
+    turn_rad: float | None = None
+    move_m: float | None = None
+    status: str = "open"
+
+    @property
+    def is_open(self) -> bool:
+        return self.status == "open"
+
+
+@dataclass(frozen=True, slots=True)
+class Recovery:
+    """The wish that a fault be over: wait, then try to have the request answered after all.
+
+    Attributes:
+        fault: id of the fault entry; request: id of the request that it kept from being answered.
+        since_s: when the fault was noticed, by the body's clock.
+        wait_s: how long to wait before the next try.
+        tries: how many there were.
+        waited_s: time from when the fault was noticed to the last try, by the body's clock.
+        status: asked, in vain (try again, or give up) or over (the request is answered).
+        what, detail: the fault as the last try found it, where it was in vain.
+    """
+
+    fault: str
+    request: str
+    since_s: float
+    wait_s: float
+    tries: int = 0
+    waited_s: float = 0.0
+    status: str = "asked"
+    what: str = ""
+    detail: str = ""

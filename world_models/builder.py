@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -17,8 +17,10 @@ from world_models.frames import Pose
 from world_models.geometer import Solid
 from world_models.landmarks import Landmark
 from world_models.locales import Doorway, Locale
+from world_models.memory_frames import MemoryFrames
 from world_models.shells import Opening, Shell, Wall, along_wall, walls_of
-from world_models.world import Fault, Thing, World
+from world_models.things import Fault, Thing
+from world_models.world import World
 
 THICKEST_WALL_M = 0.6
 """Walls of two rooms that are further apart than this are not the two sides of one wall."""
@@ -34,16 +36,15 @@ def build_world(blueprint: Blueprint) -> World:
     site.raise_shells()
     site.hang_doors()
     site.furnish()
-    return World(
+    return World(MemoryFrames(
         name=blueprint.name,
-        root=blueprint.name,
         locales=MappingProxyType(_locales(blueprint, site.poses)),
-        doorways=tuple(site.doorways),
-        faces=tuple(site.faces),
-        landmarks=tuple(mark for mark in site.landmarks if len(mark.edges)),
-        things=tuple(site.things),
+        every_doorway=tuple(site.doorways),
+        every_face=tuple(site.faces),
+        every_landmark=tuple(mark for mark in site.landmarks if len(mark.edges)),
+        every_thing=tuple(site.things),
         building_faults=tuple(site.faults),
-    )
+    ))
 
 
 def world_poses(locales: Mapping[str, LocaleSpec], root: str) -> dict[str, Pose]:
@@ -227,9 +228,12 @@ def _locales(blueprint: Blueprint, poses: Mapping[str, Pose]) -> dict[str, Local
     out = {blueprint.name: root}
     for name, s in specs.items():
         if s.outline is None:
-            out[name] = _container(name, s.kind, s.parent, s.frame, blueprint, poses, s.properties, s.source)
+            out[name] = replace(
+                _container(name, s.kind, s.parent, s.frame, blueprint, poses, s.properties, s.source),
+                survey_m=s.survey_m, survey_rad=s.survey_rad)
         else:
-            out[name] = Locale(name, s.kind, s.parent, s.frame, s.outline, s.height_m, s.properties, s.source)
+            out[name] = Locale(name, s.kind, s.parent, s.frame, s.outline, s.height_m, s.properties, s.source,
+                               survey_m=s.survey_m, survey_rad=s.survey_rad)
     return out
 
 

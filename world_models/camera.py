@@ -6,7 +6,7 @@ Pixels: the centre of the top-left pixel is (0.0, 0.0), u to the right, v down (
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,12 @@ from world_models.frames import Pose, frozen
 
 NEAR_M = 0.05
 """Nothing nearer than this to the optical centre is projected [m]."""
+
+UNDONE_STEPS, LEAST_RADIAL = 60, 0.2
+"""Steps to where a ray came from, and the strongest barrel that is undone: beyond it no ray falls on a pixel."""
+
+_ZOOMS = tuple(1.0 + 0.01 * i for i in range(101))
+"""Focal lengths that are tried for :attr:`Camera.pinhole`, relative to the camera's own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +65,26 @@ class Camera:
     def matrix(self) -> NDArray[np.float64]:
         """(3, 3) intrinsic matrix K."""
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def pinhole(self) -> Camera:
+        """The camera without lens distortion that pictures are put into: as this one, with its focal lengths drawn out
+        where the middle of the picture would otherwise not fill it (a pincushion lens).
+        """
+        if self.distortion is None:
+            return self
+        plain = replace(self, distortion=None)
+        return next(
+            (c for f in _ZOOMS if self._fills(c := replace(plain, fx=f * self.fx, fy=f * self.fy))), plain
+        )
+
+    def distort(self, pixels: Any) -> NDArray[np.float64]:
+        """Where this camera sees what it would see at pixels (..., 2) without its lens distortion."""
+        p = np.asarray(pixels, float)
+        if self.distortion is None:
+            return p
+        centre, focal = np.array([self.cx, self.cy]), np.array([self.fx, self.fy])
+        return np.asarray(self._distorted((p - centre) / focal) * focal + centre)
 
     def project(self, points_camera: Any) -> NDArray[np.float64]:
         """Project points (..., 3) [m, camera frame] to pixels (..., 2).
@@ -119,6 +145,17 @@ class Camera:
         out[~mask] = np.nan
         return out, mask
 
+    def _fills(self, pinhole: Camera) -> bool:
+        """Whether all that a camera without distortion would see is in this one's picture."""
+        return bool(np.all(self.inside(self.project(pinhole.rays(pinhole.border())), -0.5)))
+
+    def border(self, steps: int = 33) -> NDArray[np.float64]:
+        """Points (4 steps, 2) on the outline of the picture [px]."""
+        u = np.linspace(-0.5, self.width - 0.5, steps)
+        v = np.linspace(-0.5, self.height - 0.5, steps)
+        sides = [(u, np.full(steps, y)) for y in v[[0, -1]]] + [(np.full(steps, x), v) for x in u[[0, -1]]]
+        return np.concatenate([np.column_stack(side) for side in sides])
+
     def _distorted(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
         if self.distortion is None:
             return xy
@@ -137,10 +174,14 @@ class Camera:
     def _undistorted(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
         if self.distortion is None:
             return xy
-        guess = xy.copy()
-        for _ in range(20):  # fixed point, as OpenCV does; converges for the lenses it models
-            guess = guess - (self._distorted(guess) - xy)
-        return guess
+        k1, k2, p1, p2, k3 = self.distortion
+        x0, y0 = x, y = xy[..., 0], xy[..., 1]
+        for _ in range(UNDONE_STEPS):  # a fixed point, as OpenCV has it
+            r2 = x * x + y * y
+            radial = np.maximum(1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), LEAST_RADIAL)
+            x, y = ((x0 - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial,
+                    (y0 - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial)
+        return np.stack([x, y], axis=-1)
 
 
 @dataclass(frozen=True, slots=True)

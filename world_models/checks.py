@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
 from typing import TYPE_CHECKING
 
 import networkx as nx
@@ -30,8 +29,9 @@ def _unclosed(world: World) -> Iterator[Finding]:
     """Rooms that one can look out of other than through a doorway: surfaces of the room must shut in its middle."""
     for name in world.rooms:
         locale = world.locales[name]
-        polygons = [r.polygon_world for f in world.faces if f.locale == name for r in f.front]
-        openings = [f.polygon_world for f in world.faces if f.locale == name and f.kind == "doorway"]
+        faces = world.faces_of(name)
+        polygons = [r.polygon_world for f in faces for r in f.front]
+        openings = [f.polygon_world for f in faces if f.kind == "doorway"]
         if not polygons or not _shut_in(world, name, [*polygons, *openings]):
             yield locale.source, f"{name}: expected a room closed by floor, ceiling, walls and doors, got a gap"
 
@@ -73,9 +73,21 @@ def _clearance(point: NDArray[np.float64], outline: NDArray[np.float64]) -> floa
 
 
 def _overlapping(world: World) -> Iterator[Finding]:
-    for a, b in combinations(world.rooms, 2):
-        if _overlap(world.outline(a), world.outline(b)):
+    outlines = [world.outline(name) for name in world.rooms]
+    for i, j in _near_pairs(outlines):
+        a, b = world.rooms[i], world.rooms[j]
+        if _overlap(outlines[i], outlines[j]):
             yield world.locales[b].source, f"{b}: expected a room apart from others, got one that overlaps {a}"
+
+
+def _near_pairs(outlines: list[NDArray[np.float64]]) -> Iterator[tuple[int, int]]:
+    """Pairs of polygons, in order, whose bounding rectangles share more than a border."""
+    if not outlines:
+        return
+    low, high = (np.array([bound(outline, axis=0) for outline in outlines]) for bound in (np.min, np.max))
+    for i in range(len(outlines)):
+        meets = (low[i + 1 :] < high[i] - TOLERANCE_M) & (high[i + 1 :] > low[i] + TOLERANCE_M)
+        yield from ((i, i + 1 + int(j)) for j in np.flatnonzero(meets.all(axis=1)))
 
 
 def _overlap(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
@@ -94,7 +106,9 @@ def _reaches_into(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
 def _unreachable(world: World) -> Iterator[Finding]:
     if not world.rooms:
         return
-    reached = nx.node_connected_component(world.passages, world.rooms[0])
+    joined = nx.Graph(world.passages)
+    joined.add_edges_from(link.between for link in world.links)
+    reached = nx.node_connected_component(joined, world.rooms[0])
     for name in world.rooms:
         if name not in reached:
             yield world.locales[name].source, f"{name}: expected open doorways from {world.rooms[0]}, got none"

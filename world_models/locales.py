@@ -27,6 +27,7 @@ class Locale:
         properties: what else the world file says of it.
         source: file:line where it is described.
         floor_m: height of its floor in its own frame; may differ from 0 only where it contains other locales.
+        survey_m, survey_rad: standard deviations of its frame's place and direction in its container.
     """
 
     name: str
@@ -38,6 +39,8 @@ class Locale:
     properties: Mapping[str, Any] = field(default_factory=dict)
     source: str = ""
     floor_m: float = 0.0
+    survey_m: float = 0.0
+    survey_rad: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outline", frozen(self.outline, (None, 2)))
@@ -108,3 +111,36 @@ class Doorway:
         if locale not in self.between:
             raise ValueError(f"expected one of {self.between}, got {locale!r}")
         return self.between.index(locale)
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A passage between two locales that share no wall: an elevator from landing to landing, a flight of stairs.
+
+    Attributes:
+        name: unique in the world.
+        kind: elevator or stairs.
+        between: the two locales.
+        stops_world: (2, 3) where one stands in each of them to begin or to end the ride, and facing where [m, rad].
+        source: file:line where it is described.
+    """
+
+    name: str
+    kind: str
+    between: tuple[str, str]
+    stops_world: NDArray[np.float64]
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stops_world", frozen(self.stops_world, (2, 3)))
+
+    def other(self, locale: str) -> str:
+        """The locale at the other end."""
+        return self.between[1 - self.between.index(locale)]
+
+    def stop_of(self, locale: str) -> NDArray[np.float64]:
+        """(3,) x, y [m] and heading [rad] of the stop in one of the two, world frame."""
+        return np.asarray(self.stops_world[self.between.index(locale)])
+
+
+Passage = Doorway | Link

@@ -70,6 +70,7 @@ class Hypothesis:
         status: held (the one that is acted on), candidate, or doubted.
         weight: relative belief among candidates.
         motion: id of the last motion report that is taken into account, or "".
+        evidence: what speaks for it, in words, where no other entry says it.
     """
 
     locale: str
@@ -79,6 +80,7 @@ class Hypothesis:
     status: str = "held"
     weight: float = 1.0
     motion: str = ""
+    evidence: str = ""
 
     @property
     def is_held(self) -> bool:
@@ -105,14 +107,14 @@ class Hypothesis:
     @staticmethod
     def of_world(
         world: Frames, locale: str, world_from_robot: Pose2, covariance_world: Any, basis: str,
-        *, status: str = "held", weight: float = 1.0, motion: str = "",
+        *, status: str = "held", weight: float = 1.0, motion: str = "", evidence: str = "",
     ) -> Hypothesis:
         """From a pose and covariance in the world frame."""
         locale_from_world = flattened(world.world_from_locale(locale)).inverse()
         turn = _turn(locale_from_world.heading_rad)
         own = turn @ np.asarray(covariance_world, float) @ turn.T
         pose = locale_from_world @ world_from_robot
-        return Hypothesis(locale, pose, covariance_tuple(own), basis, status, weight, motion)
+        return Hypothesis(locale, pose, covariance_tuple(own), basis, status, weight, motion, evidence)
 
 
 def _turn(angle_rad: float) -> NDArray[np.float64]:

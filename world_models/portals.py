@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,16 +13,23 @@ from numpy.typing import NDArray
 from world_models.camera import NEAR_M, Camera
 from world_models.frames import Pose
 from world_models.locales import Doorway
-from world_models.outlines import distance_to_border
 
 if TYPE_CHECKING:
     from world_models.world import World
+
+Point = tuple[float, float, float]
 
 Window = tuple[float, float, float, float]
 """Left, top, right, bottom of a rectangle at depth 1 (x / z and y / z in the camera frame)."""
 
 AT_HAND_M = 0.3
 """A doorway nearer than this may fill the whole image, parts of it closer than the near plane."""
+
+AROUND_DOORWAY_M = 2.0
+"""A camera in a doorway is no further from the rooms that it joins."""
+
+SIGHT_M = 40.0
+"""Nobody looks further."""
 
 BORDER = 0.02
 """How much wider than its exact image a doorway is taken to be."""
@@ -38,59 +48,105 @@ def windows_of(world: World, window: Window, camera_from_world: Pose) -> dict[st
     """The locales in view, each with the rectangle through which it is seen; the camera's own one fills the image."""
     centre = camera_from_world.inverse().translation
     seen = dict.fromkeys(locales_at_camera(world, centre), window)
+    eye = _Eye(camera_from_world, float(centre[0]), float(centre[1]))
     todo = list(seen)
     while todo:
         here = todo.pop(0)
-        for doorway in world.doorways_of(here):
-            there = doorway.other(here)
-            through = _common(seen[here], _through(doorway, here, world, camera_from_world))
-            grown = _joined(seen.get(there), through)
-            if grown is not None and grown != seen.get(there):
-                seen[there] = grown
-                todo.append(there)
+        for portal in portals_of(world, here):
+            grown = _joined(seen.get(portal.there), _common(seen[here], eye.through(portal)))
+            if grown is not None and grown != seen.get(portal.there):
+                seen[portal.there] = grown
+                todo.append(portal.there)
     return seen
 
 
+@dataclass(frozen=True, slots=True)
+class Portal:
+    """A doorway as seen from inside one of its locales, in plain numbers: there are few, and they are asked often.
+
+    Attributes:
+        there: the locale beyond.
+        corners: of the opening on this locale's wall, left foot, right foot, right head, left head [m, world].
+    """
+
+    there: str
+    corners: tuple[tuple[float, float, float], ...]
+
+
+def portals_of(world: World, locale: str) -> tuple[Portal, ...]:
+    """The open doorways of a locale; made once."""
+    made: dict[str, tuple[Portal, ...]] = world.memo.setdefault("portals", {})
+    if locale not in made:
+        base = float(world.world_from_locale(locale).translation[2])
+        made[locale] = tuple(_portal(doorway, locale, base) for doorway in world.doorways_of(locale))
+    return made[locale]
+
+
+def _portal(doorway: Doorway, locale: str, base: float) -> Portal:
+    (lx, ly), (rx, ry) = doorway.threshold_of(locale).tolist()
+    top = base + doorway.height_m
+    return Portal(doorway.other(locale), ((lx, ly, base), (rx, ry, base), (rx, ry, top), (lx, ly, top)))
+
+
+class _Eye:
+    """A camera pose in plain numbers."""
+
+    def __init__(self, camera_from_world: Pose, x: float, y: float) -> None:
+        self._rows = [(*row, t) for row, t in zip(camera_from_world.rotation.tolist(),
+                                                  camera_from_world.translation.tolist(), strict=True)]
+        self._x, self._y = x, y
+
+    def through(self, portal: Portal) -> Window | None:
+        """The rectangle that bounds a doorway."""
+        if self._away(portal) < AT_HAND_M:
+            return -math.inf, -math.inf, math.inf, math.inf
+        return bounds(near_clipped([self._camera(corner) for corner in portal.corners]))
+
+    def _away(self, portal: Portal) -> float:
+        """Distance from the line between the feet of the jambs."""
+        (ax, ay, _), (bx, by, _) = portal.corners[:2]
+        dx, dy = bx - ax, by - ay
+        t = ((self._x - ax) * dx + (self._y - ay) * dy) / max(dx * dx + dy * dy, 1e-18)
+        t = min(max(t, 0.0), 1.0)
+        return math.hypot(ax + t * dx - self._x, ay + t * dy - self._y)
+
+    def _camera(self, corner: tuple[float, float, float]) -> Point:
+        x, y, z = corner
+        a, b, c = (r[0] * x + r[1] * y + r[2] * z + r[3] for r in self._rows)
+        return a, b, c
+
+
 def locales_at_camera(world: World, centre_world: NDArray[np.float64]) -> tuple[str, ...]:
-    """The room that the camera is in; both rooms in a doorway; all rooms from anywhere else."""
+    """The room that the camera is in; both rooms in a doorway; from anywhere else all rooms within sight."""
     here = world.locale_at(centre_world)
-    if here is not None and here in world.rooms:
+    if here is not None and world.is_room(here):
         return (here,)
-    for doorway in world.doorways:
-        if np.linalg.norm(doorway.centre_world - centre_world[:2]) < doorway.width_m / 2 + doorway.depth_m:
-            return doorway.between
-    return world.rooms
+    for room in world.rooms_near(centre_world, AROUND_DOORWAY_M):
+        for doorway in world.doorways_of(room):
+            if np.linalg.norm(doorway.centre_world - centre_world[:2]) < doorway.width_m / 2 + doorway.depth_m:
+                return doorway.between
+    return world.rooms_near(centre_world, SIGHT_M)
 
 
-def _through(doorway: Doorway, locale: str, world: World, camera_from_world: Pose) -> Window | None:
-    """The rectangle that bounds a doorway as seen from inside ``locale``."""
-    feet = doorway.threshold_of(locale)
-    if distance_to_border(camera_from_world.inverse().translation[:2], feet) < AT_HAND_M:
-        return -np.inf, -np.inf, np.inf, np.inf
-    base = float(world.world_from_locale(locale).translation[2])
-    heights = (base, base + doorway.height_m)
-    corners = [(*feet[0], heights[0]), (*feet[1], heights[0]), (*feet[1], heights[1]), (*feet[0], heights[1])]
-    return bounds(near_clipped(camera_from_world.apply(corners)))
-
-
-def near_clipped(polygon_camera: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The part of a polygon (k, 3) in front of the near plane (k', 3)."""
-    out = []
-    for a, b in zip(polygon_camera, np.roll(polygon_camera, -1, axis=0), strict=True):
-        if a[2] >= NEAR_M:
-            out.append(a)
+def near_clipped(polygon_camera: Sequence[Point]) -> list[Point]:
+    """The part of a polygon in front of the near plane."""
+    out: list[Point] = []
+    for index, b in enumerate(polygon_camera):
+        a = polygon_camera[index - 1]
         if (a[2] >= NEAR_M) != (b[2] >= NEAR_M):
-            out.append(a + (NEAR_M - a[2]) / (b[2] - a[2]) * (b - a))
-    return np.array(out).reshape(-1, 3)
+            t = (NEAR_M - a[2]) / (b[2] - a[2])
+            out.append((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), NEAR_M))
+        if b[2] >= NEAR_M:
+            out.append(b)
+    return out
 
 
-def bounds(polygon_camera: NDArray[np.float64]) -> Window | None:
-    """The rectangle that bounds a polygon (k, 3) in front of the camera, a little enlarged."""
-    if not len(polygon_camera):
+def bounds(polygon_camera: Sequence[Point]) -> Window | None:
+    """The rectangle that bounds a polygon in front of the camera, a little enlarged."""
+    if not polygon_camera:
         return None
-    xy = polygon_camera[:, :2] / polygon_camera[:, 2:]
-    (x0, y0), (x1, y1) = xy.min(axis=0) - BORDER, xy.max(axis=0) + BORDER
-    return float(x0), float(y0), float(x1), float(y1)
+    xs, ys = [x / z for x, _, z in polygon_camera], [y / z for _, y, z in polygon_camera]
+    return min(xs) - BORDER, min(ys) - BORDER, max(xs) + BORDER, max(ys) + BORDER
 
 
 def _common(one: Window, other: Window | None) -> Window | None:

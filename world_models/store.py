@@ -1,7 +1,8 @@
-"""Reading a world from TOML that a person can write; see ``worlds/research_center.toml`` for an annotated one."""
+"""Reading a world: TOML that a person writes (``worlds/research_center.toml`` is annotated), or a compiled file."""
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -18,31 +19,53 @@ from world_models.frames import Pose
 from world_models.outlines import is_simple
 from world_models.regions import Finish
 from world_models.shelf import Shelf
+from world_models.sqlite_frames import SqliteFrames
+from world_models.store_schema import SUFFIXES
+from world_models.store_writer import compile_world
 from world_models.toml_source import Node, Source, WorldError
 from world_models.world import World
 
-__all__ = ["WORLDS", "WorldError", "load_world", "read_world"]
+__all__ = ["SUFFIXES", "WORLDS", "WorldError", "compile_file", "fingerprint", "load_world", "read_world"]
 
 WORLDS = Path(__file__).parent / "worlds"
 """Where the worlds that come with the project are kept."""
 
 RECTANGLE_WALLS = ("south", "east", "north", "west")
 FINISH_KEYS = ("walls", "floor", "ceiling", "baseboard", "moulding", "frame", "leaf", "threshold")
-LOCALE_KEYS = ("in", "at", "turn", "size", "outline", "height", "things", "properties", *FINISH_KEYS[:5])
+LOCALE_KEYS = ("in", "at", "turn", "size", "outline", "height", "things", "properties", "survey", *FINISH_KEYS[:5])
 DEFAULT_KEYS = (*FINISH_KEYS, "height", "door_width", "door_height")
 
 
 def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[str]] = ()) -> World:
-    """The world described by a TOML file.
+    """The world described by a TOML file, or in a compiled one, whose frames are then loaded as they are asked for.
 
     Args:
         path: the world file.
-        details: further files that add parts, finishes and things (no rooms or doors).
+        details: further files that add parts, finishes and things (no rooms or doors). A compiled world has them in
+            itself: they must be those that it was compiled with, and only their names matter.
 
     Raises:
         WorldError: a file cannot be read or does not describe a world; names file, line, what was expected and came.
     """
-    return read_world(Source.read(Path(path)), [Source.read(Path(detail)) for detail in details])
+    path = Path(path)
+    if path.suffix in SUFFIXES:
+        return World(SqliteFrames(path, [Path(detail).stem for detail in details]))
+    return read_world(Source.read(path), [Source.read(Path(detail)) for detail in details])
+
+
+def fingerprint(path: str | PathLike[str]) -> str:
+    """SHA-256 of a world file, or of what a compiled one was made of. Raises OSError or WorldError."""
+    path = Path(path)
+    return SqliteFrames(path).sha256 if path.suffix in SUFFIXES else hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def compile_file(path: str | PathLike[str], out: str | PathLike[str],
+                 details: Sequence[str | PathLike[str]] = ()) -> World:
+    """Compile a TOML world with its details; returns the world as it was compiled. Raises WorldError."""
+    base, added = Source.read(Path(path)), [Source.read(Path(detail)) for detail in details]
+    layers = [read_world(base, added[:count]) for count in range(len(added) + 1)]
+    compile_world(layers, Path(out), [Path(detail).stem for detail in details])
+    return layers[-1]
 
 
 def read_world(base: Source, details: Sequence[Source] = ()) -> World:
@@ -106,8 +129,16 @@ class _Draft:
             name, node["kind"].text(), node["in"].text() if "in" in node else self.name,
             self._placed(node, 3), outline, names,
             self.shelf.length(height, 0.1, 1000.0) if height else 2.7,
-            self._look(node, names), _properties(node.get("properties")), node.where,
+            self._look(node, names), _properties(node.get("properties")), node.where, *self._survey(node.get("survey")),
         )
+
+    def _survey(self, node: Node | None) -> tuple[float, float]:
+        """How well a frame's place and direction in its container are known."""
+        if node is None:
+            return 0.0, 0.0
+        node.table(optional=("sigma", "sigma_deg"))
+        place = self.shelf.length(node["sigma"], 0.0) if "sigma" in node else 0.0
+        return place, math.radians(node["sigma_deg"].number(0.0, 180.0)) if "sigma_deg" in node else 0.0
 
     def _outline(self, node: Node) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
         if "size" in node and "outline" in node:

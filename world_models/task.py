@@ -114,6 +114,9 @@ class Leg:
         heading_rad: the heading wanted at the end [rad, world]; None for any.
         increments: motor commands so far.
         status: moving, arrived or halted.
+        to_go_m, left_m: what was left along the line, and how far to the left of it the robot was believed to be, when
+            the last increment was decided; None before the first.
+        aim_rad: how far to the left of its heading the point lay that it then steered at [rad].
     """
 
     sketch: str
@@ -126,6 +129,9 @@ class Leg:
     heading_rad: float | None = None
     increments: int = 0
     status: str = "moving"
+    to_go_m: float | None = None
+    left_m: float | None = None
+    aim_rad: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +200,21 @@ class Certificate:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How the mission ended: reached, lost, blocked or failed, and why."""
+    """How the mission ended: reached, lost, blocked, failed or stopped (somebody wanted it to), and why."""
 
     kind: str
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Resumed:
+    """A run that was cut off goes on; the robot was stopped in between.
+
+    Attributes:
+        after_cycle: the last cycle that was written down.
+        interrupted: motor commands (refs as ``MotorCommand-3.0``) that were written down, but of which nobody heard how
+            far they were carried out; they are not carried out again, the wheels are asked instead.
+    """
+
+    after_cycle: int
+    interrupted: tuple[str, ...] = ()

@@ -25,6 +25,7 @@ from world_models.shadows import (
     clipped_spans,
     hidden_points,
     lengths_px,
+    over_corners,
     overlap,
     pieces,
     rectangles,
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
     from world_models.world import World
 
 Floats = NDArray[np.float64]
+
+KEPT_VIEWS = 16
+"""How many views are kept: as many as a sketch has milestones, or a milestone directions."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -110,13 +114,32 @@ def visible_lines(
         min_separation_px: of lines that fall together within this in the image only the strongest is kept
             (0: keep all).
         max_distance_m: pieces that begin further away are left out.
+
+    The same question, asked again soon, has its answer at hand: a view is judged before it is chosen, and chosen again
+    for the sketch above.
     """
-    scene, window, view = world.scene, image_window(camera), _View(world, camera, camera_from_world)
+    wanted = None if locales is None else tuple(sorted(locales))
+    key = (id(camera), camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes(), wanted,
+           min_length_px, min_contrast, min_separation_px, max_distance_m)
+    known: dict[object, tuple[Camera, VisibleLines]] = world.memo.setdefault("visible lines", {})
+    if key not in known:
+        if len(known) >= KEPT_VIEWS:
+            del known[next(iter(known))]
+        known[key] = camera, _visible_lines(world, camera, camera_from_world, locales, min_length_px, min_contrast,
+                                            min_separation_px, max_distance_m)
+    return known[key][1]
+
+
+def _visible_lines(
+    world: World, camera: Camera, camera_from_world: Pose, locales: Collection[str] | None, min_length_px: float,
+    min_contrast: float, min_separation_px: float, max_distance_m: float,
+) -> VisibleLines:
+    view = _View(world, camera, camera_from_world)
+    scene = view.scene
     contrast = scene.edges.contrasts(camera_from_world.inverse().translation)
-    chosen = view.locales_seen(scene.line_locales) & _named(scene, scene.line_landmark, world, locales)
-    index = np.flatnonzero(chosen & (contrast >= min_contrast))
+    index = np.flatnonzero(_named(scene, scene.line_locales, locales) & (contrast >= min_contrast))
     lines = camera_from_world.apply(scene.edges.lines_world[index]).reshape(-1, 2, 3)
-    span = clipped_spans(lines, window)
+    span = clipped_spans(lines, view.window)
     lines, keep = pieces(lines, span), span[:, 1] - span[:, 0] > SHORTEST_PIECE
     keep[keep] &= lengths_px(camera.project(lines[keep])) >= min_length_px
     keep[keep] &= np.linalg.norm(lines[keep], axis=2).min(axis=1) < max_distance_m
@@ -145,13 +168,13 @@ def visible_points(
 
     A corner shows where at least two model lines with ``min_contrast`` meet; see :func:`visible_lines` for the rest.
     """
-    scene, view = world.scene, _View(world, camera, camera_from_world)
+    view = _View(world, camera, camera_from_world)
+    scene = view.scene
     centre = camera_from_world.inverse().translation
     steps = np.append(scene.edges.contrasts(centre), 0.0)[scene.corner_lines]
     contrast = np.sort(steps, axis=1)[:, -2]
-    chosen = view.locales_seen(scene.corner_locales) & _named(scene, scene.corner_landmark, world, locales)
     near = np.linalg.norm(scene.corners_world - centre, axis=1) < max_distance_m
-    index = np.flatnonzero(chosen & near & (contrast >= min_contrast))
+    index = np.flatnonzero(_named(scene, scene.corner_locales, locales) & near & (contrast >= min_contrast))
     points = camera_from_world.apply(scene.corners_world[index]).reshape(-1, 3)
     ahead = points[:, 2] > NEAR_M
     index, points = index[ahead], points[ahead]
@@ -163,33 +186,35 @@ def visible_points(
                          scene.corner_index[index], contrast[index])
 
 
+def hidden(world: World, camera: Camera, camera_from_world: Pose, points_world: Any) -> NDArray[np.bool_]:
+    """(n,) which of the points (n, 3) before the camera lie behind something, as the model has it."""
+    return hidden_points(camera_from_world.apply(points_world), _View(world, camera, camera_from_world).shadows())
+
+
 class _View:
     """What one camera pose opens to the eye."""
 
     def __init__(self, world: World, camera: Camera, camera_from_world: Pose) -> None:
-        self.scene: Scene = world.scene
         self.camera_from_world = camera_from_world
-        seen = windows_of(world, image_window(camera), camera_from_world)
+        self.window = _image_window(world, camera)
+        seen = windows_of(world, self.window, camera_from_world)
+        self.scene: Scene = world.scene_of(seen)
         nowhere: Window = (np.inf, np.inf, -np.inf, -np.inf)
         self.windows = np.array([seen.get(name, nowhere) for name in self.scene.locales]).reshape(-1, 4)
 
-    def locales_seen(self, locales: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """(n,) whether one of the two locales (n, 2) of each element is in view."""
-        return np.asarray((self.windows[:, 0] < np.inf)[locales].any(axis=1))
-
     def windows_for(self, locales: NDArray[np.int64]) -> Floats:
         """(n, 4) the rectangle through which each element, in one or the other of two locales, can be seen."""
-        both = self.windows[locales]
-        return np.concatenate([both[:, :, :2].min(axis=1), both[:, :, 2:].max(axis=1)], axis=1)
+        one, other = self.windows[locales[:, 0]], self.windows[locales[:, 1]]
+        return np.concatenate([np.minimum(one[:, :2], other[:, :2]), np.maximum(one[:, 2:], other[:, 2:])], axis=1)
 
     def shadows(self) -> Shadows:
         scene, pose = self.scene, self.camera_from_world
         centre = pose.inverse().translation
         facing = scene.planes_world[:, :3] @ centre - scene.planes_world[:, 3] > 1e-6
-        index = np.flatnonzero(facing & self.locales_seen(scene.surface_locales))
+        index = np.flatnonzero(facing)
         polygons = pose.apply(scene.polygons_world[index])
         windows = rectangles(polygons)
-        keep = (polygons[..., 2].max(axis=1) > NEAR_M) & overlap(
+        keep = (over_corners(np.maximum, polygons[..., 2]) > NEAR_M) & overlap(
             windows, self.windows_for(scene.surface_locales[index]))
         index, polygons, windows = index[keep], polygons[keep], windows[keep]
         planes = np.column_stack([scene.planes_world[index, :3] @ pose.rotation.T, scene.planes_world[index, 3]])
@@ -197,12 +222,21 @@ class _View:
         return shadows_of(polygons, planes, windows)
 
 
-def _named(scene: Scene, landmark: NDArray[np.int64], world: World, locales: Collection[str] | None) -> Any:
-    """(n,) whether each element's landmark is in one of the locales asked for."""
+def _image_window(world: World, camera: Camera) -> Window:
+    """As :func:`image_window`, worked out once for a world and camera."""
+    known: list[tuple[Camera, Window]] = world.memo.setdefault("image windows", [])
+    for other, window in known:
+        if other is camera:
+            return window
+    known[:] = [(camera, image_window(camera)), *known[:3]]
+    return known[0][1]
+
+
+def _named(scene: Scene, rooms: NDArray[np.int64], locales: Collection[str] | None) -> Any:
+    """(n,) whether one of the two locales (n, 2) of each element is among those asked for."""
     if locales is None:
         return True
-    wanted = np.array([mark.locale in locales or mark.neighbour in locales for mark in world.landmarks], bool)
-    return wanted[landmark]
+    return np.array([name in locales for name in scene.locales], bool)[rooms].any(axis=1)
 
 
 def _distinct(lines: VisibleLines, separation_px: float) -> NDArray[np.int64]:
@@ -217,8 +251,9 @@ def _distinct(lines: VisibleLines, separation_px: float) -> NDArray[np.int64]:
         off.append(np.abs(dx * uy - dy * ux))
     shared = np.minimum(np.maximum(*along), length[:, None]) - np.maximum(np.minimum(*along), 0.0)
     covers = (np.maximum(*off) < separation_px) & (shared > 0.5 * length)
-    kept: list[int] = []
+    kept, covered = [], np.zeros(len(lines), bool)
     for i in np.argsort(-lines.contrast, kind="stable").tolist():
-        if not covers[kept, i].any():
+        if not covered[i]:
             kept.append(i)
+            covered |= covers[i]
     return np.array(sorted(kept), np.int64)

@@ -5,11 +5,24 @@ They import what they need when they run, so that ``harvey --help`` answers at o
 
 from __future__ import annotations
 
-from harvey.commands import diff, experiment, listing, replay, run, view, why, world
+from harvey.commands import (
+    calibrate,
+    diff,
+    drive,
+    emulate,
+    experiment,
+    listing,
+    repair,
+    replay,
+    resume,
+    run,
+    view,
+    why,
+    world,
+)
 from harvey.commands.command import Command
-from harvey.commands.not_yet import NOT_YET
 
 COMMANDS: tuple[Command, ...] = (
-    listing.COMMAND, run.COMMAND, view.COMMAND, why.COMMAND, replay.COMMAND, diff.COMMAND, world.COMMAND,
-    experiment.COMMAND, *NOT_YET,
+    listing.COMMAND, run.COMMAND, view.COMMAND, why.COMMAND, replay.COMMAND, diff.COMMAND, resume.COMMAND,
+    repair.COMMAND, world.COMMAND, experiment.COMMAND, drive.COMMAND, calibrate.COMMAND, emulate.COMMAND,
 )

@@ -1,37 +1,57 @@
-"""``harvey diff``: the first decision in which two runs differ."""
+"""``harvey diff``: the first decision in which two runs differ, and why."""
 
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from itertools import islice
 
 from harvey.commands.command import Command
 from harvey.diff import describe, first_difference
-from harvey.records import read_records
+from harvey.diff_cause import apart, because, opening, settings
 from harvey.run_directory import RunDirectory, open_run
+from harvey.why_journal import JournalHistory
 
 
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("first", metavar="RUN", help="a run directory")
     parser.add_argument("second", metavar="RUN", help="another")
+    parser.add_argument("--fields", action="store_true", help="list the first decision that differs field by field")
 
 
 def _run(args: Namespace) -> int:
     first, second = open_run(args.first), open_run(args.second)
     print(f"first:  {_title(first)}\nsecond: {_title(second)}")
-    agreed, one, other = first_difference(read_records(first.journal), read_records(second.journal))
-    print("\n".join(describe(agreed, one, other)))
-    return 0 if one is None and other is None else 1
+    set_differently = tuple(settings(first, second))
+    if set_differently:
+        print(f"set differently: {'; '.join(set_differently)}")
+    ours, theirs = JournalHistory(first.journal), JournalHistory(second.journal)
+    alike = ours.lines_alike(theirs)
+    more, one, other = first_difference(*(islice(h.decisions(), alike, None) for h in (ours, theirs)))
+    agreed = alike + more
+    if one is None or other is None or args.fields:
+        print("\n".join(describe(agreed, one, other)))
+    else:
+        print("\n".join([opening(agreed), "", *because(ours, theirs, agreed, set_differently)]))
+    if one is None and other is None:
+        return 0
+    print(f"\nHow they went:\n{apart(first, second, ours, theirs)}")
+    return 1
 
 
 def _title(run: RunDirectory) -> str:
     result = run.read_result()
-    named = [f"{key} {result[key]}" for key in ("scenario", "seed") if key in result]
+    named = [f"{key} {result[key]}" for key in ("scenario", "seed", "outcome") if key in result]
     return ", ".join([str(run.path), *named])
 
 
 COMMAND = Command(
-    "diff", "the first decision in which two runs differ, and in what",
-    (("harvey diff runs/lab-to-allens-office-0 runs/lab-to-allens-office-1", "two seeds of one scenario"),),
+    "diff", "the first decision in which two runs differ, and why",
+    (
+        ("harvey diff runs/lab-to-allens-office-0 runs/lab-to-allens-office-1", "two seeds of one scenario"),
+        ("harvey diff runs/bump-0 runs/without-door", "a run and what would have been (harvey replay --without)"),
+        ("harvey diff runs/bump-0 runs/bump-1 --fields", "the first difference field by field"),
+    ),
     _arguments, _run,
-    "Exit code 0 where all decisions agree, 1 where they do not.",
+    "Goes down from the first decision that differs to the observation or the setting that it comes from.\n"
+    "Exit code 0 where all decisions agree, 1 where they do not, 2 where an input cannot be used.",
 )

@@ -4,55 +4,105 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+from harvey.campaign import settings_of
 from harvey.commands.command import Command
-from harvey.diff import describe
 from harvey.errors import BadInput
-from harvey.records import DecisionRecord, decision_of, read_records
-from harvey.run_directory import RunDirectory, open_run
+from harvey.run_directory import RunDirectory, new_run, open_run
 from harvey.units import count
+
+if TYPE_CHECKING:
+    from harvey.replay import Told
 
 
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN", help="a run directory")
+    what_if = parser.add_argument_group("what would it have done")
+    what_if.add_argument("--without", metavar="NAME", action="append", default=[],
+                         help="without an expert, a landmark or face of its model, or one segment, as 'frame 8 segment"
+                              " 12'; may be repeated")
+    what_if.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
+                         help="with another constant, as servo.plan=off or tolerances.FLOOR_PX=8; may be repeated")
+    what_if.add_argument("--record-only", action="store_true",
+                         help="end where the record no longer answers, instead of going on in the simulator")
+    what_if.add_argument("--out", metavar="DIR", help="keep what would have been as a run, for diff, why and view")
 
 
 def _run(args: Namespace) -> int:
-    run = open_run(args.run, "recording.rrd")
-    from blackboard.journal import decision_line, decision_record
-    from harvey.replay import replayed, scenario_of, scheduler_of
-    from logs.reader import read_frames
+    run, settings = open_run(args.run), settings_of(args.settings)
+    if args.without or settings:
+        return _otherwise(run, args, settings)
+    if args.out or args.record_only:
+        raise BadInput("--out and --record-only: expected --without or --set beside them, got neither")
+    return _again(run)
 
-    frames = read_frames(run.recording)
-    agreed = 0
-    for pair, line in zip(replayed(_shown(run), frames, scheduler_of(scenario_of(run))), _lines(run), strict=False):
-        if pair.now is None or decision_line(pair.now).encode() != line:
-            print("first: as recorded; second: as decided now")
-            now = None if pair.now is None else decision_of(decision_record(pair.now))
-            print("\n".join(describe(agreed, pair.recorded, now)))
-            return 1
-        agreed += 1
-    if not agreed:
-        raise BadInput(f"{run.journal}: expected at least one decision, got none")
-    print(f"{count(agreed, 'decision')} decided again from {count(len(frames), 'frame')}: all the same, byte for byte")
+
+def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, str], ...]) -> int:
+    """Decide it again with a changed mind."""
+    from harvey.counterfactual import what_if
+    from harvey.counterfactual_words import told
+
+    out = RunDirectory(new_run(Path(args.out))) if args.out else None
+    answer = what_if(run, args.without, settings, out=out, go_on=not args.record_only)
+    print("\n".join(told(answer, run, [*(f"without {name}" for name in args.without),
+                                       *(f"with {key} = {value}" for key, value in settings)])))
+    if out is not None:
+        print(f"\nit is kept in {out.path}; compare with    harvey diff {run.path} {out.path}")
     return 0
 
 
-def _lines(run: RunDirectory) -> Iterator[bytes]:
-    with run.journal.open("rb") as lines:
-        yield from (line.removesuffix(b"\n") for line in lines)
+def _again(run: RunDirectory) -> int:
+    """Decide it again as it was."""
+    from harvey.minds import mind_of
+    from harvey.replay import pictures_of, replayed
+    from harvey.run_head import RunHead
+
+    pictures, agreed = pictures_of(run), 0
+    with mind_of(RunHead.read(run.path)) as mind:
+        for told in shown(replayed(run, pictures, mind.scheduler())):
+            if not told.same:
+                print(_difference(agreed, told))
+                return 1
+            agreed += 1
+    if not agreed:
+        raise BadInput(f"{run.journal}: expected at least one decision, got none")
+    frames = count(len(pictures), "frame")
+    print(f"{count(agreed, 'decision')} decided again from {frames}: all the same, byte for byte")
+    return 0
 
 
-def _shown(run: RunDirectory) -> Iterator[DecisionRecord]:
+def _difference(agreed: int, told: Told) -> str:
+    from blackboard.journal import decision_record
+    from harvey.diff import describe
+    from harvey.records import decision_of
+
+    now = None if told.now is None else decision_of(decision_record(told.now))
+    return "\n".join(["first: as recorded; second: as decided now", *describe(agreed, told.recorded, now)])
+
+
+def shown(decisions: Iterable[Told]) -> Iterator[Told]:
+    """The decisions, with a bar on a terminal."""
     from tqdm import tqdm
 
-    yield from tqdm(read_records(run.journal), unit=" decisions", file=sys.stderr, disable=not sys.stderr.isatty(),
-                    leave=False)
+    yield from tqdm(decisions, unit=" decisions", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False)
 
 
 COMMAND = Command(
     "replay", "decide a recorded run again and compare, byte for byte",
-    (("harvey replay runs/lab-to-allens-office-0", "from its camera frames and odometry"),), _arguments, _run,
-    "Neither simulator nor robot takes part. Exit code 0 where every decision is the same, 1 where one is not.",
+    (
+        ("harvey replay runs/lab-to-allens-office-0", "from its camera frames and odometry"),
+        ("harvey replay runs/bump-0 --without plan_adjuster", "what it would have done without an expert"),
+        ("harvey replay runs/bump-0 --without fire-door", "without a landmark of its model"),
+        ("harvey replay runs/bump-0 --without 'frame 8 segment 12'", "had it not found one segment"),
+        ("harvey replay runs/bump-0 --set servo.plan=off --out runs/bump-no-plan", "and keep it as a run"),
+        ("harvey replay runs/bump-0 --set tolerances.FLOOR_PX=8", "with another number in knowledge_sources/"),
+    ),
+    _arguments, _run,
+    "Neither simulator nor robot takes part. Exit code 0 where every decision is the same, 1 where one is not.\n\n"
+    "With --without or --set it tells what would have been: a changed mind is told what was observed, as long as it\n"
+    "asks its body for the same. From the first motion or picture that differs the record no longer answers; a run of\n"
+    "the simulator then goes on by itself, in the same world with the same chance.",
 )

@@ -18,14 +18,22 @@ def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", help="where the run is kept (runs/SCENARIO-SEED; several: one each)")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
                         help="change a setting of the scenario, as servo.action=off; may be repeated")
+    parser.add_argument("--body", metavar="BODY", default="simulated",
+                        help="how the simulated body is reached: simulated, or over an emulated serial line as"
+                             " serial:denning, serial:p2os or serial:create2 (simulated)")
+    parser.add_argument("--go-on", action="store_true",
+                        help="keep the runs that are there already, and resume those that were cut off")
     parser.add_argument("--check", action="store_true", help="do not drive; list the milestones to come")
     parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
     parser.add_argument("--trace", action="store_true", help="print every cycle: changes, candidates, choice, effects")
 
 
 def _run(args: Namespace) -> int:
-    seeds, settings = seeds_of(args.seed), settings_of(args.settings)
-    tasks = tuple(Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1)) for seed in seeds)
+    from harvey.serial_body import body_kind
+
+    seeds, settings, body = seeds_of(args.seed), settings_of(args.settings), body_kind(args.body)
+    tasks = tuple(
+        Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1), body, args.go_on) for seed in seeds)
     if args.check:
         return _check(tasks[0])
     if len(tasks) == 1:
@@ -83,9 +91,11 @@ COMMAND = Command(
     (
         ("harvey run lab-to-allens-office", "Figure 17's mission"),
         ("harvey run lab-to-allens-office --seed 0..19", "twenty of them, and a table"),
+        ("harvey run lab-to-allens-office --seed 0..19 --go-on", "those that are still to be done, after a crash"),
         ("harvey run lab-to-allens-office --check", "which milestones it will have, and how well each tells the place"),
         ("harvey run hallway-kidnap --seed 3 --trace", "print what each cycle sees, weighs and does"),
         ("harvey run bump --set servo.action=off", "without correcting on the move"),
+        ("harvey run lab-to-allens-office --body serial:p2os", "the body behind an emulated Pioneer's serial line"),
         ("harvey run my_mission.toml --set start.heading_deg=80 --out runs/try", "a mission of your own"),
     ),
     _arguments, _run,

@@ -1,8 +1,9 @@
-"""``harvey view``: open the recording of a run."""
+"""``harvey view``: open the recording of a run, or an overview of several."""
 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -11,15 +12,78 @@ from pathlib import Path
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_directory import open_run
+from harvey.run_directory import RUNS, RunDirectory, open_run
+
+OVERVIEW = "overview.rrd"
 
 
 def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("run", metavar="RUN", help="a run directory")
+    parser.add_argument("runs", metavar="RUN", nargs="+",
+                        help="a run directory; several, or a directory of them, make an overview of one row a run")
+    parser.add_argument("--save", metavar="FILE",
+                        help=f"write the overview there and do not open it (else {OVERVIEW} beside the runs)")
 
 
 def _run(args: Namespace) -> int:
-    recording = open_run(args.run, "recording.rrd").recording
+    runs = [run for text in args.runs for run in _runs(text)]
+    if len(args.runs) == 1 and runs[0].path == _directory(args.runs[0]):
+        if args.save:
+            raise BadInput("--save: expected several runs, or a directory of them, got one run")
+        return _open(_whole(open_run(args.runs[0], "recording.rrd")))
+    overview = Path(args.save) if args.save else _beside(runs)
+    _write(runs, overview)
+    if args.save:
+        print(f"{len(runs)} runs in {overview}; open it with: rerun {overview}")
+        return 0
+    return _open(overview)
+
+
+def _whole(run: RunDirectory) -> Path:
+    """The recording; where it is damaged, that is said."""
+    from logs.reader import damage_of
+
+    if (damage := damage_of(run.recording)) is not None:
+        print(f"{run.recording} is damaged: {damage}; harvey repair {run.path} draws it anew", file=sys.stderr)
+    return run.recording
+
+
+def _directory(text: str) -> Path:
+    """What a user names, as it is or under ``runs/``; the directory of a file."""
+    path = next((p for p in (Path(text), RUNS / text) if p.exists()), Path(text))
+    return path if path.is_dir() else path.parent
+
+
+def _runs(text: str) -> list[RunDirectory]:
+    """One run, or all runs of a directory in the order of their numbers. Raises BadInput where there is none."""
+    here = _directory(text)
+    inner = [path.parent for path in here.glob("*/journal.jsonl")]
+    if inner and not (here / "journal.jsonl").exists():
+        return [RunDirectory(path) for path in sorted(inner, key=_natural)]
+    return [open_run(text)]
+
+
+def _natural(path: Path) -> list[tuple[int, str]]:
+    """Sorts 2 before 10."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
+
+
+def _beside(runs: list[RunDirectory]) -> Path:
+    """In the directory that holds all of the runs."""
+    return Path(os.path.commonpath([run.path.resolve().parent for run in runs])) / OVERVIEW
+
+
+def _write(runs: list[RunDirectory], overview: Path) -> None:
+    from logs.overview import RunFiles, write_overview
+
+    names = [run.path.name for run in runs]
+    unique = len(set(names)) == len(names)
+    files = [RunFiles(run.path.name if unique else str(run.path), run.recording, run.read_result()) for run in runs]
+    print(f"reading {len(files)} recordings", file=sys.stderr, flush=True)
+    for line in write_overview(files, overview, overview.parent.name or "runs"):
+        print(f"left out: {line}", file=sys.stderr)
+
+
+def _open(recording: Path) -> int:
     if not _has_screen():
         print(f"no screen here to open a window on; the recording is {recording.resolve()}\n"
               f"open it where there is one, with: rerun {recording}", file=sys.stderr)
@@ -41,7 +105,11 @@ def _viewer() -> str:
 
 
 COMMAND = Command(
-    "view", "open the recording of a run in the rerun viewer",
-    (("harvey view runs/lab-to-allens-office-0", "building, camera, plan tree, experts and why"),),
+    "view", "open the recording of a run, or an overview of several, in the rerun viewer",
+    (
+        ("harvey view runs/lab-to-allens-office-0", "building, camera, plan, experts and why"),
+        ("harvey view runs/lab-to-allens-office", "all runs of a campaign, one row each"),
+        ("harvey view runs/bump-0 runs/hallway-kidnap-0 --save both.rrd", "two runs side by side, kept in a file"),
+    ),
     _arguments, _run,
 )

@@ -1,47 +1,132 @@
-"""``harvey why``: what a decision rests on, down to goal, model and pixels."""
+"""``harvey why``: what a decision rests on, down to goal, model and pixels; and why not something else."""
 
 from __future__ import annotations
 
+import json
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 from harvey.commands.command import Command, whole
-from harvey.records import read_records
-from harvey.run_directory import open_run
-from harvey.trace import trace_of
-from harvey.why import DEPTH, History, explain
+from harvey.errors import BadInput
+from harvey.run_directory import RunDirectory, open_run
+from harvey.trace import cycle_lines
+from harvey.why import explain, principal
+from harvey.why_history import History
+from harvey.why_journal import JournalHistory
+from harvey.why_story import LEGEND, Story, lines_of, story
 
 
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN", help="a run directory")
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument("entry", metavar="ENTRY", nargs="?",
-                       help="as MotorCommand-12 (its last revision) or Leg-3.2; without one: how the mission ended")
-    which.add_argument("--at", metavar="CYCLE", type=whole, help="explain what this cycle did")
-    parser.add_argument("--depth", metavar="N", type=whole, default=DEPTH, help=f"how many steps down to go ({DEPTH})")
+    parser.add_argument("entry", metavar="ENTRY", nargs="?",
+                        help="as MotorCommand-12 (its last revision) or Leg-3.2; without one: how the mission ended")
+    parser.add_argument("--at", metavar="CYCLE", type=whole, help="explain what this cycle did")
+    parser.add_argument("--milestone", metavar="NAME", help="tell a milestone's story: Milestone-3, or M1 of hallway")
+    parser.add_argument("--not", metavar="KS|ENTRY", dest="not_", help="why this expert did not act (--at CYCLE: then),"
+                        " or why this entry did not stay")
+    parser.add_argument("--check", action="store_true",
+                        help="walk every decision of the run, and name those that rest on nothing")
+    parser.add_argument("--depth", metavar="N", type=whole,
+                        help="also list what it rests on, entry by entry, N steps down")
+    parser.add_argument("--json", action="store_true", help="for machines")
 
 
 def _run(args: Namespace) -> int:
-    decisions = list(read_records(open_run(args.run).journal))
-    history = History(decisions)
-    if args.at is None:
-        refs = [history.named(args.entry) if args.entry else history.outcome()]
+    asked = [name for name in ("entry", "milestone", "not_") if getattr(args, name)] + ["--check"] * args.check
+    if len(asked) + (args.at is not None and not args.not_) > 1:
+        raise BadInput("expected one of ENTRY, --at, --milestone, --not and --check; --not also goes with --at")
+    run = open_run(args.run)
+    history = JournalHistory(run.journal)
+    if args.check:
+        return _checked(history, args.json)
+    if args.not_:
+        _print_not(run, history, args)
+        return 0
+    refs = _refs(history, args)
+    if args.json:
+        print(json.dumps([_record(one) for one in _stories(history, args, refs)], indent=2))
     else:
-        decision = history.decision(args.at)
-        print("\n".join(trace_of(decisions, args.at)))
-        refs = [record.ref for record in decision.made]
-        print()
-    print("\n".join(explain(history, refs, args.depth)))
+        print("\n".join(_paragraphs(history, args, refs)))
     return 0
 
 
+def _refs(history: History, args: Namespace) -> list[str]:
+    """What is to be explained."""
+    if args.milestone:
+        return []
+    if args.at is None:
+        return [history.named(args.entry) if args.entry else history.outcome()]
+    return principal(history.decision(args.at))
+
+
+def _stories(history: History, args: Namespace, refs: Iterable[str]) -> Iterator[Story]:
+    if args.milestone:
+        from harvey.why_milestone import milestone_story, milestones
+
+        yield from (milestone_story(history, id) for id in milestones(history, args.milestone))
+    for ref in refs:
+        record = history.entry(ref)
+        if record is None:
+            history.verify()
+            raise BadInput(f"{history.source}: expected {ref} in the journal, which does not say how it came about")
+        yield story(history, record)
+
+
+def _paragraphs(history: History, args: Namespace, refs: list[str]) -> Iterator[str]:
+    if args.at is not None:
+        yield from cycle_lines(history.decision(args.at), history.candidates(args.at))
+        yield ""
+    for number, one in enumerate(_stories(history, args, refs)):
+        yield from ("",) * (number > 0)
+        yield from lines_of(one)
+    if args.depth is not None and refs:
+        yield "\nEntry by entry:"
+        yield from explain(history, refs, args.depth)
+    yield "\n" + LEGEND
+
+
+def _record(one: Story) -> dict[str, Any]:
+    steps = [{"label": step.label, "text": step.text, "entries": list(step.refs)} for step in one.steps]
+    return {"entry": one.ref, "headline": one.headline, "decided": one.decided, "steps": steps}
+
+
+def _checked(history: History, as_json: bool) -> int:
+    from harvey.why_reach import KINDS, check, named
+
+    found = check(history)
+    if as_json:
+        print(json.dumps({"decisions": found.decisions, "acts": found.acts, "reached": found.reached, **found.by_kind,
+                          "failing": [one.decision.cycle for one in found.failing]}, indent=2))
+    else:
+        kinds = ", ".join(f"{found.by_kind[kind]} {words}" for kind, words in zip(KINDS, named(), strict=True))
+        print(f"{found.reached} of {found.decisions} decisions rest on something ({kinds}).")
+        for one in found.failing:
+            lacking = ", ".join(ref for ref, grounds in one.grounds.items() if not grounds.hold)
+            print(f"  cycle {one.decision.cycle}: nothing is below {lacking}")
+    return 0 if not found.failing else 1
+
+
+def _print_not(run: RunDirectory, history: History, args: Namespace) -> None:
+    from harvey.why_expert import answers
+
+    lines = list(answers(run, history, args.not_, args.at))
+    print(json.dumps({"not": args.not_, "at": args.at, "because": lines}, indent=2) if args.json else "\n".join(lines))
+
+
 COMMAND = Command(
-    "why", "why Harvey did what it did, in sentences",
+    "why", "why Harvey did what it did, in sentences; and why not something else",
     (
         ("harvey why runs/lab-to-allens-office-0", "how the mission ended, and why"),
         ("harvey why runs/lab-to-allens-office-0 MotorCommand-12", "why it turned there"),
         ("harvey why runs/lab-to-allens-office-0 --at 88", "what cycle 88 did, and why"),
-        ("harvey why runs/lab-to-allens-office-0 --depth 12", "go further down"),
+        ("harvey why runs/lab-to-allens-office-0 --milestone 'M1 of hallway'", "what was expected, seen and judged"),
+        ("harvey why runs/lab-to-allens-office-0 --not relocalizer --at 88", "why another expert did not act then"),
+        ("harvey why runs/lab-to-allens-office-0 --not Hypothesis-1.20", "what came of an entry, and what instead"),
+        ("harvey why runs/lab-to-allens-office-0 --check", "whether every decision rests on something"),
+        ("harvey why runs/lab-to-allens-office-0 --depth 12", "the whole web of reasons, twelve steps down"),
     ),
     _arguments, _run,
-    "Walks from an entry to the entries it rests on. What several share is told once.",
+    "Follows the main reasons from an entry down to goal, model and pixels. With --check, exit code 1 where a\n"
+    "decision rests on nothing.",
 )

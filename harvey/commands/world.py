@@ -16,29 +16,56 @@ if TYPE_CHECKING:
 
 
 def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("what", choices=("check", "show", "import"),
-                        help="check for faults; show what is in it; import from another format (not yet)")
-    parser.add_argument("file", metavar="FILE", help="a world file, or the name of one that comes with the project")
+    parser.add_argument("what", choices=("check", "show", "compile", "import"),
+                        help="check for faults; show what is in it; compile it into one file that is read room by room;"
+                             " import from another format (not yet)")
+    parser.add_argument("file", metavar="FILE",
+                        help="a world file (.toml, compiled: .world), or the name of one that comes with the project")
     parser.add_argument("--details", metavar="FILE", action="append", default=[], help="add what only the building has")
-    parser.add_argument("--out", metavar="FILE", help="show: draw the plan there, as SVG")
+    parser.add_argument("--out", metavar="FILE", help="show: draw the plan there, as SVG; compile: the .world file")
 
 
 def _run(args: Namespace) -> int:
     if args.what == "import":
         print("harvey world import: not yet available; it will read plans of other formats", file=sys.stderr)
         return 2
+    if args.what == "compile":
+        return _compile(args.file, args.details, args.out)
     world = _load(args.file, args.details)
     return _check(world, args.file) if args.what == "check" else _show(world, args.out)
 
 
 def _load(file: str, details: list[str]) -> World:
-    from world_models.store import WORLDS, load_world
+    from world_models.store import load_world
+
+    return load_world(_path(file), details=details)
+
+
+def _path(file: str) -> Path:
+    """A file, or one that comes with the project, by its bare name."""
+    from world_models.store import SUFFIXES, WORLDS
 
     shipped = WORLDS / f"{file}.toml"
-    if not file.endswith(".toml") and not shipped.is_file():
+    if file.endswith((".toml", *SUFFIXES)):
+        return Path(file)
+    if not shipped.is_file():
         names = ", ".join(sorted(p.stem for p in WORLDS.glob("*.toml")))
-        raise BadInput(f"expected a .toml file or one of {names}, got {file!r}")
-    return load_world(Path(file) if file.endswith(".toml") else shipped, details=details)
+        raise BadInput(f"expected a .toml or .world file or one of {names}, got {file!r}")
+    return shipped
+
+
+def _compile(file: str, details: list[str], out: str | None) -> int:
+    from world_models.store import SUFFIXES, compile_file
+
+    path = _path(file)
+    if path.suffix != ".toml":
+        raise BadInput(f"expected a .toml file to compile, got {file!r}")
+    target = Path(out or path.with_suffix(".world").name)
+    if target.suffix not in SUFFIXES:
+        raise BadInput(f"--out: expected a name that ends in {' or '.join(SUFFIXES)}, got {str(target)!r}")
+    world = compile_file(path, target, details)
+    print(f"{target}: {_inventory(world)}, {target.stat().st_size / 1e6:.1f} MB")
+    return 0
 
 
 def _check(world: World, file: str) -> int:
@@ -53,17 +80,15 @@ def _check(world: World, file: str) -> int:
 
 
 def _inventory(world: World) -> str:
-    return (f"{count(len(world.rooms), 'room')}, {count(len(world.doorways), 'open doorway')},"
-            f" {count(len(world.things), 'thing')}, {count(len(world.faces), 'face')},"
-            f" {count(len(world.landmarks), 'landmark')}")
+    return ", ".join(count(number, what) for what, number in world.counts().items())
 
 
 def _show(world: World, out: str | None) -> int:
     print(f"{world.name}: {_inventory(world)}")
     for name in world.locales:
-        doors = ", ".join(d.name for d in world.doorways_of(name)) if name in world.rooms else ""
-        things = count(sum(1 for t in world.things if t.locale == name), "thing")
-        inside = f"{things}, doorways: {doors or 'none'}" if name in world.rooms else ""
+        doors = ", ".join(d.name for d in world.doorways_of(name))
+        things = count(len(world.things_of(name)), "thing")
+        inside = f"{things}, doorways: {doors or 'none'}" if world.is_room(name) else ""
         print(f"{'  ' * len(world.path_of(name))}{name}{': ' + inside if inside else ''}")
     if out is not None:
         _draw(world, Path(out))
@@ -81,11 +106,12 @@ def _draw(world: World, out: Path) -> None:
 
 
 COMMAND = Command(
-    "world", "check or show a world file",
+    "world", "check, show or compile a world file",
     (
         ("harvey world check my_floor.toml", "faults with file and line; exit code 2 where there are any"),
         ("harvey world show research_center", "rooms, doorways and what is in them"),
         ("harvey world show research_center --out plan.svg", "and the plan as a drawing"),
+        ("harvey world compile campus.toml --out campus.world", "for worlds that are too large to read at once"),
     ),
     _arguments, _run,
 )

@@ -7,10 +7,12 @@ wrong place (Desolneux, Moisan, Morel: From Gestalt Theory to Image Analysis, 20
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.stats import binom
 
@@ -53,46 +55,64 @@ class Agreement:
 
 def coverage(lines_px: Floats, segments_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
     """(m,) part of each line (m, 2, 2) that lies under segments (k, 2, 2) within the tolerances."""
-    if not len(lines_px) or not len(segments_px):
-        return np.where(np.isnan(lines_px).any(axis=(1, 2)), np.nan, 0.0)
-    a, d = lines_px[:, 0], lines_px[:, 1] - lines_px[:, 0]
-    length = np.maximum(np.linalg.norm(d, axis=1), 1e-9)
-    u = d / length[:, None]
-    n = np.stack([-u[:, 1], u[:, 0]], axis=1)
-    ends = segments_px[None] - a[:, None, None]  # (m, k, 2, 2)
-    off = np.abs(np.einsum("mkej,mj->mke", ends, n)).max(axis=2)
-    t = np.sort(np.einsum("mkej,mj->mke", ends, u), axis=2)
-    s = segments_px[:, 1] - segments_px[:, 0]
-    s = s / np.maximum(np.linalg.norm(s, axis=1), 1e-9)[:, None]
-    turned = np.abs(n @ s.T)
-    lies = (off <= tolerance_px) & (turned <= np.sin(tolerance_rad))
-    cells = (np.arange(CELLS) + 0.5) / CELLS * length[:, None]
-    under = (t[:, :, :1] <= cells[:, None]) & (t[:, :, 1:] >= cells[:, None]) & lies[:, :, None]
-    return np.where(np.isnan(lines_px).any(axis=(1, 2)), np.nan, under.any(axis=1).mean(axis=1))
+    lines, segments = np.array(lines_px, float, order="C"), np.array(segments_px, float, order="C")
+    covered: Floats = _covered(lines, segments, tolerance_px, math.sin(tolerance_rad))
+    return covered
+
+
+@njit(cache=True, error_model="numpy")
+def _covered(lines: Any, segments: Any, tolerance_px: float, sine: float) -> Any:
+    """(m,) share of CELLS cells of each line over which some near and parallel segment lies; NaN out of view."""
+    out = np.empty(len(lines))
+    directions = np.empty((len(segments), 2))
+    for k in range(len(segments)):
+        u, v = segments[k, 1, 0] - segments[k, 0, 0], segments[k, 1, 1] - segments[k, 0, 1]
+        size = max(math.hypot(u, v), 1e-9)
+        directions[k, 0], directions[k, 1] = u / size, v / size
+    for i in range(len(lines)):
+        u0, v0 = lines[i, 0, 0], lines[i, 0, 1]
+        u, v = lines[i, 1, 0] - u0, lines[i, 1, 1] - v0
+        length = max(math.hypot(u, v), 1e-9)
+        if not (math.isfinite(u0) and math.isfinite(v0) and math.isfinite(u) and math.isfinite(v)):
+            out[i] = math.nan
+            continue
+        u, v = u / length, v / length
+        under = np.zeros(CELLS, np.bool_)
+        for k in range(len(segments)):
+            if abs(u * directions[k, 1] - v * directions[k, 0]) > sine:
+                continue
+            low, high, off = math.inf, -math.inf, 0.0
+            for e in range(2):
+                x, y = segments[k, e, 0] - u0, segments[k, e, 1] - v0
+                off = max(off, abs(x * v - y * u))
+                low, high = min(low, x * u + y * v), max(high, x * u + y * v)
+            if off <= tolerance_px:
+                for c in range(CELLS):
+                    at = (c + 0.5) / CELLS * length
+                    if low <= at <= high:
+                        under[c] = True
+        out[i] = np.sum(under) / CELLS
+    return out
 
 
 def agreement(
     lines_px: Floats,
     segments_px: Floats,
-    displaced_px: Callable[[int], Floats | None],
+    displaced_px: Floats,
     *,
     tolerance_px: float = 2.5,
     tolerance_rad: float = 0.06,
 ) -> Agreement:
     """Agreement of lines projected at a pose (m, 2, 2; NaN: not in view) with segments (k, 2, 2).
 
-    ``displaced_px(i)`` gives the same lines at the i-th wrong pose nearby, None when there are no more.
+    ``displaced_px`` (p, m, 2, 2) are the same lines at p wrong poses nearby.
     """
     here = coverage(lines_px, segments_px, tolerance_px, tolerance_rad)
-    counts = []
-    for i in range(64):
-        wrong = displaced_px(i)
-        if wrong is None:
-            break
-        there = coverage(wrong, segments_px, tolerance_px, tolerance_rad)
-        if np.any(~np.isnan(there)):
-            counts.append(float(np.mean(there[~np.isnan(there)] >= 0.5)))
-    chance = min(0.95, max(0.02, float(np.mean(counts)) if counts else 1.0))
+    there = coverage(displaced_px.reshape(-1, 2, 2), segments_px, tolerance_px, tolerance_rad)
+    each = there.reshape(displaced_px.shape[:2])
+    seen = np.count_nonzero(~np.isnan(each), axis=1)
+    by_chance = np.count_nonzero(each >= 0.5, axis=1)[seen > 0] / seen[seen > 0]
+    chance = min(0.95, max(0.02, float(np.mean(by_chance)) if len(by_chance) else 1.0))
     found = Agreement(here, chance, 1.0)
     p = PLACES * float(binom.sf(found.accounted - 1, found.seen, chance)) if found.seen else 1.0
     return Agreement(here, chance, min(1.0, p))

@@ -14,8 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.correlation_align import align, gradients
-from knowledge_sources.methods.images import grey_float, noise_sigma
+from knowledge_sources.methods import correlation_kernels as kernels
+from knowledge_sources.methods.correlation_align import align
+from knowledge_sources.methods.images import checked_grey, noise_sigma
 
 _MARGIN_PX = 4
 _LOBE_PX = 2
@@ -40,11 +41,10 @@ class Template:
 
     def patch(self, scale: float = 1.0, border: int = 0) -> NDArray[np.float32]:
         """(2 half + 1 + 2 border) squared float32, enlarged by `scale`, its middle cell exactly at the centre."""
-        height, width = self.pixels.shape
-        places = np.arange(-self.half_px - border, self.half_px + border + 1) / scale + self.centre[:, None]
-        inside = np.minimum(np.maximum(places, 0.0), np.array([[width - 1.0], [height - 1.0]]))
-        columns, rows = _interpolation(inside, max(width, height), scale)
-        return np.asarray(rows[:, :height] @ self.pixels @ columns[:, :width].T, np.float32)
+        cut: NDArray[np.float32] = kernels.patch(
+            self.pixels, float(self.centre[0]), float(self.centre[1]), self.half_px, border, float(scale)
+        )
+        return cut
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,18 +84,23 @@ def extract_template(image: Any, centre_px: Any, half_px: int = 12) -> Template:
     Raises:
         ValueError: the patch does not lie in the image, or half_px < 2.
     """
-    pixels = grey_float(image)
+    window, centre = _cut_out(image, centre_px, half_px)
+    return Template(window, centre, int(half_px), noise_sigma(window))
+
+
+def _cut_out(image: Any, centre_px: Any, half_px: int) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """The pixels round a patch, enough for it to shrink to half, and its centre among them."""
+    pixels = checked_grey(image)
     centre = np.asarray(centre_px, float).reshape(-1)
     height, width = pixels.shape
     if half_px < 2 or centre.shape != (2,):
         raise ValueError(f"expected a centre (u, v) and half_px >= 2, got {centre_px!r} and {half_px}")
     if not fits(pixels.shape, centre, half_px):
         raise ValueError(f"expected a patch of half-width {half_px} inside {width} x {height} px, got centre {centre}")
-    reach = 2 * half_px + _MARGIN_PX  # enough for a template that shrinks to half
+    reach = 2 * half_px + _MARGIN_PX
     u, v = (math.floor(c) for c in centre)
     left, top = max(u - reach, 0), max(v - reach, 0)
-    window = pixels[top : v + reach + 2, left : u + reach + 2].copy()
-    return Template(window, centre - (left, top), int(half_px), noise_sigma(window))
+    return np.array(pixels[top : v + reach + 2, left : u + reach + 2], np.float32, order="C"), centre - (left, top)
 
 
 def fits(shape: tuple[int, ...], centre_px: Any, half_px: float) -> bool:
@@ -135,7 +140,7 @@ def correlate(
     view = np.ascontiguousarray(pixels[v0 - half : v1 + half + 1, u0 - half : u1 + half + 1], np.float32)
     score = _scores(patch, view)
     row, column = divmod(int(np.argmax(score)), score.shape[1])
-    start = np.array([column, row], float) + _quadratic_peak(score, row, column)
+    start = np.array([column, row], float) + kernels.summit(score, row, column)
     place, covariance, aligned = align(patch, view, start, template.noise, search_px)
     last = np.array(score.shape[::-1]) - 1
     at_border = row in (0, last[1]) or column in (0, last[0]) or bool(np.any((place < 0) | (place > last)))
@@ -143,15 +148,17 @@ def correlate(
         place, aligned = start, -1.0
     position = place + np.array([u0, v0])
     peak = max(float(score[row, column]), aligned)
-    second = _second(score, row, column, half)
+    second = kernels.second_best(score, row, column, _LOBE_PX, half // 2)
     return Correlation(position, covariance, peak, second, at_border, position - predicted)
 
 
 def corner_strength(image: Any, centre_px: Any, half_px: int = 12) -> float:
     """Root of the smaller eigenvalue of the mean squared gradient [grey levels / px]: 0 on a wall or along an edge."""
-    gradient = gradients(extract_template(image, centre_px, half_px).patch(border=1))
-    least = float(np.linalg.eigvalsh((gradient @ gradient.T).astype(np.float64))[0])
-    return math.sqrt(max(least, 0.0) / gradient.shape[1])
+    window, centre = _cut_out(image, centre_px, half_px)
+    cut = kernels.patch(window, float(centre[0]), float(centre[1]), half_px, 1, 1.0)
+    uu, uv, vv = kernels.gradient_energy(cut)
+    least = 0.5 * (uu + vv) - math.hypot(0.5 * (uu - vv), uv)
+    return math.sqrt(max(least, 0.0)) / (2 * half_px + 1)
 
 
 def self_correlation(image: Any, centre_px: Any, half_px: int, search_px: float) -> Correlation:
@@ -165,20 +172,6 @@ def self_correlation(image: Any, centre_px: Any, half_px: int, search_px: float)
     if found is None:
         raise ValueError(f"expected a patch of half-width {half_px} inside the image, got centre {centre_px!r}")
     return found
-
-
-def _interpolation(places: NDArray[np.float64], size: int, scale: float) -> NDArray[np.float32]:
-    """(..., size) weights of cubic interpolation at places (...) in 0 .. size - 1, widened where the template shrinks.
-
-    Source: R. Keys, Cubic convolution interpolation, 1981, with a = -1/2: exact for polynomials to the second degree.
-    """
-    distance = np.abs((places[..., None] - np.arange(size)).astype(np.float32))
-    if scale < 1.0:
-        distance *= np.float32(scale)
-    near = ((1.5 * distance - 2.5) * distance * distance + 1.0) * (distance <= 1.0)
-    far = (((2.5 - 0.5 * distance) * distance - 4.0) * distance + 2.0) * ((distance > 1.0) & (distance < 2.0))
-    weights = near + far
-    return np.asarray(weights / weights.sum(axis=-1, keepdims=True), np.float32)
 
 
 def _window(
@@ -198,31 +191,3 @@ def _scores(patch: NDArray[np.float32], view: NDArray[np.float32]) -> NDArray[np
     score = np.asarray(cv2.matchTemplate(view, inner, cv2.TM_CCOEFF_NORMED), np.float32)
     score[~np.isfinite(score)] = -1.0
     return score
-
-
-def _quadratic_peak(score: NDArray[np.float32], row: int, column: int) -> NDArray[np.float64]:
-    """Offset (u, v) of the top of the quadric through the 3 x 3 scores round a peak, at most half a cell."""
-    if not (0 < row < score.shape[0] - 1 and 0 < column < score.shape[1] - 1):
-        return np.zeros(2)
-    s = score[row - 1 : row + 2, column - 1 : column + 2].astype(float)
-    slope = np.array([(s[:, 2] - s[:, 0]).sum(), (s[2] - s[0]).sum()]) / 6.0
-    xx = (s[:, 0] - 2.0 * s[:, 1] + s[:, 2]).sum() / 3.0
-    yy = (s[0] - 2.0 * s[1] + s[2]).sum() / 3.0
-    xy = (s[2, 2] - s[2, 0] - s[0, 2] + s[0, 0]) / 4.0
-    det = xx * yy - xy * xy
-    if not (xx < 0 and det > 1e-12):
-        return np.zeros(2)
-    step = -np.array([yy * slope[0] - xy * slope[1], xx * slope[1] - xy * slope[0]]) / det
-    return np.asarray(np.clip(step, -0.5, 0.5))
-
-
-def _second(score: NDArray[np.float32], row: int, column: int, half: int) -> float:
-    """The best score at another place: a local maximum beyond the main lobe, or anything half a half-width away."""
-    summits = np.where(score >= cv2.dilate(score, np.ones((3, 3), np.uint8)), score, np.float32(-1.0))
-    return max(_best_beyond(summits, row, column, _LOBE_PX), _best_beyond(score.copy(), row, column, half // 2))
-
-
-def _best_beyond(score: NDArray[np.float32], row: int, column: int, reach: int) -> float:
-    """The best score outside a square round a place, which is overwritten; -1 where there is none."""
-    score[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) : column + reach + 1] = -1.0
-    return float(score.max())

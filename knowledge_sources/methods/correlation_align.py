@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from knowledge_sources.methods import correlation_kernels as kernels
 
 _STEPS = 2
 
@@ -16,14 +17,6 @@ _DIRECTION_LEAK = 3e-4
 
 _FLOOR_PX = 0.02
 """What interpolation and rounding leave in a position [px]."""
-
-
-def gradients(patch: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(2, cells) gradient (u, v) of a patch with a border of one, free of its mean."""
-    u = patch[1:-1, 2:] - patch[1:-1, :-2]
-    v = patch[2:, 1:-1] - patch[:-2, 1:-1]
-    gradient = np.stack([u.ravel(), v.ravel()]) * np.float32(0.5)
-    return np.asarray(gradient - gradient.mean(axis=1, keepdims=True))
 
 
 def align(
@@ -40,42 +33,15 @@ def align(
     Returns:
         The place (u, v), its covariance (2, 2) [px^2], and the normalised correlation there.
 
-    Source: S. Baker, I. Matthews, Lucas-Kanade 20 years on, IJCV 2004 (inverse composition).
     """
     widest = search**2 / 3.0
-    side = patch.shape[0] - 2
-    shape = patch[1:-1, 1:-1].ravel()
-    shape = shape - shape.mean()
-    energy = float(shape @ shape)
-    gradient = gradients(patch)
-    normal = _Symmetric(*(float(x) for x in (gradient @ gradient.T).ravel()[[0, 1, 3]]))
-    if energy <= 0.0 or normal.uu + normal.vv <= 0.0:
-        return start, np.eye(2) * widest, -1.0
-    # All three rows are free of their mean, so the brightness of what is seen needs no removing.
-    rows = np.concatenate([normal.damped_inverse() @ gradient, shape[None]])
-    still = rows @ shape
-    u, v = float(start[0]), float(start[1])
-    for _ in range(_STEPS):
-        du, dv, gain = (float(x) for x in rows @ _seen(view, side, u, v))
-        gain = max(gain / energy, 0.05)
-        u, v = u - _bounded(du / gain - float(still[0])), v - _bounded(dv / gain - float(still[1]))
-    if abs(u - start[0]) > 1.0 or abs(v - start[1]) > 1.0:
-        u, v = float(start[0]), float(start[1])  # it wandered off: the correlation's own peak stands
-    seen = _seen(view, side, u, v)
-    seen = seen - seen.mean()
-    correlation = float(seen @ shape) / max(math.sqrt(float(seen @ seen) * energy), 1e-9)
-    residual = seen / np.float32(max(float(seen @ shape) / energy, 0.05)) - shape
-    variance = max(float(residual @ residual) / max(residual.size - 4, 1), 2.0 * noise**2)
-    return np.array([u, v]), _covariance(normal, shape.size, variance, noise, widest), correlation
-
-
-def _bounded(step: float) -> float:
-    return min(max(step, -0.5), 0.5)
-
-
-def _seen(view: NDArray[np.float32], side: int, u: float, v: float) -> NDArray[np.float32]:
-    middle = (side - 1) / 2.0
-    return np.asarray(cv2.getRectSubPix(view, (side, side), (u + middle, v + middle)), np.float32).ravel()
+    u, v, correlation, squares = kernels.aligned(patch, view, float(start[0]), float(start[1]), _STEPS)
+    if correlation == -1.0:
+        return start, np.eye(2) * widest, correlation
+    cells = (patch.shape[0] - 2) ** 2
+    variance = max(squares / max(cells - 4, 1), 2.0 * noise**2)
+    energy = _Symmetric(*kernels.gradient_energy(patch))
+    return np.array([u, v]), _covariance(energy, cells, variance, noise, widest), correlation
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +51,6 @@ class _Symmetric:
     uu: float
     uv: float
     vv: float
-
-    def damped_inverse(self) -> NDArray[np.float32]:
-        extra = 1e-3 * (self.uu + self.vv)
-        a, c = self.uu + extra, self.vv + extra
-        det = a * c - self.uv**2
-        return np.array([[c, -self.uv], [-self.uv, a]], np.float32) / np.float32(det)
 
     def eigen(self) -> tuple[float, float, float]:
         """Larger and smaller eigenvalue, and the angle of the larger one's axis from u towards v [rad]."""

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from knowledge_sources.methods.correlation_kernels import noise_response
 
+
+@lru_cache(maxsize=8)
 def decode(jpeg: bytes) -> NDArray[np.uint8]:
-    """The grey picture (h, w) uint8 in compressed bytes (JPEG; PNG is understood too).
+    """The grey picture (h, w) uint8, read-only, in compressed bytes (JPEG; PNG is understood too).
+
+    The last few are remembered: several experts look at one frame, and landmarks' templates lie in earlier ones.
 
     Raises:
         ValueError: the bytes are not a picture.
     """
-    return _decoded(jpeg, cv2.IMREAD_GRAYSCALE)
+    image = _decoded(jpeg, cv2.IMREAD_GRAYSCALE)
+    image.setflags(write=False)
+    return image
 
 
 def decode_colour(jpeg: bytes) -> NDArray[np.uint8]:
@@ -33,10 +41,15 @@ def grey_float(image: Any) -> NDArray[np.float32]:
     Raises:
         ValueError: not two-dimensional, or with a side under 2 px.
     """
+    return np.ascontiguousarray(checked_grey(image), np.float32)
+
+
+def checked_grey(image: Any) -> NDArray[Any]:
+    """An image (h, w) of any number type, as it is. Raises ValueError as :func:`grey_float`."""
     array = np.asarray(image)
     if array.ndim != 2 or min(array.shape) < 2:
         raise ValueError(f"expected a grey image of shape (h, w), at least 2 x 2, got shape {array.shape}")
-    return np.ascontiguousarray(array, np.float32)
+    return array
 
 
 def noise_sigma(image: NDArray[np.float32]) -> float:
@@ -48,9 +61,8 @@ def noise_sigma(image: NDArray[np.float32]) -> float:
     if min(image.shape) < 3:
         return ROUNDING_SIGMA
     step = max(image.shape[0] // 64, 1)
-    rows = image[:-2:step] - 2.0 * image[1:-1:step] + image[2::step]
-    response = rows[:, :-2] - 2.0 * rows[:, 1:-1] + rows[:, 2:]
-    return max(float(np.median(np.abs(response))) / (0.6745 * 6.0), ROUNDING_SIGMA)
+    response = noise_response(np.ascontiguousarray(image, np.float32), step)
+    return max(response / (0.6745 * 6.0), ROUNDING_SIGMA)
 
 
 ROUNDING_SIGMA = 12.0**-0.5

@@ -155,10 +155,7 @@ def _judged(
 ) -> Location:
     """With the evidence: agreement is counted with the whole image's segments, which were not sought at this pose."""
     wrong = _wrong_poses(fine.camera_from_world, spread)
-
-    def displaced(i: int) -> Floats | None:
-        return camera.project_segments(model, wrong[i])[0] if i < len(wrong) else None
-
+    displaced = np.array([camera.project_segments(model, pose)[0] for pose in wrong])
     here = camera.project_segments(model, fine.camera_from_world)[0]
     lengths = np.linalg.norm(here[:, 1] - here[:, 0], axis=1)
     here[~(np.nan_to_num(lengths) >= LEAST_LENGTH_PX)] = np.nan

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -53,48 +55,70 @@ def best_fits(forms: Array, with_scale: bool, start: Array) -> Fits:
     Without, a linear term is left and the minimum is a root of a quartic; a few Newton steps from the turn of
     ``start`` (5,) or (k, 5) find it.
     """
-    reduced, back = _without_shift(forms)
-    if with_scale:
-        cosines, sines, scales = _circle_with_scale(reduced)
-    else:
-        cosines, sines = _circle(reduced, np.arctan2(start[..., 1], start[..., 0]))
-        scales = np.ones_like(cosines)
-    rest = np.stack([cosines, sines, scales], axis=-1)
-    errors = np.einsum("ka,kab,kb->k", rest, reduced, rest)
-    shifts = -np.einsum("kta,ka->kt", back, rest)
-    return Fits(np.maximum(errors, 0.0), np.concatenate([rest[:, :2], shifts, rest[:, 2:]], axis=1))
+    turns = np.empty(len(forms))
+    turns[:] = np.arctan2(start[..., 1], start[..., 0])
+    errors, placements = _fits(np.ascontiguousarray(forms), with_scale, turns)
+    return Fits(errors, placements)
 
 
-def _without_shift(forms: Array) -> tuple[Array, Array]:
-    """Eliminate T: the (k, 3, 3) form in (cos, sin, s) and (k, 2, 3) with T = -back @ (cos, sin, s)."""
-    keep = np.array([0, 1, 4])
-    a, b, d = forms[:, 2, 2], forms[:, 2, 3], forms[:, 3, 3]
+@njit(cache=True, error_model="numpy")
+def _fits(forms: Any, with_scale: bool, turns: Any) -> tuple[Any, Any]:
+    errors, placements = np.empty(len(forms)), np.empty((len(forms), 5))
+    back, q = np.empty((2, 3)), np.empty((3, 3))
+    for k in range(len(forms)):
+        _without_shift(forms[k], back, q)
+        scale = 1.0
+        if with_scale:
+            c, s, scale = _circle_with_scale(q)
+        else:
+            c, s = _circle(q, turns[k])
+        rest = (c, s, scale)
+        error = 0.0
+        for a in range(3):
+            for b in range(3):
+                error += rest[a] * q[a, b] * rest[b]
+        errors[k] = max(error, 0.0)
+        placements[k, 0], placements[k, 1], placements[k, 4] = c, s, scale
+        for t in range(2):
+            placements[k, 2 + t] = -(back[t, 0] * c + back[t, 1] * s + back[t, 2] * scale)
+    return errors, placements
+
+
+@njit(cache=True, error_model="numpy")
+def _without_shift(form: Any, back: Any, reduced: Any) -> None:
+    """Eliminate T: ``reduced`` (3, 3) in (cos, sin, s) and ``back`` (2, 3) with T = -back @ (cos, sin, s)."""
+    a, b, d = form[2, 2], form[2, 3], form[3, 3]
     determinant = a * d - b * b
-    inverse = np.stack([d, -b, -b, a], axis=-1).reshape(-1, 2, 2) / determinant[:, None, None]
-    across = forms[:, 2:4][:, :, keep]
-    back = inverse @ across
-    return forms[:, keep][:, :, keep] - np.swapaxes(across, 1, 2) @ back, back
+    kept = (0, 1, 4)
+    for j in range(3):
+        u, v = form[2, kept[j]], form[3, kept[j]]
+        back[0, j], back[1, j] = (d * u - b * v) / determinant, (a * v - b * u) / determinant
+    for i in range(3):
+        for j in range(3):
+            across = form[2, kept[i]] * back[0, j] + form[3, kept[i]] * back[1, j]
+            reduced[i, j] = form[kept[i], kept[j]] - across
 
 
-def _circle_with_scale(q: Array) -> tuple[Array, Array, Array]:
-    """Eliminate s from (k, 3, 3), then the smaller root of the second-order equation."""
-    pull = q[:, :2, 2] / q[:, 2, 2][:, None]
-    rest = q[:, :2, :2] - q[:, :2, 2][:, :, None] * pull[:, None, :]
-    double = 0.5 * np.arctan2(2.0 * rest[:, 0, 1], rest[:, 0, 0] - rest[:, 1, 1]) + 0.5 * np.pi
-    cosines, sines = np.cos(double), np.sin(double)
-    sign = np.where(cosines < 0.0, -1.0, 1.0)
-    cosines, sines = cosines * sign, sines * sign
-    return cosines, sines, -(pull[:, 0] * cosines + pull[:, 1] * sines)
+@njit(cache=True, error_model="numpy")
+def _circle_with_scale(q: Any) -> tuple[float, float, float]:
+    """Eliminate s from (3, 3), then the smaller root of the second-order equation."""
+    pull = (q[0, 2] / q[2, 2], q[1, 2] / q[2, 2])
+    xx, xy, yy = q[0, 0] - q[0, 2] * pull[0], q[0, 1] - q[0, 2] * pull[1], q[1, 1] - q[1, 2] * pull[1]
+    turn = 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
+    c, s = math.cos(turn), math.sin(turn)
+    if c < 0.0:
+        c, s = -c, -s
+    return c, s, -(pull[0] * c + pull[1] * s)
 
 
-def _circle(q: Array, start: Array) -> tuple[Array, Array]:
+@njit(cache=True, error_model="numpy")
+def _circle(q: Any, turn: float) -> tuple[float, float]:
     """Newton on the turn for x'Ax + 2 b'x, x = (cos, sin), with s = 1."""
-    a, b, d = q[:, 0, 0], q[:, 0, 1], q[:, 1, 1]
-    e, f = q[:, 0, 2], q[:, 1, 2]
-    turn = np.broadcast_to(start, a.shape)
+    a, b, d, e, f = q[0, 0], q[0, 1], q[1, 1], q[0, 2], q[1, 2]
     for _ in range(NEWTON_STEPS):
-        c, s = np.cos(turn), np.sin(turn)
+        c, s = math.cos(turn), math.sin(turn)
         slope = (d - a) * s * c + b * (c * c - s * s) - e * s + f * c
         bend = (d - a) * (c * c - s * s) - 4.0 * b * s * c - e * c - f * s
-        turn = turn - np.clip(slope / np.where(bend > 1e-12, bend, np.inf), -0.5, 0.5)
-    return np.cos(turn), np.sin(turn)
+        if bend > 1e-12:
+            turn -= min(max(slope / bend, -0.5), 0.5)
+    return math.cos(turn), math.sin(turn)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -96,22 +99,34 @@ def _offset_votes(
     reach = int(np.ceil(1.5 * window_px / step))
     bins = 2 * reach + 1
     rows, columns = _near_pairs(model, data, window_px, window_rad)
-    angle = undirected(data.angles[columns] - model.angles[rows])
     votes = np.zeros((len(turns), len(model.ends), bins))
-    for t, turn in enumerate(turns):
-        miss = np.abs(undirected(angle - turn))
-        near = miss < 1.5 * TURN_STEP_RAD
-        i, k = rows[near], columns[near]
-        c, s = np.cos(turn), np.sin(turn)
-        middle = data.middles[k]
-        back = np.stack([c * middle[:, 0] + s * middle[:, 1], -s * middle[:, 0] + c * middle[:, 1]], axis=1)
-        across = np.sum(model.normals[i] * back, axis=1) - model.offsets[i]
-        cell = np.rint(across / step).astype(np.intp) + reach
-        inside = (cell >= 0) & (cell < bins)
-        share = np.minimum(data.lengths[k], model.lengths[i]) * (1.0 - miss[near] / (1.5 * TURN_STEP_RAD))
-        np.add.at(votes[t], (i[inside], cell[inside]), share[inside])
+    _vote(
+        votes, turns, rows, columns, undirected(data.angles[columns] - model.angles[rows]),
+        model.normals, model.offsets, model.lengths, data.middles, data.lengths, step,
+    )
     votes[..., 1:-1] += 0.5 * (votes[..., :-2] + votes[..., 2:])
     return np.minimum(votes, model.lengths[None, :, None])
+
+
+@njit(cache=True, error_model="numpy")
+def _vote(
+    votes: Any, turns: Any, rows: Any, columns: Any, angles: Any, normals: Any, offsets: Any, model_lengths: Any,
+    middles: Any, data_lengths: Any, step: float,
+) -> None:
+    """Each near pair votes, at each turn that makes it nearly parallel, for the offset that lays one on the other."""
+    bins, widest = votes.shape[2], 1.5 * TURN_STEP_RAD
+    for t in range(len(turns)):
+        c, s = math.cos(turns[t]), math.sin(turns[t])
+        for p in range(len(rows)):
+            i, k = rows[p], columns[p]
+            miss = abs((angles[p] - turns[t] + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
+            if miss >= widest:
+                continue
+            u, v = middles[k, 0], middles[k, 1]
+            across = normals[i, 0] * (c * u + s * v) + normals[i, 1] * (c * v - s * u) - offsets[i]
+            cell = int(np.rint(across / step)) + bins // 2
+            if 0 <= cell < bins:
+                votes[t, i, cell] += min(data_lengths[k], model_lengths[i]) * (1.0 - miss / widest)
 
 
 def _near_pairs(
@@ -131,29 +146,52 @@ def _near_pairs(
 def _gathered(model: LineTable, votes: Array, turns: Array, window_px: float, step: float) -> Array:
     """(t, CELLS, CELLS) accumulator over turn and shift."""
     axis = np.linspace(-window_px, window_px, CELLS)
-    bins = votes.shape[2]
-    scores = np.zeros((len(turns), CELLS, CELLS))
-    for t, turn in enumerate(turns):
-        c, s = np.cos(turn), np.sin(turn)
-        # In the model's own frame the shift T appears turned back.
-        u = c * axis[None, :] + s * axis[:, None]
-        v = -s * axis[None, :] + c * axis[:, None]
-        across = model.normals[:, 0, None, None] * u + model.normals[:, 1, None, None] * v
-        cell = np.clip(np.rint(across / step).astype(np.intp) + bins // 2, 0, bins - 1)
-        scores[t] = np.take_along_axis(votes[t], cell.reshape(len(cell), -1), axis=1).sum(axis=0).reshape(CELLS, -1)
+    scores: Array = _gather(votes, turns, axis, model.normals, step)
+    return scores
+
+
+@njit(cache=True, error_model="numpy")
+def _gather(votes: Any, turns: Any, axis: Any, normals: Any, step: float) -> Any:
+    """At each turn and shift T the sum of what each model line has at its offset n . T."""
+    bins, cells = votes.shape[2], len(axis)
+    scores = np.zeros((len(turns), cells, cells))
+    for t in range(len(turns)):
+        c, s = math.cos(turns[t]), math.sin(turns[t])
+        for i in range(len(normals)):
+            # In the model's own frame the shift appears turned back.
+            by_u = (c * normals[i, 0] - s * normals[i, 1]) / step
+            by_v = (s * normals[i, 0] + c * normals[i, 1]) / step
+            for v in range(cells):
+                for u in range(cells):
+                    cell = int(np.rint(by_u * axis[u] + by_v * axis[v])) + bins // 2
+                    scores[t, v, u] += votes[t, i, min(max(cell, 0), bins - 1)]
     return scores
 
 
 def _separate_peaks(scores: Array, turns: Array, window_px: float, step: float, count: int) -> list[Peak]:
     """Highest cells first, each clearing its neighbourhood (2 turns, 2 cells); ties go to the smaller motion."""
     axis = np.linspace(-window_px, window_px, CELLS)
-    still = np.abs(turns)[:, None, None] / 0.3 + np.hypot(axis[None, :, None], axis[None, None, :]) / 30.0
-    left = scores - 1e-6 * still
+    free = np.ones(scores.shape, np.bool_)
     peaks: list[Peak] = []
     while len(peaks) < count:
-        t, v, u = np.unravel_index(int(np.argmax(left)), left.shape)
-        if scores[t, v, u] <= 0.0 or not np.isfinite(left[t, v, u]):
+        t, v, u = _highest(scores, free, turns, axis)
+        if t < 0 or scores[t, v, u] <= 0.0:
             break
         peaks.append(Peak(float(turns[t]), (float(axis[u]), float(axis[v])), float(scores[t, v, u])))
-        left[max(t - 2, 0) : t + 3, max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3] = -np.inf
+        free[max(t - 2, 0) : t + 3, max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3] = False
     return peaks or [NO_MOTION]
+
+
+@njit(cache=True, error_model="numpy")
+def _highest(scores: Any, free: Any, turns: Any, axis: Any) -> tuple[int, int, int]:
+    """The highest free cell, a hair lower the larger its motion; -1 where none is free."""
+    best, found = -math.inf, (-1, -1, -1)
+    for t in range(len(turns)):
+        for v in range(len(axis)):
+            for u in range(len(axis)):
+                if free[t, v, u] and scores[t, v, u] > best:
+                    motion = abs(turns[t]) / 0.3 + math.hypot(axis[u], axis[v]) / 30.0
+                    score = scores[t, v, u] - 1e-6 * motion
+                    if score > best:
+                        best, found = score, (t, v, u)
+    return found

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching_fit import Similarity2, best_fits
@@ -95,11 +98,12 @@ def model_move(placement: Array, centre: Array) -> Similarity2:
 def gated(table: PairTable, placement: Array, gates: Array, window_rad: float) -> NDArray[np.bool_]:
     """(p,) pairs that, so placed, lie within (m,) ``gates`` across, overlap along and are nearly parallel."""
     gate = gates[table.model]
-    across = np.abs(table.across @ placement).max(axis=1)
+    across = np.abs(table.across @ placement)
     along = table.along @ placement
     turn = np.arctan2(placement[1], placement[0])
-    near = (across <= gate) & (np.abs(table.angles + turn) <= window_rad)
-    return np.asarray(near & (along.max(axis=1) >= -gate) & (along.min(axis=1) <= table.lengths + gate))
+    near = (np.maximum(across[:, 0], across[:, 1]) <= gate) & (np.abs(table.angles + turn) <= window_rad)
+    low, high = np.minimum(along[:, 0], along[:, 1]), np.maximum(along[:, 0], along[:, 1])
+    return np.asarray(near & (high >= -gate) & (low <= table.lengths + gate))
 
 
 def settled(table: PairTable, placements: Array) -> tuple[Array, Array]:
@@ -119,19 +123,25 @@ def settled(table: PairTable, placements: Array) -> tuple[Array, Array]:
 
 def start_anchor(placements: Array, shift_weight: Array, turn_weight: Array, scale_weight: Array) -> Array:
     """(k, 5, 5) weak pulls to placements (k, 5): few or parallel pairs still have one best fit."""
-    c, s = placements[:, 0], placements[:, 1]
-    zero, one = np.zeros_like(c), np.ones_like(c)
-    rows = np.stack(
-        [
-            np.stack([zero, zero, one, zero, -placements[:, 2]], axis=-1),
-            np.stack([zero, zero, zero, one, -placements[:, 3]], axis=-1),
-            np.stack([-s, c, zero, zero, zero], axis=-1),
-            np.stack([-c, -s, zero, zero, one], axis=-1),
-        ],
-        axis=1,
-    )
-    weights = np.stack([shift_weight, shift_weight, turn_weight, scale_weight], axis=1)
-    return np.asarray(np.swapaxes(rows * weights[..., None], 1, 2) @ rows)
+    weights = [np.ascontiguousarray(w, float) for w in (shift_weight, turn_weight, scale_weight)]
+    pulls: Array = _pulls(np.ascontiguousarray(placements), *weights)
+    return pulls
+
+
+@njit(cache=True, error_model="numpy")
+def _pulls(placements: Any, shift_weight: Any, turn_weight: Any, scale_weight: Any) -> Any:
+    out = np.zeros((len(placements), 5, 5))
+    row = np.zeros((4, 5))
+    for k in range(len(placements)):
+        c, s, u, v = placements[k, 0], placements[k, 1], placements[k, 2], placements[k, 3]
+        row[0, 2], row[0, 4], row[1, 3], row[1, 4] = 1.0, -u, 1.0, -v
+        row[2, 0], row[2, 1], row[3, 0], row[3, 1], row[3, 4] = -s, c, -c, -s, 1.0
+        weights = (shift_weight[k], shift_weight[k], turn_weight[k], scale_weight[k])
+        for r in range(4):
+            for a in range(5):
+                for b in range(5):
+                    out[k, a, b] += weights[r] * row[r, a] * row[r, b]
+    return out
 
 
 def _support(table: PairTable, placements: Array) -> Array:
@@ -147,12 +157,26 @@ def _support(table: PairTable, placements: Array) -> Array:
 
 def _closeness(table: PairTable, placements: Array, width: float) -> Array:
     """(k, p) from 1, on the model line and overlapping it, to 0."""
-    flat = table.across.reshape(-1, 5)
-    across = (placements @ flat.T).reshape(len(placements), -1, 2)
-    along = (placements @ table.along.reshape(-1, 5).T).reshape(len(placements), -1, 2)
-    beside = (along.max(axis=2) < 0.0) | (along.min(axis=2) > table.lengths)
-    square = 0.5 * (across[..., 0] ** 2 + across[..., 1] ** 2)
-    return np.where(beside, 0.0, 1.0 / (1.0 + square / width**2))
+    close: Array = _close(table.across, table.along, table.lengths, np.ascontiguousarray(placements), width)
+    return close
+
+
+@njit(cache=True, error_model="numpy")
+def _close(across: Any, along: Any, lengths: Any, placements: Any, width: float) -> Any:
+    out = np.zeros((len(placements), len(lengths)))
+    for k in range(len(placements)):
+        at = placements[k]
+        for p in range(len(lengths)):
+            low, high, square = math.inf, -math.inf, 0.0
+            for e in range(2):
+                off = beside = 0.0
+                for a in range(5):
+                    off += across[p, e, a] * at[a]
+                    beside += along[p, e, a] * at[a]
+                low, high, square = min(low, beside), max(high, beside), square + 0.5 * off * off
+            if high >= 0.0 and low <= lengths[p]:
+                out[k, p] = 1.0 / (1.0 + square / (width * width))
+    return out
 
 
 def _rows(unit: Array, offset: Array, ends: Array) -> Array:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching_fit import Fits
@@ -156,8 +157,7 @@ def _omission_after(space: PairSpace, terms: Terms, chosen: Mask, counts: Array,
     covered = (counts > 0).mean(axis=1)
     lines = np.arange(space.lines)
     now = terms.omission(1.0 - covered, lines)
-    gained = (space.masks & (counts[space.model] == 0)).mean(axis=1)
-    lost = (space.masks & (counts[space.model] == 1)).mean(axis=1)
+    gained, lost = _shares(space.masks, counts, space.model)
     after = covered[space.model] + np.where(chosen, -lost, gained)
     change = terms.omission(1.0 - after, space.model) - now[space.model]
     robs = rival >= 0
@@ -165,6 +165,22 @@ def _omission_after(space: PairSpace, terms: Terms, chosen: Mask, counts: Array,
     victim = space.model[other]
     change[robs] += terms.omission(1.0 - covered[victim] + lost[other], victim) - now[victim]
     return np.asarray(now.sum() + change)
+
+
+@njit(cache=True, error_model="numpy")
+def _shares(masks: Any, counts: Any, model: Any) -> tuple[Any, Any]:
+    """(p,) share of its model line that each pair covers and nobody else, (p,) and that it covers alone."""
+    pairs, cells = masks.shape
+    gained, lost = np.zeros(pairs), np.zeros(pairs)
+    for p in range(pairs):
+        for c in range(cells):
+            if masks[p, c]:
+                held = counts[model[p], c]
+                gained[p] += held == 0.0
+                lost[p] += held == 1.0
+        gained[p] /= cells
+        lost[p] /= cells
+    return gained, lost
 
 
 def _best_swap(
@@ -196,8 +212,18 @@ def _best_swap(
 
 def _counts(space: PairSpace, chosen: Mask) -> Array:
     """(m, c) how many chosen data lines cover each cell."""
-    belongs = space.model[chosen] == np.arange(space.lines)[:, None]
-    return np.asarray(belongs.astype(np.float64) @ space.masks[chosen].astype(np.float64))
+    counts: Array = _counted(space.masks, space.model, chosen, space.lines)
+    return counts
+
+
+@njit(cache=True, error_model="numpy")
+def _counted(masks: Any, model: Any, chosen: Any, lines: int) -> Any:
+    counts = np.zeros((lines, masks.shape[1]))
+    for p in range(len(model)):
+        if chosen[p]:
+            for c in range(masks.shape[1]):
+                counts[model[p], c] += masks[p, c]
+    return counts
 
 
 def _rivals(space: PairSpace, chosen: Mask) -> Index:

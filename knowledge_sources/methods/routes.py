@@ -40,9 +40,11 @@ def shortest_route(free: shapely.Geometry, start: Any, goal: Any) -> list[Floats
     slack = free.buffer(SLACK_M)
     graph: nx.Graph = nx.Graph()
     graph.add_nodes_from(range(len(nodes)))
-    for i, j in combinations(range(len(nodes)), 2):
-        if slack.covers(shapely.LineString([nodes[i], nodes[j]])):
-            graph.add_edge(i, j, weight=float(np.linalg.norm(nodes[i] - nodes[j])))
+    pairs = np.array(list(combinations(range(len(nodes)), 2)))
+    shapely.prepare(slack)
+    clear = shapely.covers(slack, shapely.linestrings(np.array(nodes)[pairs]))
+    for i, j in pairs[clear].tolist():
+        graph.add_edge(i, j, weight=float(np.linalg.norm(nodes[i] - nodes[j])))
     try:
         way = nx.shortest_path(graph, 0, 1, weight="weight")
     except nx.NetworkXNoPath:

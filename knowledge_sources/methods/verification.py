@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.agreement import Agreement, agreement
-from world_models.frames import Pose2
+from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 
 Floats = NDArray[np.float64]
@@ -42,19 +42,17 @@ class Verification:
 
 def verify(robot: RobotModel, lines_world: Floats, segments_px: Floats, world_from_robot: Pose2) -> Verification:
     """Compare model lines (m, 2, 3), visible from there, with segments (k, 2, 2) found in the image."""
-    wrong = _wrong_poses(world_from_robot)
-
-    def displaced(i: int) -> Floats | None:
-        return _projected(robot, lines_world, wrong[i]) if i < len(wrong) else None
-
-    here = _projected(robot, lines_world, world_from_robot)
-    found = agreement(here, segments_px, displaced)
+    here, *displaced = _projected(robot, lines_world, [world_from_robot, *_wrong_poses(world_from_robot)])
+    found = agreement(here, segments_px, np.array(displaced))
     lengths = np.linalg.norm(here[:, 1] - here[:, 0], axis=1) if len(here) else np.zeros(0)
     return Verification(found, found.total(lengths), here)
 
 
-def _projected(robot: RobotModel, lines_world: Floats, pose: Pose2) -> Floats:
-    return robot.camera.project_segments(lines_world, robot.camera_from_world(pose))[0]
+def _projected(robot: RobotModel, lines_world: Floats, poses: list[Pose2]) -> Floats:
+    """(p, m, 2, 2) the lines as seen from each pose, NaN where not in view [px]."""
+    lines_camera = np.array([robot.camera_from_world(pose).apply(lines_world) for pose in poses])
+    seen, _ = robot.camera.project_segments(lines_camera.reshape(-1, 2, 3), Pose.identity())
+    return seen.reshape(len(poses), len(lines_world), 2, 2)
 
 
 def _wrong_poses(pose: Pose2) -> list[Pose2]:

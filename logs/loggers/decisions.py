@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+import rerun as rr
 
 from blackboard.activation import Activation
 from blackboard.change import Change
 from blackboard.journal import Decision
 from blackboard.servoing import Discrepancy
+from logs import words
+from logs.deeds import Deeds
 from logs.mirror import Moment
+from logs.palette import DONE, LEVELS, REJECTED
 from logs.paths import RECORDS, TABLE
 from logs.tape import Tape
 
@@ -20,8 +26,28 @@ COLUMNS = ("focus_level", "chosen_knowledge_source", "rating", "trigger_entry", 
            "runner_up_with_rating", "waiting")
 """Of the decision table; the viewer makes a column as wide as its name."""
 
+MARKS: Mapping[str, str] = {"ERROR": "⚠ ", "WARN": "⚠ ", "INFO": "", "DEBUG": ""}
+
 RECORD = "record"
 """The component that holds a decision's line."""
+
+
+class Record:
+    """A column of decisions' lines."""
+
+    @classmethod
+    def columns(cls, **components: Any) -> Iterable[Any]:
+        return rr.AnyValues.columns(True, **components)
+
+
+class TableRow:
+    """Columns of the sentence and of the table."""
+
+    @classmethod
+    def columns(cls, **components: Any) -> Iterator[Any]:
+        for name, values in components.items():
+            kind = rr.TextLog if name in ("text", "level", "color") else None
+            yield from kind.columns(**{name: values}) if kind else rr.AnyValues.columns(True, **{name: values})
 
 
 class Decisions:
@@ -30,24 +56,35 @@ class Decisions:
     def __init__(self, line_of: Callable[[Decision], str]) -> None:
         """``line_of`` gives a decision's line in the journal."""
         self._line_of = line_of
+        self._deeds = Deeds()
 
     def begin(self, tape: Tape) -> None:
         """Nothing holds at all times."""
 
     def log(self, tape: Tape, moment: Moment) -> None:
         decision = moment.decision
-        tape.add(RECORDS, **{RECORD: self._line_of(decision)})
-        tape.add(TABLE, text=sentence(decision), level=log_level(decision), **row(decision))
+        tape.log(RECORDS, Record, **{RECORD: [self._line_of(decision)]})
+        level = log_level(decision)
+        fields: dict[str, list[Any]] = {name: [value] for name, value in row(decision).items()}
+        tape.log(TABLE, TableRow, text=[MARKS[level] + sentence(decision, self._deeds)], level=[level],
+                 color=[_colour(decision)], **fields)
 
 
-def sentence(decision: Decision) -> str:
-    """What was decided, in words."""
+def sentence(decision: Decision, deeds: Deeds) -> str:
+    """What was seen and decided, in words."""
+    seen = _told(decision.observed, deeds)
+    given = f" [{seen}]" if seen else ""
+    done = _told(decision.made, deeds) or "changes nothing"
     if decision.chosen is None:
-        return "nobody acted"
-    who = f"{_bid(decision.chosen)} on {decision.chosen.trigger.entry.ref}"
+        return f"nobody had anything to do{given}"
+    who = words.expert(decision.chosen.source.name)
     if decision.refused:
-        return f"{who}: refused, {decision.refused.splitlines()[-1]}"
-    return f"{who}: {_deeds(decision.made)}"
+        return f"{who}: refused, {decision.refused.splitlines()[-1]}{given}"
+    return f"{who}: {done}{given}"
+
+
+def _told(changes: Iterable[Change], deeds: Deeds) -> str:
+    return "; ".join(words.numerous(said for change in changes if (said := deeds.tell(change))))
 
 
 def log_level(decision: Decision) -> str:
@@ -62,6 +99,13 @@ def _is_trouble(change: Change) -> bool:
     if isinstance(value, Discrepancy):
         return value.exceeds or value.status == "escalated" or (value.is_open and value.magnitude is None)
     return getattr(value, "status", "") in TROUBLES
+
+
+def _colour(decision: Decision) -> tuple[int, int, int, int]:
+    """Of the servo level at which the expert works, as in the lanes; red where the act was refused."""
+    if decision.refused:
+        return REJECTED
+    return LEVELS[str(decision.chosen.source.level)] if decision.chosen else DONE
 
 
 def row(decision: Decision) -> dict[str, str | float]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import rerun as rr
 
 from logs.mirror import Moment
@@ -14,6 +17,18 @@ NUMBER = "number"
 """The component beside an image that holds the frame's number."""
 
 
+class Picture:
+    """Columns of a picture and of what is known about it."""
+
+    @classmethod
+    def columns(cls, **components: Any) -> Iterator[Any]:
+        for name, values in components.items():
+            if name == "blob":
+                yield from rr.EncodedImage.columns(blob=values)
+            else:
+                yield from rr.AnyValues.columns(True, **{name: values})
+
+
 class Frames:
     """Logs each picture as it is delivered."""
 
@@ -23,9 +38,10 @@ class Frames:
     def begin(self, tape: Tape) -> None:
         camera = self._camera
         tape.fix(CAMERA, rr.Pinhole(image_from_camera=camera.matrix, width=camera.width, height=camera.height))
+        tape.fix(IMAGE, rr.EncodedImage.from_fields(media_type="image/jpeg"))
 
     def log(self, tape: Tape, moment: Moment) -> None:
         for entry in moment.changed(Frame):
             frame = entry.value
-            about = rr.AnyValues(number=[frame.number], purpose=[frame.purpose], entry=[str(entry.ref)])
-            tape.log(IMAGE, rr.EncodedImage(contents=frame.jpeg, media_type="image/jpeg"), about)
+            tape.log(IMAGE, Picture, blob=[frame.jpeg], **{NUMBER: [frame.number]}, purpose=[frame.purpose],
+                     entry=[str(entry.ref)])

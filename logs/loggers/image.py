@@ -10,25 +10,33 @@ from numpy.typing import NDArray
 
 from logs.mirror import Mirror, Moment
 from logs.palette import EXPECTED, FOUND, MATCHED, PLANNED, REJECTED, Colour
-from logs.paths import DRIFTS, IMAGE, WINDOWS
+from logs.paths import DRIFTS, LANDMARK_NAMES, WINDOWS
 from logs.paths import EXPECTED as EXPECTED_PATH
 from logs.paths import MATCHED as MATCHED_PATH
+from logs.paths import REJECTED as REJECTED_PATH
 from logs.paths import SEGMENTS as SEGMENTS_PATH
 from logs.tape import Tape
+from logs.words import nearby
 from world_models.body import Frame
 from world_models.camera import Camera, clip_segments
+from world_models.frames import frozen
 from world_models.percepts import LineMatch, PoseFix, Segments, Track, Tracks
 from world_models.task import Milestone
 
 DRIFT_SCALE = 5.0
 """Drifts of a few pixels would not show: their arrows are drawn longer, and the view's legend says so."""
 
-NAMES_PATH, REJECTED_PATH = f"{IMAGE}/names", f"{IMAGE}/rejected"
 STYLES = ((EXPECTED_PATH, EXPECTED, 1.5), (SEGMENTS_PATH, FOUND, 1.0), (MATCHED_PATH, MATCHED, 2.0),
           (REJECTED_PATH, REJECTED, 2.0))
 """Lines of each kind: where, colour and half width on the screen."""
 
 MOST_NAMES = 6
+
+LABEL_PX, LABEL_HIGH_PX = 80.0, 26.0
+"""Half a long name's width, and a name's height: nearer to the border it is moved inwards; nearer to another, left out.
+"""
+
+NO_LINES, NO_POINTS = frozen(np.zeros((0, 2, 2))), frozen(np.zeros((0, 2)))
 
 Floats = NDArray[np.float64]
 
@@ -38,11 +46,16 @@ class Image:
 
     def __init__(self, camera: Camera) -> None:
         self._size = camera.width, camera.height
+        self._lens, self._pinhole = camera, camera.pinhole
         self._shown: dict[str, None] = {}
 
     def begin(self, tape: Tape) -> None:
         for path, colour, width in STYLES:
             tape.fix(path, rr.LineStrips2D.from_fields(colors=[colour], radii=rr.Radius.ui_points(width)))
+        thin = rr.Radius.ui_points(1.5)
+        tape.fix(LANDMARK_NAMES, rr.Points2D.from_fields(show_labels=True, colors=[EXPECTED], radii=thin))
+        tape.fix(WINDOWS, rr.Boxes2D.from_fields(radii=thin))
+        tape.fix(DRIFTS, rr.Arrows2D.from_fields(colors=[PLANNED], radii=thin))
 
     def log(self, tape: Tape, moment: Moment) -> None:
         if moment.touched(Frame):
@@ -61,25 +74,48 @@ class Image:
     def _wipe(self, tape: Tape, mirror: Mirror) -> None:
         """A new picture: nothing found in the last one holds; what is expected does while its milestone is open."""
         last = mirror.latest(Milestone)
-        keep = (EXPECTED_PATH, NAMES_PATH) if last and last.value.status == "expected" else ()
+        keep = (EXPECTED_PATH, LANDMARK_NAMES) if last and last.value.status == "expected" else ()
         for path in [path for path in self._shown if path not in keep]:
-            tape.log(path, rr.Clear(recursive=False))
             del self._shown[path]
-
-    def _show(self, tape: Tape, path: str, what: Any) -> None:
-        tape.log(path, what)
-        self._shown[path] = None
+            if path == LANDMARK_NAMES:
+                tape.log(path, rr.Points2D, positions=NO_POINTS, labels=())
+            elif path == WINDOWS:
+                self._log_windows(tape, [], 0)
+            elif path == DRIFTS:
+                tape.log(path, rr.Arrows2D, origins=NO_POINTS, vectors=NO_POINTS)
+            else:
+                tape.log(path, rr.LineStrips2D, strips=NO_LINES)
 
     def _lines(self, tape: Tape, path: str, segments_px: Any) -> None:
-        lines, inside = clip_segments(segments_px, *self._size)
-        self._show(tape, path, rr.LineStrips2D(lines[inside].astype(np.float32)))
+        lines, inside = self._clipped(np.asarray(segments_px))
+        self._log_lines(tape, path, lines[inside])
+
+    def _log_lines(self, tape: Tape, path: str, lines: Floats) -> None:
+        tape.log(path, rr.LineStrips2D, strips=lines.astype(np.float32))
+        self._shown[path] = None
+
+    def _clipped(self, lines: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """Lines (n, 2, 2) cut at the picture's border, and which of them are left; most need no cut."""
+        lines = lines.reshape(-1, 2, 2)
+        if lines.size == 0 or (lines.min() >= 0.0 and (lines.max(axis=(0, 1)) <= np.subtract(self._size, 1.0)).all()):
+            return self._bent(lines), np.ones(len(lines), bool)
+        lines, inside = clip_segments(lines, *self._size)
+        return self._bent(lines), inside
+
+    def _bent(self, pixels: Floats) -> Floats:
+        """Where points (..., 2) of the picture without distortion, as the experts see it, lie in the camera's."""
+        return pixels if self._pinhole is self._lens else self._lens.project(self._pinhole.rays(pixels))
 
     def _expected(self, tape: Tape, milestone: Milestone) -> None:
         if milestone.status == "turning" or not milestone.expected_px:
             return
         lines = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
-        self._lines(tape, EXPECTED_PATH, lines)
-        self._show(tape, NAMES_PATH, _names(milestone, *clip_segments(lines, *self._size)))
+        clipped, inside = self._clipped(lines)
+        self._log_lines(tape, EXPECTED_PATH, clipped[inside])
+        names = _largest(milestone, clipped, inside, self._size[0])
+        spots = np.array(list(names.values()), float).reshape(-1, 2)
+        tape.log(LANDMARK_NAMES, rr.Points2D, positions=spots, labels=[nearby(name) for name in names])
+        self._shown[LANDMARK_NAMES] = None
 
     def _inliers(self, tape: Tape, mirror: Mirror, fix: PoseFix) -> None:
         match = mirror.get(fix.match)
@@ -89,43 +125,48 @@ class Image:
 
     def _tracks(self, tape: Tape, tracks: Tracks) -> None:
         items = [track for track in tracks.items if self._inside(track.predicted_px)]
-        self._show(tape, WINDOWS, self._windows(items, tracks.half_px))
-        self._show(tape, DRIFTS, self._drifts(items))
+        self._log_windows(tape, items, tracks.half_px)
+        self._log_drifts(tape, items)
 
     def _inside(self, point_px: tuple[float, float]) -> bool:
         return all(0 <= value < size for value, size in zip(point_px, self._size, strict=True))
 
-    def _windows(self, items: list[Track], half_px: int) -> Any:
+    def _log_windows(self, tape: Tape, items: list[Track], half_px: int) -> None:
         """The searched templates where they were found, red where they were expected and not found."""
-        middles = np.array([track.found_px or track.predicted_px for track in items], float).reshape(-1, 2)
-        low, high = middles - half_px, middles + half_px
-        low, high = (np.clip(corner, 0.0, np.array(self._size) - 1.0) for corner in (low, high))
-        return rr.Boxes2D(mins=low, sizes=high - low, colors=[_track_colour(track) for track in items],
-                          radii=rr.Radius.ui_points(1.5), labels=[track.landmark for track in items],
-                          show_labels=len(items) <= MOST_NAMES)
+        middles = self._bent(np.array([track.found_px or track.predicted_px for track in items], float).reshape(-1, 2))
+        last = np.subtract(self._size, 1.0)
+        low, high = np.clip(middles - half_px, 0.0, last), np.clip(middles + half_px, 0.0, last)
+        names = [nearby(track.landmark) if len(items) <= MOST_NAMES else "" for track in items]
+        tape.log(WINDOWS, rr.Boxes2D, centers=(low + high) / 2, half_sizes=(high - low) / 2, labels=names,
+                 colors=[_track_colour(track) for track in items])
+        self._shown[WINDOWS] = None
 
-    def _drifts(self, items: list[Track]) -> Any:
-        pairs = [(t.predicted_px, t.found_px) for t in items if t.found_px]
-        ends = np.array(pairs, float).reshape(-1, 2, 2)
+    def _log_drifts(self, tape: Tape, items: list[Track]) -> None:
+        """From where a template was expected towards where it was found, drawn longer."""
+        ends = np.array([(t.predicted_px, t.found_px) for t in items if t.found_px], float).reshape(-1, 2, 2)
         ends[:, 1] = ends[:, 0] + DRIFT_SCALE * (ends[:, 1] - ends[:, 0])
-        ends, inside = clip_segments(ends, *self._size)
+        ends, inside = self._clipped(ends)
         ends = ends[inside]
-        return rr.Arrows2D(origins=ends[:, 0], vectors=ends[:, 1] - ends[:, 0], colors=[PLANNED],
-                           radii=rr.Radius.ui_points(1.5))
+        tape.log(DRIFTS, rr.Arrows2D, origins=ends[:, 0], vectors=ends[:, 1] - ends[:, 0])
+        self._shown[DRIFTS] = None
 
 
 def _track_colour(track: Track) -> Colour:
     return FOUND if track.found_px else REJECTED
 
 
-def _names(milestone: Milestone, lines: Floats, inside: NDArray[np.bool_]) -> Any:
-    """The names of the landmarks that show most, each at the middle of its longest line."""
-    best: dict[str, tuple[float, Floats]] = {}
-    for number, landmark in enumerate(milestone.landmark_of):
-        length = float(np.linalg.norm(lines[number, 1] - lines[number, 0])) if inside[number] else 0.0
-        name = milestone.landmarks[landmark]
-        if length > best.get(name, (0.0,))[0]:
-            best[name] = length, lines[number].mean(axis=0)
-    largest = sorted(best, key=lambda name: -best[name][0])[:MOST_NAMES]
-    return rr.Points2D([best[name][1] for name in largest], labels=largest, show_labels=True, colors=[EXPECTED],
-                       radii=rr.Radius.ui_points(2.0))
+def _largest(
+    milestone: Milestone, lines: Floats, inside: NDArray[np.bool_], width: int
+) -> dict[str, tuple[float, float]]:
+    """The landmarks that show most, each at the middle of its longest line, as far as their names do not overlap."""
+    lengths = np.where(inside, np.hypot(*(lines[:, 1] - lines[:, 0]).T), 0.0)
+    best: dict[str, tuple[float, float]] = {}
+    for number in np.argsort(-lengths, kind="stable"):
+        name = milestone.landmarks[milestone.landmark_of[number]]
+        if lengths[number] <= 0.0 or len(best) >= MOST_NAMES:
+            break
+        u, v = lines[number].mean(axis=0).tolist()
+        u = min(max(u, LABEL_PX), width - LABEL_PX)
+        if name not in best and all(abs(u - x) > 2 * LABEL_PX or abs(v - y) > LABEL_HIGH_PX for x, y in best.values()):
+            best[name] = u, v
+    return best

@@ -1,15 +1,18 @@
-"""Lanes: when each knowledge source acts, and which servo level is in focus."""
+"""Lanes: what Harvey is busy with, which servo level is in focus, when each expert acts, what ails the robot."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import rerun as rr
 
 from blackboard.activation import Activation
-from blackboard.level import Level
 from logs.mirror import Moment
-from logs.palette import LEVELS, Colour
-from logs.paths import FOCUS, LANES
+from logs.mood import MOOD_KINDS, MOODS, mood
+from logs.palette import LEVELS, REJECTED, Colour
+from logs.paths import FAULTS, FOCUS, HARVEY, WHO
 from logs.tape import Tape
+from world_models.body import BodyFault
 
 ACTS, GAP = "acts", ""
 
@@ -19,44 +22,61 @@ class Lanes:
 
     def __init__(self) -> None:
         self._known: dict[str, None] = {}
+        self._states: dict[str, str] = {}
         self._acting = ""
-        self._focus = ""
 
     def begin(self, tape: Tape) -> None:
-        names = [str(level) for level in Level]
-        tape.fix(FOCUS, _style(names, [LEVELS[name] for name in names]))
+        tape.fix(HARVEY, style(MOODS))
+        tape.fix(FOCUS, style(LEVELS))
 
     def log(self, tape: Tape, moment: Moment) -> None:
         decision = moment.decision
         for activation in decision.activated:
-            self._meet(tape, activation)
+            self._meet(tape, lane(activation), {ACTS: LEVELS[str(activation.source.level)]})
         self._act(tape, lane(decision.chosen) if decision.chosen else "")
-        if str(decision.focus) != self._focus:
-            self._focus = str(decision.focus)
-            tape.log(FOCUS, rr.StateChange(state=self._focus))
+        self._set(tape, FOCUS, str(decision.focus))
+        if moment.touched(*MOOD_KINDS):
+            self._set(tape, HARVEY, mood(moment.mirror).word)
+        if moment.touched(BodyFault):
+            self._ail(tape, moment)
 
-    def _meet(self, tape: Tape, activation: Activation) -> None:
+    def _ail(self, tape: Tape, moment: Moment) -> None:
+        """A lane for the body, once something is wrong with it."""
+        self._meet(tape, FAULTS, {fault.value.what: REJECTED for fault in moment.mirror.all(BodyFault)})
+        fault = moment.mirror.latest(BodyFault, lambda f: f.is_open)
+        self._set(tape, FAULTS, fault.value.what if fault else GAP)
+
+    def _meet(self, tape: Tape, path: str, states: Mapping[str, Colour]) -> None:
         """A lane needs its style before its first state."""
-        path = lane(activation)
-        if path not in self._known:
-            self._known[path] = None
-            tape.fix(path, _style([ACTS], [LEVELS[str(activation.source.level)]]))
+        if any(f"{path}:{state}" not in self._known for state in states):
+            self._known |= dict.fromkeys(f"{path}:{state}" for state in states)
+            tape.fix(path, style(states))
 
     def _act(self, tape: Tape, path: str) -> None:
-        if path == self._acting:
-            return
-        if self._acting:
-            tape.log(self._acting, rr.StateChange(state=GAP))
+        if self._acting and self._acting != path:
+            self._set(tape, self._acting, GAP)
         if path:
-            tape.log(path, rr.StateChange(state=ACTS))
+            self._set(tape, path, ACTS)
         self._acting = path
+
+    def _set(self, tape: Tape, path: str, state: str) -> None:
+        if self._states.get(path) != state:
+            self._states[path] = state
+            tape.log(path, rr.StateChange, state=[state])
 
 
 def lane(activation: Activation) -> str:
     """Entity path of a knowledge source's lane; sources of one level lie together."""
-    return f"{LANES}/{activation.source.level}/{activation.source.name}"
+    return f"{WHO}/{activation.source.level}/{activation.source.name}"
 
 
-def _style(states: list[str], colours: list[Colour]) -> rr.StateConfiguration:
-    return rr.StateConfiguration(values=[*states, GAP], labels=[*states, GAP], colors=[*colours, (0, 0, 0, 0)],
-                                 visible=[True] * len(states) + [False])
+def contents() -> list[str]:
+    """Where the lanes are, for the view."""
+    return [f"+ /{path}" for path in (HARVEY, FOCUS, FAULTS, f"{WHO}/**")]
+
+
+def style(states: Mapping[str, Colour]) -> rr.StateConfiguration:
+    """How the states of a lane look."""
+    return rr.StateConfiguration(
+        values=[*states, GAP], labels=[*states, GAP], colors=[*states.values(), (0, 0, 0, 0)],
+        visible=[True] * len(states) + [False])

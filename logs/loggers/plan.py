@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import rerun as rr
 
@@ -26,48 +23,64 @@ class Plan:
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._drawn: tuple[tuple[type[Any], str, Callable[[Mirror], Any]], ...] = (
-            (Goal, GOAL, self._flag), (PlanSketch, PATH, self._way), (Leg, LEG, _leg),
-            (Milestone, LANDMARKS, _landmarks))
+        self._last: dict[str, object] = {}
 
     def begin(self, tape: Tape) -> None:
-        """Nothing holds at all times."""
+        tape.fix(GOAL, rr.Arrows3D.from_fields(radii=0.08, colors=[PLANNED], show_labels=True))
+        tape.fix(LEG, rr.Arrows3D.from_fields(radii=0.06, colors=[PLANNED]))
+        tape.fix(LANDMARKS, rr.LineStrips3D.from_fields(radii=0.03, colors=[EXPECTED]))
 
     def log(self, tape: Tape, moment: Moment) -> None:
-        for kind, path, draw in self._drawn:
-            if moment.touched(kind):
-                tape.log(path, draw(moment.mirror))
+        if moment.touched(Goal):
+            self._flag(tape, moment.mirror)
+        if moment.touched(PlanSketch):
+            self._way(tape, moment.mirror)
+        if moment.touched(Leg):
+            self._leg(tape, moment.mirror)
+        if moment.touched(Milestone):
+            self._landmarks(tape, moment.mirror)
+
+    def _is_new(self, path: str, what: object) -> bool:
+        """Whether something else is drawn there now."""
+        before, self._last[path] = self._last.get(path), what
+        return before != what
 
     def _point(self, place: Place, height_m: float) -> Point:
         pose = place.in_world(self._world)
         return pose.x_m, pose.y_m, height_m
 
-    def _flag(self, mirror: Mirror) -> Any:
+    def _flag(self, tape: Tape, mirror: Mirror) -> None:
         goals = [e.value for e in mirror.all(Goal) if e.value.status != "abandoned"]
         tops = [self._point(goal.destination, FLAG_M) for goal in goals]
-        return rr.Arrows3D(origins=tops, vectors=[[0, 0, -FLAG_M]] * len(tops), radii=0.08, colors=[PLANNED],
-                           labels=[f"goal ({goal.status})" for goal in goals], show_labels=True)
+        tape.log(GOAL, rr.Arrows3D, origins=tops, vectors=[(0.0, 0.0, -FLAG_M)] * len(tops),
+                 labels=["goal" if goal.is_active else f"goal ({goal.status})" for goal in goals])
 
-    def _way(self, mirror: Mirror) -> Any:
+    def _way(self, tape: Tape, mirror: Mirror) -> None:
         """Each sketch in use as a strip; the first level thin, what lies behind grey."""
+        sketches = [e.value for e in mirror.all(PlanSketch) if e.value.status != "superseded"]
+        if not self._is_new(PATH, [(sketch.subgoals, sketch.at, sketch.status) for sketch in sketches]):
+            return
         strips, colours, radii = [], [], []
-        for sketch in (e.value for e in mirror.all(PlanSketch) if e.value.status != "superseded"):
+        for sketch in sketches:
             thick = 0.05 if sketch.path else 0.02
             for number, subgoal in enumerate(sketch.subgoals):
                 behind = sketch.status == "done" or number < sketch.at
                 strips.append([self._point(p, 0.03 + thick) for p in (subgoal.origin, subgoal.destination)])
                 colours.append(faint(DONE, 160) if behind else faint(PLANNED, 255 if sketch.path else 110))
                 radii.append(thick)
-        return rr.LineStrips3D(strips, colors=colours, radii=radii)
+        lines = np.array(strips, np.float32).reshape(-1, 2, 3)
+        tape.log(PATH, rr.LineStrips3D, strips=lines, colors=colours, radii=radii)
 
+    def _leg(self, tape: Tape, mirror: Mirror) -> None:
+        last = mirror.latest(Leg, lambda g: g.status == "moving")
+        legs = [last.value] if last else []
+        ends = [(g.x0_m, g.y0_m, g.x1_m - g.x0_m, g.y1_m - g.y0_m) for g in legs]
+        if self._is_new(LEG, ends):
+            tape.log(LEG, rr.Arrows3D, origins=[(x, y, 0.15) for x, y, _, _ in ends],
+                     vectors=[(dx, dy, 0.0) for _, _, dx, dy in ends])
 
-def _leg(mirror: Mirror) -> Any:
-    legs = [e.value for e in mirror.all(Leg) if e.value.status == "moving"][-1:]
-    return rr.Arrows3D(origins=[(g.x0_m, g.y0_m, 0.15) for g in legs],
-                       vectors=[(g.x1_m - g.x0_m, g.y1_m - g.y0_m, 0.0) for g in legs], radii=0.06, colors=[PLANNED])
-
-
-def _landmarks(mirror: Mirror) -> Any:
-    last = mirror.latest(Milestone)
-    lines = last.value.expected if last and last.value.is_open else ()
-    return rr.LineStrips3D(np.array(lines, float).reshape(-1, 2, 3), colors=[EXPECTED], radii=0.03)
+    def _landmarks(self, tape: Tape, mirror: Mirror) -> None:
+        last = mirror.latest(Milestone)
+        lines = last.value.expected if last and last.value.is_open else ()
+        if self._is_new(LANDMARKS, lines):
+            tape.log(LANDMARKS, rr.LineStrips3D, strips=np.array(lines, np.float32).reshape(-1, 2, 3))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from logs.belief import Belief
 from logs.mirror import Mirror, Moment
 from logs.palette import BELIEVED, CANDIDATE, TRUE, Colour, faint
-from logs.paths import BELIEVED_ROBOT, BELIEVED_TRAIL, CANDIDATES, TRUE_ROBOT, TRUE_TRAIL
+from logs.paths import BELIEVED_BODY, BELIEVED_ROBOT, BELIEVED_TRAIL, CANDIDATES, TRUE_ROBOT, TRUE_TRAIL
 from logs.tape import Tape
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, frozen
@@ -35,20 +37,21 @@ SIGHT_M = 2.5
 class Robots:
     """Logs both robots when they move."""
 
-    def __init__(self, world: World, camera: Camera, mount: CameraMount) -> None:
-        self._world, self._camera, self._mount = world, camera, mount
+    def __init__(self, world: World, camera: Camera, mount: CameraMount, belief: Belief) -> None:
+        self._world, self._camera, self._mount, self._belief = world, camera, mount, belief
         self._last: dict[str, Pose2] = {}
         self._has_candidates = False
 
     def begin(self, tape: Tape) -> None:
         wires = rr.components.FillMode.MajorWireframe
-        tape.fix(f"{BELIEVED_ROBOT}/body", _cylinder(BELIEVED, RADIUS_M + 0.08, 1.3, wires))
+        tape.fix(BELIEVED_BODY, _cylinder(BELIEVED, RADIUS_M + 0.08, 1.3, wires))
         tape.fix(f"{BELIEVED_ROBOT}/heading", _arrow(BELIEVED, 1.35))
         tape.fix(f"{BELIEVED_ROBOT}/sight", _wedge(self._camera, self._mount.forward_m))
         tape.fix(BELIEVED_TRAIL, rr.LineStrips3D.from_fields(colors=[BELIEVED], radii=0.04))
         label = f"1 sigma, drawn {SIGMA_SCALE:.0f} times as large"
         tape.fix(BELIEVED_ROBOT, rr.LineStrips3D.from_fields(
             colors=[BELIEVED], radii=0.025, labels=[label], show_labels=False))
+        tape.fix(CANDIDATES, rr.Arrows3D.from_fields(colors=[CANDIDATE], radii=0.05))
 
     def log(self, tape: Tape, moment: Moment) -> None:
         for pose in moment.truth[-1:]:
@@ -60,12 +63,13 @@ class Robots:
 
     def _log_belief(self, tape: Tape, mirror: Mirror) -> None:
         self._log_candidates(tape, mirror)
-        held = believed(mirror)
+        held = self._belief.now(mirror)
         if held is not None:
-            pose = held.world_from_robot(self._world)
-            points = ring(pose, held.covariance_world(self._world))
+            pose = held.world_from_robot
+            points = ring(pose, held.value.covariance_world(self._world))
             strip = np.column_stack([points, np.full(len(points), 0.06)])
-            self._move(tape, BELIEVED_ROBOT, BELIEVED_TRAIL, pose, rr.LineStrips3D(strip[None].astype(np.float32)))
+            tape.log(BELIEVED_ROBOT, rr.LineStrips3D, strips=strip[None].astype(np.float32))
+            self._move(tape, BELIEVED_ROBOT, BELIEVED_TRAIL, pose)
 
     def _log_candidates(self, tape: Tape, mirror: Mirror) -> None:
         """Where else he might be: an arrow each, the longer the likelier."""
@@ -74,27 +78,20 @@ class Robots:
             return
         self._has_candidates = bool(others)
         poses = [h.world_from_robot(self._world) for h in others]
-        vectors = [[(0.5 + h.weight) * np.cos(p.heading_rad), (0.5 + h.weight) * np.sin(p.heading_rad), 0.0]
+        vectors = [((0.5 + h.weight) * math.cos(p.heading_rad), (0.5 + h.weight) * math.sin(p.heading_rad), 0.0)
                    for h, p in zip(others, poses, strict=True)]
-        origins = [[p.x_m, p.y_m, 0.1] for p in poses]
-        tape.log(CANDIDATES, rr.Arrows3D(origins=origins, vectors=vectors, radii=0.05, colors=[CANDIDATE]))
+        tape.log(CANDIDATES, rr.Arrows3D, origins=[(p.x_m, p.y_m, 0.1) for p in poses], vectors=vectors)
 
-    def _move(self, tape: Tape, robot: str, trail: str, pose: Pose2, *more: Any) -> None:
+    def _move(self, tape: Tape, robot: str, trail: str, pose: Pose2) -> None:
         before = self._last.get(robot)
-        if before == pose and not more:
+        if before == pose:
             return
         self._last[robot] = pose
-        turn = rr.Quaternion(xyzw=(0.0, 0.0, np.sin(pose.heading_rad / 2), np.cos(pose.heading_rad / 2)))
-        tape.log(robot, rr.Transform3D(translation=(pose.x_m, pose.y_m, 0.0), quaternion=turn), *more)
+        turn = (0.0, 0.0, math.sin(pose.heading_rad / 2), math.cos(pose.heading_rad / 2))
+        tape.log(robot, rr.Transform3D, translation=[(pose.x_m, pose.y_m, 0.0)], quaternion=[turn])
         if before is not None and before.distance_to(pose) > STILL_M:
-            step = [[p.x_m, p.y_m, TRAIL_HEIGHT_M] for p in (before, pose)]
-            tape.log(trail, rr.LineStrips3D(np.array([step], np.float32)))
-
-
-def believed(mirror: Mirror) -> Hypothesis | None:
-    """The hypothesis that is acted on."""
-    entry = mirror.latest(Hypothesis, lambda h: h.is_held)
-    return entry.value if entry else None
+            step = [[(p.x_m, p.y_m, TRAIL_HEIGHT_M) for p in (before, pose)]]
+            tape.log(trail, rr.LineStrips3D, strips=np.array(step, np.float32))
 
 
 def _begin_truth(tape: Tape) -> None:
@@ -124,7 +121,10 @@ def _wedge(camera: Camera, forward_m: float) -> Any:
 
 def ring(pose: Pose2, covariance_world: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n, 2) one standard deviation of the position, enlarged, round the robot in the robot's own frame [m]."""
-    values, axes = np.linalg.eigh(covariance_world[:2, :2])
-    offsets = SIGMA_SCALE * (axes @ (np.sqrt(np.maximum(values, 0.0))[:, None] * CIRCLE)).T
-    c, s = np.cos(pose.heading_rad), np.sin(pose.heading_rad)
-    return np.asarray(offsets @ np.array([[c, -s], [s, c]]))
+    (a, b), (_, d) = covariance_world[:2, :2].tolist()
+    along = math.sqrt(max(a, 0.0))  # Cholesky's root of the matrix takes the circle to the ellipse
+    across = b / along if along > 0.0 else 0.0
+    root = np.array([[along, 0.0], [across, math.sqrt(max(d - across**2, 0.0))]])
+    c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    robot_from_world = np.array([[c, s], [-s, c]])
+    return np.asarray((SIGMA_SCALE * (robot_from_world @ root) @ CIRCLE).T)

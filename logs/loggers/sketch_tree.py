@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import rerun as rr
 
@@ -12,11 +13,14 @@ from logs.mirror import Mirror, Moment
 from logs.palette import DONE, PLANNED, VERDICTS, WAITING, Colour
 from logs.paths import SKETCH
 from logs.tape import Tape
+from logs.words import short
 from world_models.task import Certificate, Goal, Milestone, PlanSketch, Subgoal
 
 ROW, INDENT = 26.0, 34.0
 LETTER, BORDER = 5.4, 26.0
 """The graph's own units: height of a row, step to the right of a level, width of a letter and of a node's border."""
+
+NO_SKETCH = "the way there is yet to be sketched"
 
 MARKS: Mapping[str, str] = {
     "verified": "✔", "refuted": "✘", "not testable": "?", "turning": "…", "expected": "…", "": "·",
@@ -34,18 +38,35 @@ class Node:
     after: str
 
 
+class Tree:
+    """Columns of nodes and edges."""
+
+    @classmethod
+    def columns(cls, **components: Any) -> Iterator[Any]:
+        for name, values in components.items():
+            yield from (rr.GraphEdges if name == "edges" else rr.GraphNodes).columns(**{name: values})
+
+
 class SketchTree:
     """Logs the whole tree when any of it changes."""
 
+    def __init__(self) -> None:
+        self._last: list[Node] = []
+
     def begin(self, tape: Tape) -> None:
-        """Nothing holds at all times."""
+        tape.fix(SKETCH, rr.GraphNodes.from_fields(show_labels=True),
+                 rr.GraphEdges.from_fields(graph_type="undirected"))
 
     def log(self, tape: Tape, moment: Moment) -> None:
         if not moment.touched(Goal, PlanSketch, Milestone, Certificate):
             return
         nodes = outline(moment.mirror)
-        if nodes:
-            tape.log(SKETCH, _boxes(nodes), _arrows(nodes))
+        if not nodes or nodes == self._last:
+            return
+        self._last = nodes
+        tape.log(SKETCH, Tree, node_ids=[n.id for n in nodes], positions=_middles(nodes),
+                 labels=[n.label for n in nodes], colors=[n.colour for n in nodes],
+                 edges=[(n.after, n.id) for n in nodes if n.after])
 
 
 def outline(mirror: Mirror) -> list[Node]:
@@ -54,7 +75,8 @@ def outline(mirror: Mirror) -> list[Node]:
     if goal is None:
         return []
     root = Node(goal.id, _goal_label(goal), DONE if goal.value.status == "reached" else PLANNED, 0, "")
-    return [root, *_rows(mirror, goal.id, (), root)]
+    rows = list(_rows(mirror, goal.id, (), root))
+    return [root, *rows] if rows else [root, Node(f"{goal.id}/none", NO_SKETCH, WAITING, 1, goal.id)]
 
 
 def _rows(mirror: Mirror, goal: str, path: tuple[int, ...], parent: Node) -> Iterator[Node]:
@@ -101,7 +123,7 @@ def _verdict(mirror: Mirror, sketch: Entry[PlanSketch], number: int) -> str:
 
 def _goal_label(goal: Entry[Goal]) -> str:
     value = goal.value
-    return f"{goal.id}: {value.origin.locale} → {value.destination.locale}, {value.status}"
+    return f"{goal.id}: be in {value.destination.locale} ({value.status})"
 
 
 def subgoal_label(subgoal: Subgoal) -> str:
@@ -110,19 +132,9 @@ def subgoal_label(subgoal: Subgoal) -> str:
     through = f" by {subgoal.passage}" if subgoal.passage else ""
     if a.locale != b.locale:
         return f"to {b.locale}{through}"
-    return f"{'go to' if subgoal.primitive else 'reach'} ({b.x_m:.1f}, {b.y_m:.1f}) m{through}"
+    how = "straight to" if subgoal.primitive else f"cross {b.locale} to"
+    return f"{how} ({b.x_m:.1f}, {b.y_m:.1f}) m{through}"
 
 
-def short(text: str, most: int = 34) -> str:
-    """The beginning of a text that may be too long for a node."""
-    return text if len(text) <= most else text[: most - 1] + "…"
-
-
-def _boxes(nodes: list[Node]) -> rr.GraphNodes:
-    middles = [(INDENT * n.depth + (BORDER + LETTER * len(n.label)) / 2, ROW * row) for row, n in enumerate(nodes)]
-    return rr.GraphNodes([n.id for n in nodes], positions=middles, labels=[n.label for n in nodes],
-                         colors=[n.colour for n in nodes], show_labels=True)
-
-
-def _arrows(nodes: list[Node]) -> rr.GraphEdges:
-    return rr.GraphEdges([(n.after, n.id) for n in nodes if n.after], graph_type="undirected")
+def _middles(nodes: list[Node]) -> list[tuple[float, float]]:
+    return [(INDENT * n.depth + (BORDER + LETTER * len(n.label)) / 2, ROW * row) for row, n in enumerate(nodes)]

@@ -4,60 +4,104 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import rerun as rr
 
-from blackboard.entry import Entry, Ref
-from blackboard.level import Level
+from blackboard.entry import Entry
 from blackboard.servoing import Discrepancy
-from logs.loggers.robots import believed
+from logs import words
+from logs.belief import Belief, Held, believed, sigma_m
 from logs.loggers.sketch_tree import subgoal_label
 from logs.mirror import Mirror, Moment
+from logs.mood import MOOD_KINDS, leg_under_way, mood
 from logs.paths import WHY
 from logs.tape import Tape
-from world_models.body import MotorCommand
+from world_models.body import BodyFault, MotorCommand, Recovery
+from world_models.frames import Pose2
 from world_models.location import Hypothesis
 from world_models.percepts import LineMatch, PoseFix, Segments, Tracks
 from world_models.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch
 
-NOTABLE = (Goal, PlanSketch, Leg, Milestone, Certificate, Discrepancy, Outcome, Hypothesis, Tracks, MotorCommand)
-
-MOST_NAMES = 4
 MOST_REASONS = 5
+
+Tell = Callable[[Mirror], str]
 
 
 class Why:
-    """Logs the text when something in it may have changed."""
+    """Logs the text when something in it changed; only what rests on a change is worded anew."""
 
-    def __init__(self) -> None:
+    def __init__(self, belief: Belief) -> None:
+        self._belief = belief
+        self._truth: Pose2 | None = None
+        self._told: dict[str, str] = {}
         self._last = ""
 
     def begin(self, tape: Tape) -> None:
-        """Nothing holds at all times."""
+        tape.fix(WHY, rr.TextDocument.from_fields(media_type="text/markdown"))
 
     def log(self, tape: Tape, moment: Moment) -> None:
-        if not moment.touched(*NOTABLE):
+        for pose in moment.truth[-1:]:
+            self._truth = pose
+        touched = [chapter for chapter in CHAPTERS if moment.touched(*chapter[2])]
+        if not touched:
             return
-        text = story(moment.mirror)
+        for title, tell, _ in touched:
+            self._told[title] = tell(moment.mirror)
+        if moment.touched(Hypothesis):
+            self._told[TRULY] = in_truth(self._belief.now(moment.mirror), self._truth)
+        text = composed(self._told)
         if text != self._last:
             self._last = text
-            tape.log(WHY, rr.TextDocument(text, media_type="text/markdown"))
+            tape.log(WHY, rr.TextDocument, text=[text])
 
 
 def story(mirror: Mirror) -> str:
     """The text, as markdown: one short paragraph a theme, none where there is nothing to say."""
-    parts = ((title, tell(mirror)) for title, tell in CHAPTERS)
-    return "\n\n".join(f"**{title}** {text}" for title, text in parts if text)
+    return composed({title: tell(mirror) for title, tell, _ in CHAPTERS})
+
+
+def composed(told: dict[str, str]) -> str:
+    """Paragraphs in the order of the themes, the headline first."""
+    titles = [title for title, _, _ in CHAPTERS]
+    titles.insert(titles.index(BELIEVES) + 1, TRULY)
+    parts = [f"**{title}** {told[title]}" for title in titles if title and told.get(title)]
+    return "\n\n".join([f"### {told['']}", *parts] if told.get("") else parts)
+
+
+def in_truth(held: Held | None, truth: Pose2 | None) -> str:
+    """How wrong the belief is, which only a simulator can tell; "" where nobody can."""
+    if held is None or truth is None:
+        return ""
+    off = truth.inverse() @ held.world_from_robot
+    distance = words.metres(math.hypot(off.x_m, off.y_m))
+    return f"that is {distance} and {words.degrees(abs(off.heading_rad))} off, which he cannot know."
+
+
+def _headline(mirror: Mirror) -> str:
+    return mood(mirror).line
 
 
 def _ended(mirror: Mirror) -> str:
     outcome = mirror.latest(Outcome)
-    return f"{outcome.value.kind}: {outcome.value.reason}" if outcome else ""
+    return f"{outcome.value.kind}: {outcome.value.reason}." if outcome else ""
+
+
+def _ails(mirror: Mirror) -> str:
+    """What is wrong with the body, and what is done about it."""
+    fault = mirror.latest(BodyFault, lambda f: f.is_open)
+    if fault is None:
+        return ""
+    trying = mirror.latest(Recovery, lambda r: r.fault == fault.id)
+    tries = f"; {words.count(trying.value.tries, 'try').replace('trys', 'tries')} so far" if trying else ""
+    return f"{fault.value.part}: {fault.value.what}. {fault.value.detail}{tries}."
 
 
 def _wants(mirror: Mirror) -> str:
     goal = mirror.latest(Goal)
-    return f"to go from {goal.value.origin} to {goal.value.destination} ({goal.value.status})." if goal else ""
+    if goal is None:
+        return ""
+    return f"to be in {words.place(goal.value.destination)}{'' if goal.value.is_active else f' ({goal.value.status})'}."
 
 
 def _believes(mirror: Mirror) -> str:
@@ -65,29 +109,29 @@ def _believes(mirror: Mirror) -> str:
     if held is None:
         return "nothing about where he is: he is lost."
     pose = held.locale_from_robot
-    where = f"({pose.x_m:.2f}, {pose.y_m:.2f}) m, heading {math.degrees(pose.heading_rad):.1f}°"
-    return (f"he is in {held.locale} at {where}, "
-            f"give or take {1e3 * held.sigma_m:.0f} mm and {math.degrees(held.sigma_rad):.2f}° (from {held.basis}).")
+    return (f"he is in {held.locale} at ({pose.x_m:.2f}, {pose.y_m:.2f}) m, heading {words.degrees(pose.heading_rad)}, "
+            f"give or take {1e3 * sigma_m(held):.0f} mm and {math.degrees(held.sigma_rad):.2f}° (from {held.basis}).")
 
 
 def _does(mirror: Mirror) -> str:
-    leg = mirror.latest(Leg, lambda g: g.status == "moving")
+    leg = leg_under_way(mirror)
     sketch = mirror.latest(PlanSketch, lambda s: s.is_active and s.current is not None)
     if leg is None or sketch is None:
         return "stands still" + (f"; next: {_next(sketch.value)}." if sketch else ".")
-    way = math.hypot(leg.value.x1_m - leg.value.x0_m, leg.value.y1_m - leg.value.y0_m)
+    way = math.hypot(leg.x1_m - leg.x0_m, leg.y1_m - leg.y0_m)
     doing = "has halted on" if _is_halted(mirror) else "drives"
-    return f"{doing} a straight leg of {way:.1f} m, {_next(sketch.value)}; {leg.value.increments} increments so far."
+    return (f"{doing} a straight leg of {words.metres(way)}, {_next(sketch.value)}; "
+            f"{words.count(leg.increments, 'move')} so far.")
 
 
 def _is_halted(mirror: Mirror) -> bool:
     """Nothing moves while something above the action level is in doubt."""
-    return mirror.latest(Discrepancy, lambda d: d.is_open and d.level is not Level.ACTION) is not None
+    return mood(mirror).word in ("doubts", "is lost", "is in trouble")
 
 
 def _next(sketch: PlanSketch) -> str:
     subgoal = sketch.current
-    where = f" in {sketch.locale}" if sketch.locale else ""
+    where = f" through {sketch.locale}" if sketch.locale else ""
     return f"part {sketch.at + 1} of {len(sketch.subgoals)}{where} ({subgoal_label(subgoal)})" if subgoal else "done"
 
 
@@ -97,8 +141,9 @@ def _expects(mirror: Mirror) -> str:
         return ""
     milestone = last.value
     if milestone.status == "turning":
-        return f"to see {milestone.what}, once he has turned to {math.degrees(milestone.look_heading_rad):.0f}°."
-    return f"{milestone.what}: {len(milestone.expected)} lines of {_list(milestone.landmarks)}."
+        return f"to see {milestone.what}, once he has turned to {words.degrees(milestone.look_heading_rad)}."
+    lines = words.count(len(milestone.expected), "line")
+    return f"{milestone.what}: {lines} of {words.listed(milestone.landmarks)}."
 
 
 def _sees(mirror: Mirror) -> str:
@@ -119,13 +164,13 @@ def _verified(mirror: Mirror) -> str:
     milestone, segments = mirror.latest(Milestone, lambda m: m.is_open), mirror.latest(Segments)
     if milestone is None or segments is None or segments.value.milestone != milestone.id:
         return ""
-    words = [f"{len(segments.value.segments_px)} line segments"]
+    parts = [f"{len(segments.value.segments_px)} line segments"]
     match = mirror.latest(LineMatch, lambda m: m.milestone == milestone.id)
     if match:
-        words.append(f"{len(match.value.pairs)} matched")
+        parts.append(f"{len(match.value.pairs)} matched")
         fix = mirror.latest(PoseFix, lambda f: f.match == match.id)
-        words += [f"{int(fix.value.inliers.sum())} of these agree on one pose"] if fix else []
-    return ", ".join(words) + "."
+        parts += [f"{int(fix.value.inliers.sum())} of these agree on one pose"] if fix else []
+    return ", ".join(parts) + "."
 
 
 def _concludes(mirror: Mirror) -> str:
@@ -133,9 +178,10 @@ def _concludes(mirror: Mirror) -> str:
     if entry is None:
         return ""
     c = entry.value
-    off = f"{1e3 * c.deviation_m:.0f} mm and {math.degrees(c.deviation_rad):.2f}° from what he believed"
-    return (f"**{c.verdict}**: {c.reason} (tolerance {c.tolerance_px:.1f} px); {off}; "
-            f"a wrong place looks so with probability {c.p_false:.1g}.")
+    known = mirror.get(c.milestone)
+    what = known.value.what if known and isinstance(known.value, Milestone) else c.milestone
+    off = f"{words.metres(c.deviation_m)} and {words.degrees(abs(c.deviation_rad))} from what he believed"
+    return f"{what}: **{c.verdict}**. {c.reason}; {off}. A wrong place would look so with probability {c.p_false:.1g}."
 
 
 def _doubts(mirror: Mirror) -> str:
@@ -144,7 +190,8 @@ def _doubts(mirror: Mirror) -> str:
 
 
 def _discrepancy(d: Discrepancy) -> str:
-    size = "not yet measured" if d.magnitude is None else f"{d.magnitude:.1f} {d.unit}"
+    size = "not yet measured" if d.magnitude is None else words.pixels(d.magnitude) if d.unit == "px" else (
+        f"{d.magnitude:.1f} {d.unit}")
     size = size if d.magnitude != math.inf else "too large to be measured"
     bound = f", may correct up to {d.bound:.1f} {d.unit}" if math.isfinite(d.bound) else ""
     return f"{d.what}: {size} (at the {d.level} level{bound})."
@@ -155,29 +202,51 @@ def _because(mirror: Mirror) -> str:
     command = mirror.latest(MotorCommand)
     if command is None:
         return ""
-    turn, move = math.degrees(command.value.turn_rad), command.value.move_m
-    chain = " ← ".join(_chain(mirror, command))
-    return f"TURN {turn:+.1f}°, MOVE {move:.2f} m" + (f" because of {chain}." if chain else ".")
+    what = words.motion(command.value.turn_rad, command.value.move_m)
+    return ", ".join([what, *_chain(mirror, command)]) + "."
 
 
-def _chain(mirror: Mirror, entry: Entry[object]) -> list[str]:
-    """What an entry rests on, what that rests on, and so on: always the first reason."""
-    names: list[str] = []
-    reasons: tuple[Ref, ...] = entry.because
-    while reasons and len(names) < MOST_REASONS and str(reasons[0]) not in names:
-        names.append(str(reasons[0]))
-        known = mirror.get(reasons[0].id)
-        reasons = known.because if known else ()
-    return names
+def _chain(mirror: Mirror, entry: Entry[Any]) -> list[str]:
+    """What an entry rests on, what that rests on, and so on: always the first reason, each entry once."""
+    parts: list[str] = []
+    met = {entry.id}
+    while entry.because and len(parts) < MOST_REASONS:
+        known = mirror.get(entry.because[0].id)
+        if known is None or known.ref == entry.ref:
+            break
+        entry = known
+        if entry.id not in met:
+            met.add(entry.id)
+            parts.append(_reason(entry))
+        elif entry.ref.revision == 0:
+            break
+    return parts
 
 
-def _list(names: tuple[str, ...]) -> str:
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more
+def _reason(entry: Entry[Any]) -> str:
+    value = entry.value
+    if isinstance(value, Leg):
+        return f"to follow {entry.id}"
+    if isinstance(value, PlanSketch):
+        return f"as {entry.id} has it for {value.locale or 'the route'}"
+    if isinstance(value, Goal):
+        return f"on the way to {value.destination.locale}"
+    return f"because of {entry.ref}"
 
 
-CHAPTERS: tuple[tuple[str, Callable[[Mirror], str]], ...] = (
-    ("The end:", _ended), ("Harvey wants", _wants), ("He believes", _believes), ("He does:", _does),
-    ("He expects", _expects), ("He sees", _sees), ("He doubts:", _doubts), ("He last judged", _concludes),
-    ("Last motor command:", _because),
+BELIEVES, TRULY = "He believes", "In truth"
+
+CHAPTERS: tuple[tuple[str, Tell, tuple[type[Any], ...]], ...] = (
+    ("", _headline, MOOD_KINDS),
+    ("The end:", _ended, (Outcome,)),
+    ("Trouble:", _ails, (BodyFault, Recovery)),
+    ("Harvey wants", _wants, (Goal,)),
+    (BELIEVES, _believes, (Hypothesis,)),
+    ("He does:", _does, (*MOOD_KINDS,)),
+    ("He expects", _expects, (Milestone,)),
+    ("He sees", _sees, (Tracks, Milestone, Segments, LineMatch, PoseFix)),
+    ("He doubts:", _doubts, (Discrepancy,)),
+    ("He last judged", _concludes, (Certificate,)),
+    ("His last order:", _because, (MotorCommand,)),
 )
+"""Title, what tells it, and the types of values that it rests on."""

@@ -70,10 +70,7 @@ def test_more_segments_never_account_for_less(seed: int) -> None:
 def test_the_right_pose_is_unlikely_by_chance_and_clutter_is_not(seed: int) -> None:
     rng = np.random.default_rng(seed)
     lines, clutter = some_lines(seed, 20), some_lines(seed + 1, 60)
-
-    def displaced(i: int) -> Floats | None:
-        return lines + rng.uniform(20, 60, 2) if i < 12 else None
-
+    displaced = np.array([lines + rng.uniform(20, 60, 2) for _ in range(12)])
     right = agreement(lines, np.concatenate([lines, clutter]), displaced)
     wrong = agreement(lines, clutter, displaced)
     assert right.accounted == 20 and right.p_false < 1e-6

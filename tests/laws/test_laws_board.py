@@ -1,4 +1,4 @@
-"""The blackboard against a dict that knows nothing of revisions, indexes or effects."""
+"""The blackboard against a dict that knows nothing of revisions, indexes, effects or forgetting."""
 
 from __future__ import annotations
 
@@ -13,10 +13,14 @@ from blackboard.board import Blackboard, StaleError
 from blackboard.change import Posted, Retracted, Revised
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref
+from blackboard.index import Index
 from strategies import Note, Tally, notes, tallies, values
 
 picks = st.integers(0, 30)
 kinds = st.sampled_from((Note, Tally))
+EVEN: Index[Tally] = Index(Tally, lambda tally: tally.count % 2 == 0)
+BY_COUNT: Index[Tally] = Index(Tally, lambda tally: tally.count)
+SHORT: Index[Note] = Index(Note, lambda note: note.text if len(note.text) < 2 else None)
 Wish = tuple[str, type[Any], int, int, int]
 wishes = st.lists(
     st.tuples(st.sampled_from(("post", "revise", "retract")), kinds, st.integers(0, 9), picks, picks),
@@ -35,6 +39,7 @@ class BoardMachine(RuleBasedStateMachine):
         super().__init__()
         self.board = Blackboard()
         self.model: dict[str, tuple[int, Any]] = {}
+        self.written: dict[str, int] = {}
         self.seen: list[Entry[Any]] = []
         self.posted = {Note: 0, Tally: 0}
         self.cycle = 0
@@ -80,7 +85,12 @@ class BoardMachine(RuleBasedStateMachine):
         assert [(type(c), c.entry.id, c.entry.revision, c.entry.value) for c in changes] == expected
         made = {id(effect): change.entry.ref for effect, change in zip(effects, changes, strict=True)}
         for effect, change in zip(effects, changes, strict=True):
-            if not isinstance(change, Retracted):
+            if isinstance(change, Retracted):
+                assert change.because == tuple(made.get(id(r)) or r.ref for r in effect.because)
+                del self.written[change.entry.id]
+            else:
+                self.written.pop(change.entry.id, None)
+                self.written[change.entry.id] = self.cycle
                 assert (change.entry.author, change.entry.cycle) == ("a", self.cycle)
                 assert change.entry.because == tuple(made.get(id(r)) or r.ref for r in effect.because)
                 self.seen.append(change.entry)
@@ -99,6 +109,15 @@ class BoardMachine(RuleBasedStateMachine):
         for wish in wished:
             effects.append(self.effect(wish, self.seen, effects))
         self.carry_out(effects)
+
+    @precondition(lambda self: self.model)
+    @rule(pick=picks)
+    def forget(self, pick: int) -> None:
+        """As if it had never been there, but that its name is used up."""
+        id = sorted(self.model)[pick % len(self.model)]
+        self.board.forget(id)
+        del self.model[id]
+        del self.written[id]
 
     @precondition(lambda self: self.model)
     @rule(value=notes, count=tallies, pick=picks)
@@ -143,9 +162,39 @@ class BoardMachine(RuleBasedStateMachine):
         found = view.latest(Tally, lambda t: t.count % 2 == 0)
         assert (found and found.id) == (even[-1] if even else None)
 
+    def current(self, kind: type[Any]) -> list[tuple[str, Any]]:
+        return [(id, value) for id, (_, value) in self.model.items() if isinstance(value, kind)]
+
+    @invariant()
+    def indexes_by_key_find_what_going_through_all_finds(self) -> None:
+        self.finds(EVEN, [True, False])
+        self.finds(BY_COUNT, range(10))
+
+    @precondition(lambda self: self.cycle > 5)
+    @invariant()
+    def an_index_that_is_asked_for_late_finds_the_same(self) -> None:
+        self.finds(SHORT, ["", *"0123456789"])
+
+    def finds(self, index: Index[Any], keys: Any) -> None:
+        view = self.board.view
+        for key in keys:
+            expected = [id for id, value in self.current(index.kind) if index.key(value) == key]
+            assert [e.id for e in view.having(index, key)] == expected
+            newest = view.newest(index, key)
+            assert (newest and newest.id) == (expected[-1] if expected else None)
+            assert all(view.is_current(entry) for entry in view.having(index, key))
+
+    @invariant()
+    def what_was_written_since_a_cycle_is_in_the_order_in_which_it_was(self) -> None:
+        for kind in (Note, Tally):
+            ids = {id for id, _ in self.current(kind)}
+            for cycle in range(max(0, self.cycle - 3), self.cycle + 2):
+                since = [id for id, written in self.written.items() if id in ids and written >= cycle]
+                assert [e.id for e in self.board.view.since(kind, cycle)] == since
+
 
 TestBoard = BoardMachine.TestCase
-TestBoard.settings = settings(max_examples=60, stateful_step_count=20, deadline=None)
+TestBoard.settings = settings(max_examples=40, stateful_step_count=20, deadline=None)
 
 
 def test_a_reason_that_is_named_twice_counts_once() -> None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable
+from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import Any
 
 from hypothesis import given, settings
@@ -15,10 +18,16 @@ from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.journal import Decision, decision_line
 from blackboard.scheduler import Scheduler
 from harvey.diff import describe, differing_leaves, first_difference
-from harvey.records import DecisionRecord, EntryRecord, as_line, decision_of
+from harvey.errors import BadInput
+from harvey.records import Candidate, DecisionRecord, EntryRecord, as_line, decision_of
 from harvey.sentences import MAKERS, sentence
 from harvey.trace import Trace
-from harvey.why import History, explain, walk
+from harvey.why import explain, walk
+from harvey.why_history import Told
+from harvey.why_journal import JournalHistory
+from harvey.why_not import Fate, in_cycle, in_run, of_entry
+from harvey.why_reach import SENSOR, accounted, explained_by, reaches
+from harvey.why_story import lines_of, story
 from strategies import Expert, Note, Tally
 
 LAWS = settings(deadline=None, max_examples=60)
@@ -95,7 +104,7 @@ def within(known: dict[str, EntryRecord], ref: str, steps: int) -> set[str]:
 @given(journals(), st.integers(0, 10**6))
 def test_the_whole_walk_is_the_closure_and_tells_each_entry_once(lines: list[str], pick: int) -> None:
     decisions = read(lines)
-    known, history = entries(decisions), History(decisions)
+    known, history = entries(decisions), Told(decisions)
     ref = sorted(known)[pick % len(known)]
     reasons = list(walk(history, [ref], depth=10**6))
     told = [r.ref for r in reasons if not r.known]
@@ -110,7 +119,7 @@ def test_a_short_walk_is_the_beginning_of_the_whole_and_says_what_it_leaves_out(
     lines: list[str], pick: int, depth: int
 ) -> None:
     decisions = read(lines)
-    known, history = entries(decisions), History(decisions)
+    known, history = entries(decisions), Told(decisions)
     ref = sorted(known)[pick % len(known)]
     reasons = list(walk(history, [ref], depth))
     assert max(r.depth for r in reasons) <= depth
@@ -155,6 +164,128 @@ def test_diff_finds_the_first_line_that_differs(ours: list[str], theirs: list[st
     assert f"{agreed} decision" in next(iter(describe(agreed, one, other)))
 
 
+@LAWS
+@given(journals(), st.binary(max_size=30).filter(lambda tail: b"\n" not in tail), st.integers(0, 10**6))
+def test_a_file_that_is_swept_tells_what_a_file_that_is_read_tells(lines: list[str], tail: bytes, pick: int) -> None:
+    told = Told(read(lines))
+    with NamedTemporaryFile() as file:
+        file.write("".join(line + "\n" for line in lines).encode() + tail)
+        file.flush()
+        swept = JournalHistory(Path(file.name))
+    assert swept.refs == told.refs
+    assert swept.newest == told.newest
+    assert swept.cycles == told.cycles
+    assert [swept.entry(ref) for ref in told.refs] == [told.entry(ref) for ref in told.refs]
+    assert [swept.retraction(ref) for ref in told.refs] == [told.retraction(ref) for ref in told.refs]
+    assert list(swept.decisions()) == list(told.decisions())
+    ref = told.refs[pick % len(told.refs)]
+    assert list(explain(swept, [ref])) == list(explain(told, [ref]))
+    assert {d.cycle for d in told.decisions() if f'"{ref}"' in d.line} == {d.cycle for d in swept.naming(ref)}
+
+
+@LAWS
+@given(journals())
+def test_an_oddly_written_file_tells_the_same(lines: list[str]) -> None:
+    told = Told(read(lines))
+    with NamedTemporaryFile("w") as file:
+        file.write("".join(json.dumps(json.loads(line)) + "\n" for line in lines))
+        file.flush()
+        swept = JournalHistory(Path(file.name))
+    assert swept.refs == told.refs
+    assert list(swept.decisions()) == list(told.decisions())
+
+
+def sensed(record: EntryRecord) -> str | None:
+    """In these laws a tally is what is sensed."""
+    return SENSOR if record.type == "Tally" else None
+
+
+@LAWS
+@given(journals())
+def test_a_decision_is_explained_exactly_if_the_closure_of_each_effect_has_a_ground(lines: list[str]) -> None:
+    decisions = read(lines)
+    known, told = entries(decisions), Told(decisions)
+    for one in accounted(decisions, sensed):
+        assert tuple(one.grounds) == explained_by(one.decision)
+        for ref, found in one.grounds.items():
+            closure = grounds(known, ref)
+            assert found.kinds == ((SENSOR,) if any(known[r].type == "Tally" for r in closure) else ())
+            assert found == reaches(told.entry, [ref], sensed)
+        assert one.holds == all(any(known[r].type == "Tally" for r in grounds(known, ref)) for ref in one.grounds)
+
+
+@LAWS
+@given(st.dictionaries(st.integers(0, 9), st.lists(st.integers(0, 12), max_size=4), min_size=1))
+def test_a_walk_ends_on_any_graph_and_names_what_is_lacking(graph: dict[int, list[int]]) -> None:
+    known = {f"Note-{n}.0": EntryRecord("Posted", f"Note-{n}.0", "Tally" if n == 7 else "Note", "expert",
+                                        tuple(f"Note-{m}.0" for m in below), {}, 1, False)
+             for n, below in graph.items()}
+    first = next(iter(known))
+    found = reaches(known.get, [first], sensed)
+    reached, todo = set[str](), [first]
+    while todo:
+        if (name := todo.pop()) not in reached:
+            reached.add(name)
+            todo += known[name].because if name in known else ()
+    assert found.lacking == tuple(sorted(reached - known.keys()))
+    assert found.kinds == ((SENSOR,) if "Note-7.0" in reached & known.keys() else ())
+
+
+@LAWS
+@given(journals())
+def test_candidates_are_those_that_the_trace_keeps(lines: list[str]) -> None:
+    decisions = read(lines)
+    told, pending = Told(decisions), dict[int, Candidate]()
+    for d in decisions:
+        pending |= {c.number: c for c in d.activated}
+        for c in d.obviated:
+            pending.pop(c.number, None)
+        assert {c.number: c for c in told.candidates(d.cycle)} == pending
+        if d.chosen is not None:
+            assert told.candidates(d.cycle)[0].number == d.chosen.number
+            del pending[d.chosen.number]
+
+
+@LAWS
+@given(journals(), st.sampled_from(["wilful", "rival"]))
+def test_why_not_agrees_with_a_plain_reading(lines: list[str], source: str) -> None:
+    decisions = read(lines)
+    told = Told(decisions)
+    activated = [c.number for d in decisions for c in d.activated if c.source == source]
+    acted = [d.cycle for d in decisions if d.chosen is not None and d.chosen.source == source and not d.refused]
+    dropped = [d.cycle for d in decisions for c in d.obviated if c.source == source]
+    occasions = in_run(told, source)
+    assert len(occasions) == len(activated)
+    assert [o.cycle for o in occasions if o.fate is Fate.ACTED] == acted
+    assert [o.cycle for o in occasions if o.fate is Fate.DROPPED] == dropped
+    for d in decisions:
+        fates = [o.fate for o in in_cycle(told, source, d.cycle)]
+        assert fates.count(Fate.DROPPED) == sum(c.source == source for c in d.obviated)
+        mine = [c for c in told.candidates(d.cycle) if c.source == source]
+        assert len(fates) - fates.count(Fate.DROPPED) == len(mine)
+        assert (Fate.ACTED in fates) == (d.cycle in acted)
+
+
+@LAWS
+@given(journals(), st.integers(0, 10**9), st.integers(0, 255), st.integers(0, 10**6))
+def test_a_broken_byte_is_told_by_file_and_line_or_does_not_matter(
+    lines: list[str], at: int, byte: int, pick: int
+) -> None:
+    data = bytearray("".join(line + "\n" for line in lines).encode())
+    data[at % len(data)] = byte
+    with NamedTemporaryFile() as file:
+        file.write(data)
+        file.flush()
+        try:
+            history = JournalHistory(Path(file.name))
+            for ref in history.refs:
+                list(explain(history, [ref]))
+                list(of_entry(history, ref))
+            list(history.decisions())
+        except BadInput as error:
+            assert re.search(rf"{re.escape(file.name)}:\d+: ", str(error))
+
+
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers(-5, 5) | st.floats(allow_nan=False) | st.text(max_size=2),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from("abc"), inner, max_size=3),
@@ -175,3 +306,22 @@ def test_every_value_has_a_sentence(kind: str, value: Any, change: str) -> None:
     told = sentence(EntryRecord(change, f"{kind}-1.0", kind, "expert", (), value, 1, False))
     assert isinstance(told, str)
     assert ("no longer believed" in told) == (change == "Retracted")
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.lists(st.tuples(st.sampled_from([*MAKERS, "Unheard"]), json_values, st.lists(st.integers(0, 14), max_size=4)),
+                min_size=1, max_size=12))
+def test_the_story_of_any_web_of_entries_ends_and_tells_each_thing_once(
+    web: list[tuple[str, Any, list[int]]]
+) -> None:
+    """Whatever the values are, and however the reasons run, in circles too."""
+    refs = [f"{type}-{number}.0" for number, (type, _, _) in enumerate(web)]
+    made = [EntryRecord("Posted", ref, type, "expert", tuple(refs[k % len(refs)] for k in below), value, 1, False)
+            for ref, (type, value, below) in zip(refs, web, strict=True)]
+    decision = DecisionRecord(1, "plan", (), (), (), (), None, None, 0, tuple(made), "", {})
+    history = Told([decision])
+    for record in made:
+        told = story(history, record)
+        assert len({(step.text, step.refs) for step in told.steps}) == len(told.steps)
+        assert all(history.entry(ref) is not None for step in told.steps for ref in step.refs)
+        assert "\n".join(lines_of(told))

@@ -88,7 +88,6 @@ def test_bad_input_is_named(argv: list[str], told: str, tmp_path: Path, capsys: 
 
 
 @pytest.mark.parametrize("argv", [
-    ["resume", "runs/x"], ["drive", "lab", "--port", "/dev/null"], ["calibrate"], ["emulate", "--port", "1"],
     ["world", "import", "a.dxf", "--out", "b.toml"],
 ])
 def test_what_is_not_built_yet_says_so(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:

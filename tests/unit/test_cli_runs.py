@@ -49,16 +49,20 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
     return out, printed.getvalue(), progress.getvalue()
 
 
-def test_a_run_leaves_its_three_files(run: Path) -> None:
-    assert sorted(p.name for p in run.iterdir()) == ["journal.jsonl", "recording.rrd", "result.json"]
-    result = json.loads((run / "result.json").read_text())
-    assert result["outcome"] == "failed"
-    assert result["origin"] == {"file": "lab-to-allens-office", "settings": {"limits.max_cycles": "28"}}
+def test_a_run_leaves_its_files(run: Path) -> None:
+    assert sorted(p.name for p in run.iterdir()) == [
+        "camera.mjpeg", "journal.jsonl", "recording.rrd", "result.json", "run.json"]
+    assert json.loads((run / "result.json").read_text())["outcome"] == "failed"
+    head = json.loads((run / "run.json").read_text())
+    assert (head["kind"], head["name"], head["seed"]) == ("simulator", "lab-to-allens-office", 0)
+    assert head["scenario"]["limits"] == {"max_cycles": 28}
 
 
 def test_why_goes_down_to_the_command(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["why", str(run), "motorcommand-1", "--depth", "99"]) == 0
     out = capsys.readouterr().out
+    assert "Harvey was told to turn" in out
+    assert "made from match LineMatch-" in out
     assert "MotorCommand-1.0: turn" in out
     assert "the user asked for (ptrans (robot-laboratory (16,2,0))" in out
     assert "Frame-1.0: camera frame 0" in out
@@ -66,14 +70,16 @@ def test_why_goes_down_to_the_command(run: Path, capsys: pytest.CaptureFixture[s
 
 def test_why_without_an_entry_tells_the_outcome(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["why", str(run)]) == 0
-    assert "the mission ended: failed" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "The mission ended: failed" in out
+    assert "The user asked for it: (ptrans" in out
 
 
 def test_why_at_a_cycle_tells_what_it_did(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["why", str(run), "--at", "1"]) == 0
     out = capsys.readouterr().out
     assert "chooses   interpreter (goal) on Command-1.0" in out
-    assert "Goal-1.0 was made in cycle 1 by interpreter" in out
+    assert "Decided in cycle 1 by the interpreter" in out
     assert main(["why", str(run), "--at", "1000"]) == 2
     assert "cycles 1 to" in capsys.readouterr().err
 
@@ -99,7 +105,7 @@ def test_replay_decides_the_same_to_the_byte(run: Path, capsys: pytest.CaptureFi
 def copied(run: Path, to: Path, *, journal: str) -> Path:
     """The run with another journal."""
     to.mkdir()
-    for name in ("recording.rrd", "result.json"):
+    for name in ("camera.mjpeg", "recording.rrd", "result.json", "run.json"):
         (to / name).write_bytes((run / name).read_bytes())
     (to / "journal.jsonl").write_text(journal, encoding="utf-8", newline="\n")
     return to
@@ -135,8 +141,10 @@ def test_diff_names_the_first_decision_that_differs(
     assert main(["diff", str(run), str(both[0] / "1")]) == 1
     out = capsys.readouterr().out
     assert "agree for 3 decisions." in out
-    assert "Frame-1.0" in out
-    assert "jpeg.sha256" in out
+    assert "The first observation that differs is Frame-1.0" in out
+    assert "seed: 0 against 1" in out
+    assert main(["diff", str(run), str(both[0] / "1"), "--fields"]) == 1
+    assert "jpeg.sha256" in capsys.readouterr().out
 
 
 def test_trace_prints_every_cycle(told: tuple[Path, str]) -> None:
@@ -195,7 +203,6 @@ def test_being_stopped_is_told_in_a_line(
         scenario=scenario, world=None, start_world=here, goal_world=here))
     assert main(["run", "bump", "--out", str(tmp_path / "run")]) == code
     assert word in capsys.readouterr().err
-    assert json.loads((tmp_path / "run" / "result.json").read_text())["outcome"] == "unfinished"
 
 
 def test_sigterm_closes_the_recording(tmp_path: Path) -> None:
@@ -212,6 +219,7 @@ def test_sigterm_closes_the_recording(tmp_path: Path) -> None:
     assert process.returncode == 143
     assert rest.endswith("harvey: terminated; what was recorded so far is kept\n")
     assert "Traceback" not in rest
+    assert json.loads((out / "result.json").read_text())["outcome"] == "unfinished"
     journal = list(read_journal(out / "journal.jsonl"))
     assert len(journal) >= 7
     assert len(read_decisions(out / "recording.rrd")) >= len(journal) - 1

@@ -6,21 +6,23 @@ from pathlib import Path
 import pytest
 
 from blackboard.journal import Decision, decision_line, decision_record
+from logs import disk
 from logs.journal_file import JournalError, JournalFile, read_journal
 from rehearsal import play
+from world_models.body import Look, MotorCommand
 
 
-def played(path: Path, *, sync: bool = False) -> list[Decision]:
+def played(path: Path, *, forced: bool = False) -> list[Decision]:
     decisions: list[Decision] = []
-    journal = JournalFile(path, sync=sync)
+    journal = JournalFile(path, forced=lambda _decision: forced)
     play([journal, decisions.append])
     journal.close()
     return decisions
 
 
-@pytest.mark.parametrize("sync", [False, True])
-def test_every_decision_comes_back(tmp_path: Path, sync: bool) -> None:
-    decisions = played(tmp_path / "journal.jsonl", sync=sync)
+@pytest.mark.parametrize("forced", [False, True])
+def test_every_decision_comes_back(tmp_path: Path, forced: bool) -> None:
+    decisions = played(tmp_path / "journal.jsonl", forced=forced)
     assert decisions
     assert list(read_journal(tmp_path / "journal.jsonl")) == [decision_record(d) for d in decisions]
 
@@ -40,6 +42,37 @@ def test_the_remembered_line_is_that_of_the_decision(tmp_path: Path) -> None:
     journal(first)
     assert journal.line(second) == decision_line(second)
     assert journal.line(first) == decision_line(first)
+
+
+def test_it_goes_on_behind_what_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    decisions = played(path)
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(lines[0] + lines[1][:9])
+    journal = JournalFile(path, keep=len(lines[0]))
+    for decision in decisions[1:]:
+        journal(decision)
+    journal.close()
+    assert path.read_bytes() == b"".join(lines)
+
+
+def test_what_a_port_will_act_on_is_on_the_disk_before_it_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    forced: list[int] = []
+    monkeypatch.setattr(disk.os, "fsync", forced.append)
+    journal = JournalFile(tmp_path / "journal.jsonl")
+    decisions: list[Decision] = []
+
+    def sink(decision: Decision) -> None:
+        before = len(forced)
+        journal(decision)
+        assert (len(forced) > before) == any(isinstance(c.entry.value, MotorCommand | Look) for c in decision.made)
+        decisions.append(decision)
+
+    play([sink])
+    journal.close()
+    assert 0 < len(forced) < len(decisions)
 
 
 def test_a_truncated_last_line_is_reported(tmp_path: Path) -> None:

@@ -1,9 +1,13 @@
 """What ``World.check`` finds wrong with worlds that can be read."""
 
+from dataclasses import replace
+
 import pytest
 
+from world_models.memory_frames import MemoryFrames
 from world_models.store import WORLDS, load_world, read_world
 from world_models.toml_source import Source
+from world_models.world import World
 
 HOUSE = """\
 name = "house"
@@ -60,8 +64,9 @@ def test_faults_are_told_with_their_line(old: str, new: str, expected: str) -> N
 
 def test_a_room_with_a_hole_is_not_closed() -> None:
     world = read_world(Source.parse(HOUSE, "house.toml"))
-    leaky = type(world)(world.name, world.root, world.locales, world.doorways,
-                        tuple(f for f in world.faces if f.name != "kitchen/north-wall"), world.landmarks, world.things)
+    frames = world.frames
+    assert isinstance(frames, MemoryFrames)
+    leaky = World(replace(frames, every_face=tuple(f for f in world.faces if f.name != "kitchen/north-wall")))
     assert [str(f) for f in leaky.check()] == [
         "house.toml:7: kitchen: expected a room closed by floor, ceiling, walls and doors, got a gap"]
 

@@ -16,7 +16,7 @@ from knowledge_sources.methods.pose.estimate import (
     Mask,
     PoseEstimate,
 )
-from knowledge_sources.methods.pose.image_error import image_distances, in_front, overlapping
+from knowledge_sources.methods.pose.image_error import aspects, in_front
 from knowledge_sources.methods.pose.lines import LineSet
 from world_models.frames import Pose
 
@@ -46,8 +46,8 @@ def mostly_in_front(lines: LineSet, rotation: Array, translation: Array) -> bool
 
 def reasons(lines: LineSet, rotation: Array, translation: Array, near: Mask) -> tuple[str | None, ...]:
     """Why each line is no inlier (n); ``near`` (n,) says which are near enough to their model line."""
-    front = in_front(lines, rotation, translation)
-    beside = ~overlapping(lines, rotation, translation)
+    _, front, over = aspects(lines, rotation, translation)
+    beside = ~over
     tests = ((lines.lengths_px <= 1e-9, NO_LENGTH), (~near, DISTANCE), (~front, BEHIND), (beside, NO_OVERLAP))
     out: list[str | None] = [None] * len(lines)
     for mask, reason in tests:
@@ -71,7 +71,7 @@ def estimate_at(
         camera_from_world=Pose(orthonormal(rotation), translation),
         covariance=0.5 * (covariance + covariance.T),
         inliers=np.array([r is None for r in rejected], dtype=bool),
-        residuals_px=image_distances(lines, rotation, translation),
+        residuals_px=aspects(lines, rotation, translation)[0],
         rejected=rejected,
         cost=cost,
         iterations=iterations,

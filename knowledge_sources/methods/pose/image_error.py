@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from knowledge_sources.methods.pose import kernels
 from knowledge_sources.methods.pose.descent import cross
 from knowledge_sources.methods.pose.estimate import Array, Mask
+from knowledge_sources.methods.pose.kernels import FARTHEST
 from knowledge_sources.methods.pose.lines import TINY, LineSet
 
 OVERLAP_SLACK_PX = 5.0
 """How far beside the model line's end an observed segment may lie [px]."""
-FARTHEST = 1e-16
-"""Square of the least share of a plane's normal that counts as lying in the image."""
 
 
 def projection_planes(lines: LineSet, rotation: Array, translation: Array) -> tuple[Array, Array]:
@@ -66,26 +66,24 @@ def image_jacobian(lines: LineSet, rotation: Array, translation: Array) -> tuple
     return distances, np.concatenate([turn, shift], axis=-1)
 
 
-def depths(lines: LineSet, rotation: Array, translation: Array) -> Array:
-    """(n, 2) depth [m] at which each model line passes the observed ends; negative behind the camera."""
-    directions, planes = projection_planes(lines, rotation, translation)
-    across = cross(lines.rays, directions[:, None, :])
-    size = np.maximum(np.sum(across * across, axis=-1), TINY)
-    return np.asarray(np.sum(planes[:, None, :] * across, axis=-1) / size)
+def aspects(lines: LineSet, rotation: Array, translation: Array) -> tuple[Array, Mask, Mask]:
+    """How the lines look from one pose.
+
+    Returns:
+        (n, 2) :func:`image_distances`; (n,) which model lines pass both observed ends in front of the camera; (n,)
+        which observed segments overlap their model line's extent (an infinite line does not end; a door does).
+    """
+    seen: tuple[Array, Mask, Mask] = kernels.aspects(
+        lines.arrays, np.array(rotation), np.array(translation), OVERLAP_SLACK_PX
+    )
+    return seen
 
 
 def in_front(lines: LineSet, rotation: Array, translation: Array) -> Mask:
     """(n,) which lines pass both observed ends in front of the camera."""
-    return np.asarray(np.all(depths(lines, rotation, translation) > 0.0, axis=1))
+    return aspects(lines, rotation, translation)[1]
 
 
 def overlapping(lines: LineSet, rotation: Array, translation: Array) -> Mask:
-    """(n,) which observed segments overlap their model line's extent (an infinite line does not end; a door does)."""
-    turned = rotation.T
-    directions = lines.directions @ turned
-    start = lines.points[:, 0] @ turned + translation
-    lengths_m = np.linalg.norm(lines.points[:, 1] - lines.points[:, 0], axis=1)
-    seen = lines.rays * depths(lines, rotation, translation)[..., None]
-    along = np.sum((seen - start[:, None, :]) * directions[:, None, :], axis=-1)
-    slack = OVERLAP_SLACK_PX * np.abs(along[:, 1] - along[:, 0]) / np.maximum(lines.lengths_px, 1.0)
-    return np.asarray((along.max(axis=1) > -slack) & (along.min(axis=1) < lengths_m + slack))
+    """(n,) which observed segments overlap their model line's extent."""
+    return aspects(lines, rotation, translation)[2]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.pose.estimate import Array
+from knowledge_sources.methods.pose.kernels import NO_LENGTH, NOT_FINITE, prepared
 from world_models.camera import Camera
 
 TINY = 1e-12
@@ -44,6 +46,12 @@ class LineSet:
     def __len__(self) -> int:
         return len(self.points)
 
+    @property
+    def arrays(self) -> tuple[Array, ...]:
+        """All of them in this order, as the compiled loops take them."""
+        return (self.points, self.directions, self.moments, self.rays, self.normals, self.lengths_px, self.sigma_px,
+                self.focal_px)
+
     def take(self, chosen: Any) -> LineSet:
         """The lines named by a mask or by indices."""
         return LineSet(
@@ -64,49 +72,53 @@ def line_set(model_lines_world: Any, segments_px: Any, camera: Camera, sigma_px:
     Raises:
         ValueError: a wrong shape, a value that is not finite, a model line without length or a sigma that is not > 0.
     """
+    model, segments = matched_arrays(model_lines_world, segments_px)
+    directions, moments, rays, normals, lengths, fault, row = prepared(
+        model, camera.undistort(segments), camera.fx, camera.fy, camera.cx, camera.cy
+    )
+    if fault == NOT_FINITE:
+        name = "segments_px" if np.all(np.isfinite(model[row])) else "model_lines_world"
+        raise ValueError(f"expected finite {name}, got a value that is not in row {row}")
+    if fault == NO_LENGTH:
+        raise ValueError(f"expected model lines with a length, got none in row {row}")
+    sigma = checked_sigma(sigma_px, len(model))
+    return LineSet(model, directions, moments, rays, normals, lengths, sigma, np.array([camera.fx, camera.fy]))
+
+
+def matched_arrays(model_lines_world: Any, segments_px: Any) -> tuple[Array, Array]:
+    """Copies (n, 2, 3) and (n, 2, 2). Raises ValueError where the shapes are wrong or do not match."""
     model = _checked(model_lines_world, "model_lines_world", (2, 3))
     segments = _checked(segments_px, "segments_px", (2, 2))
     if len(model) != len(segments):
         raise ValueError(f"expected one segment a model line, got {len(model)} lines and {len(segments)} segments")
-    span = model[:, 1] - model[:, 0]
-    lengths_m = np.linalg.norm(span, axis=1)
-    if np.any(lengths_m < 1e-9):
-        raise ValueError(f"expected model lines with a length, got none in row {int(np.argmin(lengths_m))}")
-    directions = span / lengths_m[:, None]
-    rays = camera.rays(segments)
-    ends_px = camera.undistort(segments)
-    planes = np.cross(rays[:, 0], rays[:, 1])
-    normals = planes / np.maximum(np.linalg.norm(planes, axis=1, keepdims=True), TINY)
-    return LineSet(
-        points=model,
-        directions=directions,
-        moments=np.cross(model[:, 0], directions),
-        rays=rays,
-        normals=normals,
-        lengths_px=np.linalg.norm(ends_px[:, 1] - ends_px[:, 0], axis=1),
-        sigma_px=checked_sigma(sigma_px, len(model)),
-        focal_px=np.array([camera.fx, camera.fy]),
-    )
+    return model, segments
 
 
 def landmark_groups(landmark_ids: LandmarkIds, n: int) -> list[NDArray[np.intp]]:
     """Indices of the lines of each landmark, in order of first appearance; one line a group without ids."""
+    check_landmarks(landmark_ids, n)
     if landmark_ids is None:
         return [np.array([i]) for i in range(n)]
-    if len(landmark_ids) != n:
-        raise ValueError(f"expected {n} landmark ids, one a line, got {len(landmark_ids)}")
     groups: dict[Any, list[int]] = {}
     for i, name in enumerate(landmark_ids):
         groups.setdefault(name, []).append(i)
     return [np.array(rows) for rows in groups.values()]
 
 
+def check_landmarks(landmark_ids: LandmarkIds, n: int) -> None:
+    """Raises ValueError unless there are none or one a line."""
+    if landmark_ids is not None and len(landmark_ids) != n:
+        raise ValueError(f"expected {n} landmark ids, one a line, got {len(landmark_ids)}")
+
+
 def checked_sigma(sigma_px: Any, n: int) -> Array:
     """A standard deviation a row, (n,), from one number or n."""
+    if isinstance(sigma_px, float) and 0.0 < sigma_px < math.inf:
+        return np.full(n, sigma_px)
     sigma = np.asarray(sigma_px, float)
     if sigma.shape not in ((), (n,)) or not np.all(np.isfinite(sigma)) or np.any(sigma <= 0):
         raise ValueError(f"expected sigma_px > 0, one number or {n}, got {sigma_px!r}")
-    return np.broadcast_to(sigma, (n,)).astype(np.float64)
+    return np.full(n, sigma) if sigma.shape == () else np.array(sigma)
 
 
 def _checked(values: Any, name: str, row: tuple[int, ...]) -> Array:
@@ -115,6 +127,4 @@ def _checked(values: Any, name: str, row: tuple[int, ...]) -> Array:
         array = array.reshape(0, *row)
     if array.shape[1:] != row:
         raise ValueError(f"expected {name} of shape (n, {row[0]}, {row[1]}), got {array.shape}")
-    if not np.all(np.isfinite(array)):
-        raise ValueError(f"expected finite {name}, got a value that is not")
-    return array
+    return np.array(array, order="C")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose.descent import Normal, cross
+from knowledge_sources.methods.pose.descent import cross
 from knowledge_sources.methods.pose.estimate import Array
 from knowledge_sources.methods.pose.image_error import distance_slopes
 from knowledge_sources.methods.pose.lines import LineSet
@@ -33,6 +33,11 @@ class PlanarPrior:
     information: Array
     given: bool
 
+    @property
+    def arrays(self) -> tuple[Array, Array]:
+        """Mean and information, as the compiled loops take them."""
+        return self.mean, self.information
+
 
 def planar_prior(prior: Pose2, covariance: Any) -> PlanarPrior:
     """The prior as a Gaussian; without a covariance a weak one (1 m, 0.3 rad)."""
@@ -46,23 +51,17 @@ def planar_prior(prior: Pose2, covariance: Any) -> PlanarPrior:
     return PlanarPrior(mean, np.linalg.inv(matrix), True)
 
 
+def mounted(camera_from_robot: Pose) -> tuple[Array, Array]:
+    """R and T of the mount, as the compiled loops take them."""
+    return np.array(camera_from_robot.rotation), np.array(camera_from_robot.translation)
+
+
 def prior_pull(states: Array, prior: PlanarPrior) -> tuple[Array, Array]:
     """Squared distance (...) of states (..., 3) to the prior in its deviations, and half its gradient (..., 3)."""
     away = states - prior.mean
     away[..., 2] = np.remainder(away[..., 2] + np.pi, 2.0 * np.pi) - np.pi
     pull = away @ prior.information
     return np.sum(away * pull, axis=-1), pull
-
-
-def with_prior(normal: Normal, state: Array, prior: PlanarPrior) -> Normal:
-    """The normal equations with the prior as one more measurement."""
-    cost, pull = prior_pull(state, prior)
-    return Normal(normal.cost + float(cost), normal.hessian + prior.information, normal.gradient + pull)
-
-
-def added(state: Array, step: Array) -> Array:
-    """A state moved by a step in (x, y, heading)."""
-    return np.asarray(state + step)
 
 
 def pose2(state: Array) -> Pose2:

@@ -7,24 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose.descent import Descent, Normal, descend, information_inverse, normal_equations
+from knowledge_sources.methods.pose import kernels
+from knowledge_sources.methods.pose.descent import Descent, Normal, information_inverse
 from knowledge_sources.methods.pose.estimate import BEHIND, Array, Mask, PlanarEstimate
 from knowledge_sources.methods.pose.guard import reasons
-from knowledge_sources.methods.pose.image_error import in_front, overlapping
+from knowledge_sources.methods.pose.image_error import aspects
 from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, landmark_groups, line_set
 from knowledge_sources.methods.pose.planar import (
     FEW,
     NOT_BETTER,
     PlanarPrior,
-    added,
     camera_states,
-    line_jacobian,
+    mounted,
     planar_prior,
     pose2,
-    prior_pull,
-    with_prior,
 )
-from knowledge_sources.methods.pose.subset_poses import squared_distances
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 
@@ -103,40 +100,24 @@ def _candidates(lines: LineSet, groups: list[Any], belief: PlanarPrior, mount: P
 
 def _pair_states(lines: LineSet, pairs: Any, belief: PlanarPrior, mount: Pose, iterations: int = 4) -> Array:
     """Gauss-Newton on each pair (k, 2) with the prior, all at once: (k, 3)."""
-    gathered = lines.take(pairs)
-    states = np.tile(belief.mean, (len(pairs), 1))
-    scale = 1.0 / gathered.sigma_px[..., None]
-    for _ in range(iterations):
-        distances, jacobian = line_jacobian(gathered.points[:, :, 0], gathered.directions, gathered, states, mount)
-        j = (jacobian * scale[..., None]).reshape(len(pairs), 4, 3)
-        r = (distances * scale).reshape(len(pairs), 4, 1)
-        across = np.swapaxes(j, 1, 2)
-        _, pull = prior_pull(states, belief)
-        step = np.linalg.solve(across @ j + belief.information, across @ r + pull[..., None])[..., 0]
-        states = states - np.clip(step, -LONGEST_STEP, LONGEST_STEP)
+    states: Array = kernels.floor_pairs(
+        lines.arrays, pairs, *belief.arrays, mounted(mount), np.array(LONGEST_STEP), iterations
+    )
     return states
 
 
 def _costs(lines: LineSet, states: Array, belief: PlanarPrior, mount: Pose, bound: float) -> Array:
     """(k,) truncated squared errors of all lines, plus the prior's share."""
-    errors = squared_distances(lines, *camera_states(states, mount))
-    share, _ = prior_pull(states, belief)
-    return np.asarray(np.minimum(errors, bound).sum(axis=1) + share)
+    costs: Array = kernels.floor_costs(lines.arrays, np.array(states), *belief.arrays, mounted(mount), bound)
+    return costs
 
 
 def _polished(lines: LineSet, states: Array, belief: PlanarPrior, mount: Pose, bound: float) -> Array:
     """States (k, 3) moved by Gauss-Newton on each one's own inliers, all at once; the first rounds let more in."""
-    for widening in WIDENING:
-        distances, jacobian = line_jacobian(lines.points[:, 0], lines.directions, lines, states, mount)
-        scaled = distances / lines.sigma_px[:, None]
-        near = np.sum(scaled**2, axis=2) <= widening * bound
-        j = (jacobian / lines.sigma_px[:, None, None]).reshape(len(states), -1, 3)
-        weighted = np.swapaxes(j * np.repeat(near, 2, axis=1)[..., None], 1, 2)
-        _, pull = prior_pull(states, belief)
-        gradient = weighted @ scaled.reshape(len(states), -1, 1) + pull[..., None]
-        step = np.linalg.solve(weighted @ j + belief.information, gradient)[..., 0]
-        states = states - np.clip(step, -LONGEST_STEP, LONGEST_STEP)
-    return states
+    moved: Array = kernels.floor_polished(
+        lines.arrays, states, *belief.arrays, mounted(mount), np.array(LONGEST_STEP), bound, np.array(WIDENING)
+    )
+    return moved
 
 
 def _agreed(lines: LineSet, state: Array, belief: PlanarPrior, mount: Pose, bound: float) -> tuple[Array, Mask]:
@@ -153,21 +134,19 @@ def _agreed(lines: LineSet, state: Array, belief: PlanarPrior, mount: Pose, boun
 
 def _near(lines: LineSet, state: Array, mount: Pose, bound: float) -> Mask:
     rotation, translation = camera_states(state, mount)
-    seen = in_front(lines, rotation, translation) & overlapping(lines, rotation, translation)
-    return np.asarray(seen & (squared_distances(lines, rotation, translation) <= bound))
+    distances, front, over = aspects(lines, rotation, translation)
+    squares = np.sum((distances / lines.sigma_px[:, None]) ** 2, axis=1)
+    return np.asarray(front & over & (squares <= bound))
 
 
 def _descend(
     lines: LineSet, state: Array, belief: PlanarPrior, mount: Pose, iterations: int = 20
 ) -> Descent[Array]:
     """Least squares on the lines given, with the prior."""
-    scale = 1.0 / lines.sigma_px[:, None]
-
-    def linearise(at: Array) -> Normal:
-        distances, jacobian = line_jacobian(lines.points[:, 0], lines.directions, lines, at, mount)
-        return with_prior(normal_equations(distances * scale, jacobian * scale[..., None]), at, belief)
-
-    return descend(state, linearise, added, iterations)
+    at, hessian, cost, steps = kernels.floor_descend(
+        lines.arrays, np.ones(len(lines)), np.array(state), *belief.arrays, mounted(mount), iterations
+    )
+    return Descent(at, Normal(cost, hessian, np.zeros(3)), steps)
 
 
 def _settled(
@@ -214,7 +193,7 @@ def _estimate(
     normal = _descend(kept, state, belief, mount, iterations=0).normal
     weak = not belief.given and reason is None
     hessian = normal.hessian - belief.information if weak else normal.hessian
-    distances, _ = line_jacobian(lines.points[:, 0], lines.directions, lines, state, mount)
+    distances = aspects(lines, *camera_states(state, mount))[0]
     return PlanarEstimate(
         world_from_robot=pose2(state),
         covariance=information_inverse(hessian) * _excess(kept, distances[inliers]),

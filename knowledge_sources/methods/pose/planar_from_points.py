@@ -6,17 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose.descent import Descent, Normal, descend, information_inverse
+from knowledge_sources.methods.pose import point_kernels
+from knowledge_sources.methods.pose.descent import Descent, Normal, information_inverse
 from knowledge_sources.methods.pose.estimate import BEHIND, Array, Mask, PlanarEstimate
 from knowledge_sources.methods.pose.lines import checked_sigma
 from knowledge_sources.methods.pose.planar import (
     FEW,
     PlanarPrior,
-    added,
+    mounted,
     planar_prior,
-    point_jacobian,
     pose2,
-    with_prior,
 )
 from world_models.camera import NEAR_M, Camera
 from world_models.frames import Pose, Pose2
@@ -68,26 +67,28 @@ class _Points:
     def __init__(
         self, world: Array, observed: Array, sigma: Array, focal: Array, mount: Pose, belief: PlanarPrior
     ) -> None:
-        self.world, self.observed, self.sigma = world, observed, sigma
-        self.focal, self.mount, self.belief = focal, mount, belief
+        self.sigma, self.belief = sigma, belief
+        self.measured = world, observed, sigma, focal, mounted(mount)
 
     def scaled(self, state: Array) -> tuple[Array, Array, Array]:
         """Depths (n,), residuals (n, 2) and derivatives (n, 2, 3) in standard deviations."""
-        p, pixels, jacobian = point_jacobian(self.world, self.focal, state, self.mount)
-        width = self.sigma[:, None]
-        return p[:, 2], (pixels - self.observed) / width, jacobian / width[..., None]
+        found: tuple[Array, Array, Array] = point_kernels.seen(*self.measured, np.array(state))
+        return found
 
     def descend(self, state: Array, chosen: Mask, huber: float) -> Descent[Array]:
-        def linearise(at: Array) -> Normal:
-            depth, residuals, jacobian = self.scaled(at)
-            use = chosen & (depth > NEAR_M)
-            return with_prior(_huber_normal(residuals[use], jacobian[use], huber), at, self.belief)
-
-        return descend(state, linearise, added, iterations=20)
+        at, hessian, cost = point_kernels.descend(
+            *self.measured, *self.belief.arrays, NEAR_M, np.array(state), chosen, huber, 20
+        )
+        return Descent(at, Normal(cost, hessian, np.zeros(3)), 0)
 
     def near(self, state: Array, cutoff: float) -> Mask:
         depth, residuals, _ = self.scaled(state)
         return np.asarray((depth > NEAR_M) & (np.sum(residuals**2, axis=1) <= cutoff**2))
+
+    def loss(self, state: Array, chosen: Mask) -> float:
+        """Huber's, of the chosen points, and the prior's share."""
+        found = point_kernels.descend(*self.measured, *self.belief.arrays, NEAR_M, np.array(state), chosen, HUBER, 0)
+        return float(found[2])
 
     def estimate(self, state: Array, near: Mask) -> PlanarEstimate:
         depth, residuals, jacobian = self.scaled(state)
@@ -102,19 +103,9 @@ class _Points:
             inliers=near,
             residuals_px=residuals * self.sigma[:, None],
             rejected=rejected,
-            cost=with_prior(_huber_normal(residuals[near], jacobian[near], HUBER), state, self.belief).cost,
+            cost=self.loss(state, near),
             reason=FEW if few else None,
         )
-
-
-def _huber_normal(residuals: Array, jacobian: Array, huber: float) -> Normal:
-    """Normal equations of Huber's loss on each point's distance; residuals (n, 2), derivatives (n, 2, 3)."""
-    size = np.sqrt(np.sum(residuals**2, axis=1))
-    weights = huber / np.maximum(size, huber)
-    cost = float(np.sum(np.where(size <= huber, size**2, 2.0 * huber * size - huber**2)))
-    j = jacobian.reshape(-1, 3)
-    weighted = (jacobian * weights[:, None, None]).reshape(-1, 3)
-    return Normal(cost, weighted.T @ j, weighted.T @ residuals.ravel())
 
 
 def _excess(residuals: Array) -> float:
@@ -124,8 +115,8 @@ def _excess(residuals: Array) -> float:
 
 
 def _checked(points_world: Any, points_px: Any) -> tuple[Array, Array]:
-    world = np.asarray(points_world, float).reshape(-1, 3)
-    pixels = np.asarray(points_px, float).reshape(-1, 2)
+    world = np.array(points_world, float).reshape(-1, 3)
+    pixels = np.array(points_px, float).reshape(-1, 2)
     if len(world) != len(pixels):
         raise ValueError(f"expected one pixel a point, got {len(world)} points and {len(pixels)} pixels")
     if not (np.all(np.isfinite(world)) and np.all(np.isfinite(pixels))):

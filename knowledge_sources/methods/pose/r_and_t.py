@@ -7,13 +7,14 @@ from typing import Any, Literal
 
 import numpy as np
 
+from knowledge_sources.methods.pose import kernels
 from knowledge_sources.methods.pose.descent import Descent, Normal, descend, normal_equations, rotations
 from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
 from knowledge_sources.methods.pose.guard import FEW_LINES, all_kept, estimate_at, guarded
-from knowledge_sources.methods.pose.lines import TINY, LandmarkIds, LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.kernels import PLANES
+from knowledge_sources.methods.pose.lines import TINY, LandmarkIds, LineSet, check_landmarks, line_set
 from knowledge_sources.methods.pose.plane_error import (
     Weighting,
-    best_translation,
     camera_ends,
     line_weights,
     plane_distances_m,
@@ -24,6 +25,10 @@ from world_models.camera import Camera
 from world_models.frames import Pose
 
 PoseState = tuple[Array, Array]
+
+NOTHING = np.zeros((6, 6))
+"""The information of a prior that says nothing."""
+NOTHING.setflags(write=False)
 
 
 def r_and_t(
@@ -54,7 +59,7 @@ def r_and_t(
     if objective not in ("E1", "E2"):
         raise ValueError(f'expected objective "E1" or "E2", got {objective!r}')
     lines = line_set(model_lines_world, segments_px, camera, sigma_px)
-    landmark_groups(landmark_ids, len(lines))
+    check_landmarks(landmark_ids, len(lines))
     weights = line_weights(lines, weighting)
     end = solve_e1(lines, prior, weights)
     steps = end.iterations
@@ -75,21 +80,24 @@ def r_and_t(
 
 def solve_e1(lines: LineSet, start: Pose, weights: Array) -> Descent[PoseState]:
     """Minimise E1 over R with T eliminated exactly at every step."""
+    return compiled_descent(PLANES, lines, weights, (start.rotation, start.translation))
 
-    def linearise(state: PoseState) -> Normal:
-        ends = camera_ends(lines, *state)
-        root = np.sqrt(weights)[:, None]
-        return normal_equations(
-            plane_distances_m(lines, ends) * root, plane_jacobian(lines, ends) * root[..., None]
-        )
 
-    def retract(state: PoseState, step: Array) -> PoseState:
-        turn = rotations(step[:3])
-        rotation = turn @ state[0]
-        return rotation, best_translation(lines, rotation, turn @ state[1] + step[3:], weights)
+def compiled_descent(
+    kind: int, lines: LineSet, weights: Array, start: PoseState, prior: Pose | None = None,
+    information: Array | None = None, iterations: int = 30,
+) -> Descent[PoseState]:
+    """:func:`kernels.descend`, with the prior's pull if its information (6, 6) is given.
 
-    first = best_translation(lines, start.rotation, start.translation, weights)
-    return descend((start.rotation, first), linearise, retract)
+    Arrays are copied where they are read-only: the loops are compiled anew for each kind of argument.
+    """
+    begin = np.array(start[0]), np.array(start[1])
+    towards = begin if prior is None else (np.array(prior.rotation), np.array(prior.translation))
+    pull = NOTHING.copy() if information is None or prior is None else np.array(information)
+    rotation, translation, hessian, cost, steps = kernels.descend(
+        kind, lines.arrays, weights, begin, towards, pull, iterations
+    )
+    return Descent((rotation, translation), Normal(cost, hessian, np.zeros(6)), steps)
 
 
 def moved(state: PoseState, step: Array) -> PoseState:

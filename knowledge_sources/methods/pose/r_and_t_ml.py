@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from knowledge_sources.methods.pose.descent import Descent, Normal, descend, information_inverse, normal_equations
-from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
+from knowledge_sources.methods.pose import kernels
+from knowledge_sources.methods.pose.descent import Descent, information_inverse
+from knowledge_sources.methods.pose.estimate import BEHIND, Array, PoseEstimate
 from knowledge_sources.methods.pose.guard import (
     FEW_LINES,
     NOT_BETTER,
@@ -21,11 +22,25 @@ from knowledge_sources.methods.pose.guard import (
     open_direction,
     prior_estimate,
 )
-from knowledge_sources.methods.pose.image_error import image_distances, image_jacobian
-from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, landmark_groups, line_set
-from knowledge_sources.methods.pose.r_and_t import PoseState, moved, solve_e1
+from knowledge_sources.methods.pose.image_error import OVERLAP_SLACK_PX
+from knowledge_sources.methods.pose.kernels import IMAGE
+from knowledge_sources.methods.pose.lines import (
+    LandmarkIds,
+    LineSet,
+    check_landmarks,
+    checked_sigma,
+    line_set,
+    matched_arrays,
+)
+from knowledge_sources.methods.pose.r_and_t import PoseState, compiled_descent, solve_e1
+from knowledge_sources.methods.pose.subset_poses import squared_distances
 from world_models.camera import Camera
 from world_models.frames import Pose
+
+UNUSUAL = 3.0
+"""Standard deviations by which the sum of squares may exceed its mean where the lines are explained."""
+LEAST = np.diag(WEAK_INFORMATION).copy()
+"""Knowing less than this in some direction, the lines do not decide the pose."""
 
 
 def r_and_t_ml(
@@ -46,8 +61,12 @@ def r_and_t_ml(
     With ``prior_covariance`` (6, 6) of the prior's left perturbation the prior is one more measurement. Without it
     the prior only decides directions that the lines leave open (fewer than 3 lines, or parallel ones).
     """
+    if prior_covariance is None:
+        found = _explained(model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px)
+        if found is not None:
+            return found
     lines = line_set(model_lines_world, segments_px, camera, sigma_px)
-    landmark_groups(landmark_ids, len(lines))
+    check_landmarks(landmark_ids, len(lines))
     information = prior_information(prior_covariance)
     if not len(lines):
         return prior_estimate(lines, prior, FEW_LINES)
@@ -78,18 +97,32 @@ def likeliest(
     return ml_descent(lines, (prior.rotation, prior.translation), prior, WEAK_INFORMATION), reason
 
 
+def _explained(
+    model: Any, segments: Any, camera: Camera, prior: Pose, landmark_ids: LandmarkIds, sigma_px: Any
+) -> PoseEstimate | None:
+    """The estimate at the foot of the prior's own basin if it explains the lines to their noise: E1 is not asked."""
+    model, ends_px = matched_arrays(model, segments)
+    n = len(model)
+    check_landmarks(landmark_ids, n)
+    freedom = 2.0 * n - 6.0
+    if freedom < 0.0:
+        return None
+    fine, rotation, translation, covariance, cost, steps, distances, front = kernels.explained_from(
+        model, camera.undistort(ends_px), (camera.fx, camera.fy, camera.cx, camera.cy), checked_sigma(sigma_px, n),
+        (np.array(prior.rotation), np.array(prior.translation)), LEAST,
+        freedom + UNUSUAL * math.sqrt(2.0 * freedom), OVERLAP_SLACK_PX,
+    )
+    if not fine:
+        return None
+    rejected = (None,) * n if front.all() else tuple(None if f else BEHIND for f in front.tolist())
+    return PoseEstimate(Pose(rotation, translation), covariance, front, distances, rejected, cost, steps)
+
+
 def ml_descent(
     lines: LineSet, start: PoseState, prior: Pose | None = None, information: Array | None = None
 ) -> Descent[PoseState]:
     """Minimise the squared image distances over their variance, plus the prior's if its information is given."""
-    scale = 1.0 / lines.sigma_px[:, None]
-
-    def linearise(state: PoseState) -> Normal:
-        distances, jacobian = image_jacobian(lines, *state)
-        normal = normal_equations(distances * scale, jacobian * scale[..., None])
-        return normal if prior is None or information is None else _with_prior(normal, state, prior, information)
-
-    return descend(start, linearise, moved)
+    return compiled_descent(IMAGE, lines, np.ones(len(lines)), start, prior, information)
 
 
 def prior_information(covariance: Any) -> Array | None:
@@ -100,13 +133,6 @@ def prior_information(covariance: Any) -> Array | None:
     if matrix.shape != (6, 6):
         raise ValueError(f"expected a prior_covariance of shape (6, 6), got {matrix.shape}")
     return np.asarray(np.linalg.inv(matrix))
-
-
-def _with_prior(normal: Normal, state: PoseState, prior: Pose, information: Array) -> Normal:
-    turn = state[0] @ prior.rotation.T
-    away = np.concatenate([Rotation.from_matrix(turn).as_rotvec(), state[1] - turn @ prior.translation])
-    pull = information @ away
-    return Normal(normal.cost + float(away @ pull), normal.hessian + information, normal.gradient + pull)
 
 
 def _best_start(lines: LineSet, prior: Pose) -> PoseState:
@@ -121,4 +147,4 @@ def _best_start(lines: LineSet, prior: Pose) -> PoseState:
 
 
 def _chi2(lines: LineSet, rotation: Array, translation: Array) -> float:
-    return float(np.sum((image_distances(lines, rotation, translation) / lines.sigma_px[:, None]) ** 2))
+    return float(np.sum(squared_distances(lines, rotation, translation)))

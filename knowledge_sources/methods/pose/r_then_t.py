@@ -17,7 +17,7 @@ from knowledge_sources.methods.pose.descent import (
 )
 from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
 from knowledge_sources.methods.pose.guard import FEW_LINES, all_kept, estimate_at, guarded
-from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, check_landmarks, line_set
 from knowledge_sources.methods.pose.plane_error import (
     Weighting,
     best_translation,
@@ -47,7 +47,7 @@ def r_then_t(
     optimum is the same, the way to it safer. Arguments as in :func:`r_and_t`.
     """
     lines = line_set(model_lines_world, segments_px, camera, sigma_px)
-    landmark_groups(landmark_ids, len(lines))
+    check_landmarks(landmark_ids, len(lines))
     weights = line_weights(lines, weighting)
     end = _solve_rotation(lines, prior, weights)
     rotation = end.state

@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from knowledge_sources.methods.pose import kernels
 from knowledge_sources.methods.pose.estimate import Array, Mask, PoseEstimate
-from knowledge_sources.methods.pose.image_error import in_front, overlapping
+from knowledge_sources.methods.pose.guard import WEAK_INFORMATION
+from knowledge_sources.methods.pose.image_error import OVERLAP_SLACK_PX
 from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, line_set
 from knowledge_sources.methods.pose.med_r_and_t import SUBSET, refined_on, subset_candidates
 from knowledge_sources.methods.pose.r_and_t import PoseState
-from knowledge_sources.methods.pose.r_and_t_ml import likeliest, r_and_t_ml
+from knowledge_sources.methods.pose.r_and_t_ml import r_and_t_ml
 from knowledge_sources.methods.pose.subset_poses import concentrated, squared_distances
 from world_models.camera import Camera
 from world_models.frames import Pose
@@ -67,32 +69,13 @@ def _costs(lines: LineSet, turns: Array, shifts: Array, bound: float) -> Array:
 
 def _polished(lines: LineSet, prior: Pose, state: PoseState, bound: float) -> tuple[PoseState, float]:
     """Alternate inliers and likelihood until they agree; the state and its truncated cost."""
-    near = _near(lines, state, 4.0 * bound)
-    best = (state, _cost(lines, state, bound))
-    for _ in range(ROUNDS):
-        if int(np.count_nonzero(near)) < SUBSET:
-            break
-        end, _ = likeliest(lines.take(near), prior, start=state)
-        state = end.state
-        cost = _cost(lines, state, bound)
-        if cost < best[1]:
-            best = (state, cost)
-        again = _near(lines, state, bound)
-        if np.array_equal(again, near):
-            break
-        near = again
-    return best
+    rotation, translation, cost = kernels.polished(
+        lines.arrays, (np.array(state[0]), np.array(state[1])), (np.array(prior.rotation), np.array(prior.translation)),
+        np.array(WEAK_INFORMATION), np.diag(WEAK_INFORMATION).copy(), bound, OVERLAP_SLACK_PX, SUBSET, ROUNDS,
+    )
+    return (rotation, translation), cost
 
 
 def _near(lines: LineSet, state: PoseState, bound: float) -> Mask:
-    return np.asarray(_bounded(lines, state, bound) < bound)
-
-
-def _cost(lines: LineSet, state: PoseState, bound: float) -> float:
-    return float(np.sum(_bounded(lines, state, bound)))
-
-
-def _bounded(lines: LineSet, state: PoseState, bound: float) -> Array:
-    """(n,) squared errors, at most ``bound``, which lines behind the camera or beside their model line get."""
-    seen = in_front(lines, *state) & overlapping(lines, *state)
-    return np.where(seen, np.minimum(squared_distances(lines, *state), bound), bound)
+    costs = kernels.truncated(lines.arrays, np.array(state[0]), np.array(state[1]), bound, OVERLAP_SLACK_PX)
+    return np.asarray(costs < bound)

@@ -1,0 +1,131 @@
+"""``harvey drive``: a mission on hardware."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from harvey.commands.command import Command
+from harvey.errors import BadInput
+from harvey.run_directory import RUNS, new_run, vacant
+
+if TYPE_CHECKING:
+    from blackboard.journal import Decision
+    from harvey.dry_run import Check, DryRun
+    from harvey.hardware_mission import HardwareMission
+
+OPTIONS = {
+    "world": ("world", "FILE", "the building: a world file, or the name of one that comes with Harvey"),
+    "goal": ("goal", "GOAL", 'from where to where, feet in each locale: "(ptrans (hall (3,4,0)) (kitchen (6,5,0)))"'),
+    "heading": ("start.heading_deg", "DEGREES", "where the robot looks at the start, in the first locale's frame"),
+    "base": ("base.port", "BASE", "denning:PORT, p2os:PORT or create2:PORT, as create2:/dev/ttyUSB0"),
+    "camera": ("camera.source", "CAMERA", "number of a device, a video file, or a URL"),
+    "calibration": ("camera.calibration", "FILE", "what harvey calibrate wrote"),
+}
+
+
+def _arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("mission", metavar="MISSION.toml", nargs="?", help="a mission's file; or say it all by options")
+    for name, (_, metavar, text) in OPTIONS.items():
+        parser.add_argument(f"--{name}", metavar=metavar, help=text)
+    parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
+                        help="any other key of the file, as start.put_down_sigma_in=2; may be repeated")
+    parser.add_argument("--dry-run", action="store_true", help="check everything, move nothing")
+    parser.add_argument("--out", metavar="DIR", help="where the run is kept (runs/MISSION-drive)")
+    parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
+
+
+def _run(args: Namespace) -> int:
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
+    from harvey.dry_run import DryRun
+
+    mission = _mission(args)
+    out = vacant(Path(args.out) if args.out else RUNS / f"{mission.name}-drive")
+    began = time.monotonic()
+
+    def clock() -> float:
+        return time.monotonic() - began
+
+    with DryRun(mission, out, clock) as dry:
+        for check in dry.run():
+            _tell(check)
+        if not dry.ok:
+            failed = sum(1 for check in dry.checks if not check.ok)
+            print(f"\n{failed} of {len(dry.checks)} failed: nothing was moved", file=sys.stderr)
+            return 2
+        if args.dry_run:
+            print("\neverything is ready; nothing was moved")
+            return 0
+        return _drive(mission, dry, clock, new_run(out), args.live)
+
+
+def _mission(args: Namespace) -> HardwareMission:
+    from harvey.campaign import settings_of
+    from harvey.hardware_mission import load_mission
+
+    given = {OPTIONS[name][0]: value for name in OPTIONS if (value := getattr(args, name)) is not None}
+    settings: dict[str, Any] = {**dict(settings_of(args.settings)), **given}
+    for key in ("world", "camera.calibration"):  # named on the command line: relative to where we are
+        if str(settings.get(key, "")).endswith(".toml"):
+            settings[key] = str(Path(settings[key]).resolve())
+    if args.mission is None and not {"world", "goal"} <= set(settings):
+        raise BadInput("expected MISSION.toml, or --world and --goal at least")
+    return load_mission(None if args.mission is None else Path(args.mission), settings)
+
+
+def _tell(check: Check) -> None:
+    print(f"{'ok    ' if check.ok else 'FAILED'}  {check.what:<12} {check.found}", flush=True)
+    if not check.ok:
+        print(f"{'':<21} -> {check.todo}", flush=True)
+
+
+def _drive(mission: HardwareMission, dry: DryRun, clock: Callable[[], float], out: Path, live: bool) -> int:
+    from harvey.hardware_run import drive
+
+    if dry.robot is None or dry.base is None or dry.camera is None:
+        raise BadInput("expected a world, a base and a camera, and one of them is lacking")
+    print("\nspace, enter, q, escape or Ctrl-C stops the robot at once", file=sys.stderr, flush=True)
+    result = drive(mission, dry.robot, dry.base, dry.camera, clock, out=out, sinks=[_follow], live=live)
+    m = result["milestones"]
+    print(f"{result['outcome']}: {result['reason']}\n"
+          f"  milestones    {m['verified']} verified, {m['refuted']} refuted, {m['not_testable']} not testable\n"
+          f"  way           {result['path_length_m']:.1f} m, as the wheels claim, in {result['sim_time_s']:.0f} s\n"
+          f"  recording     {out / 'recording.rrd'}\n\n"
+          f"open it with    harvey view {out}\nask it with     harvey why {out}")
+    return 0 if result["outcome"] == "reached" else 1
+
+
+def _follow(decision: Decision) -> None:
+    """A line for every milestone, and for whatever is wrong with the body."""
+    from world_models.body import BodyFault
+    from world_models.task import Milestone
+
+    for change in (*decision.observed, *decision.made):
+        value, said = change.entry.value, ""
+        if isinstance(value, Milestone) and not value.is_open:
+            said = f"{value.what}: {value.status}"
+        elif isinstance(value, BodyFault):
+            said = f"{value.part}: {value.what}" + (f" ({value.detail})" if value.is_open else ": over")
+        if said:
+            print(f"cycle {decision.cycle}: {said}", file=sys.stderr, flush=True)
+
+
+COMMAND = Command(
+    "drive", "drive a mission on hardware",
+    (
+        ("harvey drive mission.toml --dry-run", "check world, plan, base, camera and disk; nothing moves"),
+        ("harvey drive mission.toml", "the same checks, then the mission"),
+        ("harvey drive mission.toml --base denning:/dev/pts/7", "on an emulated base: harvey emulate tells its port"),
+        ("harvey drive mission.toml --camera http://127.0.0.1:8090/stream.mjpg", "with another camera"),
+    ),
+    _arguments, _run,
+    """
+It is told before the first move what is not ready, and what to do about it. The robot moves only while the base
+answers and the milestone before the move was verified. Any of space, enter, q, escape, Ctrl-C and SIGTERM stops it.
+docs/hardware.md goes from the parts to a first mission. Exit code 0: reached; 1: not; 2: something is not ready.""",
+)

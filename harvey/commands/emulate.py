@@ -1,0 +1,170 @@
+"""``harvey emulate``: a base on a pseudo-terminal, for trying things out without one."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from harvey.commands.command import Command, whole
+from harvey.errors import BadInput
+
+if TYPE_CHECKING:
+    from sim.body import SimulatedBody
+    from sim.emulators.emulator import Emulator
+    from sim.emulators.ground import Ground
+
+KINDS = ("denning", "p2os", "create2")
+TELL_S = 1.0
+"""How often its place is told, with --trace [s of the base]."""
+
+
+def _arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("kind", choices=KINDS, help="which protocol it speaks")
+    parser.add_argument("--scenario", metavar="NAME",
+                        help="put it where a scenario begins, with the scenario's walls, wheels and faults; else on an"
+                             " endless floor")
+    parser.add_argument("--seed", metavar="N", type=whole, default=0, help="of the scenario's chance (0)")
+    parser.add_argument("--camera-port", metavar="PORT", type=whole,
+                        help="serve what the robot's camera sees as motion JPEG on this port of 127.0.0.1; 0 takes a"
+                             " free one")
+    parser.add_argument("--calibration", metavar="FILE", help="write what harvey calibrate would find of that camera")
+    parser.add_argument("--speed", metavar="X", type=_factor, default=1.0,
+                        help="run X times as fast as real time, watchdog and all (1)")
+    parser.add_argument("--trace", action="store_true", help="print the traffic, and where the robot is")
+
+
+def _factor(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.01 <= value <= 1000.0:
+        raise ArgumentTypeError(f"expected a factor of 0.01 to 1000, got {text!r}")
+    return value
+
+
+def _run(args: Namespace) -> int:
+    from sim.emulators.terminal import Terminal
+
+    if args.scenario is None and not (args.camera_port is None and args.calibration is None):
+        raise BadInput("--camera-port and --calibration: expected a --scenario to look at, got none")
+    emulator, where, body = _base(args)
+    trace = _Trace(args.kind, where) if args.trace else None
+    terminal = Terminal(emulator, trace)
+    print(f"an emulated {args.kind} base is at {terminal.name}; Ctrl-C ends it", flush=True)
+    try:
+        with _camera(args.camera_port, body):
+            terminal.serve(args.speed, until=trace.tell_place if trace else lambda: False)
+    except KeyboardInterrupt:
+        print("the base is gone", file=sys.stderr)
+    finally:
+        terminal.close()
+    return 0
+
+
+@contextmanager
+def _camera(port: int | None, body: SimulatedBody | None) -> Iterator[None]:
+    """The robot's camera on the network, if it is wanted."""
+    if port is None or body is None:
+        yield
+        return
+    from sim.camera_server import CameraServer
+
+    body.picture()  # the renderer is compiled before anybody waits for a picture
+    with CameraServer(body, port) as camera:
+        print(f"its camera is at {camera.url}", flush=True)
+        yield
+
+
+def _base(args: Namespace) -> tuple[Emulator, Callable[[], tuple[float, str]], SimulatedBody | None]:
+    """The base, what tells its time and its true place, and the simulated body, if one is under it.
+
+    With a scenario the line fails when the scenario's faults say so.
+    """
+    from sim.emulators.ailing import AilingLine
+    from sim.emulators.create2 import Create2Emulator
+    from sim.emulators.denning import DenningEmulator
+    from sim.emulators.denning_motion import Rolling
+    from sim.emulators.p2os import P2osEmulator
+
+    ground, where, body = _ground(args)
+    emulator: Emulator
+    if args.kind == "denning":
+        emulator = DenningEmulator(Rolling(ground))
+    else:
+        emulator = P2osEmulator(ground) if args.kind == "p2os" else Create2Emulator(ground)
+    return emulator if body is None else AilingLine(emulator, body), where, body
+
+
+def _ground(args: Namespace) -> tuple[Ground, Callable[[], tuple[float, str]], SimulatedBody | None]:
+    from sim.emulators.ground import BodyGround, Floor
+
+    if args.scenario is None:
+        floor = Floor()
+        return floor, lambda: (floor.time_s, f"{floor.pose.x_m:.3f} {floor.pose.y_m:.3f} m"), None
+    body = _body(args.scenario, args.seed, args.calibration)
+    return BodyGround(body), lambda: (body.truth.time_s, _place(body)), body
+
+
+def _body(name: str, seed: int, calibration: str | None) -> SimulatedBody:
+    from sim.assembly import set_stage
+    from sim.scenario import ScenarioError, load_scenario
+    from world_models.camera_file import camera_text
+
+    print(f"{name}: setting the stage", file=sys.stderr, flush=True)
+    try:
+        scenario = load_scenario(name)
+        body = set_stage(scenario).body(seed)
+    except ScenarioError as error:
+        raise BadInput(str(error)) from None
+    if calibration is not None:
+        text = camera_text(scenario.camera.camera, scenario.camera.mount, (f"the simulated camera of {name}",))
+        Path(calibration).write_text(text, encoding="utf-8")
+    return body
+
+
+def _place(body: SimulatedBody) -> str:
+    there = body.truth.world_from_robot
+    hits = f", {body.truth.collisions} collisions" if body.truth.collisions else ""
+    return f"{there.x_m:.3f} {there.y_m:.3f} m in {body.truth.locale or 'no room'}{hits}"
+
+
+class _Trace:
+    """Prints the traffic: lines of text as they are, bytes in hexadecimal; and now and then where the robot is."""
+
+    def __init__(self, kind: str, where: Callable[[], tuple[float, str]]) -> None:
+        self._text, self._where = kind == "denning", where
+        self._told_s, self._place = 0.0, ""
+
+    def __call__(self, direction: str, data: bytes) -> None:
+        lines = data.decode("ascii", "backslashreplace").splitlines() if self._text else [data.hex(" ")]
+        for line in lines:
+            print(f"{self._where()[0]:9.3f} {direction} {line}", flush=True)
+
+    def tell_place(self) -> bool:
+        """Where it is, if that has changed; never the end."""
+        now_s, place = self._where()
+        if now_s - self._told_s >= TELL_S and place != self._place:
+            self._told_s, self._place = now_s, place
+            print(f"{now_s:9.3f} = {place}", flush=True)
+        return False
+
+
+COMMAND = Command(
+    "emulate", "a robot base on a pseudo-terminal, for trying things out without one",
+    (
+        ("harvey emulate denning", "the documented line protocol; docs/protocol-denning.md"),
+        ("harvey emulate create2 --trace", "a Create 2, with every byte printed"),
+        ("harvey emulate p2os --scenario lab-to-allens-office", "a Pioneer in the robot laboratory, walls and all"),
+        ("harvey emulate create2 --scenario link-lost --camera-port 8090 --calibration camera.toml",
+         "with its camera, for harvey drive; docs/hardware.md"),
+    ),
+    _arguments, _run,
+    "It prints the name of a serial port, as /dev/pts/7, and serves it until Ctrl-C. A driver that opens this port\n"
+    "finds a base that answers byte by byte as the real one would. In another terminal, for one metre ahead:\n"
+    "  python -c \"from harvey.hardware_base import open_base; print(open_base('denning:/dev/pts/7').move(1))\"",
+)

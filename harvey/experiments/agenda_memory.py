@@ -1,0 +1,126 @@
+"""A board that runs for a very long time: what it holds in memory, with and without forgetting."""
+
+from __future__ import annotations
+
+import os
+import resource
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from blackboard.retention import Forget
+from blackboard.scheduler import Scheduler
+from blackboard.servoing import Discrepancy
+from logs.journal_file import JournalFile
+
+DOUBT_EVERY = 20
+"""One picture in so many shows something unexpected."""
+PIXELS = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """Something seen: bytes, so that keeping them all would show."""
+
+    number: int
+    pixels: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """What follows from all that was seen; one entry, revised for ever."""
+
+    picture: str
+    count: int
+
+
+class Seer(KnowledgeSource):
+    """Takes up a picture into the belief, and asks for the next; now and then it is in doubt."""
+
+    level = Level.ACTION
+    watches = (Watch(Picture, (Posted,)),)
+    writes = (Belief, Picture, Discrepancy)
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        belief, picture = view.latest(Belief), trigger.entry
+        number = picture.value.number + 1
+        if belief is None:
+            yield Post(Belief(picture.id, 1), (picture,))
+        else:
+            yield Revise(belief, Belief(picture.id, belief.value.count + 1), (picture,))
+        if number % DOUBT_EVERY == 0:
+            yield Post(Discrepancy(Level.ACTION, "unexpected", 1.0, (2.0, 3.0), "px"), (picture,))
+        yield Post(Picture(number, number.to_bytes(4, "big") * (PIXELS // 4)), (picture,))
+
+
+class Corrector(KnowledgeSource):
+    """Closes a doubt."""
+
+    level = Level.ACTION
+    watches = (Watch(Discrepancy, (Posted,), lambda found: found.is_open),)
+    writes = (Discrepancy,)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        return 0.9
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        yield Revise(trigger.entry, trigger.entry.value.corrected(), (trigger.entry,))
+
+
+RETENTION: tuple[Forget[Any], ...] = (
+    Forget(Picture, keep=2),
+    Forget(Discrepancy, keep=2, when=lambda found: not found.is_open),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """What was held after a tenth of the cycles, and after all of them.
+
+    Attributes:
+        cycles: how many.
+        early_bytes, late_bytes: of the process, resident.
+        entries: on the board in the end.
+        posted: pictures that were posted.
+    """
+
+    cycles: int
+    early_bytes: int
+    late_bytes: int
+    entries: int
+    posted: int
+
+    @property
+    def a_cycle_bytes(self) -> float:
+        """By how much it grew with each cycle."""
+        return (self.late_bytes - self.early_bytes) / (self.cycles - self.cycles // 10)
+
+
+def long_run(cycles: int, retention: Sequence[Forget[Any]]) -> Memory:
+    """Run so many cycles; the journal's lines are made and written, but to the null device."""
+    journal = JournalFile(Path(os.devnull))
+    scheduler = Scheduler([Seer(), Corrector()], sinks=[journal], retention=retention)
+    scheduler.tell([Post(Picture(0, bytes(PIXELS)))], "user")
+    early_bytes = 0
+    while scheduler.cycle < cycles:
+        scheduler.step()
+        if scheduler.cycle == cycles // 10:
+            early_bytes = resident_bytes()
+    journal.close()
+    newest = scheduler.view.latest(Picture)
+    return Memory(
+        cycles, early_bytes, resident_bytes(), len(scheduler.view), 0 if newest is None else newest.value.number + 1)
+
+
+def resident_bytes() -> int:
+    """Of this process now; its peak where the system does not say."""
+    try:
+        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * resource.getpagesize()
+    except OSError:
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024

@@ -1,0 +1,106 @@
+"""A mission on hardware: the same experts, board, journal and recording; a base and a camera of metal; no truth."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from blackboard.effect import Post
+from blackboard.journal import Decision, Sink
+from blackboard.scheduler import Scheduler
+from harvey.diary import Diary
+from harvey.hardware import HardwareBody, Watching
+from harvey.hardware_mission import HardwareMission
+from harvey.heart import Heart
+from harvey.loop import until_outcome
+from harvey.minds import mind_of
+from harvey.ports import BodyPort
+from harvey.referee import Counts
+from harvey.run_directory import RunDirectory
+from harvey.run_head import HARDWARE, RunHead
+from harvey.stop_key import stop_key
+from knowledge_sources.drivers.base import Base
+from knowledge_sources.drivers.video_camera import VideoCamera
+from logs.disk import CannotWriteError
+from logs.errors import RecordingError
+from world_models.body import Frame, MotionReport
+from world_models.robot import RobotModel
+from world_models.task import Outcome
+
+
+class Odometer(Counts):
+    """Counts, and adds up what the wheels claim."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.path_m, self.frames, self.time_s = 0.0, 0, 0.0
+
+    def __call__(self, decision: Decision) -> None:
+        super().__call__(decision)
+        for change in decision.observed:
+            value = change.entry.value
+            if isinstance(value, MotionReport):
+                self.path_m += value.move_m
+                self.time_s = value.sim_time_s
+            self.frames += isinstance(value, Frame)
+
+
+def drive(
+    mission: HardwareMission,
+    robot: RobotModel,
+    base: Base,
+    camera: VideoCamera,
+    clock: Callable[[], float],
+    *,
+    out: Path,
+    sinks: Sequence[Sink] = (),
+    live: bool = False,
+) -> dict[str, Any]:
+    """Drive to the outcome; however it ends, the base is told to stop, and what was recorded is kept.
+
+    Returns what ``result.json`` holds: as for a run in the simulator, with null for what only the truth could tell.
+    """
+    began, run = time.perf_counter(), RunDirectory(out)
+    head = RunHead.of(HARDWARE, mission.name, 0, mission.world, robot, mission.servo, mission.command,
+                      scenario=mission.data, folder=str(mission.folder.resolve()))
+    body, counts = HardwareBody(base, Watching(camera, clock, mission.camera.rate_hz), clock=clock), Odometer()
+    try:
+        with stop_key(body.stop_for_good), Heart(base) as heart, mind_of(head) as mind:
+            diary = Diary(run, head, mind.robot, live=live)
+            try:
+                run.write_result({"scenario": mission.name, "seed": 0, "outcome": "unfinished"})
+                port = diary.kept(BodyPort(body))
+                scheduler = mind.scheduler(ports=(port,), sinks=(*diary.sinks, counts, *sinks))
+                scheduler.tell([Post(head.task())], "user")
+                outcome = until_outcome(scheduler, over=lambda s: _over(mission, s, clock()), before=heart.tick)
+            finally:
+                body.stop()
+                diary.close()
+    except (CannotWriteError, RecordingError) as error:
+        outcome = Outcome("failed", f"stopped, because nothing more can be written down: {error}")
+    finally:
+        base.close()
+    result = _result(mission, outcome, counts, time.perf_counter() - began)
+    with suppress(OSError):  # where the disk is full, the outcome that is there, unfinished, is true as well
+        run.write_result(result)
+    return result
+
+
+def _over(mission: HardwareMission, scheduler: Scheduler, now_s: float) -> str | None:
+    if now_s > mission.limits.max_time_s:
+        return f"not there after {now_s:.0f} s"
+    return f"not there after {scheduler.cycle} cycles" if scheduler.cycle >= mission.limits.max_cycles else None
+
+
+def _result(mission: HardwareMission, outcome: Outcome, counts: Odometer, wall_time_s: float) -> dict[str, Any]:
+    return {
+        "scenario": mission.name, "seed": 0, "outcome": outcome.kind, "reason": outcome.reason, "goal": mission.goal,
+        "final_error_m": None, "final_heading_error_rad": None, "path_length_m": counts.path_m,
+        "sim_time_s": counts.time_s, "wall_time_s": wall_time_s, "frames": counts.frames, "decisions": counts.decisions,
+        "milestones": {**counts.milestones, "false_accepts": None}, "replans": counts.replans,
+        "relocalizations": counts.relocalizations, "sketches": counts.sketches, "collisions": None,
+        "max_cross_track_m": None,
+    }

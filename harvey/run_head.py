@@ -1,0 +1,140 @@
+"""Run head: what a run directory tells from its first moment, ``run.json``: enough to decide the run again or go on."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from blackboard.encoding import plain
+from harvey.errors import BadInput
+from harvey.observations import decoded
+from sim.scenario import ROOT, Servo
+from world_models.actuator import ActuatorModel
+from world_models.camera import Camera, CameraMount
+from world_models.robot import RobotModel
+from world_models.store import fingerprint, load_world
+from world_models.task import Command
+
+SIMULATOR, HARDWARE = "simulator", "hardware"
+
+
+@dataclass(frozen=True, slots=True)
+class RunHead:
+    """How a run began.
+
+    Attributes:
+        kind: simulator or hardware.
+        name: of the scenario or mission.
+        seed: of all chance in the simulator; 0 on hardware.
+        world: the world file that the robot believes in; relative to the project where it comes with it.
+        world_sha256: of that file's bytes.
+        robot: what the robot knows of itself beside the world, as JSON types.
+        servo: which levels of perceptual servoing are on.
+        command: what the user asked for, as JSON types.
+        without, constants: what was taken from the experts' minds, for a run that tells what would have been.
+        scenario: simulator: the scenario's tables as read, with ``--set`` applied; hardware: what the driver needs.
+        folder: simulator: where the scenario's file was.
+        body: simulator: how the body is reached, as :func:`harvey.serial_body.reached` knows it.
+        harvey: version.
+    """
+
+    kind: str
+    name: str
+    seed: int
+    world: str
+    world_sha256: str
+    robot: Mapping[str, Any]
+    servo: Mapping[str, bool]
+    command: Mapping[str, Any]
+    without: tuple[str, ...] = ()
+    constants: tuple[tuple[str, str], ...] = ()
+    scenario: Mapping[str, Any] = field(default_factory=dict)
+    folder: str = ""
+    body: str = "simulated"
+    harvey: str = field(default_factory=lambda: version("harvey"))
+
+    @staticmethod
+    def of(
+        kind: str, name: str, seed: int, world: Path, robot: RobotModel, servo: Servo, command: Command, **more: Any
+    ) -> RunHead:
+        """The head of a run that begins now; ``more`` are the other attributes. Raises OSError for the world file."""
+        known = {f.name: getattr(robot, f.name) for f in fields(robot) if f.name not in ("world", "lens")}
+        known["camera"] = robot.lens  # the robot's model is made of the camera as it is, with its lens
+        return RunHead(
+            kind, name, seed, _portable(world), _sha256(world), plain(known), asdict(servo), plain(command), **more
+        )
+
+    def write(self, folder: Path) -> None:
+        """Write ``run.json``. Raises OSError."""
+        part = folder / "run.json.part"
+        part.write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
+        os.replace(part, folder / "run.json")
+
+    @staticmethod
+    def read(folder: Path) -> RunHead:
+        """Raises BadInput where ``run.json`` is missing or malformed."""
+        path = folder / "run.json"
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise BadInput(f"{path}: expected the head of a run, got: {error.strerror}") from None
+        except (ValueError, RecursionError) as error:
+            raise BadInput(f"{path}: expected JSON, got: {error}") from None
+        try:
+            head: RunHead = decoded(data, RunHead)
+        except (ValueError, TypeError) as error:
+            raise BadInput(f"{path}: {error}") from None
+        return head
+
+    def is_like(self, other: RunHead) -> bool:
+        """Whether both are written alike: then their runs began alike."""
+        return json.dumps(asdict(self)) == json.dumps(asdict(other))
+
+    def model(self) -> RobotModel:
+        """What the robot knows. Raises BadInput where the world file has changed since, or a value cannot be used."""
+        path = ROOT / self.world
+        if _sha256_or_none(path) != self.world_sha256:
+            raise BadInput(f"{path}: expected the world file as it was when the run was made, got another or none")
+        kinds = {"camera": Camera, "mount": CameraMount, "actuator": ActuatorModel}
+        try:
+            made = {name: kinds[name](**value) if name in kinds else value for name, value in self.robot.items()}
+            return RobotModel(load_world(path), **made)
+        except (TypeError, ValueError) as error:
+            raise BadInput(f"run.json: robot: {error}") from None
+
+    def task(self) -> Command:
+        """What the user asked for. Raises BadInput."""
+        try:
+            command: Command = decoded(self.command, Command)
+        except (TypeError, ValueError) as error:
+            raise BadInput(f"run.json: command: {error}") from None
+        return command
+
+    def servo_settings(self) -> Servo:
+        """Which levels are on. Raises BadInput."""
+        try:
+            return Servo(**self.servo)
+        except TypeError as error:
+            raise BadInput(f"run.json: servo: {error}") from None
+
+
+def _portable(path: Path) -> str:
+    """A path that also holds where the project lies elsewhere."""
+    there = path.resolve()
+    return str(there.relative_to(ROOT)) if there.is_relative_to(ROOT) else str(there)
+
+
+def _sha256(path: Path) -> str:
+    return fingerprint(path)
+
+
+def _sha256_or_none(path: Path) -> str | None:
+    try:
+        return _sha256(path)
+    except OSError:
+        return None

@@ -1,0 +1,88 @@
+"""Appending to a file so that whatever happens leaves it whole: all of what is written, or nothing of it."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import stat
+from pathlib import Path
+
+
+class CannotWriteError(OSError):
+    """A file of the diary cannot be written any more, as when the disk is full; what was written before stays valid."""
+
+
+class Appended:
+    """A file that only grows.
+
+    After :meth:`append` the bytes are with the operating system, so that they outlive the process even if it is killed;
+    after :meth:`sync` they are on the disk, so that they outlive a power cut too.
+    """
+
+    def __init__(self, path: Path, what: str, *, keep: int = 0) -> None:
+        """Begin a file, or go on with one behind its first ``keep`` bytes; what it holds beyond them is dropped.
+
+        ``what`` names the file in messages. Raises OSError where it cannot be opened, or somebody writes it.
+        """
+        self._path, self._what = path, what
+        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        self._size = 0
+        if stat.S_ISREG(os.fstat(self._file).st_mode):
+            self._lock()
+            os.ftruncate(self._file, keep)
+            self._size = os.lseek(self._file, 0, os.SEEK_END)
+
+    def append(self, data: bytes) -> None:
+        """Add bytes at the end, all or none. Raises CannotWriteError."""
+        try:
+            done = 0
+            while done < len(data):
+                done += os.write(self._file, data[done:])
+        except OSError as error:
+            self._undo()
+            raise self._cannot(error) from error
+        self._size += len(data)
+
+    def sync(self) -> None:
+        """Force everything onto the disk. Raises CannotWriteError."""
+        try:
+            os.fsync(self._file)
+        except OSError as error:
+            raise self._cannot(error) from error
+
+    def close(self) -> None:
+        """No more bytes."""
+        os.close(self._file)
+
+    def _lock(self) -> None:
+        """Nobody else may write it meanwhile; the lock goes with the process, however that ends."""
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            os.close(self._file)
+            message = f"cannot write the {self._what}: another process is writing it"
+            raise CannotWriteError(error.errno, message, str(self._path)) from None
+
+    def _undo(self) -> None:
+        """Take back what was written of the last bytes; a file that cannot be cut is left for the reader to mend."""
+        try:
+            os.ftruncate(self._file, self._size)
+            os.lseek(self._file, self._size, os.SEEK_SET)
+        except OSError:
+            return
+
+    def _cannot(self, error: OSError) -> CannotWriteError:
+        return CannotWriteError(error.errno, f"cannot write the {self._what}: {error.strerror}", str(self._path))
+
+
+def sync_folder(path: Path) -> None:
+    """Force the names of a folder's files onto the disk, where the file system can do that."""
+    folder = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+            raise
+    finally:
+        os.close(folder)

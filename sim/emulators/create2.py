@@ -1,0 +1,182 @@
+"""An emulated iRobot Create 2, written from the Open Interface Specification: no frames, no checksum, no watchdog.
+
+Bytes are taken as they come: an opcode, then as many bytes as belong to it. What the manual leaves open is taken to be
+so: a byte that is no opcode is ignored. Clean, Spot, Max and Dock make it drive about by itself, as they do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+from sim.emulators.ground import Ground
+
+STREAM_S = 0.015
+AXLE_M = 0.235
+MM_PER_COUNT = math.pi * 72.0 / 508.8
+MOST_MM_PER_S = 500
+OFF, PASSIVE, SAFE, FULL = range(4)
+LENGTHS: Mapping[int, int] = {
+    129: 1, 137: 4, 138: 1, 139: 3, 141: 1, 142: 1, 144: 3, 145: 4, 146: 4, 147: 1, 150: 1, 162: 2, 163: 4, 164: 4,
+    165: 2, 167: 15, 168: 3,
+}
+"""Bytes behind an opcode; 140, 148 and 149 say themselves how many, the others have none."""
+
+SIZES: Mapping[int, int] = {7: 1, 35: 1, 41: 2, 42: 2, 43: 2, 44: 2}
+"""Bytes of the sensor packets that this one has; it sends no others."""
+
+WANDERING = (300, 150)
+"""Wheel speeds when it cleans; a spiral of some kind."""
+
+
+class Create2Emulator:
+    """The robot's side of the Open Interface.
+
+    Attributes:
+        heard: told of every command that was carried out, as its bytes, if it is there.
+        mode: 0 off, 1 passive, 2 safe, 3 full.
+        deaf: whether it was told another baud rate, so that it cannot be understood, nor understand.
+    """
+
+    def __init__(self, ground: Ground, *, count: int = 0, heard: Callable[[bytes], None] | None = None) -> None:
+        """``count``: where its encoders begin."""
+        self._ground, self._count, self.heard = ground, count, heard
+        self.stops = 0
+        self.power_cycle()
+
+    def power_cycle(self) -> None:
+        """Off and on again: it stands, and has forgotten everything."""
+        self.mode, self.deaf = OFF, False
+        self._pending, self._out = bytearray(), bytearray()
+        self._wanted = (0, 0)
+        self._wandering = self._bumped = False
+        self._stream: tuple[int, ...] = ()
+        self._streaming = False
+        self._since_s = 0.0
+        self._right = self._left = float(self._count)
+
+    @property
+    def moving(self) -> bool:
+        """Whether its motors run."""
+        return self._speeds != (0, 0)
+
+    @property
+    def _speeds(self) -> tuple[int, int]:
+        if self._wandering:
+            return WANDERING
+        return self._wanted if self.mode in (SAFE, FULL) else (0, 0)
+
+    def receive(self, data: bytes) -> None:
+        """Bytes from the line."""
+        for byte in data if not self.deaf else b"":
+            self._pending.append(byte)
+            if len(self._pending) > self._length():
+                command = bytes(self._pending)
+                self._pending.clear()
+                self._obey(command[0], command[1:], command)
+
+    def take(self) -> bytes:
+        """Bytes for the line, each once."""
+        out = b"" if self.deaf else bytes(self._out)
+        self._out.clear()
+        return out
+
+    def advance(self, duration_s: float) -> None:
+        """Time passes."""
+        left_s = duration_s
+        while left_s > 1e-9:
+            tick_s = min(left_s, STREAM_S - self._since_s if self._since_s < STREAM_S - 1e-9 else STREAM_S)
+            self._roll(tick_s)
+            self._since_s += tick_s
+            left_s -= tick_s
+            if self._since_s >= STREAM_S - 1e-9:
+                self._since_s = 0.0
+                if self._streaming:
+                    self._tell()
+
+    def _length(self) -> int:
+        """How many bytes belong to the opcode that is pending; more, where it says itself how many and has not yet."""
+        got, opcode = self._pending, self._pending[0]
+        if opcode in (148, 149):
+            return 1 + got[1] if len(got) > 1 else 1
+        if opcode == 140:
+            return 2 + 2 * got[2] if len(got) > 2 else 2
+        return LENGTHS.get(opcode, 0)
+
+    def _obey(self, opcode: int, values: bytes, raw: bytes) -> None:
+        if self.heard is not None and opcode in (7, *range(128, 174)):
+            self.heard(raw)
+        if opcode == 128:
+            self._enter(PASSIVE)
+        elif self.mode == OFF:
+            return
+        elif opcode in (7, 133, 173):
+            self._enter(OFF)
+            self._streaming = False
+        elif opcode in (130, 131):
+            self._enter(SAFE)
+        elif opcode == 132:
+            self._enter(FULL)
+        elif opcode in (134, 135, 136, 143):
+            self._enter(PASSIVE)
+            self._wandering = True
+        elif opcode == 129 and values[0] <= 11:
+            self.deaf = values[0] != 11
+        elif opcode in (137, 145, 146) and self.mode in (SAFE, FULL):
+            self._drive(opcode, values)
+        elif opcode == 148:
+            self._stream = tuple(values[1:]) if all(number in SIZES for number in values[1:]) else ()
+            self._streaming = bool(self._stream)
+        elif opcode == 150:
+            self._streaming = values[0] == 1 and bool(self._stream)
+
+    def _enter(self, mode: int) -> None:
+        """A change of mode stops it; the same mode again does not."""
+        if mode != self.mode or self._wandering:
+            self._wanted, self._wandering = (0, 0), False
+        self.mode = mode
+
+    def _drive(self, opcode: int, values: bytes) -> None:
+        first, second = (int.from_bytes(values[i:i + 2], "big", signed=True) for i in (0, 2))
+        if opcode == 137:
+            first, second = _of_radius(first, second)
+        elif opcode == 146:
+            first, second = (round(value * MOST_MM_PER_S / 255) for value in (first, second))
+        self._wanted = (_bounded(first), _bounded(second))
+
+    def _roll(self, tick_s: float) -> None:
+        right, left = self._speeds
+        turn, move = (right - left) / 1000.0 / AXLE_M * tick_s, (right + left) / 2000.0 * tick_s
+        turned, moved = self._ground.roll(turn, move, tick_s)
+        self._bumped = (turn, move) != (0.0, 0.0) and (turned, moved) == (0.0, 0.0)
+        self._right += 1000.0 * (moved + turned * AXLE_M / 2.0) / MM_PER_COUNT
+        self._left += 1000.0 * (moved - turned * AXLE_M / 2.0) / MM_PER_COUNT
+
+    def _tell(self) -> None:
+        """One frame of the stream: with header and checksum its bytes add up to 0 in eight bits."""
+        body = b"".join(bytes([number]) + self._packet(number) for number in self._stream)
+        frame = bytes([19, len(body)]) + body
+        self._out += frame + bytes([-sum(int(byte) for byte in frame) % 256])
+
+    def _packet(self, number: int) -> bytes:
+        value = {
+            7: 3 if self._bumped else 0, 35: self.mode, 41: self._wanted[0], 42: self._wanted[1],
+            43: math.floor(self._left), 44: math.floor(self._right),
+        }[number]
+        return (value % (1 << 8 * SIZES[number])).to_bytes(SIZES[number], "big")
+
+
+def _of_radius(speed: int, radius: int) -> tuple[int, int]:
+    """Wheel speeds (right, left) of opcode 137: a speed along a circle, with 32767, -32768, 1 and -1 set apart."""
+    if radius in (32767, -32768):
+        return speed, speed
+    if radius in (1, -1):
+        return radius * speed, -radius * speed
+    if radius == 0:
+        return 0, 0
+    half = 1000.0 * AXLE_M / 2.0
+    return round(speed * (1.0 + half / radius)), round(speed * (1.0 - half / radius))
+
+
+def _bounded(speed: int) -> int:
+    return max(-MOST_MM_PER_S, min(MOST_MM_PER_S, speed))

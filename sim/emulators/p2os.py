@@ -1,0 +1,210 @@
+"""An emulated Pioneer: P2OS as its manual describes it, watchdog and all, on whatever ground it is put on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from sim.emulators.ground import Ground
+from sim.emulators.p2os_packets import Reader, Request, counts, sealed, status
+
+WATCHDOG_S = 2.0
+STATUS_S = 0.1
+TICK_S = 0.015
+AXLE_M = 0.33
+COUNTS_PER_M = 132_000
+NAMES = b"Harvey_0001\0Pioneer\0p3dx-sh\0"
+
+
+class Axis:
+    """One of the two servos, of translation [m] and of rotation [rad]: to a velocity, or to a place and no further.
+
+    Attributes:
+        rate: how fast it goes now.
+        fastest, quickening: its limits.
+    """
+
+    def __init__(self, fastest: float, quickening: float) -> None:
+        self.rate, self.fastest, self.quickening = 0.0, fastest, quickening
+        self._wanted_rate = 0.0
+        self._to_go: float | None = None
+
+    def go_at(self, rate: float) -> None:
+        self._wanted_rate, self._to_go = max(-self.fastest, min(self.fastest, rate)), None
+
+    def go_by(self, way: float) -> None:
+        self._to_go = way
+
+    def drop(self) -> None:
+        """Stand at once."""
+        self.rate = 0.0
+        self.go_at(0.0)
+
+    @property
+    def at_rest(self) -> bool:
+        return self.rate == 0.0 and self._wanted_rate == 0.0 and self._to_go is None
+
+    def step(self, duration_s: float, *, muted: bool) -> float:
+        """How far to go in this time."""
+        most = self.quickening * duration_s
+        wanted = self._braking_rate() if self._to_go is not None else self._wanted_rate
+        self.rate += max(-most, min(most, (0.0 if muted else wanted) - self.rate))
+        way = self.rate * duration_s
+        if self._to_go is not None and not muted and abs(self._to_go) <= max(abs(way), 1e-4):
+            way, self.rate, self._to_go, self._wanted_rate = self._to_go, 0.0, None, 0.0
+        return way
+
+    def went(self, way: float) -> None:
+        """What it really did of the last step."""
+        if self._to_go is not None:
+            self._to_go -= way
+
+    def _braking_rate(self) -> float:
+        to_go = self._to_go or 0.0
+        return math.copysign(min(self.fastest, math.sqrt(2.0 * self.quickening * abs(to_go)) + 0.002), to_go)
+
+
+class P2osEmulator:
+    """The base's side of P2OS.
+
+    Attributes:
+        heard: told of every command that was accepted, as (number, argument, raw bytes), if it is there.
+        rejected: headers that no packet followed are counted by the reader; stops: how often the watchdog struck.
+    """
+
+    def __init__(self, ground: Ground, *, heard: Callable[[Request], None] | None = None) -> None:
+        self._ground, self.heard = ground, heard
+        self.stops = 0
+        self._reset()
+
+    def _reset(self) -> None:
+        self._reader, self._out = Reader(), bytearray()
+        self._synced, self._open, self._enabled, self._muted = 0, False, False, False
+        self._travel, self._turning = Axis(0.4, 0.3), Axis(math.radians(50.0), math.radians(100.0))
+        self._x = self._y = self._heading = 0.0
+        self._left = self._right = 0.0
+        self._stalled = self._encoders = False
+        self._quiet_s = self._since_status_s = 0.0
+
+    def power_cycle(self) -> None:
+        """Off and on again: it stands, and has forgotten everything."""
+        self._reset()
+
+    @property
+    def rejected(self) -> int:
+        return self._reader.rejected
+
+    @property
+    def moving(self) -> bool:
+        """Whether its motors run."""
+        return self._travel.rate != 0.0 or self._turning.rate != 0.0
+
+    @property
+    def standing_within_s(self) -> float:
+        """It stands at the latest this long after the last packet that it accepted: watchdog, then braking."""
+        return WATCHDOG_S + self._travel.fastest / self._travel.quickening + 2 * TICK_S
+
+    def receive(self, data: bytes) -> None:
+        """Bytes from the line."""
+        for request in self._reader.feed(data):
+            if self.heard is not None:
+                self.heard(request)
+            self._quiet_s, self._muted = 0.0, False
+            if self._open:
+                self._obey(request.number, request.argument)
+            else:
+                self._greet(request.number)
+
+    def take(self) -> bytes:
+        """Bytes for the line, each once."""
+        out = bytes(self._out)
+        self._out.clear()
+        return out
+
+    def advance(self, duration_s: float) -> None:
+        """Time passes."""
+        left_s = duration_s
+        while left_s > 1e-9:
+            tick_s = min(TICK_S, left_s)
+            self._tick(tick_s)
+            left_s -= tick_s
+
+    def _tick(self, tick_s: float) -> None:
+        self._quiet_s += tick_s
+        if self._open and not self._muted and self._quiet_s > WATCHDOG_S:
+            self._muted = True
+            self.stops += self.moving
+        self._roll(tick_s)
+        self._since_status_s += tick_s
+        if self._open and self._since_status_s >= STATUS_S - 1e-9:
+            self._since_status_s = 0.0
+            self._tell()
+
+    def _roll(self, tick_s: float) -> None:
+        muted = self._muted or not self._enabled
+        turn, move = self._turning.step(tick_s, muted=muted), self._travel.step(tick_s, muted=muted)
+        turned, moved = self._ground.roll(turn, move, tick_s)
+        self._stalled = (turn, move) != (0.0, 0.0) and (turned, moved) == (0.0, 0.0)
+        self._turning.went(turned)
+        self._travel.went(moved)
+        self._heading += turned
+        self._x += moved * math.cos(self._heading)
+        self._y += moved * math.sin(self._heading)
+        self._left += moved - turned * AXLE_M / 2.0
+        self._right += moved + turned * AXLE_M / 2.0
+
+    def _greet(self, number: int) -> None:
+        """SYNC0, SYNC1, SYNC2, in this order; OPEN after that."""
+        if number == 1 and self._synced == 3:
+            self._open, self._since_status_s = True, 0.0
+        elif number <= min(2, self._synced):
+            self._synced = number + 1
+            self._out += sealed(bytes([number]) + (NAMES if number == 2 else b""))
+
+    def _obey(self, number: int, argument: int) -> None:
+        travel, turning = self._travel, self._turning
+        match number:
+            case 2:  # CLOSE
+                self._reset()
+            case 4:  # ENABLE
+                self._enabled = argument == 1
+            case 5:  # SETA
+                travel.quickening = max(0.05, abs(argument) / 1000.0)
+            case 6:  # SETV
+                travel.fastest = max(0.0, min(1.2, argument / 1000.0))
+            case 7:  # SETO
+                self._x = self._y = self._heading = 0.0
+            case 8:  # MOVE
+                travel.go_by(argument / 1000.0)
+            case 10:  # SETRV
+                turning.fastest = max(0.0, min(math.radians(300.0), math.radians(argument)))
+            case 11:  # VEL
+                travel.go_at(argument / 1000.0)
+            case 12:  # HEAD
+                turning.go_by(math.remainder(math.radians(argument) - self._heading, 2.0 * math.pi))
+            case 13:  # DHEAD
+                turning.go_by(math.radians(argument))
+            case 19:  # ENCODER
+                self._encoders = argument > 0
+            case 21:  # RVEL
+                turning.go_at(math.radians(argument))
+            case 23:  # SETRA
+                turning.quickening = max(0.1, abs(math.radians(argument)))
+            case 29:  # STOP
+                travel.go_at(0.0)
+                turning.go_at(0.0)
+            case 55:  # ESTOP
+                travel.drop()
+                turning.drop()
+
+    def _tell(self) -> None:
+        left, right = (self._travel.rate + side * self._turning.rate * AXLE_M / 2.0 for side in (-1, 1))
+        units = round(self._heading / (2.0 * math.pi) * 4096) % 4096
+        self._out += status(
+            moving=not (self._travel.at_rest and self._turning.at_rest),
+            x=round(1000 * self._x), y=round(1000 * self._y), heading=units,
+            left=round(1000 * left), right=round(1000 * right), stalled=self._stalled, enabled=self._enabled,
+        )
+        if self._encoders:
+            wrap = (round(COUNTS_PER_M * side) for side in (self._left, self._right))
+            self._out += counts(*((value + (1 << 31)) % (1 << 32) - (1 << 31) for value in wrap))

@@ -1,0 +1,96 @@
+"""P2OS packets as the base reads and writes them, written from the manual's tables."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+STRING = 0x2B
+NEGATIVE = 0x1B
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A client command.
+
+    Attributes:
+        number: of the command.
+        argument: 0 where there is none.
+        raw: command, type and argument as they came.
+    """
+
+    number: int
+    argument: int
+    raw: bytes
+
+
+def sealed(content: bytes) -> bytes:
+    """A packet with this content."""
+    return b"\xfa\xfb" + struct.pack("B", len(content) + 2) + content + struct.pack(">H", check(content))
+
+
+def check(content: bytes) -> int:
+    """The packet-integrity checksum, word by word as the manual has it."""
+    total, left = 0, len(content)
+    at = 0
+    while left > 1:
+        total = (total + (content[at] << 8 | content[at + 1])) & 0xFFFF
+        at, left = at + 2, left - 2
+    if left:
+        total ^= content[at]
+    return total
+
+
+class Reader:
+    """The base's receiver: a state machine that is fed byte by byte, and begins anew where a packet does not hold."""
+
+    def __init__(self) -> None:
+        self._bytes = bytearray()
+        self.rejected = 0
+
+    def feed(self, data: bytes) -> list[Request]:
+        """The commands that are complete with these bytes."""
+        requests = []
+        for byte in data:
+            self._bytes.append(byte)
+            if not self._may_go_on():
+                self.rejected += len(self._bytes) > 2
+                self._bytes[:] = b"\xfa" if byte == 0xFA else b""
+            elif len(self._bytes) > 3 and len(self._bytes) == 3 + self._bytes[2]:
+                content = bytes(self._bytes[3:-2])
+                if check(content) == self._bytes[-2] << 8 | self._bytes[-1]:
+                    requests.append(_request(content))
+                else:
+                    self.rejected += 1
+                self._bytes.clear()
+        return requests
+
+    def _may_go_on(self) -> bool:
+        """Whether what is there may still become a packet: header, then a count that is in bounds."""
+        got = self._bytes
+        return b"\xfa\xfb".startswith(bytes(got[:2])) and (len(got) < 3 or 3 <= got[2] <= 249)
+
+
+def _request(content: bytes) -> Request:
+    if len(content) < 4 or content[1] == STRING:
+        return Request(content[0], 0, content)
+    amount: int = struct.unpack_from("<H", content, 2)[0]
+    if content[1] != NEGATIVE and amount > 32767:
+        amount -= 65536
+    return Request(content[0], -amount if content[1] == NEGATIVE else amount, content)
+
+
+def status(
+    *, moving: bool, x: int, y: int, heading: int, left: int, right: int, stalled: bool, enabled: bool
+) -> bytes:
+    """A standard server information packet; battery full, no sonar, nothing on the ports."""
+    return sealed(struct.pack(
+        "<BHHhhhBBBhHBBBBBB",
+        0x33 if moving else 0x32, x & 0x7FFF, y & 0x7FFF, heading, left, right, 130,
+        1 if stalled else 0, 1 if stalled else 0, 0, 1 if enabled else 0, 0, 0, 0, 0, 0, 0,
+    ))
+
+
+def counts(left: int, right: int) -> bytes:
+    """An encoder packet."""
+    return sealed(struct.pack("<Bii", 0x90, left, right))

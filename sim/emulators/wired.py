@@ -1,0 +1,33 @@
+"""An emulated base wired to its host by a pseudo-terminal that pyserial opens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import serial
+
+from sim.emulators.emulator import Emulator
+from sim.emulators.lockstep import LockstepLink
+from sim.emulators.terminal import Terminal
+
+
+class Wired(LockstepLink):
+    """A lock-step link, both ends of its pseudo-terminal with it.
+
+    Attributes:
+        name: the pseudo-terminal, as /dev/pts/7.
+    """
+
+    def __init__(self, emulator: Emulator, clock: Callable[[], float] | None = None) -> None:
+        """``clock``: see :class:`LockstepLink`."""
+        terminal = Terminal(emulator)
+        super().__init__(serial.serial_for_url(terminal.name), terminal, emulator, clock=clock)
+        self.name = terminal.name
+        self._open: Terminal | None = terminal
+
+    def close(self) -> None:
+        """Let go of both ends."""
+        super().close()
+        if self._open is not None:
+            self._open.close()
+            self._open = None

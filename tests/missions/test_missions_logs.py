@@ -1,0 +1,99 @@
+"""The recording of a real mission in which things go wrong: everything that the journal has is in it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from harvey.mission import run_mission
+from harvey.run_directory import RunDirectory
+from logs.journal_file import read_journal
+from logs.overview import read_series
+from logs.paths import CHAPTERS, HARVEY, TABLE, WHY
+from logs.reader import read_decisions, read_frames
+from sim.assembly import set_stage
+from sim.scenario import parse_scenario
+
+SCENARIO = """
+description = "Unplugged, pushed aside and carried off in the hallway."
+world = "research_center"
+details = ["research_center_details"]
+goal = "(ptrans (hallway (4,4,0)) (hallway (24,4,0)))"
+
+[start]
+heading_deg = 0.0
+put_down_sigma_in = 0.5
+
+[[faults]]
+kind = "bump"
+in_locale = "hallway"
+after_ft = 5.0
+left_m = 0.3
+turn_deg = 10.0
+
+[[faults]]
+kind = "kidnap"
+in_locale = "hallway"
+after_ft = 12.0
+forward_m = 0.8
+turn_deg = 15.0
+
+[[faults]]
+kind = "camera_unplugged"
+after_ft = 2.0
+duration_s = 4.0
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
+    folder = tmp_path_factory.mktemp("faulty")
+    out = folder / "run"
+    out.mkdir()
+    run_mission(set_stage(parse_scenario(SCENARIO, "faulty")), 0, out=out)
+    return RunDirectory(out)
+
+
+def test_every_field_of_every_decision_is_in_the_recording(run: RunDirectory) -> None:
+    from_journal, from_recording = list(read_journal(run.journal)), read_decisions(run.recording)
+    assert len(from_journal) == len(from_recording) > 100
+    for kept, drawn in zip(from_journal, from_recording, strict=True):
+        assert kept.keys() == drawn.keys()
+        for field, value in kept.items():
+            assert drawn[field] == value, f"cycle {kept['cycle']}: {field}"
+
+
+def test_every_picture_is_in_the_recording(run: RunDirectory) -> None:
+    frames = read_frames(run.recording)
+    assert b"".join(frames[number] for number in sorted(frames)) == run.camera.read_bytes()
+
+
+def test_every_decision_has_its_sentence(run: RunDirectory) -> None:
+    cycles = [record["cycle"] for record in read_journal(run.journal)]
+    told = read_series(run.recording, TABLE, "TextLog:text")
+    assert [cycle for cycle, _ in told] == cycles
+    assert all(text for _, text in told)
+
+
+def test_the_story_tells_what_went_wrong(run: RunDirectory) -> None:
+    """The turning points in the recording are those in the journal, and the truth beside them."""
+    turns = read_series(run.recording, CHAPTERS, "TextLog:level")
+    for verdict in ("verified", "refuted"):
+        judged = [record["cycle"] for record in read_journal(run.journal) for change in record["made"]
+                  if change["type"] == "Certificate" and change["value"]["verdict"] == verdict]
+        assert [cycle for cycle, word in turns if word == verdict] == judged
+    words = [word for _, word in turns]
+    assert words.count("fault") == 2, "it begins and it ends"
+    assert "in truth" in words and "lost" in words and "found" in words
+    assert words.index("in truth") < words.index("lost") < words.index("found")
+    moods = [word for _, word in read_series(run.recording, HARVEY, "StateChange:state")]
+    assert {"drives", "doubts", "is lost", "is in trouble"} <= set(moods)
+    assert moods[-1] == json.loads(run.result.read_text())["outcome"]
+
+
+def test_the_headline_follows_the_mood(run: RunDirectory) -> None:
+    headlines = [text.splitlines()[0] for _, text in read_series(run.recording, WHY, "TextDocument:text")]
+    assert all(line.startswith("### ") for line in headlines)
+    assert any(line.startswith("### Lost") for line in headlines)
+    assert headlines[-1].startswith("### The end: ")

@@ -1,0 +1,197 @@
+"""A run that was cut off goes on from its last decision: nothing is lost, nothing is done twice, and it arrives."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harvey.cli import main
+from harvey.experiments import crash
+from harvey.minds import mind_of
+from harvey.mission import run_mission
+from harvey.records import DecisionRecord, read_records
+from harvey.referee import MissionResult
+from harvey.repair import redrawn
+from harvey.replay import pictures_of, replayed
+from harvey.resume import remains_of, resume
+from harvey.run_directory import RunDirectory
+from harvey.run_head import RunHead
+from logs import disk
+from logs.reader import damage_of, read_decisions, read_frames
+from sim.assembly import Stage
+
+SEED = 3
+
+
+@pytest.fixture(scope="module")
+def whole(short_stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
+    """A run that was not cut off."""
+    run = RunDirectory(tmp_path_factory.mktemp("runs") / "whole")
+    assert run_mission(short_stage, SEED, out=run.path).outcome == "reached"
+    return run
+
+
+def cut(whole: RunDirectory, to: Path, decisions: int, *, tail: int = 40) -> RunDirectory:
+    """The run as a crash leaves it: so many decisions, and the beginning of the next."""
+    run = RunDirectory(to)
+    to.mkdir()
+    for name in ("run.json", "camera.mjpeg"):
+        shutil.copy(whole.path / name, to / name)
+    (to / "recording.rrd").write_bytes(whole.recording.read_bytes()[:5000])
+    lines = whole.journal.read_bytes().splitlines(keepends=True)
+    run.journal.write_bytes(b"".join(lines[:decisions]) + b"".join(lines[decisions:])[:tail])
+    return run
+
+
+def gone_on(run: RunDirectory, stage: Stage) -> MissionResult:
+    return resume(run, remains_of(run), stage=stage)
+
+
+def decided_again(run: RunDirectory) -> bool:
+    """Whether the whole journal, the crash included, comes out again byte for byte."""
+    with mind_of(RunHead.read(run.path)) as mind:
+        return all(told.same for told in replayed(run, pictures_of(run), mind.scheduler()))
+
+
+def made_by(records: list[DecisionRecord], kind: str, which: int) -> int:
+    """How many decisions there are up to the one that makes the n-th entry of a type."""
+    return [r.cycle for r in records if any(e.type == kind for e in r.made)][which]
+
+
+def answered(run: RunDirectory) -> list[str]:
+    """The motor commands, once for each report on them."""
+    return [record.because[0] for decision in read_records(run.journal) for record in decision.observed
+            if record.type == "MotionReport"]
+
+
+def test_where_no_motion_was_broken_off_it_is_as_if_nothing_had_been(
+    whole: RunDirectory, short_stage: Stage, tmp_path: Path
+) -> None:
+    records = list(read_records(whole.journal))
+    before = made_by(records, "Look", 2)
+    run = cut(whole, tmp_path / "run", before)
+    assert gone_on(run, short_stage).outcome == "reached"
+    first, second = ([r.data for r in read_records(d.journal)] for d in (whole, run))
+    assert first[:before] == second[:before]
+    assert first[before + 1:] == second[before + 1:]
+    told = [e for e in read_records(run.journal) for e in e.observed if e.type == "Resumed"]
+    assert [(e.cycle, e.author, e.value["interrupted"]) for e in told] == [(before + 1, "resume", [])]
+    assert run.camera.read_bytes() == whole.camera.read_bytes()
+    assert decided_again(run)
+    assert damage_of(run.recording) is None
+    assert [d["cycle"] for d in read_decisions(run.recording)] == [r.cycle for r in records]
+
+
+def test_a_motion_that_nobody_reported_on_is_not_carried_out_again(
+    whole: RunDirectory, short_stage: Stage, tmp_path: Path
+) -> None:
+    """Cut off twice, each time while a motor command is under way: the wheels are asked how far it went."""
+    before = made_by(list(read_records(whole.journal)), "MotorCommand", 2)
+    run = cut(whole, tmp_path / "once", before)
+    assert gone_on(run, short_stage).outcome == "reached"
+    records = list(read_records(run.journal))
+    command = next(e for e in records[before - 1].made if e.type == "MotorCommand")
+    resumed, report = records[before].observed
+    assert (resumed.type, resumed.value["interrupted"], resumed.because) == ("Resumed", [command.ref], (command.ref,))
+    assert (report.type, report.because) == ("MotionReport", (command.ref,))
+    claimed, asked = (abs(v["turn_rad"]) + v["move_m"] for v in (report.value, command.value))
+    assert claimed < asked
+    assert len(answered(run)) == len(set(answered(run)))
+    assert decided_again(run)
+
+    again = cut(run, tmp_path / "twice", made_by(records, "MotorCommand", 4))
+    assert gone_on(again, short_stage).outcome == "reached"
+    assert sum(e.type == "Resumed" for r in read_records(again.journal) for e in r.observed) == 2
+    assert len(answered(again)) == len(set(answered(again)))
+    assert decided_again(again)
+
+
+@pytest.mark.parametrize("tail", [0, 200])
+def test_a_run_that_had_hardly_begun_begins(
+    whole: RunDirectory, short_stage: Stage, tmp_path: Path, tail: int
+) -> None:
+    run = cut(whole, tmp_path / "run", 0, tail=tail)
+    assert gone_on(run, short_stage).outcome == "reached"
+    assert run.journal.read_bytes() == whole.journal.read_bytes()
+
+
+def test_a_finished_run_says_so(whole: RunDirectory, capsys: pytest.CaptureFixture[str]) -> None:
+    before = whole.journal.read_bytes()
+    assert main(["resume", str(whole.path)]) == 0
+    assert "was not cut off: it ended with reached" in capsys.readouterr().out
+    assert whole.journal.read_bytes() == before
+
+
+def test_a_simulator_that_answers_otherwise_is_found_out(
+    whole: RunDirectory, short_stage: Stage, tmp_path: Path
+) -> None:
+    run = cut(whole, tmp_path / "run", 20)
+    head = json.loads((run.path / "run.json").read_text())
+    (run.path / "run.json").write_text(json.dumps({**head, "seed": SEED + 1}))
+    assert main(["resume", str(run.path)]) == 2
+
+
+def test_two_processes_do_not_write_one_run(
+    whole: RunDirectory, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = cut(whole, tmp_path / "run", 9)
+    open_elsewhere = disk.Appended(run.journal, "journal", keep=run.journal.stat().st_size)
+    assert main(["resume", str(run.path)]) == 2
+    assert "another process is writing it" in capsys.readouterr().err
+    open_elsewhere.close()
+
+
+def test_a_damaged_recording_is_drawn_anew(
+    whole: RunDirectory, short_stage: Stage, tmp_path: Path
+) -> None:
+    run = cut(whole, tmp_path / "run", 30)
+    assert damage_of(run.recording) is not None
+    assert redrawn(run) == 30
+    assert damage_of(run.recording) is None
+    assert [d["cycle"] for d in read_decisions(run.recording)] == list(range(1, 31))
+    drawn, known = read_frames(run.recording), pictures_of(run)
+    assert drawn == dict(known)
+
+
+@pytest.mark.parametrize(("name", "room"), [("journal.jsonl", 60_000), ("camera.mjpeg", 150_000)])
+def test_a_full_disk_stops_the_run_and_what_was_written_stays(
+    short_stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, room: int
+) -> None:
+    run = RunDirectory(tmp_path / "run")
+    with monkeypatch.context() as patched:
+        patched.setattr(disk.os, "write", _with_room(run.path / name, room))
+        result = run_mission(short_stage, SEED, out=run.path)
+    assert result.outcome == "failed"
+    assert "No space left on device" in result.reason and str(run.path / name) in result.reason
+    assert (run.path / name).stat().st_size <= room
+    assert run.journal.read_bytes().endswith(b"\n")
+    assert decided_again(run)
+    assert gone_on(run, short_stage).outcome == "reached"
+
+
+def _with_room(path: Path, room: int) -> Callable[[int, bytes], int]:
+    """``os.write`` on a disk where one file finds only so much room; the last write gets in a part."""
+    def write(file: int, data: bytes) -> int:
+        if os.path.realpath(f"/proc/self/fd/{file}") != str(path.resolve()):
+            return real(file, data)
+        left = room - os.fstat(file).st_size
+        if left <= 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return real(file, data[:left])
+
+    real: Any = os.write
+    return write
+
+
+def test_a_process_that_is_killed_loses_nothing(tmp_path: Path) -> None:
+    """SIGKILL in the middle of a drive, and again while it is resumed."""
+    found = crash._tried(crash.Trial(0, "office", 1, 25, 0.03, 6.0), tmp_path)
+    assert (found.wrong, found.outcome) == ("", "reached")
+    assert found.kills >= 1

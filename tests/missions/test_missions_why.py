@@ -1,0 +1,216 @@
+"""Why, on whole missions: every entry has a story, every decision its grounds, every expert a reason to keep still.
+
+Two seeds of one mission across Allen's office, in which somebody bumps into Harvey.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from blackboard.knowledge_source import KnowledgeSource
+from harvey.campaign import Task, run_task
+from harvey.cli import main
+from harvey.diff_cause import grounds, parting, same
+from harvey.minds import mind_of
+from harvey.run_head import RunHead
+from harvey.why_ask import AskedView, board_at, changes, why_absent
+from harvey.why_history import History
+from harvey.why_hour import write_hour
+from harvey.why_journal import JournalHistory
+from harvey.why_links import reason
+from harvey.why_milestone import milestone_story, milestones
+from harvey.why_not import in_cycle
+from harvey.why_reach import check
+from harvey.why_story import lines_of, story
+
+BUMPED = """
+description = "Across Allen's office, with a bump on the way."
+world = "research_center"
+details = ["research_center_details"]
+goal = "(ptrans (allens-office (7,4,0)) (allens-office (13,12,0)))"
+
+[start]
+heading_deg = 60.0
+put_down_sigma_m = 0.02
+put_down_sigma_deg = 1.0
+
+[[faults]]
+kind = "bump"
+in_locale = "allens-office"
+after_ft = 3.0
+left_m = 0.3
+turn_deg = 10.0
+"""
+MOTION = re.compile(
+    r"Harvey was told to .+ because the line to follow lay .+ (left|right) of where it believed that it faced,"
+    r" because in camera frame \d+ .+ px (left|right|above|below).* its prediction at .+ \(Tracks-1\.\d+\),"
+    r" made from pose Hypothesis-1\.\d+, made from match LineMatch-\d+ of segments? [\d, and]+.* in camera frame \d+"
+    r" against .+\.$"
+)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("bumped")
+    scenario = folder / "bumped.toml"
+    scenario.write_text(BUMPED, encoding="utf-8")
+    for seed in (0, 1):
+        assert run_task(Task(str(scenario), (), seed, folder / str(seed))).outcome == "reached"
+    return folder / "0", folder / "1"
+
+
+@pytest.fixture(scope="module")
+def history(runs: tuple[Path, Path]) -> History:
+    return JournalHistory(runs[0] / "journal.jsonl")
+
+
+@pytest.fixture(scope="module")
+def experts(runs: tuple[Path, Path]) -> Iterator[tuple[KnowledgeSource, ...]]:
+    with mind_of(RunHead.read(runs[0])) as mind:
+        yield mind.sources
+
+
+def test_every_decision_rests_on_something(runs: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    for run in runs:
+        found = check(JournalHistory(run / "journal.jsonl"))
+        assert found.reached == found.decisions > 50
+        assert main(["why", str(run), "--check"]) == 0
+        assert f"{found.decisions} of {found.decisions} decisions rest on something" in capsys.readouterr().out
+
+
+def test_every_entry_has_a_story_that_tells_each_thing_once_and_names_its_sources(history: History) -> None:
+    for ref in history.refs:
+        record = history.entry(ref)
+        assert record is not None
+        told = story(history, record)
+        texts = [step.text for step in told.steps]
+        assert len(set(texts)) == len(texts)
+        assert all(history.entry(name) is not None for step in told.steps for name in step.refs)
+        if record.type != "Command":
+            assert "command" in {step.label for step in told.steps}
+        assert not re.search(r"\bnan\b|\binf\b|None", "\n".join(lines_of(told)))
+
+
+def test_a_motion_is_told_in_one_sentence_down_to_segments_and_model(history: History) -> None:
+    motions = [r for ref in history.refs if ref.startswith("MotorCommand") and (r := history.entry(ref))]
+    heads = [story(history, r).headline for r in motions]
+    assert all(" because " in head for head in heads)
+    tracked = [h for h in heads if "(Tracks-" in h]
+    assert len(tracked) >= 5
+    assert [h for h in tracked if "line to follow" in h and "match" in h and not MOTION.match(h)] == []
+    assert sum(MOTION.match(h) is not None for h in tracked) >= 5
+
+
+def test_the_numbers_of_a_story_are_those_of_the_entries(history: History) -> None:
+    for ref in (ref for ref in history.refs if ref.startswith("Leg-")):
+        leg = history.entry(ref)
+        belief = None if leg is None else reason(history, leg, "Hypothesis")
+        sketch = None if leg is None else history.entry(history.newest[leg.value["sketch"]])
+        if leg is None or belief is None or sketch is None or leg.value["to_go_m"] is None:
+            continue
+        goal, here = sketch.value["subgoals"][leg.value["index"]]["destination"], belief.value["locale_from_robot"]
+        if goal["locale"] == belief.value["locale"]:
+            away = ((goal["x_m"] - here["x_m"]) ** 2 + (goal["y_m"] - here["y_m"]) ** 2) ** 0.5
+            assert away**2 == pytest.approx(leg.value["to_go_m"] ** 2 + leg.value["left_m"] ** 2, abs=1e-6)
+
+
+def test_a_milestone_tells_what_was_expected_seen_and_judged_and_what_followed(history: History) -> None:
+    told = [milestone_story(history, id) for id in milestones(history, "M0")]
+    assert told
+    for one in told:
+        labels = [step.label for step in one.steps]
+        assert [label for label in ("wanted", "believed", "expected", "seen", "judged", "followed")
+                if label not in labels] == []
+        assert "probability" in next(step.text for step in one.steps if step.label == "judged")
+
+
+def test_who_is_not_named_could_not_act_and_who_is_says_so_again(
+    history: History, experts: tuple[KnowledgeSource, ...]
+) -> None:
+    """The journal and the experts, asked again on a board that is put together from it, agree in every cycle."""
+    asked = 0
+    for cycle in history.cycles:
+        board, decision = board_at(history, cycle), history.decision(cycle)
+        ratings = {(c.source, c.trigger): c.rating for c in decision.activated}
+        for expert in experts:
+            for change in changes(history, cycle):
+                key = (expert.name, str(change.entry.ref))
+                if any(watch.sees(change) for watch in expert.watches) and board.view.is_current(change.entry):
+                    assert expert.rate(AskedView(board), change) == ratings.get(key)
+                    asked += 1
+        absent = [e for e in experts if not in_cycle(history, e.name, cycle)]
+        for expert in absent[:: len(absent) // 2 or 1]:
+            assert "could have acted" not in "\n".join(why_absent(history, expert, cycle))
+    assert asked > 100
+
+
+def test_why_not_is_answered_on_the_command_line(
+    runs: tuple[Path, Path], history: History, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def said(*more: str) -> str:
+        assert main(["why", str(runs[0]), *more]) == 0
+        return capsys.readouterr().out
+
+    assert "watches for" in said("--not", "relocalizer", "--at", "3")
+    lost = next(d for d in history.decisions() if d.runner_up and d.chosen and d.runner_up.source != d.chosen.source)
+    assert lost.runner_up is not None and lost.chosen is not None
+    out = said("--not", lost.runner_up.source, "--at", str(lost.cycle))
+    assert "was not chosen" in out
+    assert f"{lost.chosen.rating:.2f}" in out and f"{lost.runner_up.rating:.2f}" in out
+    assert "superseded in cycle" in said("--not", "Hypothesis-1.0")
+    assert "was able to act" in said("--not", "motor")
+    assert json.loads(said("--not", "motor", "--json"))["not"] == "motor"
+    assert main(["why", str(runs[0]), "--not", "mtor", "--at", "3"]) == 2
+    assert "motor" in capsys.readouterr().err
+    assert main(["why", str(runs[0]), "--not", "Gaol-1"]) == 2
+    assert "Goal-1" in capsys.readouterr().err
+
+
+def test_two_seeds_part_at_an_observation_and_each_later_difference_goes_back_to_one(
+    runs: tuple[Path, Path], history: History, capsys: pytest.CaptureFixture[str]
+) -> None:
+    theirs = JournalHistory(runs[1] / "journal.jsonl")
+    assert main(["diff", str(runs[0]), str(runs[1])]) == 1
+    out = capsys.readouterr().out
+    where = parting(history, theirs, 0)
+    first = history.entry(where.observation)
+    assert first is not None and first.observed
+    assert all(same(history.entry(r.ref), theirs.entry(r.ref))
+               for d in history.decisions() if d.cycle < first.cycle for r in (*d.observed, *d.made))
+    assert f"The first observation that differs is {where.observation}, in cycle {first.cycle}" in out
+    assert f"The first motion that differs is {where.motion}" in out
+    chain = list(grounds(history, theirs, where.motion))
+    assert chain[-1][0].observed
+    assert "seed: 0 against 1" in out
+
+
+def test_the_same_run_does_not_differ(runs: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["diff", str(runs[0]), str(runs[0])]) == 0
+    assert "agree in all" in capsys.readouterr().out
+
+
+def test_a_run_told_over_and_over_is_a_journal_too(runs: tuple[Path, Path], history: History, tmp_path: Path) -> None:
+    write_hour(runs[0] / "journal.jsonl", tmp_path / "journal.jsonl", cycles=3 * len(history.cycles))
+    longer = JournalHistory(tmp_path / "journal.jsonl")
+    assert longer.cycles == tuple(range(1, 3 * len(history.cycles) + 1))
+    assert len(longer.refs) == len(set(longer.refs)) == 3 * len(history.refs)
+    found = check(longer)
+    assert found.reached == found.decisions == len(longer.cycles)
+    for k in (1, 2):
+        cycle = history.cycles[-1] * k + 40
+        assert len(longer.candidates(cycle)) == len(history.candidates(40))
+
+
+def test_an_answer_needs_none_of_the_heavy_libraries(runs: tuple[Path, Path]) -> None:
+    """An explanation starts as fast as it can only where nothing is imported that it does not use."""
+    code = f"import sys; from harvey.cli import main; main(['why', {str(runs[0])!r}]); print(sorted(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    loaded = set(re.findall(r"'(\w+)'", done.stdout.splitlines()[-1]))
+    assert loaded & {"numpy", "scipy", "cv2", "numba", "rerun", "shapely", "networkx"} == set()
