@@ -9,11 +9,11 @@ import sys
 import termios
 import threading
 import tty
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
 
-KEYS = {" ": "space", "\n": "enter", "\r": "enter", "q": "q", "\x1b": "escape", "\x03": "Ctrl-C"}
+KEYS: Mapping[str, str] = {" ": "space", "\n": "enter", "\r": "enter", "q": "q", "\x1b": "escape", "\x03": "Ctrl-C"}
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 

@@ -21,7 +21,7 @@ FRAME_S = 0.1
 """Time that taking a picture takes [s]."""
 WATCHDOG_S = 0.5
 """A base that hears nothing any more goes on for so long before it stops by itself [s]."""
-GOES_ON = {"link_lost": WATCHDOG_S, "nonsense": WATCHDOG_S, "stall": 0.0}
+GOES_ON: Mapping[str, float] = {"link_lost": WATCHDOG_S, "nonsense": WATCHDOG_S, "stall": 0.0}
 """Ailments that break a motion off, and how long it goes on [s]."""
 
 

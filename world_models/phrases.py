@@ -7,6 +7,7 @@ means the point in it that is furthest from walls and from what stands about.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -22,7 +23,7 @@ FETCH = re.compile(r"\s*(?:please\s+)?(?:fetch|get)\s+(?P<what>.+?)\s*[.!]?\s*",
 EMPTY = frozenset(("the", "a", "an", "of", "my"))
 SHOWN = 6
 GRID = 21
-NUMBERS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
+NUMBERS: Mapping[int, str] = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
 
 
 def check_command(text: str) -> None:

@@ -6,7 +6,7 @@ import os
 import sys
 import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from harvey.dry_run import Check, DryRun
     from harvey.hardware_mission import HardwareMission
 
-OPTIONS = {
+OPTIONS: Mapping[str, tuple[str, str, str]] = {
     "world": ("world", "FILE", "the building: a world file, or the name of one that comes with Harvey"),
     "goal": ("goal", "GOAL", 'from where to where, feet in each locale: "(ptrans (hall (3,4,0)) (kitchen (6,5,0)))"'),
     "heading": ("start.heading_deg", "DEGREES", "where the robot looks at the start, in the first locale's frame"),

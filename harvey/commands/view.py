@@ -25,11 +25,11 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    runs = [run for text in args.runs for run in _runs(text)]
-    if len(args.runs) == 1 and runs[0].path == _directory(args.runs[0]):
+    if len(args.runs) == 1 and not _is_campaign(_directory(args.runs[0])):
         if args.save:
             raise BadInput("--save: expected several runs, or a directory of them, got one run")
         return _open(_whole(open_run(args.runs[0], "recording.rrd")))
+    runs = [run for text in args.runs for run in _runs(text)]
     overview = Path(args.save) if args.save else _beside(runs)
     _write(runs, overview)
     if args.save:
@@ -56,10 +56,14 @@ def _directory(text: str) -> Path:
 def _runs(text: str) -> list[RunDirectory]:
     """One run, or all runs of a directory in the order of their numbers. Raises BadInput where there is none."""
     here = _directory(text)
-    inner = [path.parent for path in here.glob("*/journal.jsonl")]
-    if inner and not (here / "journal.jsonl").exists():
-        return [RunDirectory(path) for path in sorted(inner, key=_natural)]
-    return [open_run(text)]
+    if not _is_campaign(here):
+        return [open_run(text)]
+    return [RunDirectory(path) for path in sorted((p.parent for p in here.glob("*/journal.jsonl")), key=_natural)]
+
+
+def _is_campaign(here: Path) -> bool:
+    """Whether a directory holds runs and is none."""
+    return not (here / "journal.jsonl").exists() and any(here.glob("*/journal.jsonl"))
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:

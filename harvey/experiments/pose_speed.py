@@ -24,8 +24,8 @@ LINES, LANDMARKS, WRONG = 17, (0, 1, 4, 5, 6, 7), 5
 SIGMA_PX, PRIOR_M, PRIOR_RAD = 0.4, 0.6, 0.04
 MOST_COMBINATORIAL, MOST_SINGLE = 0.6, 1.0
 NOTES = (
-    f"{LINES} lines of {len(LANDMARKS)} landmarks of the campus of Table 2: 20 subsets of three. {WRONG} lines wrong for"
-    " the robust solvers, none for the others.",
+    f"{LINES} lines of {len(LANDMARKS)} landmarks of the campus of Table 2: 20 subsets of three. {WRONG} lines wrong"
+    " for the robust solvers, none for the others.",
     f"Ends with {SIGMA_PX} px of noise; prior off by up to {PRIOR_M} m and {PRIOR_RAD} rad on each axis.",
     "Whole calls from Python on both sides, with their checks and what they hand back; ours gives residuals, covariance"
     " and reasons besides. Ours are compiled by numba, PoseLib is C++. The peer's pose object is made within its call.",

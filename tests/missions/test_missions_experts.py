@@ -24,8 +24,8 @@ from world_models.body import MotionReport
 from world_models.robot import RobotModel
 
 NAMES = [expert.__module__.rpartition(".")[2] for expert in EXPERTS]
-NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer"}
-"""Where nothing goes wrong, the mission may be reached without these: they close the servo loops."""
+NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "safekeeper"}
+"""Where nothing goes wrong, the mission may be reached without these: they close servo loops, or answer faults."""
 
 
 @pytest.mark.parametrize("missing", NAMES)

@@ -1,7 +1,7 @@
 """Calibration of real photographs: OpenCV's samples of a chessboard, 640 x 480, left and right camera of a pair.
 
-They are in `opencv/samples/data` of the source distribution of opencv-python-headless: unpack it and name that folder in
-OPENCV_SAMPLES.
+They are in `opencv/samples/data` of the source distribution of opencv-python-headless: unpack it and name that folder
+in OPENCV_SAMPLES.
 """
 
 from __future__ import annotations
