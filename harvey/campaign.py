@@ -106,9 +106,9 @@ def run_task(
 
 def _kept_or_resumed(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence[Sink], live: bool) -> MissionResult:
     """What an earlier campaign did of this mission. Raises BadInput where another mission is there."""
+    from harvey.again.resume import remains_of, resume
     from harvey.mission import head_of
     from harvey.referee import MissionResult
-    from harvey.resume import remains_of, resume
     from harvey.run_head import RunHead
 
     if not RunHead.read(run.path).is_like(head_of(stage, task.seed, task.body)):

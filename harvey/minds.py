@@ -21,7 +21,7 @@ from blackboard.effect import Effect, Post
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Servoing
-from harvey.constants import set_for_a_while
+from harvey.again.constants import set_for_a_while
 from harvey.errors import BadInput
 from harvey.retention import RETENTION
 from harvey.run_head import RunHead

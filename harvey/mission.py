@@ -13,13 +13,13 @@ from blackboard.effect import Post
 from blackboard.journal import Decision, Sink
 from blackboard.scheduler import Scheduler
 from harvey.diary import Diary
+from harvey.hardware.serial_body import IN_PROCESS, reached
 from harvey.loop import until_outcome
 from harvey.minds import Mind, Sources, mind_of
 from harvey.ports import Body, BodyPort
 from harvey.referee import MissionResult, Referee
 from harvey.run_directory import RunDirectory
 from harvey.run_head import SIMULATOR, RunHead
-from harvey.serial_body import IN_PROCESS, reached
 from harvey.wiring import command, knowledge_sources, robot_model
 from logs.disk import CannotWriteError
 from logs.errors import RecordingError
@@ -58,7 +58,7 @@ def run_mission(
         live: let a viewer watch.
         sources: which experts sit round the board.
         head: how the run begins, if otherwise than the scenario says.
-        body: how the body is reached (:func:`harvey.serial_body.reached`), where ``head`` does not say it.
+        body: how the body is reached (:func:`harvey.hardware.serial_body.reached`), where ``head`` does not say it.
         around: puts something between the mind and the body.
     """
     head = head or head_of(stage, seed, body)

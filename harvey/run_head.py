@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from blackboard.encoding import plain
+from harvey.again.observations import decoded
 from harvey.errors import BadInput
-from harvey.observations import decoded
 from sim.scenario import ROOT, Servo
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
@@ -39,7 +39,7 @@ class RunHead:
         without, constants: what was taken from the experts' minds, for a run that tells what would have been.
         scenario: simulator: the scenario's tables as read, with ``--set`` applied; hardware: what the driver needs.
         folder: simulator: where the scenario's file was.
-        body: simulator: how the body is reached, as :func:`harvey.serial_body.reached` knows it.
+        body: simulator: how the body is reached, as :func:`harvey.hardware.serial_body.reached` knows it.
         harvey: version.
     """
 

@@ -14,7 +14,7 @@ from harvey.commands.command import Command, whole
 from harvey.errors import BadInput
 
 if TYPE_CHECKING:
-    from harvey.calibration import Grey, Mounted
+    from harvey.hardware.calibration import Grey, Mounted
     from knowledge_sources.drivers.video_camera import VideoCamera
     from knowledge_sources.methods.calibration import Calibration
     from knowledge_sources.methods.calibration_board import Pattern
@@ -63,7 +63,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.calibration import boards_in, calibrated, grey_of, mounted, report
+    from harvey.hardware.calibration import boards_in, calibrated, grey_of, mounted, report
     from knowledge_sources.methods.calibration_board import Pattern
     from knowledge_sources.methods.calibration_picture import calibration_picture
     from world_models.camera_file import camera_text
@@ -90,7 +90,7 @@ def _run(args: Namespace) -> int:
 
 def _checked(args: Namespace) -> Mounted | None:
     """The board of the mounting. Raises BadInput where options do not go together."""
-    from harvey.calibration import Mounted
+    from harvey.hardware.calibration import Mounted
 
     if bool(args.images) == (args.camera is not None):
         raise BadInput("expected pictures or --camera SOURCE, got " + ("both" if args.images else "neither"))
@@ -109,7 +109,7 @@ def _checked(args: Namespace) -> Mounted | None:
 
 
 def _pictures(args: Namespace, pattern: Pattern) -> Iterator[tuple[str, Grey]]:
-    from harvey.calibration import grey_of, live_pictures, picture_files
+    from harvey.hardware.calibration import grey_of, live_pictures, picture_files
 
     if args.camera is None:
         yield from ((str(path), grey_of(path)) for path in picture_files(args.images))

@@ -6,10 +6,10 @@ from argparse import ArgumentParser, Namespace
 from itertools import islice
 
 from harvey.commands.command import Command
-from harvey.diff import describe, first_difference
-from harvey.diff_cause import apart, because, opening, settings
+from harvey.explain.diff import describe, first_difference
+from harvey.explain.diff_cause import apart, because, opening, settings
+from harvey.explain.journal import JournalHistory
 from harvey.run_directory import RunDirectory, open_run
-from harvey.why_journal import JournalHistory
 
 
 def _arguments(parser: ArgumentParser) -> None:

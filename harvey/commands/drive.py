@@ -16,8 +16,8 @@ from harvey.run_directory import RUNS, new_run, vacant
 
 if TYPE_CHECKING:
     from blackboard.journal import Decision
-    from harvey.dry_run import Check, DryRun
-    from harvey.hardware_mission import HardwareMission
+    from harvey.hardware.dry_run import Check, DryRun
+    from harvey.hardware.mission import HardwareMission
 
 OPTIONS: Mapping[str, tuple[str, str, str]] = {
     "world": ("world", "FILE", "the building: a world file, or the name of one that comes with Harvey"),
@@ -42,7 +42,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 def _run(args: Namespace) -> int:
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
-    from harvey.dry_run import DryRun
+    from harvey.hardware.dry_run import DryRun
 
     mission = _mission(args)
     out = vacant(Path(args.out) if args.out else RUNS / f"{mission.name}-drive")
@@ -66,7 +66,7 @@ def _run(args: Namespace) -> int:
 
 def _mission(args: Namespace) -> HardwareMission:
     from harvey.campaign import settings_of
-    from harvey.hardware_mission import load_mission
+    from harvey.hardware.mission import load_mission
 
     given = {OPTIONS[name][0]: value for name in OPTIONS if (value := getattr(args, name)) is not None}
     settings: dict[str, Any] = {**dict(settings_of(args.settings)), **given}
@@ -85,7 +85,7 @@ def _tell(check: Check) -> None:
 
 
 def _drive(mission: HardwareMission, dry: DryRun, clock: Callable[[], float], out: Path, live: bool) -> int:
-    from harvey.hardware_run import drive
+    from harvey.hardware.run import drive
 
     if dry.robot is None or dry.base is None or dry.camera is None:
         raise BadInput("expected a world, a base and a camera, and one of them is lacking")

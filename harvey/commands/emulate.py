@@ -166,5 +166,5 @@ COMMAND = Command(
     _arguments, _run,
     "It prints the name of a serial port, as /dev/pts/7, and serves it until Ctrl-C. A driver that opens this port\n"
     "finds a base that answers byte by byte as the real one would. In another terminal, for one metre ahead:\n"
-    "  python -c \"from harvey.hardware_base import open_base; print(open_base('denning:/dev/pts/7').move(1))\"",
+    "  python -c \"from harvey.hardware.base import open_base; print(open_base('denning:/dev/pts/7').move(1))\"",
 )

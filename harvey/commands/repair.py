@@ -17,7 +17,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     from tqdm import tqdm
 
-    from harvey.repair import redrawn
+    from harvey.again.repair import redrawn
 
     run = open_run(args.run)
     with tqdm(unit=" decisions", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:

@@ -15,7 +15,7 @@ from harvey.run_directory import RunDirectory, new_run, open_run
 from harvey.units import count
 
 if TYPE_CHECKING:
-    from harvey.replay import Told
+    from harvey.again.replay import Told
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -42,8 +42,8 @@ def _run(args: Namespace) -> int:
 
 def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, str], ...]) -> int:
     """Decide it again with a changed mind."""
-    from harvey.counterfactual import what_if
-    from harvey.counterfactual_words import told
+    from harvey.again.counterfactual import what_if
+    from harvey.again.counterfactual_words import told
 
     out = RunDirectory(new_run(Path(args.out))) if args.out else None
     answer = what_if(run, args.without, settings, out=out, go_on=not args.record_only)
@@ -56,8 +56,8 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
 
 def _again(run: RunDirectory) -> int:
     """Decide it again as it was."""
+    from harvey.again.replay import pictures_of, replayed
     from harvey.minds import mind_of
-    from harvey.replay import pictures_of, replayed
     from harvey.run_head import RunHead
 
     pictures, agreed = pictures_of(run), 0
@@ -76,7 +76,7 @@ def _again(run: RunDirectory) -> int:
 
 def _difference(agreed: int, told: Told) -> str:
     from blackboard.journal import decision_record
-    from harvey.diff import describe
+    from harvey.explain.diff import describe
     from harvey.records import decision_of
 
     now = None if told.now is None else decision_of(decision_record(told.now))

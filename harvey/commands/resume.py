@@ -11,7 +11,7 @@ from harvey.run_directory import RunDirectory, open_run
 from harvey.units import count
 
 if TYPE_CHECKING:
-    from harvey.resume import Remains
+    from harvey.again.resume import Remains
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -21,7 +21,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 def _run(args: Namespace) -> int:
     run = open_run(args.run, "run.json")
-    from harvey.resume import remains_of, resume
+    from harvey.again.resume import remains_of, resume
     from harvey.summary import one
 
     remains = remains_of(run)

@@ -29,7 +29,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.serial_body import body_kind
+    from harvey.hardware.serial_body import body_kind
 
     seeds, settings, body = seeds_of(args.seed), settings_of(args.settings), body_kind(args.body)
     tasks = tuple(
@@ -63,9 +63,9 @@ def _check(task: Task) -> int:
 
 
 def _one(task: Task, args: Namespace) -> int:
+    from harvey.explain.trace import printing
     from harvey.progress import following
     from harvey.summary import one
-    from harvey.trace import printing
 
     sinks = (printing(sys.stdout),) if args.trace else ()
     print(f"{task.named}: setting the stage", file=sys.stderr, flush=True)

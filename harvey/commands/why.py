@@ -9,12 +9,12 @@ from typing import Any
 
 from harvey.commands.command import Command, whole
 from harvey.errors import BadInput
+from harvey.explain.history import History
+from harvey.explain.journal import JournalHistory
+from harvey.explain.story import LEGEND, Story, lines_of, story
+from harvey.explain.trace import cycle_lines
+from harvey.explain.walk import explain, principal
 from harvey.run_directory import RunDirectory, open_run
-from harvey.trace import cycle_lines
-from harvey.why import explain, principal
-from harvey.why_history import History
-from harvey.why_journal import JournalHistory
-from harvey.why_story import LEGEND, Story, lines_of, story
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -62,7 +62,7 @@ def _refs(history: History, args: Namespace) -> list[str]:
 
 def _stories(history: History, args: Namespace, refs: Iterable[str]) -> Iterator[Story]:
     if args.milestone:
-        from harvey.why_milestone import milestone_story, milestones
+        from harvey.explain.milestone import milestone_story, milestones
 
         yield from (milestone_story(history, id) for id in milestones(history, args.milestone))
     for ref in refs:
@@ -92,7 +92,7 @@ def _record(one: Story) -> dict[str, Any]:
 
 
 def _checked(history: History, as_json: bool) -> int:
-    from harvey.why_reach import KINDS, check, named
+    from harvey.explain.reach import KINDS, check, named
 
     found = check(history)
     if as_json:
@@ -108,7 +108,7 @@ def _checked(history: History, as_json: bool) -> int:
 
 
 def _print_not(run: RunDirectory, history: History, args: Namespace) -> None:
-    from harvey.why_expert import answers
+    from harvey.explain.expert import answers
 
     lines = list(answers(run, history, args.not_, args.at))
     print(json.dumps({"not": args.not_, "at": args.at, "because": lines}, indent=2) if args.json else "\n".join(lines))

@@ -18,17 +18,18 @@ if TYPE_CHECKING:
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("what", choices=("check", "show", "compile", "import"),
                         help="check for faults; show what is in it; compile it into one file that is read room by room;"
-                             " import from another format (not yet)")
+                             " import a building from IFC or IndoorGML")
     parser.add_argument("file", metavar="FILE",
-                        help="a world file (.toml, compiled: .world), or the name of one that comes with the project")
+                        help="a world file (.toml, compiled: .world), or the name of one that comes with the project;"
+                             " import: a building (.ifc, .gml)")
     parser.add_argument("--details", metavar="FILE", action="append", default=[], help="add what only the building has")
-    parser.add_argument("--out", metavar="FILE", help="show: draw the plan there, as SVG; compile: the .world file")
+    parser.add_argument("--out", metavar="FILE", help="show: draw the plan there, as SVG; compile: the .world file;"
+                                                      " import: the .toml file")
 
 
 def _run(args: Namespace) -> int:
     if args.what == "import":
-        print("harvey world import: not yet available; it will read plans of other formats", file=sys.stderr)
-        return 2
+        return _import(args.file, args.out)
     if args.what == "compile":
         return _compile(args.file, args.details, args.out)
     world = _load(args.file, args.details)
@@ -66,6 +67,23 @@ def _compile(file: str, details: list[str], out: str | None) -> int:
     world = compile_file(path, target, details)
     print(f"{target}: {_inventory(world)}, {target.stat().st_size / 1e6:.1f} MB")
     return 0
+
+
+def _import(file: str, out: str | None) -> int:
+    from world_models.importers import BuildingError, import_building
+    from world_models.store import load_world
+
+    path = Path(file)
+    target = Path(out or path.with_suffix(".toml").name)
+    if target.suffix != ".toml":
+        raise BadInput(f"--out: expected a name that ends in .toml, got {str(target)!r}")
+    try:
+        made = import_building(path)
+    except BuildingError as error:
+        raise BadInput(str(error)) from None
+    target.write_text(made.text, encoding="utf-8")
+    print(f"{made.account}\n")
+    return _check(load_world(target), str(target))
 
 
 def _check(world: World, file: str) -> int:
@@ -106,11 +124,12 @@ def _draw(world: World, out: Path) -> None:
 
 
 COMMAND = Command(
-    "world", "check, show or compile a world file",
+    "world", "check, show, compile or import a world file",
     (
         ("harvey world check my_floor.toml", "faults with file and line; exit code 2 where there are any"),
         ("harvey world show research_center", "rooms, doorways and what is in them"),
         ("harvey world show research_center --out plan.svg", "and the plan as a drawing"),
+        ("harvey world import house.ifc --out house.toml", "what was used of a building, guessed and left out"),
         ("harvey world compile campus.toml --out campus.world", "for worlds that are too large to read at once"),
     ),
     _arguments, _run,

@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from harvey.again.reliving import interrupted_in
 from harvey.experiments.report import Cell, Report
 from harvey.records import read_records
-from harvey.reliving import interrupted_in
 from harvey.run_directory import RUNS
 
 CHILD = (sys.executable, "-m", "harvey.experiments.crash_child")

@@ -11,12 +11,12 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from harvey.again.replay import pictures_of, replayed
+from harvey.again.resume import remains_of, resume
 from harvey.campaign import Task
 from harvey.minds import mind_of
 from harvey.mission import Around, run_mission
 from harvey.ports import Body
-from harvey.replay import pictures_of, replayed
-from harvey.resume import remains_of, resume
 from harvey.run_directory import RunDirectory
 from harvey.run_head import RunHead
 from world_models.body import BodyFault, Frame, MotionReport, MotorCommand

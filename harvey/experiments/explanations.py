@@ -28,10 +28,10 @@ from tqdm import tqdm
 from harvey.campaign import WORKERS, Task, run_task
 from harvey.errors import BadInput
 from harvey.experiments.report import Report
+from harvey.explain.hour import HOUR_CYCLES, write_hour
+from harvey.explain.journal import JournalHistory
+from harvey.explain.reach import GOAL, KINDS, MODEL, SENSOR, check
 from harvey.run_directory import RUNS, RunDirectory
-from harvey.why_hour import HOUR_CYCLES, write_hour
-from harvey.why_journal import JournalHistory
-from harvey.why_reach import GOAL, KINDS, MODEL, SENSOR, check
 from sim.scenario import list_scenarios
 
 FOLDER = RUNS / "explanations"
@@ -148,8 +148,8 @@ def explained(task: Task, code: str) -> Explained:
 
 def _same(run: RunDirectory) -> int:
     """How many decisions are the same when the run is decided again."""
+    from harvey.again.replay import pictures_of, replayed
     from harvey.minds import mind_of
-    from harvey.replay import pictures_of, replayed
     from harvey.run_head import RunHead
 
     with mind_of(RunHead.read(run.path)) as mind:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey.reliving import part_of
+from harvey.again.reliving import part_of
 from sim.actuator import ActuatorParameters
 from sim.body import SimulatedBody
 from sim.box_room import box_room

@@ -17,17 +17,17 @@ from blackboard.change import Change, Posted, Retracted, Revised
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.journal import Decision, decision_line
 from blackboard.scheduler import Scheduler
-from harvey.diff import describe, differing_leaves, first_difference
 from harvey.errors import BadInput
+from harvey.explain.diff import describe, differing_leaves, first_difference
+from harvey.explain.history import Told
+from harvey.explain.journal import JournalHistory
+from harvey.explain.reach import SENSOR, accounted, explained_by, reaches
+from harvey.explain.sentences import MAKERS, sentence
+from harvey.explain.story import lines_of, story
+from harvey.explain.trace import Trace
+from harvey.explain.walk import explain, walk
+from harvey.explain.why_not import Fate, in_cycle, in_run, of_entry
 from harvey.records import Candidate, DecisionRecord, EntryRecord, as_line, decision_of
-from harvey.sentences import MAKERS, sentence
-from harvey.trace import Trace
-from harvey.why import explain, walk
-from harvey.why_history import Told
-from harvey.why_journal import JournalHistory
-from harvey.why_not import Fate, in_cycle, in_run, of_entry
-from harvey.why_reach import SENSOR, accounted, explained_by, reaches
-from harvey.why_story import lines_of, story
 from strategies import Expert, Note, Tally
 
 LAWS = settings(deadline=None, max_examples=60)

@@ -16,8 +16,8 @@ from blackboard.change import Quiescence
 from blackboard.effect import Post
 from blackboard.entry import Ref
 from blackboard.journal import change_record, plain
+from harvey.again.observations import effect_of, value_of
 from harvey.errors import BadInput
-from harvey.observations import effect_of, value_of
 from harvey.records import EntryRecord
 from world_models.body import Frame, MotionReport
 from world_models.task import Command, Outcome

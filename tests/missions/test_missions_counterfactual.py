@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from harvey.again.counterfactual import what_if
 from harvey.cli import main
-from harvey.counterfactual import what_if
 from harvey.errors import BadInput
 from harvey.mission import run_mission
 from harvey.records import DecisionRecord, read_records

@@ -12,15 +12,15 @@ from typing import Any
 
 import pytest
 
+from harvey.again.repair import redrawn
+from harvey.again.replay import pictures_of, replayed
+from harvey.again.resume import remains_of, resume
 from harvey.cli import main
 from harvey.experiments import crash
 from harvey.minds import mind_of
 from harvey.mission import run_mission
 from harvey.records import DecisionRecord, read_records
 from harvey.referee import MissionResult
-from harvey.repair import redrawn
-from harvey.replay import pictures_of, replayed
-from harvey.resume import remains_of, resume
 from harvey.run_directory import RunDirectory
 from harvey.run_head import RunHead
 from logs import disk

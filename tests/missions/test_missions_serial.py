@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from blackboard.journal import Decision, decision_line
+from harvey.hardware.serial_body import KINDS
 from harvey.mission import run_mission
 from harvey.referee import MissionResult
-from harvey.serial_body import KINDS
 from sim.assembly import Stage
 from sim.body import SimulatedBody
 from sim.faults import Ailment, Moment

@@ -17,18 +17,18 @@ import pytest
 from blackboard.knowledge_source import KnowledgeSource
 from harvey.campaign import Task, run_task
 from harvey.cli import main
-from harvey.diff_cause import grounds, parting, same
+from harvey.explain.ask import AskedView, board_at, changes, why_absent
+from harvey.explain.diff_cause import grounds, parting, same
+from harvey.explain.history import History
+from harvey.explain.hour import write_hour
+from harvey.explain.journal import JournalHistory
+from harvey.explain.links import reason
+from harvey.explain.milestone import milestone_story, milestones
+from harvey.explain.reach import check
+from harvey.explain.story import lines_of, story
+from harvey.explain.why_not import in_cycle
 from harvey.minds import mind_of
 from harvey.run_head import RunHead
-from harvey.why_ask import AskedView, board_at, changes, why_absent
-from harvey.why_history import History
-from harvey.why_hour import write_hour
-from harvey.why_journal import JournalHistory
-from harvey.why_links import reason
-from harvey.why_milestone import milestone_story, milestones
-from harvey.why_not import in_cycle
-from harvey.why_reach import check
-from harvey.why_story import lines_of, story
 
 BUMPED = """
 description = "Across Allen's office, with a bump on the way."

@@ -17,8 +17,8 @@ import pytest
 from harvey.campaign import Task, run_all, seeds_of, settings_of
 from harvey.cli import main
 from harvey.errors import BadInput, Terminated
+from harvey.explain.sentences import MAKERS
 from harvey.records import read_records
-from harvey.sentences import MAKERS
 from logs.journal_file import read_journal
 from logs.reader import read_decisions
 from world_models.frames import Pose2

@@ -17,9 +17,9 @@ from harvey.errors import BadInput
 from harvey.experiments.levels import _row
 from harvey.experiments.render_speed import edge_offsets_px
 from harvey.experiments.report import Report
+from harvey.explain.sentences import sentence
 from harvey.records import EntryRecord
 from harvey.referee import MissionResult
-from harvey.sentences import sentence
 from harvey.summary import one, several
 from harvey.tables import table
 from harvey.units import degrees, metres, turn

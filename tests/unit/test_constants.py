@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from harvey.constants import constants, set_for_a_while
+from harvey.again.constants import constants, set_for_a_while
 from harvey.errors import BadInput
 from knowledge_sources import tolerances
 from knowledge_sources.methods import lines

@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from harvey import hardware_base
 from harvey.cli import main
-from harvey.dry_run import DryRun
 from harvey.errors import BadInput
-from harvey.hardware_base import open_base
-from harvey.hardware_mission import load_mission
-from harvey.serial_body import body_kind
-from harvey.stop_key import stop_key
+from harvey.hardware import base as hardware_base
+from harvey.hardware.base import open_base
+from harvey.hardware.dry_run import DryRun
+from harvey.hardware.mission import load_mission
+from harvey.hardware.serial_body import body_kind
+from harvey.hardware.stop_key import stop_key
 from sim.emulators.denning import DenningEmulator
 from sim.emulators.denning_motion import Rolling
 from sim.emulators.ground import Floor

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from harvey.cli import main
-from harvey.hardware_base import open_base
+from harvey.hardware.base import open_base
 
 
 @pytest.mark.parametrize("kind", ["denning", "p2os", "create2"])

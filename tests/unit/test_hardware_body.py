@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
-from harvey.hardware import BASE_WORDS, CAMERA_WORDS, HardwareBody, Watching
-from harvey.heart import Heart
+from harvey.hardware.body import BASE_WORDS, CAMERA_WORDS, HardwareBody, Watching
+from harvey.hardware.heart import Heart
 from knowledge_sources.drivers.base import BaseFault, FaultKind
 from knowledge_sources.drivers.video_camera import CameraFault, CameraFaultKind, Health, VideoCamera
 from world_models.body import STOP_KEY, BodyFault, Frame, MotionReport, MotorCommand, Odometry

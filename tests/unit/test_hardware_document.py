@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from harvey.cli import main, parser
-from harvey.hardware import BASE_WORDS, CAMERA_WORDS
-from harvey.hardware_mission import load_mission
+from harvey.hardware.body import BASE_WORDS, CAMERA_WORDS
+from harvey.hardware.mission import load_mission
 from harvey.rehearsal import rehearsed
 from harvey.wiring import robot_model
 from knowledge_sources.safekeeper import FIRST_WAIT_S, LONGEST_WAIT_S, PATIENCE_S, STRIKES

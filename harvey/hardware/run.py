@@ -12,16 +12,16 @@ from blackboard.effect import Post
 from blackboard.journal import Decision, Sink
 from blackboard.scheduler import Scheduler
 from harvey.diary import Diary
-from harvey.hardware import HardwareBody, Watching
-from harvey.hardware_mission import HardwareMission
-from harvey.heart import Heart
+from harvey.hardware.body import HardwareBody, Watching
+from harvey.hardware.heart import Heart
+from harvey.hardware.mission import HardwareMission
+from harvey.hardware.stop_key import stop_key
 from harvey.loop import until_outcome
 from harvey.minds import mind_of
 from harvey.ports import BodyPort
 from harvey.referee import Counts
 from harvey.run_directory import RunDirectory
 from harvey.run_head import HARDWARE, RunHead
-from harvey.stop_key import stop_key
 from knowledge_sources.drivers.base import Base
 from knowledge_sources.drivers.video_camera import VideoCamera
 from logs.disk import CannotWriteError

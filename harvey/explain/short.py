@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from harvey import why_facts as facts
+from harvey.explain import facts
+from harvey.explain.history import History
+from harvey.explain.links import anchor_of, reason, tracks_of
+from harvey.explain.sentences import followed, sentence
 from harvey.records import EntryRecord
-from harvey.sentences import followed, sentence
 from harvey.units import turn
-from harvey.why_history import History
-from harvey.why_links import anchor_of, reason, tracks_of
 
 
 def in_one_sentence(history: History, command: EntryRecord) -> str:

@@ -11,8 +11,8 @@ from pathlib import Path
 from types import TracebackType
 
 from harvey.errors import BadInput
-from harvey.hardware_base import kind_of, open_base
-from harvey.hardware_mission import HardwareMission
+from harvey.hardware.base import kind_of, open_base
+from harvey.hardware.mission import HardwareMission
 from harvey.rehearsal import Prospect, rehearsed
 from harvey.units import count
 from knowledge_sources.drivers.base import Base, BaseFault

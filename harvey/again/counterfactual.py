@@ -16,17 +16,17 @@ from blackboard.effect import Post
 from blackboard.encoding import plain
 from blackboard.journal import Decision, decision_line, decision_record
 from blackboard.scheduler import Scheduler
+from harvey.again.observations import effect_of
+from harvey.again.reliving import RESUME, Reliving
+from harvey.again.replay import Live, pictures_of
+from harvey.again.resume import stage_of
 from harvey.diary import Diary
 from harvey.loop import Over, endless, until_outcome
 from harvey.minds import mind_of
 from harvey.mission import UNFINISHED, Mission
-from harvey.observations import effect_of
 from harvey.ports import BodyPort
 from harvey.records import DecisionRecord, EntryRecord, as_line, decision_of, read_records
 from harvey.referee import MissionResult
-from harvey.reliving import RESUME, Reliving
-from harvey.replay import Live, pictures_of
-from harvey.resume import stage_of
 from harvey.run_directory import RunDirectory
 from harvey.run_head import SIMULATOR, RunHead
 from logs.journal_file import ACTED_ON

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 from blackboard.knowledge_source import KnowledgeSource
 from harvey.errors import BadInput
+from harvey.explain.history import History
+from harvey.explain.links import words
+from harvey.explain.why_not import Fate, in_cycle, in_run, of_entry, told
 from harvey.run_directory import RunDirectory
-from harvey.why_history import History
-from harvey.why_links import words
-from harvey.why_not import Fate, in_cycle, in_run, of_entry, told
 
 
 def answers(run: RunDirectory, history: History, name: str, cycle: int | None) -> Iterator[str]:
@@ -61,9 +61,9 @@ def _never(run: RunDirectory, source: str) -> Iterator[str]:
 
 def _asked_again(run: RunDirectory, history: History, source: str, cycle: int) -> Iterator[str]:
     """The expert is asked once more, on the board as it was."""
+    from harvey.explain.ask import why_absent
     from harvey.minds import mind_of
     from harvey.run_head import RunHead
-    from harvey.why_ask import why_absent
 
     head = RunHead.read(run.path)
     if source in head.without:

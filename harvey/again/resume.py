@@ -15,14 +15,14 @@ from pathlib import Path
 from blackboard.change import Change, Posted
 from blackboard.effect import Post
 from blackboard.journal import Decision, Sink
+from harvey.again.reliving import RESUME, Reliving
+from harvey.again.replay import checked, pictures_of, replayed
 from harvey.diary import Diary, Extent
 from harvey.errors import BadInput
 from harvey.minds import mind_of
 from harvey.mission import Around, Mission
 from harvey.records import read_records
 from harvey.referee import MissionResult
-from harvey.reliving import RESUME, Reliving
-from harvey.replay import checked, pictures_of, replayed
 from harvey.run_directory import RunDirectory
 from harvey.run_head import HARDWARE, RunHead
 from logs.camera_file import Pictures

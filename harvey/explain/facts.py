@@ -10,11 +10,11 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
+from harvey.explain.history import History
+from harvey.explain.links import reason
+from harvey.explain.sentences import followed, landmark, listed, shift_px, size_of
 from harvey.records import EntryRecord
-from harvey.sentences import followed, landmark, listed, shift_px, size_of
 from harvey.units import count, degrees, metres, number, point, quantity, turn
-from harvey.why_history import History
-from harvey.why_links import reason
 
 Value = Mapping[str, Any]
 SLIGHT_RAD = math.radians(0.05)

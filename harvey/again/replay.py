@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from blackboard.change import Change
 from blackboard.journal import Decision, decision_line
 from blackboard.scheduler import Scheduler
+from harvey.again.observations import effect_of
 from harvey.errors import BadInput
-from harvey.observations import effect_of
 from harvey.records import DecisionRecord, EntryRecord, read_records
 from harvey.run_directory import RunDirectory
 from logs.camera_file import Pictures

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 
+from harvey.explain.history import History
 from harvey.records import EntryRecord
-from harvey.why_history import History
 
 FAR = 3000
 """So many entries are looked at for the nearest of a kind."""

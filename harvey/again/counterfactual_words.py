@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from harvey.counterfactual import ASKED, Answer, Parting
-from harvey.diff import describe, differing_leaves
+from harvey.again.counterfactual import ASKED, Answer, Parting
+from harvey.explain.diff import describe, differing_leaves
+from harvey.explain.sentences import sentence
 from harvey.mission import UNFINISHED
 from harvey.records import DecisionRecord
 from harvey.run_directory import RunDirectory
-from harvey.sentences import sentence
 from harvey.summary import millimetres
 from harvey.units import count
 

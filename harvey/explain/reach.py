@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from harvey.explain.history import History
 from harvey.records import DecisionRecord, EntryRecord
-from harvey.why_history import History
 
 GOAL, MODEL, SENSOR = "goal", "model", "sensor"
 KINDS = (GOAL, MODEL, SENSOR)

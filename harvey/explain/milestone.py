@@ -5,13 +5,13 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator
 
-from harvey import why_facts as facts
 from harvey.errors import BadInput
+from harvey.explain import facts
+from harvey.explain.history import History
+from harvey.explain.links import STRANGE, reason, words
+from harvey.explain.sentences import sentence
+from harvey.explain.story import Step, Story, decided
 from harvey.records import EntryRecord
-from harvey.sentences import sentence
-from harvey.why_history import History
-from harvey.why_links import STRANGE, reason, words
-from harvey.why_story import Step, Story, decided
 
 FOLLOWED = ("Certificate", "Milestone", "Discrepancy")
 """The entries of a verdict; what they wake is what follows."""

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from harvey.errors import BadInput
-from harvey.hardware import HardwareBody
+from harvey.hardware.body import HardwareBody
 from harvey.ports import Body
 from knowledge_sources.drivers.base import Base
 from knowledge_sources.drivers.create2 import Create2Base

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import zip_longest
 from typing import Any
 
+from harvey.explain.sentences import sentence
 from harvey.records import Candidate, DecisionRecord, EntryRecord, as_line
-from harvey.sentences import sentence
 from harvey.units import count
 
 MEANINGS: Mapping[str, str] = {

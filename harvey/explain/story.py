@@ -11,13 +11,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from textwrap import fill
 
-from harvey import why_facts as facts
+from harvey.explain import facts
+from harvey.explain.history import History
+from harvey.explain.links import STRANGE, anchor_of, nearest, reason, tracks_of, within, words
+from harvey.explain.sentences import PURPOSES, sentence
+from harvey.explain.short import in_one_sentence
 from harvey.records import Candidate, EntryRecord
-from harvey.sentences import PURPOSES, sentence
 from harvey.units import number
-from harvey.why_history import History
-from harvey.why_links import STRANGE, anchor_of, nearest, reason, tracks_of, within, words
-from harvey.why_short import in_one_sentence
 
 MOST = 24
 """So many things are told at the most."""

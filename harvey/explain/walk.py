@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from textwrap import fill
 
-from harvey.diff import differing_leaves
+from harvey.explain.diff import differing_leaves
+from harvey.explain.history import History
+from harvey.explain.sentences import sentence
+from harvey.explain.story import decided
 from harvey.records import DecisionRecord, EntryRecord
-from harvey.sentences import sentence
 from harvey.units import count
-from harvey.why_history import History
-from harvey.why_story import decided
 
 WIDTH = 120
 DEEPEST_INDENT = 20

@@ -8,14 +8,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from harvey.diff import differing_leaves, short
+from harvey.explain.diff import differing_leaves, short
+from harvey.explain.history import History
+from harvey.explain.links import STRANGE, reason, words
+from harvey.explain.sentences import sentence
 from harvey.records import DecisionRecord, EntryRecord, as_line
 from harvey.run_directory import RunDirectory
-from harvey.sentences import sentence
 from harvey.tables import table
 from harvey.units import count, metres
-from harvey.why_history import History
-from harvey.why_links import STRANGE, reason, words
 
 MOST_SETTINGS = 8
 DEEPEST = 40

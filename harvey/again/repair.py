@@ -6,11 +6,11 @@ import os
 from collections.abc import Sequence
 
 from blackboard.journal import Sink
+from harvey.again.replay import checked, pictures_of, replayed
+from harvey.again.resume import relived, remains_of, stage_of
 from harvey.diary import Diary
 from harvey.minds import mind_of
 from harvey.mission import Mission
-from harvey.replay import checked, pictures_of, replayed
-from harvey.resume import relived, remains_of, stage_of
 from harvey.run_directory import RunDirectory
 from harvey.run_head import SIMULATOR, RunHead
 

@@ -24,9 +24,9 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import WORDS, Level
 from blackboard.servoing import Discrepancy
 from harvey.errors import BadInput
+from harvey.explain.history import History
+from harvey.explain.links import words
 from harvey.records import EntryRecord
-from harvey.why_history import History
-from harvey.why_links import words
 from world_models import body, location, percepts, task
 
 TYPES: Mapping[str, type[Any]] = {

@@ -1,7 +1,7 @@
 """Why not: what an expert or an entry could have brought about and did not, and the rating or the reason that decided.
 
 These answers are read from the journal. Whether an expert that the journal does not name in a cycle could have acted is
-asked of the expert itself (:mod:`harvey.why_ask`).
+asked of the expert itself (:mod:`harvey.explain.ask`).
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
+from harvey.explain.history import History
+from harvey.explain.links import words
+from harvey.explain.sentences import sentence
+from harvey.explain.story import headline
 from harvey.records import Candidate, DecisionRecord, EntryRecord
-from harvey.sentences import sentence
 from harvey.units import count
-from harvey.why_history import History
-from harvey.why_links import words
-from harvey.why_story import headline
 
 LEVELS = ("action", "plan", "goal")
 REVISED = re.compile(r"newer trigger|is now|no longer held")

@@ -14,8 +14,8 @@ from functools import cached_property
 from pathlib import Path
 
 from harvey.errors import BadInput
+from harvey.explain.history import History
 from harvey.records import DecisionRecord, EntryRecord, decision_of
-from harvey.why_history import History
 
 PLAIN = re.compile(rb'\{"cycle":(\d+),"')
 """How a line begins as the scheduler writes it; a line that begins otherwise is read in full."""

@@ -15,7 +15,7 @@ class History(ABC):
     """What a run's journal tells, asked for by name.
 
     Two kinds give the same answers: :class:`Told`, from decisions in memory, and
-    :class:`harvey.why_journal.JournalHistory`, which reads of a long journal only the lines that are needed.
+    :class:`harvey.explain.journal.JournalHistory`, which reads of a long journal only the lines that are needed.
     """
 
     @property

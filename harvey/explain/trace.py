@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from typing import TextIO
 
 from blackboard.journal import Decision, Sink, decision_record
+from harvey.explain.sentences import sentence
 from harvey.records import Candidate, DecisionRecord, EntryRecord, decision_of
-from harvey.sentences import sentence
 
 
 def printing(out: TextIO) -> Sink:
