@@ -20,6 +20,7 @@ PLANNED: Mapping[str, str] = {
     "explanations": "Missions of every scenario: does every decision rest on something, does a replay decide the same?",
     "figure12": "The trace of the 2D matcher's local search (Figure 12).",
     "lens": "Lines seen through a distorting lens: picture straightened first, or the segments' ends afterwards.",
+    "frame-budget": "What perception costs a frame: tracking, and a milestone from picture to verdict.",
     "levels": "What the three levels of perceptual servoing do: missions with each of them switched off (Figure 2).",
     "malformed-worlds": "World files that somebody has spoilt: a clear error or a checked world, each time.",
     "matcher": "2D matching of 4 to 40 model lines: success within a pixel, and time as problems grow.",
