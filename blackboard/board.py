@@ -7,11 +7,12 @@ from typing import Any, TypeVar
 
 from blackboard.change import Change, Posted, Retracted, Revised, always
 from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.entry import Entry, Ref
+from blackboard.entry import Entry, Ref, new_tuple
 from blackboard.index import Index
 from blackboard.shelf import Shelf
 
 T = TypeVar("T")
+Reasons = tuple[Ref, ...]
 NAMED = (Ref, Entry)
 """What names a revision that is there already."""
 
@@ -27,6 +28,7 @@ class Blackboard:
         self._current: dict[str, Entry[Any]] = {}
         self._shelves: dict[type[Any], Shelf] = {}
         self._numbers: dict[type[Any], int] = {}
+        self.current: Mapping[str, Entry[Any]] = self._current
         self.view = View(self)
 
     def apply(self, effects: Iterable[Effect], *, author: str, cycle: int) -> tuple[Change, ...]:
@@ -37,54 +39,67 @@ class Blackboard:
             ValueError: a value of another type than the entry's, or a reason that is no entry and no earlier effect.
         """
         acts = tuple(effects)
-        self._refuse_faulty(acts)
+        if len(acts) == 1:
+            self._refuse_faulty(acts[0], (), ())
+            return (self._apply_one(acts[0], author, cycle, {}),)
+        self._refuse_together(acts)
         made: dict[int, Change] = {}
         changes = []
         for effect in acts:
-            because = self._reasons(effect, made) if effect.because else ()
-            change = made[id(effect)] = self._apply_one(effect, author, cycle, because)
+            change = made[id(effect)] = self._apply_one(effect, author, cycle, made)
             changes.append(change)
         return tuple(changes)
 
-    def _refuse_faulty(self, acts: tuple[Effect, ...]) -> None:
+    def _refuse_together(self, acts: tuple[Effect, ...]) -> None:
         earlier: set[int] = set()
         touched: set[str] = set()
         for effect in acts:
-            for reason in effect.because:
-                if not isinstance(reason, NAMED) and id(reason) not in earlier:
-                    expected = "because to hold entries or earlier effects of the same act"
-                    raise ValueError(f"expected {expected}, got {reason!r}")
+            self._refuse_faulty(effect, earlier, touched)
             earlier.add(id(effect))
             if not isinstance(effect, Post):
-                self._refuse_stale(effect.entry, touched)
                 touched.add(effect.entry.id)
-            if isinstance(effect, Revise) and type(effect.value) is not type(effect.entry.value):
-                raise ValueError(f"expected {effect.entry.ref} to stay a {type(effect.entry.value).__name__}, "
-                                 f"got a {type(effect.value).__name__}")
+
+    def _refuse_faulty(self, effect: Effect, earlier: Collection[int], touched: Collection[str]) -> None:
+        for reason in effect.because:
+            if not isinstance(reason, NAMED) and id(reason) not in earlier:
+                expected = "because to hold entries or earlier effects of the same act"
+                raise ValueError(f"expected {expected}, got {reason!r}")
+        if isinstance(effect, Post):
+            return
+        seen = effect.entry
+        if self._current.get(seen.id) is not seen or seen.id in touched:
+            self._refuse_stale(seen, touched)
+        if isinstance(effect, Revise) and type(effect.value) is not type(seen.value):
+            raise ValueError(f"expected {seen.ref} to stay a {type(seen.value).__name__}, "
+                             f"got a {type(effect.value).__name__}")
 
     def _refuse_stale(self, seen: Entry[Any], touched: Collection[str]) -> None:
+        """Refuse what is stale; what is not the entry on the board, but equal to it, is as good."""
         now = self._current.get(seen.id)
         if now is None or now.revision != seen.revision or seen.id in touched:
             state = f"now {now.ref}" if now else "retracted"
             raise StaleError(f"{seen.ref} is {'touched twice by this act' if seen.id in touched else state}")
 
     @staticmethod
-    def _reasons(effect: Effect, made: Mapping[int, Change]) -> tuple[Ref, ...]:
-        named = [r.ref if isinstance(r, Entry) else r if isinstance(r, Ref) else made[id(r)].entry.ref
-                 for r in effect.because]
-        return tuple(dict.fromkeys(named)) if len(named) > 1 else (named[0],)
+    def _reasons(reasons: tuple[Any, ...], made: Mapping[int, Change]) -> Reasons:
+        if len(reasons) == 1 and isinstance(reasons[0], Entry):
+            return (reasons[0].ref,)
+        named = [r.ref if isinstance(r, Entry) else r if isinstance(r, Ref) else made[id(r)].entry.ref for r in reasons]
+        return tuple(dict.fromkeys(named))
 
-    def _apply_one(self, effect: Effect, author: str, cycle: int, because: tuple[Ref, ...]) -> Change:
+    def _apply_one(self, effect: Effect, author: str, cycle: int, made: Mapping[int, Change]) -> Change:
+        because = self._reasons(effect.because, made) if effect.because else ()
         if isinstance(effect, Retract):
             return Retracted(self._remove(effect.entry.id), because)
-        kind = type(effect.value)
+        value = effect.value
+        kind = type(value)
         if isinstance(effect, Revise):
             id, revision = effect.entry.id, effect.entry.revision + 1
         else:
             number = self._numbers[kind] = self._numbers.get(kind, 0) + 1
             id, revision = f"{kind.__name__}-{number}", 0
-        entry = self._current[id] = Entry(id, revision, effect.value, author, cycle, because)
-        self._shelf(kind).store(entry)
+        entry = self._current[id] = new_tuple(Entry, (id, revision, value, author, cycle, because))
+        (self._shelves.get(kind) or self._shelf(kind)).store(entry)
         return Revised(entry) if revision else Posted(entry)
 
     def forget(self, id: str) -> None:
@@ -128,7 +143,7 @@ class View:
 
     def is_current(self, entry: Entry[Any]) -> bool:
         now = self._board._current.get(entry.id)
-        return now is not None and now.revision == entry.revision
+        return now is entry or (now is not None and now.revision == entry.revision)
 
     def all(self, kind: type[T]) -> tuple[Entry[T], ...]:
         """Current entries of a type, oldest first."""
@@ -156,6 +171,11 @@ class View:
         shelf = self._board._shelves.get(index.kind)
         found = None if shelf is None else shelf.having(index, key)
         return None if found is None else found.newest()
+
+    def keys(self, index: Index[T]) -> Collection[Hashable]:
+        """The keys under which an index files something now."""
+        shelf = self._board._shelves.get(index.kind)
+        return () if shelf is None else shelf.keys(index)
 
     def since(self, kind: type[T], cycle: int) -> tuple[Entry[T], ...]:
         """Current entries of a type whose current revision was written in a cycle or later, in that order."""

@@ -6,6 +6,9 @@ from typing import Generic, NamedTuple, TypeVar
 
 T_co = TypeVar("T_co", covariant=True)
 
+new_tuple = tuple.__new__
+"""Makes a NamedTuple of a tuple of all its fields in half the time of calling it, which goes through Python code."""
+
 
 class Ref(NamedTuple):
     """Names one revision of one entry; written ``Goal-1.0``."""
@@ -38,4 +41,4 @@ class Entry(NamedTuple, Generic[T_co]):
 
     @property
     def ref(self) -> Ref:
-        return Ref(self.id, self.revision)
+        return new_tuple(Ref, self[:2])

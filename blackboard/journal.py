@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from blackboard.activation import Activation, Obviated
 from blackboard.change import Change, Retracted
-from blackboard.encoding import encoder_of, plain, quoted
+from blackboard.encoding import ENCODERS, plain, quoted
 from blackboard.entry import Entry, Ref
+from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import WORDS, Level
 
 
@@ -42,6 +43,8 @@ class Decision(NamedTuple):
 
 
 Sink = Callable[[Decision], None]
+NOTHING = '""'
+"""An empty text as JSON text."""
 
 
 def entry_record(entry: Entry[Any]) -> dict[str, Any]:
@@ -102,67 +105,81 @@ def decision_line(d: Decision) -> str:
 class JournalLines:
     """The decisions of one run as lines of its journal, one after the other.
 
-    A line is the JSON text of :func:`decision_record`, written without making that first. An activation stands in
-    several lines, as activated, as runner-up and as chosen or obviated; its text is made once and kept until then.
+    A line is the JSON text of :func:`decision_record`, written without making that first. What stands in several lines
+    is written once and kept until the last of them: an activation is activated, runner-up, and chosen or obviated; what
+    was made is seen in the next cycle.
     """
 
     def __init__(self) -> None:
-        self._texts: dict[int, tuple[Activation, str]] = {}
+        self._texts: dict[int, str] = {}
+        self._bidders: dict[int, tuple[str, KnowledgeSource]] = {}
+        self._last: Change | None = None
+        self._last_ref = ""
 
     def __call__(self, d: Decision) -> str:
         """A decision's line, without its newline."""
-        activated = ",".join([self._text(a) for a in d.activated])
-        runner_up = self._text(d.runner_up) if d.runner_up else "null"
-        obviated = ",".join([f'{self._last_text(o.activation)[:-1]},"reason":{quoted(o.reason)}}}' for o in d.obviated])
-        chosen = self._last_text(d.chosen) if d.chosen else "null"
+        cycle, seen, observed, focus, activated, obviated, chosen, runner_up, pending, made, refused = d
+        texts = self._texts
+        told = ",".join(map(self._change, observed)) if observed else ""
+        refs = ",".join(map(self._ref, seen)) if seen else ""
+        bids = ",".join(map(self._bid, activated)) if activated else ""
+        next_best = "null" if runner_up is None else texts.get(runner_up.number) or self._bid(runner_up)
+        dropped = ",".join(map(self._dropped, obviated)) if obviated else ""
+        executed = "null" if chosen is None else texts.pop(chosen.number, "") or self._activation(chosen)
+        acts = ",".join(map(self._change, made)) if made else ""
         return (
-            f'{{"cycle":{d.cycle},"focus":"{WORDS[d.focus]}","observed":[{_changes(d.observed)}],"seen":[{_seen(d.seen)}],'
-            f'"activated":[{activated}],"obviated":[{obviated}],"chosen":{chosen},"runner_up":{runner_up},'
-            f'"pending":{d.pending},"made":[{_changes(d.made)}],"refused":{quoted(d.refused)}}}'
+            f'{{"cycle":{cycle},"focus":"{WORDS[focus]}","observed":[{told}],"seen":[{refs}],"activated":[{bids}],'
+            f'"obviated":[{dropped}],"chosen":{executed},"runner_up":{next_best},"pending":{pending},"made":[{acts}],'
+            f'"refused":{quoted(refused) if refused else NOTHING}}}'
         )
 
-    def _text(self, a: Activation) -> str:
-        known = self._texts.get(a.number)
-        if known is not None and known[0] is a:
-            return known[1]
-        text = _activation(a)
-        self._texts[a.number] = a, text
+    def _bid(self, a: Activation) -> str:
+        text = self._texts[a.number] = self._activation(a)
         return text
 
-    def _last_text(self, a: Activation) -> str:
-        known = self._texts.pop(a.number, None)
-        return known[1] if known is not None and known[0] is a else _activation(a)
+    def _dropped(self, obviated: Obviated) -> str:
+        a, reason = obviated
+        text = self._texts.pop(a.number, "") or self._activation(a)
+        return f'{text[:-1]},"reason":{quoted(reason)}}}'
+
+    def _activation(self, a: Activation) -> str:
+        number, source, trigger, rating, since = a
+        bidder = (self._bidders.get(id(source)) or self._bidder(source))[0]
+        ref = self._last_ref if trigger is self._last else self._ref(trigger)
+        return (
+            f'{{"number":{number},{bidder},"trigger":{ref},"kind":"{type(trigger).__name__}",'
+            f'"rating":{ENCODERS[type(rating)](rating)},"since":{since}}}'
+        )
+
+    def _bidder(self, source: KnowledgeSource) -> tuple[str, KnowledgeSource]:
+        """What is told of a source with each of its activations; the source is kept so that its id stays its own."""
+        text = f'"source":{quoted(source.name)},"level":"{WORDS[source.level]}"'
+        made = self._bidders[id(source)] = text, source
+        return made
+
+    def _ref(self, change: Change) -> str:
+        """The revision's name, quoted; mostly the last one again: made, then seen, then the trigger of activations."""
+        if change is not self._last:
+            self._last, entry = change, change.entry
+            self._last_ref = quoted(f"{entry.id}.{entry.revision}")
+        return self._last_ref
+
+    def _change(self, change: Change) -> str:
+        id, revision, value, author, _cycle, because = change.entry
+        self._last, self._last_ref = change, quoted(f"{id}.{revision}")
+        kind = type(value)
+        reasons = ""
+        if isinstance(change, Retracted) and change.because:
+            reasons = f',"retracted_because":[{_refs(change.because)}]'
+        return (
+            f'{{"change":"{type(change).__name__}","entry":{self._last_ref},"type":{quoted(kind.__name__)},'
+            f'"author":{quoted(author)},"because":[{_refs(because) if because else ""}],'
+            f'"value":{ENCODERS[kind](value)}{reasons}}}'
+        )
 
 
-def _activation(a: Activation) -> str:
-    source, trigger, rating = a.source, a.trigger, a.rating
-    entry = trigger.entry
-    return (
-        f'{{"number":{a.number},"source":{quoted(source.name)},"level":"{WORDS[source.level]}",'
-        f'"trigger":{quoted(f"{entry.id}.{entry.revision}")},"kind":"{type(trigger).__name__}",'
-        f'"rating":{encoder_of(type(rating))(rating)},"since":{a.cycle}}}'
-    )
-
-
-def _changes(changes: tuple[Change, ...]) -> str:
-    return ",".join([_change(c) for c in changes]) if changes else ""
-
-
-def _change(change: Change) -> str:
-    e = change.entry
-    kind = type(e.value)
-    reasons = ""
-    if isinstance(change, Retracted) and change.because:
-        reasons = f',"retracted_because":[{_refs(change.because)}]'
-    return (
-        f'{{"change":"{type(change).__name__}","entry":{quoted(f"{e.id}.{e.revision}")},"type":{quoted(kind.__name__)},'
-        f'"author":{quoted(e.author)},"because":[{_refs(e.because)}],"value":{encoder_of(kind)(e.value)}{reasons}}}'
-    )
-
-
-def _refs(refs: Iterable[Ref]) -> str:
+def _refs(refs: tuple[Ref, ...]) -> str:
+    if len(refs) == 1:
+        (id, revision), = refs
+        return quoted(f"{id}.{revision}")
     return ",".join([quoted(f"{id}.{revision}") for id, revision in refs])
-
-
-def _seen(changes: Iterable[Change]) -> str:
-    return ",".join([quoted(f"{c.entry.id}.{c.entry.revision}") for c in changes])

@@ -28,11 +28,15 @@ class KnowledgeSource(ABC):
     watches: ClassVar[tuple[Watch, ...]]
     writes: ClassVar[tuple[type[Any], ...]]
 
+    has_own_word: ClassVar[bool]
+    """Whether it says itself which triggers still stand; where not, the scheduler knows the answer without asking."""
+
     _called: ClassVar[str]
 
     def __init_subclass__(cls, **more: Any) -> None:
         super().__init_subclass__(**more)
         cls._called = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+        cls.has_own_word = cls.still_valid is not KnowledgeSource.still_valid
 
     @property
     def name(self) -> str:

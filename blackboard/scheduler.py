@@ -9,19 +9,20 @@ not depend on how much is pending.
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any, Protocol
 
 from blackboard.activation import Activation, Obviated
 from blackboard.agenda import Agenda
 from blackboard.board import Blackboard, StaleError, View
-from blackboard.change import Change, Posted, always
+from blackboard.change import Change, Posted, Retracted, always
 from blackboard.effect import Effect, kind_of
+from blackboard.entry import new_tuple
 from blackboard.journal import Decision, Sink
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.retention import Forget, Retention
-from blackboard.servoing import Servoing
+from blackboard.servoing import Groups, Servoing
 
 RAISED = "raised: "
 """How the refusal of an act begins whose knowledge source raised an exception; its traceback follows."""
@@ -58,6 +59,7 @@ class Scheduler:
             raise ValueError(f"expected knowledge sources of different names, got {names}")
         self.board = Blackboard()
         self.view: View = self.board.view
+        self._current = self.board.current
         self.cycle = 0
         self._servoing = servoing or Servoing()
         self._sources = tuple(s for s in sources if self._servoing.allows(s.closes))
@@ -79,8 +81,8 @@ class Scheduler:
 
     def step(self) -> Decision | None:
         """Run one cycle; None when nothing is left to see and nothing to do."""
-        seen, observed = self._unseen, self._observed
-        if not seen and not len(self._agenda):
+        seen, observed, agenda = self._unseen, self._observed, self._agenda
+        if not seen and not len(agenda):
             return None
         self._unseen = self._observed = ()
         self.cycle += 1
@@ -88,18 +90,19 @@ class Scheduler:
         activated: list[Activation] = []
         fault = self._hear_bids(seen, activated, obviated)
         if self._retention is not None:
-            self._retention.sweep(seen, self.board, self._agenda)
+            self._retention.sweep(seen, self.board, agenda)
         focus = self._servoing.focus(self.view)
         chosen, runner_up, fault = (None, None, fault) if fault else self._two_best(focus, obviated)
         made, refused = self._execute(chosen) if chosen else ((), fault)
-        decision = Decision(
-            self.cycle, seen, observed, focus, tuple(activated), tuple(obviated), chosen, runner_up,
-            len(self._agenda), made, refused,
-        )
+        decision = new_tuple(Decision, (
+            self.cycle, seen, observed, focus, tuple(activated), tuple(obviated), chosen, runner_up, len(agenda), made,
+            refused,
+        ))
         self._unseen = made
         for sink in self._sinks:
             sink(decision)
-        self._tell_ports(made)
+        if self._ports:
+            self._tell_ports(made)
         return decision
 
     def _hear_bids(self, seen: tuple[Change, ...], activated: list[Activation], obviated: list[Obviated]) -> str:
@@ -107,71 +110,83 @@ class Scheduler:
         try:
             for change in seen:
                 if not isinstance(change, Posted):
-                    self._drop_stale(change.entry.id, obviated)
+                    for activation in self._agenda.triggered_by(change.entry.id):
+                        self._drop_if_stale(activation, obviated)
             for change in seen:
-                value = change.entry.value
-                for source, wheres in self._watching(type(change), type(value)):
-                    if not wheres or any(where(value) for where in wheres):
-                        self._activate(source, change, activated, obviated)
+                kind, value = type(change), type(change.entry.value)
+                watchers = self._watchers.get((kind, value))
+                if watchers is None:
+                    watchers = self._watchers[kind, value] = self._watchers_of(kind, value)
+                if watchers:
+                    self._hear_bids_on(change, watchers, activated, obviated)
         except Exception:  # whatever an expert does wrong is journalled, never lost
             return RAISED + traceback.format_exc(limit=-4)
         return ""
 
-    def _drop_stale(self, id: str, obviated: list[Obviated]) -> None:
+    def _drop_if_stale(self, activation: Activation, obviated: list[Obviated]) -> None:
         """What was triggered by an earlier revision of an entry that changed goes."""
-        for activation in self._agenda.triggered_by(id):
-            if not activation.source.still_valid(self.view, activation.trigger):
-                self._agenda.take(activation)
-                obviated.append(Obviated(activation, self._staleness(activation.trigger)))
+        source, trigger = activation.source, activation.trigger
+        if not (source.still_valid(self.view, trigger) if source.has_own_word else self._stands(trigger)):
+            self._agenda.take(activation)
+            obviated.append(Obviated(activation, self._staleness(trigger)))
 
     def _staleness(self, trigger: Change) -> str:
         now = self.view.get(trigger.entry.id)
         return f"stale trigger: {trigger.entry.ref} is {f'now {now.ref}' if now else 'retracted'}"
 
-    def _watching(self, change: type[Change], value: type[Any]) -> Watchers:
-        watchers = self._watchers.get((change, value))
-        if watchers is None:
-            watchers = self._watchers[change, value] = self._watchers_of(change, value)
-        return watchers
-
     def _watchers_of(self, change: type[Change], value: type[Any]) -> Watchers:
         found = ((source, [w.where for w in source.watches if w.is_for(change, value)]) for source in self._sources)
         return tuple((source, () if always in wheres else tuple(wheres)) for source, wheres in found if wheres)
 
-    def _activate(
-        self, source: KnowledgeSource, change: Change, activated: list[Activation], obviated: list[Obviated]
+    def _hear_bids_on(
+        self, change: Change, watchers: Watchers, activated: list[Activation], obviated: list[Obviated]
     ) -> None:
-        rating = source.rate(self.view, change) if source.still_valid(self.view, change) else None
-        if rating is None:
-            return
+        view, value = self.view, change.entry.value
+        stands = self._stands(change)
+        for source, wheres in watchers:
+            if wheres and not any(where(value) for where in wheres):
+                continue
+            if not (source.still_valid(view, change) if source.has_own_word else stands):
+                continue
+            rating = source.rate(view, change)
+            if rating is not None:
+                activation = self._activation(source, change, rating)
+                activated.append(activation)
+                replaced = self._agenda.add(activation)
+                if replaced is not None:
+                    obviated.append(replaced)
+
+    def _activation(self, source: KnowledgeSource, change: Change, rating: float) -> Activation:
         if not 0.0 <= rating <= 1.0:
             raise ValueError(f"expected a rating of 0..1 from {source.name}, got {rating}")
         self._numbers += 1
-        activation = Activation(self._numbers, source, change, rating, self.cycle)
-        activated.append(activation)
-        replaced = self._agenda.add(activation)
-        if replaced is not None:
-            obviated.append(replaced)
+        return new_tuple(Activation, (self._numbers, source, change, rating, self.cycle))
+
+    def _stands(self, trigger: Change) -> bool:
+        """What :meth:`KnowledgeSource.still_valid` says, which most sources leave as it is."""
+        entry = trigger.entry
+        return self._current.get(entry.id) is entry or isinstance(trigger, Retracted)
 
     def _two_best(
         self, focus: Level, obviated: list[Obviated]
     ) -> tuple[Activation | None, Activation | None, str]:
         """The activation to be executed, taken from the agenda, and the next best; or how an expert raised."""
         chosen: Activation | None = None
+        groups = self._servoing.nearest(focus)
         try:
-            chosen = self._best(focus, obviated)
+            chosen = self._best(groups, obviated)
             if chosen is None:
                 return None, None, ""
             self._agenda.take(chosen)
-            return chosen, self._best(focus, obviated), ""
+            return chosen, self._best(groups, obviated), ""
         except Exception:
             if chosen is not None:
                 self._agenda.add(chosen)
             return None, None, RAISED + traceback.format_exc(limit=-4)
 
-    def _best(self, focus: Level, obviated: list[Obviated]) -> Activation | None:
+    def _best(self, groups: Groups, obviated: list[Obviated]) -> Activation | None:
         """The best that is pending and still holds; what is better and does not is obviated."""
-        while (best := self._agenda.best(self._servoing.nearest(focus))) is not None:
+        while (best := self._agenda.best(groups)) is not None:
             if best.cycle == self.cycle:  # it was asked in this cycle, and the board is as it was then
                 return best
             reason = "raised when it was asked"
@@ -187,18 +202,19 @@ class Scheduler:
 
     def _objection(self, activation: Activation) -> str:
         """Why an activation no longer holds, or ""."""
-        source, trigger = activation.source, activation.trigger
-        if not source.still_valid(self.view, trigger):
+        _number, source, trigger, _rating, _cycle = activation
+        view = self.view
+        if not (source.still_valid(view, trigger) if source.has_own_word else self._stands(trigger)):
             return self._staleness(trigger)
-        return "could not answer any more" if source.rate(self.view, trigger) is None else ""
+        return "could not answer any more" if source.rate(view, trigger) is None else ""
 
     def _execute(self, chosen: Activation) -> tuple[tuple[Change, ...], str]:
         source = chosen.source
         try:
             effects = tuple(source.act(self.view, chosen.trigger))
-            alien = [kind.__name__ for kind in map(kind_of, effects) if kind not in source.writes]
+            alien = aliens(effects, source.writes)
             if alien:
-                return (), f"{source.name} may not write {', '.join(sorted(set(alien)))}"
+                return (), f"{source.name} may not write {', '.join(alien)}"
             return self.board.apply(effects, author=source.name, cycle=self.cycle), ""
         except StaleError as error:
             return (), f"stale: {error}"
@@ -209,3 +225,13 @@ class Scheduler:
         for change in made:
             for port in self._ports:
                 self.tell(port.answer(change), port.name)
+
+
+def aliens(effects: Iterable[Effect], writes: Collection[type[Any]]) -> list[str]:
+    """The types that effects touch and may not, by name."""
+    names: list[str] = []
+    for effect in effects:
+        kind = kind_of(effect)
+        if kind not in writes:
+            names.append(kind.__name__)
+    return sorted(set(names)) if names else names

@@ -11,7 +11,6 @@ level is in focus while all open discrepancies belong to it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import groupby
 
@@ -76,14 +75,18 @@ OPEN: Index[Discrepancy] = Index(Discrepancy, lambda found: found.level if found
 """Open discrepancies by their level."""
 
 
-def _nearest(focus: Level) -> tuple[tuple[Level, ...], ...]:
+Groups = tuple[tuple[Level, ...], ...]
+"""Levels, those together that are equally near."""
+
+
+def _nearest(focus: Level) -> Groups:
     def distance(level: Level) -> int:
         return abs(level - focus)
 
     return tuple(tuple(group) for _, group in groupby(sorted(Level, key=distance), key=distance))
 
 
-NEAREST: Mapping[Level, tuple[tuple[Level, ...], ...]] = {focus: _nearest(focus) for focus in Level}
+NEAREST: tuple[Groups, ...] = tuple(_nearest(focus) for focus in Level)
 """For each level in focus: all levels in groups, nearest first."""
 
 
@@ -99,12 +102,12 @@ class Servoing:
 
     def focus(self, view: View) -> Level:
         """The highest level with an open discrepancy; action where there is none."""
-        for level in (Level.GOAL, Level.PLAN):
-            if view.newest(OPEN, level) is not None:
-                return level
-        return Level.ACTION
+        found = view.keys(OPEN)
+        if not found:
+            return Level.ACTION
+        return Level.GOAL if Level.GOAL in found else Level.PLAN if Level.PLAN in found else Level.ACTION
 
-    def nearest(self, focus: Level) -> tuple[tuple[Level, ...], ...]:
+    def nearest(self, focus: Level) -> Groups:
         """The levels, nearest to the focus first; two that are equally near stand together. Pure.
 
         This is the choice rule: the best rated activation of the nearest level that has any is executed, and of equally

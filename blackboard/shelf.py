@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left, insort
-from collections.abc import Hashable, Iterator
+from collections.abc import Collection, Hashable, Iterator
 from typing import Any
 
 from blackboard.entry import Entry
@@ -46,6 +46,10 @@ class Shelf:
     def having(self, index: Index[Any], key: Hashable) -> Bucket | None:
         """The entries with a key; None where there is none."""
         return (self._indexes.get(index) or self._made(index)).get(key)
+
+    def keys(self, index: Index[Any]) -> Collection[Hashable]:
+        """The keys that some entry has."""
+        return (self._indexes.get(index) or self._made(index)).keys()
 
     def since(self, cycle: int) -> Entries:
         """Entries whose current revision is of a cycle or later, in the order in which they were written."""
@@ -104,6 +108,9 @@ class _Buckets:
 
     def get(self, key: Hashable) -> Bucket | None:
         return self._buckets.get(key)
+
+    def keys(self) -> Collection[Hashable]:
+        return self._buckets.keys()
 
     def replace(self, old: Entry[Any] | None, new: Entry[Any] | None) -> None:
         """An entry was revised, posted (no old one) or taken away (no new one)."""

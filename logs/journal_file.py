@@ -55,7 +55,7 @@ class JournalFile:
         Raises:
             CannotWriteError: the file cannot be written any more, as when the disk is full; names the file.
         """
-        self._file.append(self.line(decision).encode() + b"\n")
+        self._file.append(f"{self.line(decision)}\n".encode())
         if self._forced(decision):
             self._file.sync()
 

@@ -90,11 +90,11 @@ def test_bad_input_is_named(argv: list[str], told: str, tmp_path: Path, capsys: 
 @pytest.mark.parametrize("argv", [
     ["world", "import", "a.dxf", "--out", "b.toml"],
 ])
-def test_what_is_not_built_yet_says_so(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_building_in_an_unknown_format_is_refused(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     code, err = said(capsys, argv)
     assert code == 2
     assert err.count("\n") == 1
-    assert "not yet available" in err
+    assert "expected a building file that ends in .ifc, .gml, .xml" in err
 
 
 @pytest.mark.parametrize("command", [command.name for command in COMMANDS])
