@@ -53,6 +53,11 @@ class Matcher(Expert):
         m: Milestone = milestone.value
         lines_world = np.array(m.expected, float).reshape(-1, 2, 3)
         data_px = segments.value.segments_px
+        if not len(lines_world):
+            none = np.zeros((0, 2), np.int64)
+            yield Post(LineMatch(milestone.id, segments.id, none, frozen(lines_world), frozen(data_px[:0]), 0.0,
+                                 frozen(np.zeros(0))), (segments, milestone, belief))
+            return
         found = self._found(m, lines_world, data_px, belief.value)
         pairs = np.asarray(found.pairs, np.int64).reshape(-1, 2)
         yield Post(

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from shapely import Geometry
+from shapely import Geometry, Point
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
@@ -29,9 +29,13 @@ CLEARANCES_M = (0.12, 0.06, 0.03)
 """Margins round the robot's disc, the most comfortable that leaves a way."""
 THRESHOLD_M = 0.65
 """How far before and behind a doorway the places are from which it is passed straight [m]."""
+NEARER_M = (0.55, 0.47, 0.40)
+"""The same where what is opposite the doorway leaves no room for that."""
 LEG_M = 3.6
 """Longer legs get a milestone in between [m]."""
 WAY_TOLERANCE_M = 0.15
+NARROW_M = 0.10
+"""A doorway with less room on both sides of the robot is come up to more exactly."""
 END_TOLERANCE_M = 0.010
 HEADING_TOLERANCE_RAD = 0.02
 ADJUSTMENTS = 8
@@ -57,6 +61,7 @@ class Sketcher(Expert):
     def __init__(self, robot: RobotModel) -> None:
         super().__init__(robot)
         self._world = robot.world
+        self._frees: dict[tuple[str, float], Geometry] = {}
 
     def rate(self, view: View, trigger: Change) -> float | None:
         value = trigger.entry.value
@@ -172,17 +177,27 @@ class Sketcher(Expert):
         subgoals: list[Subgoal] = []
         for step in route.steps:
             before, behind = (self._before(step.passage, locale) for locale in (step.origin, step.destination))
-            subgoals.append(self._subgoal(here, before, WAY_TOLERANCE_M))
+            subgoals.append(self._subgoal(here, before, self._way_tolerance_m(step.passage)))
             subgoals.append(Subgoal(before, behind, True, step.passage.name, WAY_TOLERANCE_M))
             here = behind
         subgoals.append(self._subgoal(here, destination, tolerance_m))
         return tuple(subgoals)
 
+    def _way_tolerance_m(self, passage: Passage) -> float:
+        """How near to the place before a passage the robot must come to pass it straight without touching it."""
+        if isinstance(passage, Link):
+            return WAY_TOLERANCE_M
+        beside = passage.width_m / 2 - self._robot.radius_m
+        return WAY_TOLERANCE_M if beside >= NARROW_M else max(beside, CLEARANCES_M[-1])
+
     def _before(self, passage: Passage, locale: str) -> Place:
         if isinstance(passage, Link):
             x, y, heading = passage.stop_of(locale)
             return Place.of_world(self._world, locale, float(x), float(y), float(heading))
-        x, y = passage.threshold_of(locale).mean(axis=0) - THRESHOLD_M * passage.outward_from(locale)
+        middle, outward = passage.threshold_of(locale).mean(axis=0), passage.outward_from(locale)
+        free = self._free(locale, CLEARANCES_M[-1])
+        away = next((m for m in (THRESHOLD_M, *NEARER_M) if free.covers(Point(middle - m * outward))), THRESHOLD_M)
+        x, y = middle - away * outward
         return Place.of_world(self._world, locale, float(x), float(y))
 
     def _subgoal(self, origin: Place, destination: Place, tolerance_m: float) -> Subgoal:
@@ -213,8 +228,11 @@ class Sketcher(Expert):
         )
 
     def _free(self, locale: str, margin_m: float) -> Geometry:
-        clearance = self._robot.radius_m + margin_m
-        return free_space(self._world.outline(locale), self._world.obstacles(locale), clearance)
+        if (locale, margin_m) not in self._frees:
+            clearance = self._robot.radius_m + margin_m
+            self._frees[locale, margin_m] = free_space(
+                self._world.outline(locale), self._world.obstacles(locale), clearance)
+        return self._frees[locale, margin_m]
 
 
 def _place(belief: Hypothesis) -> Place:

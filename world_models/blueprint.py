@@ -85,6 +85,17 @@ class ThingSpec:
     up_m: float = 0.0
 
 
+@dataclass(frozen=True)
+class LinkSpec:
+    """An elevator or a flight of stairs; each stop is x, y [m] and heading [rad] in the frame of its locale."""
+
+    name: str
+    kind: str
+    between: tuple[str, str]
+    stops: tuple[tuple[float, float, float], tuple[float, float, float]]
+    source: str
+
+
 @dataclass(frozen=True, eq=False)
 class Blueprint:
     """A whole world file."""
@@ -94,3 +105,4 @@ class Blueprint:
     locales: Mapping[str, LocaleSpec]
     doors: tuple[DoorSpec, ...]
     things: tuple[ThingSpec, ...] = field(default=())
+    links: tuple[LinkSpec, ...] = field(default=())

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.blueprint import Blueprint, DoorSpec, LocaleSpec, ThingSpec
+from world_models.blueprint import Blueprint, DoorSpec, LinkSpec, LocaleSpec, ThingSpec
 from world_models.doors import LEAF_DEPTH_M, DoorSide, closed_door, open_door
 from world_models.faces import Face
-from world_models.frames import Pose
+from world_models.frames import Pose, Pose2, flattened
 from world_models.geometer import Solid
 from world_models.landmarks import Landmark
-from world_models.locales import Doorway, Locale
+from world_models.locales import Doorway, Link, Locale
 from world_models.memory_frames import MemoryFrames
 from world_models.shells import Opening, Shell, Wall, along_wall, walls_of
 from world_models.things import Fault, Thing
@@ -43,6 +43,7 @@ def build_world(blueprint: Blueprint) -> World:
         every_face=tuple(site.faces),
         every_landmark=tuple(mark for mark in site.landmarks if len(mark.edges)),
         every_thing=tuple(site.things),
+        every_link=tuple(_link(link, site.poses) for link in blueprint.links),
         building_faults=tuple(site.faults),
     ))
 
@@ -210,6 +211,12 @@ def _doorway(door: DoorSpec, sides: list[DoorSide]) -> Doorway:
     """Left jamb first, as seen from inside each room: the wall's x runs to the left as one faces it."""
     thresholds = [side.wall.world_from_wall.apply([(side.x[1], 0, 0), (side.x[0], 0, 0)])[:, :2] for side in sides]
     return Doorway(door.name, (door.between[0], door.between[1]), np.array(thresholds), door.height_m, door.source)
+
+
+def _link(spec: LinkSpec, poses: Mapping[str, Pose]) -> Link:
+    stops = [flattened(poses[room]) @ Pose2(*stop) for room, stop in zip(spec.between, spec.stops, strict=True)]
+    return Link(spec.name, spec.kind, spec.between, np.array([(s.x_m, s.y_m, s.heading_rad) for s in stops]),
+                spec.source)
 
 
 def _thing(spec: ThingSpec, name: str, world_from_part: Pose) -> Thing:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.blueprint import Blueprint, DoorSpec, LocaleSpec, RoomLook, ThingSpec
+from world_models.blueprint import Blueprint, DoorSpec, LinkSpec, LocaleSpec, RoomLook, ThingSpec
 from world_models.builder import build_world
 from world_models.frames import Pose
 from world_models.outlines import is_simple
@@ -88,14 +88,16 @@ class _Draft:
     locales: dict[str, LocaleSpec] = field(default_factory=dict)
     doors: list[DoorSpec] = field(default_factory=list)
     things: list[ThingSpec] = field(default_factory=list)
+    links: list[LinkSpec] = field(default_factory=list)
 
     def blueprint(self) -> Blueprint:
-        return Blueprint(self.name, f"{self.base.name}:1", self.locales, tuple(self.doors), tuple(self.things))
+        return Blueprint(self.name, f"{self.base.name}:1", self.locales, tuple(self.doors), tuple(self.things),
+                         tuple(self.links))
 
     # -- files -----------------------------------------------------------------------------------------------------
 
     def read_base(self, root: Node) -> None:
-        root.table(("name", "units", "locales"), ("finishes", "parts", "defaults", "doors"))
+        root.table(("name", "units", "locales"), ("finishes", "parts", "defaults", "doors", "links"))
         self.name = root["name"].text()
         self.shelf.read(root)
         if defaults := root.get("defaults"):
@@ -107,6 +109,8 @@ class _Draft:
             self._read_things(name, node)
         for name, node in doors.entries() if (doors := root.get("doors")) else ():
             self.doors.append(self._door(name, node))
+        for name, node in links.entries() if (links := root.get("links")) else ():
+            self.links.append(self._link(name, node))
 
     def read_details(self, root: Node) -> None:
         root.table(("units", "locales"), ("finishes", "parts"))
@@ -222,6 +226,20 @@ class _Draft:
             self.shelf.length(height, 0.1, 20.0) if height else 2.0,
             is_open, frame, leaf, threshold, self.shelf.part(node["panel"]) if "panel" in node else (), node.where,
         )
+
+    def _link(self, name: str, node: Node) -> LinkSpec:
+        node.table(("kind", "between", "stops"))
+        between = [self._room(item) for item in node["between"].items(least=2)]
+        if len(between) != 2 or between[0] == between[1]:
+            raise node["between"].fail("two different locales")
+        stops = [item.numbers((3,), -self.shelf.far, self.shelf.far) for item in node["stops"].items(least=2)]
+        if len(stops) != 2:
+            raise node["stops"].fail("a stop [x, y, heading in degrees] in each of the two locales")
+        if name in [door.name for door in self.doors]:
+            raise node.fail("a name that no door has")
+        unit = self.shelf.unit_m
+        a, b = ((x * unit, y * unit, math.radians(degrees)) for x, y, degrees in stops)
+        return LinkSpec(name, node["kind"].choice("elevator", "stairs"), (between[0], between[1]), (a, b), node.where)
 
     def _room(self, node: Node) -> str:
         rooms = [name for name, spec in self.locales.items() if spec.outline is not None]

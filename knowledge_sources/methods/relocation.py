@@ -116,11 +116,13 @@ def _lines_round(robot: RobotModel, x: float, y: float) -> Floats:
 
 
 def _refined(robot: RobotModel, segments_px: Floats, pose: Pose2) -> Candidate | None:
-    """Match, solve, and again from nearer; None where the picture does not bear it out."""
+    """Match, solve, and again from nearer; None where the picture does not bear it out, or the model shows nothing."""
     covariance = ROUNDS[0]
     for spread in ROUNDS:
         lines = visible_lines(robot.world, robot.camera, robot.camera_from_world(pose), min_length_px=12.0,
                               min_contrast=0.05, max_distance_m=15.0)
+        if not len(lines.lines_world):
+            return None
         found = match_on_floor(
             lines.lines_world, segments_px, robot.camera, robot.mount.camera_from_robot, pose, spread
         )
