@@ -254,7 +254,7 @@ class _Reader:
 
     def _told(self, layers: list[Layer], network: Network | None) -> None:
         plan, account = self.plan, self.plan.account
-        doors = sum(cell.is_door for cell in self.cells)
+        doors = len([cell for cell in self.cells if cell.is_door])
         account.used.append(f"IndoorGML: {len(plan.storeys)} floors, {len(self.cells)} of "
                             f"{len(elements(self.root, 'CellSpace'))} cells, {doors} of them doors, layers "
                             f"{', '.join(layer.name for layer in layers)}")
