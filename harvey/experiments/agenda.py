@@ -171,5 +171,5 @@ def _notes(parts: int) -> tuple[str, ...]:
         " a better use of it.",
         "Memory: resident set of this process; lines are made and written to the null device. The mission is decided"
         " again from its observations; its experts include the seeing, but no camera and no wheels.",
-        *(f"{peer} is not installed: pip install 'harvey[peers]'." for peer in absent),
+        *(f"{peer} is not installed: .venv/bin/pip install '.[peers]'." for peer in absent),
     )

@@ -22,7 +22,7 @@ TOOK = "took "
 
 
 def has(peer: str) -> bool:
-    """Whether a peer is installed: ``pip install 'harvey[peers]'``."""
+    """Whether a peer is installed: ``.venv/bin/pip install '.[peers]'``."""
     return importlib.util.find_spec(peer) is not None
 
 

@@ -44,11 +44,11 @@ def test_a_peer_that_is_not_installed_leaves_its_column_out(monkeypatch: pytest.
     assert any("py_trees is not installed" in note for note in agenda._notes(1))
 
 
-@pytest.mark.skipif(not agenda_peers.has("clips"), reason="clipspy is not installed: pip install 'harvey[peers]'")
+@pytest.mark.skipif(not agenda_peers.has("clips"), reason="clipspy is not installed: pip install '.[peers]'")
 def test_clips_fires_once_for_each_step() -> None:
     assert 0.0 < agenda_peers.clips_s(10, 50) < 1.0
 
 
-@pytest.mark.skipif(not agenda_peers.has("py_trees"), reason="py_trees is not installed: pip install 'harvey[peers]'")
+@pytest.mark.skipif(not agenda_peers.has("py_trees"), reason="py_trees is not installed: pip install '.[peers]'")
 def test_py_trees_ticks() -> None:
     assert 0.0 < agenda_peers.py_trees_s(10, 5) < 1.0

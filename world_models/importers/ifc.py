@@ -45,7 +45,7 @@ def read_ifc(path: Path) -> Plan:
     """
     if find_spec("ifcopenshell") is None:
         raise BuildingError(f"{path.name}: reading IFC takes ifcopenshell, which is not installed: "
-                            "pip install harvey[ifc]")
+                            ".venv/bin/pip install '.[ifc]'")
     context = multiprocessing.get_context("spawn")
     answers, sender = context.Pipe(duplex=False)
     child = context.Process(target=_answer, args=(path, sender), daemon=True)
