@@ -2,61 +2,58 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Iterable, Iterator
 from heapq import heapify, heappop, heappush
 
 from blackboard.activation import Activation, Obviated
 from blackboard.level import Level
 
-Ranked = tuple[float, int, Activation]
-"""Sorts activations of one level: the best rated first, then the oldest; as numbers differ it goes no further."""
+SPARE = 16
+"""So many queues of a level are kept whether or not they are empty."""
 
 
 class Agenda:
     """Pending activations, one for each (source, entry).
 
-    Each servo level has a heap. What was taken or dropped leaves its heap when it is at the top, or when more than half
-    of the heap is of that kind; so adding and taking cost O(log n) on average, and nothing is ever searched.
+    Adding, taking and finding the best cost the same however many are pending: experts give few different ratings, and
+    those of one rating stand in a queue.
     """
 
     def __init__(self) -> None:
-        self._pending: dict[int, Activation] = {}
+        self._count = 0
         self._by_entry: dict[str, list[Activation]] = {}
-        self._heaps: tuple[list[Ranked], ...] = tuple([] for _ in Level)
+        self._levels: tuple[_Queues, ...] = tuple(_Queues() for _ in Level)
 
     def add(self, activation: Activation) -> Obviated | None:
-        """Add one; the pending activation of the same source on the same entry, if any, is replaced."""
-        number, source, trigger, rating, _cycle = activation
-        self._pending[number] = activation
-        heap = self._heaps[source.level]
-        heappush(heap, (-rating, number, activation))
-        if len(heap) > 2 * len(self._pending) + 16:
-            self._sift(heap)
-        same = self._by_entry.get(trigger.entry.id)
+        """Add a new one; the pending activation of the same source on the same entry, if any, is replaced."""
+        source, id = activation.source, activation.trigger.entry.id
+        self._levels[source.level].add(activation)
+        self._count += 1
+        same = self._by_entry.get(id)
         if same is None:
-            self._by_entry[trigger.entry.id] = [activation]
+            self._by_entry[id] = [activation]
             return None
-        return self._beside(same, activation)
-
-    def _beside(self, same: list[Activation], new: Activation) -> Obviated | None:
-        """Add one to those of its entry, oldest first; there are as many as experts that it woke, so a list will do."""
-        old = next((a for a in same if a.source is new.source), None)
-        same.append(new)
-        if same[-2].number > new.number:
-            same.sort(key=_number)
+        old = next((a for a in same if a.source is source), None)
+        same.append(activation)
         if old is None:
             return None
-        same.remove(old)
-        del self._pending[old.number]
-        self._uncover(self._heaps[old.source.level])
-        return Obviated(old, f"newer trigger {new.trigger.entry.ref}")
+        self.take(old)
+        return Obviated(old, f"newer trigger {activation.trigger.entry.ref}")
+
+    def put_back(self, activation: Activation) -> None:
+        """Add one that was taken: by its age it stands before others."""
+        self._levels[activation.source.level].put_back(activation)
+        self._count += 1
+        same = self._by_entry.setdefault(activation.trigger.entry.id, [])
+        same.append(activation)
+        same.sort(key=_number)
 
     def take(self, activation: Activation) -> None:
         """Remove one that is about to be executed, or that is dropped."""
-        number, source, trigger, _rating, _cycle = activation
-        del self._pending[number]
-        self._uncover(self._heaps[source.level])
-        id = trigger.entry.id
+        self._levels[activation.source.level].take(activation)
+        self._count -= 1
+        id = activation.trigger.entry.id
         same = self._by_entry[id]
         if len(same) > 1:
             same.remove(activation)
@@ -70,33 +67,80 @@ class Agenda:
 
     def best(self, groups: Iterable[Iterable[Level]]) -> Activation | None:
         """The best rated, and of these the oldest, of the first group of levels that has any."""
-        heaps = self._heaps
+        levels = self._levels
         for group in groups:
-            best: Ranked | None = None
-            for level in group:
-                heap = heaps[level]
-                if heap and (best is None or heap[0] < best):
-                    best = heap[0]
-            if best is not None:
-                return best[2]
+            firsts = [first for level in group if levels[level].ratings and (first := levels[level].first())]
+            if firsts:
+                return firsts[0] if len(firsts) == 1 else min(firsts, key=_rank)
         return None
-
-    def _uncover(self, heap: list[Ranked]) -> None:
-        """Have one at the top that is pending."""
-        pending = self._pending
-        while heap and heap[0][1] not in pending:
-            heappop(heap)
-
-    def _sift(self, heap: list[Ranked]) -> None:
-        heap[:] = [ranked for ranked in heap if ranked[1] in self._pending]
-        heapify(heap)
 
     def __iter__(self) -> Iterator[Activation]:
         """Oldest first."""
-        return iter(sorted(self._pending.values(), key=_number))
+        return iter(sorted((a for same in self._by_entry.values() for a in same), key=_number))
 
     def __len__(self) -> int:
-        return len(self._pending)
+        return self._count
+
+
+class _Queues:
+    """The activations of one level: a queue for each rating, oldest first, and a heap of those ratings.
+
+    A queue that has run empty stays until it comes to the top of the heap, or until there are twice as many queues as
+    were needed when the empty ones were last closed.
+    """
+
+    __slots__ = ("_most", "_queues", "ratings")
+
+    def __init__(self) -> None:
+        self._queues: dict[float, OrderedDict[int, Activation]] = {}
+        self.ratings: list[float] = []
+        self._most = SPARE
+
+    def add(self, activation: Activation) -> None:
+        number, _source, _trigger, rating, _cycle = activation
+        queue = self._queues.get(rating)
+        if queue is None:
+            queue = self._opened(rating)
+        queue[number] = activation
+
+    def put_back(self, activation: Activation) -> None:
+        self.add(activation)
+        queue = self._queues[activation.rating]
+        for number in sorted(queue):
+            queue.move_to_end(number)
+
+    def take(self, activation: Activation) -> None:
+        del self._queues[activation.rating][activation.number]
+
+    def first(self) -> Activation | None:
+        """The best rated, and of these the oldest."""
+        ratings, queues = self.ratings, self._queues
+        while ratings:
+            queue = queues[-ratings[0]]
+            if queue:
+                return next(iter(queue.values()))
+            del queues[-heappop(ratings)]
+        return None
+
+    def _opened(self, rating: float) -> OrderedDict[int, Activation]:
+        if len(self._queues) > self._most:
+            self._close_empty()
+        queue = self._queues[rating] = OrderedDict()
+        heappush(self.ratings, -rating)
+        return queue
+
+    def _close_empty(self) -> None:
+        self._queues = {rating: queue for rating, queue in self._queues.items() if queue}
+        self.ratings = [-rating for rating in self._queues]
+        heapify(self.ratings)
+        self._most = 2 * len(self._queues) + SPARE
+
+    def __len__(self) -> int:
+        return len(self._queues)
+
+
+def _rank(activation: Activation) -> tuple[float, int]:
+    return -activation.rating, activation.number
 
 
 def _number(activation: Activation) -> int:

@@ -83,7 +83,7 @@ class Blackboard:
     @staticmethod
     def _reasons(reasons: tuple[Any, ...], made: Mapping[int, Change]) -> Reasons:
         if len(reasons) == 1 and isinstance(reasons[0], Entry):
-            return (reasons[0].ref,)
+            return (new_tuple(Ref, reasons[0][:2]),)
         named = [r.ref if isinstance(r, Entry) else r if isinstance(r, Ref) else made[id(r)].entry.ref for r in reasons]
         return tuple(dict.fromkeys(named))
 

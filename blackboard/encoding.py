@@ -12,7 +12,7 @@ import json
 from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
 from json.encoder import encode_basestring_ascii
-from math import isfinite
+from math import inf, isfinite, nan
 from operator import attrgetter, call
 from typing import Any
 
@@ -22,6 +22,9 @@ NUMBERS = ("b", "i", "u", "f")
 """The kinds of array elements that JSON has a word for."""
 
 FLOATS = frozenset((float,))
+
+NOT_FINITE = frozenset(map(repr, (nan, inf, -inf)))
+"""Floats that JSON has no word for; no encoder writes these without quotes."""
 
 quoted: Encoder = encode_basestring_ascii
 """A text as JSON text."""
@@ -122,8 +125,11 @@ def _dataclass_encoder(kind: type[Any]) -> Encoder:
         kinds = tuple(map(type, held))
         encoders = shapes.get(kinds)
         if encoders is None:
-            encoders = shapes[kinds] = tuple([ENCODERS[kind] for kind in kinds])
-        return form % tuple(map(call, encoders, held))
+            encoders = shapes[kinds] = tuple([float.__repr__ if kind is float else ENCODERS[kind] for kind in kinds])
+        texts = tuple(map(call, encoders, held))
+        if not NOT_FINITE.isdisjoint(texts):
+            texts = tuple([f'"{text}"' if text in NOT_FINITE else text for text in texts])
+        return form % texts
 
     return encode
 

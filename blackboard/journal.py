@@ -112,7 +112,7 @@ class JournalLines:
 
     def __init__(self) -> None:
         self._texts: dict[int, str] = {}
-        self._bidders: dict[int, tuple[str, KnowledgeSource]] = {}
+        self._bidders = _Bidders()
         self._last: Change | None = None
         self._last_ref = ""
 
@@ -125,7 +125,7 @@ class JournalLines:
         bids = ",".join(map(self._bid, activated)) if activated else ""
         next_best = "null" if runner_up is None else texts.get(runner_up.number) or self._bid(runner_up)
         dropped = ",".join(map(self._dropped, obviated)) if obviated else ""
-        executed = "null" if chosen is None else texts.pop(chosen.number, "") or self._activation(chosen)
+        executed = "null" if chosen is None else self._last_time(chosen)
         acts = ",".join(map(self._change, made)) if made else ""
         return (
             f'{{"cycle":{cycle},"focus":"{WORDS[focus]}","observed":[{told}],"seen":[{refs}],"activated":[{bids}],'
@@ -133,29 +133,24 @@ class JournalLines:
             f'"refused":{quoted(refused) if refused else NOTHING}}}'
         )
 
-    def _bid(self, a: Activation) -> str:
-        text = self._texts[a.number] = self._activation(a)
-        return text
-
     def _dropped(self, obviated: Obviated) -> str:
         a, reason = obviated
-        text = self._texts.pop(a.number, "") or self._activation(a)
-        return f'{text[:-1]},"reason":{quoted(reason)}}}'
+        return f'{self._last_time(a)[:-1]},"reason":{quoted(reason)}}}'
 
-    def _activation(self, a: Activation) -> str:
+    def _bid(self, a: Activation) -> str:
         number, source, trigger, rating, since = a
-        bidder = (self._bidders.get(id(source)) or self._bidder(source))[0]
         ref = self._last_ref if trigger is self._last else self._ref(trigger)
-        return (
-            f'{{"number":{number},{bidder},"trigger":{ref},"kind":"{type(trigger).__name__}",'
+        text = self._texts[number] = (
+            f'{{"number":{number},{self._bidders[source]},"trigger":{ref},"kind":"{type(trigger).__name__}",'
             f'"rating":{ENCODERS[type(rating)](rating)},"since":{since}}}'
         )
+        return text
 
-    def _bidder(self, source: KnowledgeSource) -> tuple[str, KnowledgeSource]:
-        """What is told of a source with each of its activations; the source is kept so that its id stays its own."""
-        text = f'"source":{quoted(source.name)},"level":"{WORDS[source.level]}"'
-        made = self._bidders[id(source)] = text, source
-        return made
+    def _last_time(self, a: Activation) -> str:
+        """An activation that has come to its end."""
+        if a.number not in self._texts:
+            self._bid(a)
+        return self._texts.pop(a.number)
 
     def _ref(self, change: Change) -> str:
         """The revision's name, quoted; mostly the last one again: made, then seen, then the trigger of activations."""
@@ -176,6 +171,14 @@ class JournalLines:
             f'"author":{quoted(author)},"because":[{_refs(because) if because else ""}],'
             f'"value":{ENCODERS[kind](value)}{reasons}}}'
         )
+
+
+class _Bidders(dict[KnowledgeSource, str]):
+    """What is told of a source with each of its activations."""
+
+    def __missing__(self, source: KnowledgeSource) -> str:
+        text = self[source] = f'"source":{quoted(source.name)},"level":"{WORDS[source.level]}"'
+        return text
 
 
 def _refs(refs: tuple[Ref, ...]) -> str:

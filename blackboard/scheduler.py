@@ -149,18 +149,16 @@ class Scheduler:
             if not (source.still_valid(view, change) if source.has_own_word else stands):
                 continue
             rating = source.rate(view, change)
-            if rating is not None:
-                activation = self._activation(source, change, rating)
-                activated.append(activation)
-                replaced = self._agenda.add(activation)
-                if replaced is not None:
-                    obviated.append(replaced)
-
-    def _activation(self, source: KnowledgeSource, change: Change, rating: float) -> Activation:
-        if not 0.0 <= rating <= 1.0:
-            raise ValueError(f"expected a rating of 0..1 from {source.name}, got {rating}")
-        self._numbers += 1
-        return new_tuple(Activation, (self._numbers, source, change, rating, self.cycle))
+            if rating is None:
+                continue
+            if not 0.0 <= rating <= 1.0:
+                raise ValueError(f"expected a rating of 0..1 from {source.name}, got {rating}")
+            self._numbers += 1
+            activation = new_tuple(Activation, (self._numbers, source, change, rating, self.cycle))
+            activated.append(activation)
+            replaced = self._agenda.add(activation)
+            if replaced is not None:
+                obviated.append(replaced)
 
     def _stands(self, trigger: Change) -> bool:
         """What :meth:`KnowledgeSource.still_valid` says, which most sources leave as it is."""
@@ -181,17 +179,22 @@ class Scheduler:
             return chosen, self._best(groups, obviated), ""
         except Exception:
             if chosen is not None:
-                self._agenda.add(chosen)
+                self._agenda.put_back(chosen)
             return None, None, RAISED + traceback.format_exc(limit=-4)
 
     def _best(self, groups: Groups, obviated: list[Obviated]) -> Activation | None:
         """The best that is pending and still holds; what is better and does not is obviated."""
+        view = self.view
         while (best := self._agenda.best(groups)) is not None:
-            if best.cycle == self.cycle:  # it was asked in this cycle, and the board is as it was then
+            _number, source, trigger, _rating, cycle = best
+            if cycle == self.cycle:  # it was asked in this cycle, and the board is as it was then
                 return best
             reason = "raised when it was asked"
             try:
-                reason = self._objection(best)
+                if not (source.still_valid(view, trigger) if source.has_own_word else self._stands(trigger)):
+                    reason = self._staleness(trigger)
+                else:
+                    reason = "could not answer any more" if source.rate(view, trigger) is None else ""
             finally:
                 if reason:
                     self._agenda.take(best)
@@ -199,14 +202,6 @@ class Scheduler:
             if not reason:
                 return best
         return None
-
-    def _objection(self, activation: Activation) -> str:
-        """Why an activation no longer holds, or ""."""
-        _number, source, trigger, _rating, _cycle = activation
-        view = self.view
-        if not (source.still_valid(view, trigger) if source.has_own_word else self._stands(trigger)):
-            return self._staleness(trigger)
-        return "could not answer any more" if source.rate(view, trigger) is None else ""
 
     def _execute(self, chosen: Activation) -> tuple[tuple[Change, ...], str]:
         source = chosen.source

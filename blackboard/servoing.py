@@ -30,6 +30,8 @@ class Discrepancy:
         bounds: up to what the action and the plan level may correct it; the goal level has no bound.
         unit: of magnitude and bounds.
         status: open, corrected (success comes back down), or escalated.
+        tried: what was being tried when it was raised to this level, "" where it arose here.
+        times: how often this level was asked so while that was being tried, this time included.
     """
 
     level: Level
@@ -38,6 +40,8 @@ class Discrepancy:
     bounds: tuple[float, float]
     unit: str
     status: str = "open"
+    tried: str = ""
+    times: int = 0
 
     def __post_init__(self) -> None:
         if self.magnitude is not None and not self.magnitude >= 0.0:

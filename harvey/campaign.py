@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import re
-import signal
-import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING
 
 from blackboard.journal import Sink
 from harvey.errors import BadInput
 from harvey.run_directory import RunDirectory, new_run
+from harvey.workers import by_workers
 
 if TYPE_CHECKING:
     from harvey.referee import MissionResult
@@ -127,36 +121,5 @@ def run_all(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Tas
 
     A mission's result follows from its task alone, so that the number of workers changes nothing but the time.
     """
-    spawn = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(workers, len(tasks)) or 1, mp_context=spawn, initializer=_become_worker)
-    try:
-        futures = {pool.submit(_work, task): task for task in tasks}
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-    except BrokenProcessPool:
-        raise BadInput("a worker process was killed from outside, as when memory runs out") from None
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for child in multiprocessing.active_children():
-            child.terminate()
-        raise
-    finally:
-        pool.shutdown()
-
-
-def _become_worker() -> None:
-    """The parent decides when to stop."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _exit)
-
-
-def _work(task: Task) -> MissionResult:
-    """In a worker: a mission that is told to stop closes its files, and then the worker takes no other."""
-    try:
-        return run_task(task)
-    except SystemExit:
-        os._exit(143)
-
-
-def _exit(_number: int, _frame: FrameType | None) -> None:
-    sys.exit(143)
+    for number, result in by_workers(run_task, tasks, workers):
+        yield tasks[number], result

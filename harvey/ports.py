@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, Protocol
 
-from blackboard.change import Change, Posted
+from blackboard.change import Change, Posted, Retracted
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
-from world_models.body import BodyFault, Frame, Look, MotionReport, MotorCommand, Recovery
+from world_models.body import BodyFault, Course, Frame, Look, MotionReport, MotorCommand, Recovery, Ride, RideReport
 
 
 class Body(Protocol):
@@ -19,12 +19,20 @@ class Body(Protocol):
         """Carry out a command and report what the wheels claim."""
         ...
 
+    def steer(self, course: Course, /) -> tuple[MotionReport, Frame] | BodyFault:
+        """Roll on by a course until the next picture, or come to a stand, and report what the wheels claim since."""
+        ...
+
     def claim(self) -> MotionReport | BodyFault:
         """What the wheels claim of the last command, asked anew after a fault broke it off."""
         ...
 
     def look(self, purpose: str, /) -> Frame | BodyFault:
         """Take a picture for a purpose."""
+        ...
+
+    def ride(self, ride: Ride, /) -> RideReport | BodyFault:
+        """Be carried by an elevator whose button somebody presses, or hear that nobody does."""
         ...
 
     def wait(self, duration_s: float, /) -> float:
@@ -56,10 +64,16 @@ class BodyPort:
             yield from self._tried_again(entry)
         elif isinstance(change, Posted) and isinstance(entry.value, MotorCommand):
             yield self._told(entry, self._body.execute(entry.value))
+        elif not isinstance(change, Retracted) and isinstance(entry.value, Course):
+            found = self._body.steer(entry.value)
+            for answer in (found,) if isinstance(found, BodyFault) else found:
+                yield self._told(entry, answer)
         elif isinstance(change, Posted) and isinstance(entry.value, Look):
             yield self._told(entry, self._body.look(entry.value.purpose))
+        elif isinstance(change, Posted) and isinstance(entry.value, Ride):
+            yield self._told(entry, self._body.ride(entry.value))
 
-    def _told(self, request: Entry[Any], found: MotionReport | Frame | BodyFault) -> Effect:
+    def _told(self, request: Entry[Any], found: MotionReport | Frame | RideReport | BodyFault) -> Effect:
         if isinstance(found, BodyFault):
             self._unanswered[request.id] = request
             return Post(replace(found, request=request.id), (request,))
@@ -74,7 +88,7 @@ class BodyPort:
             yield Revise(recovery, replace(tried, status="in vain", what="the request is gone"), (recovery,))
             return
         wanted = request.value
-        found = self._body.claim() if isinstance(wanted, MotorCommand) else self._body.look(wanted.purpose)
+        found = self._again(wanted)
         if isinstance(found, BodyFault):
             vain = replace(tried, status="in vain", what=found.what, detail=found.detail)
             yield Revise(recovery, vain, (recovery,))
@@ -82,3 +96,9 @@ class BodyPort:
         del self._unanswered[asked.request]
         yield Revise(recovery, replace(tried, status="over", what="", detail=""), (recovery,))
         yield Post(found, (request,))
+
+    def _again(self, wanted: MotorCommand | Course | Look | Ride) -> MotionReport | Frame | RideReport | BodyFault:
+        """What a request is answered with now; a command is not carried out once more."""
+        if isinstance(wanted, Ride):
+            return self._body.ride(wanted)
+        return self._body.claim() if isinstance(wanted, MotorCommand | Course) else self._body.look(wanted.purpose)

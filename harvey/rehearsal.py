@@ -24,12 +24,13 @@ from knowledge_sources.methods.views import view_quality
 from knowledge_sources.milestone_selector import GOOD_PART, GOOD_RAD, LEAST_LINES
 from knowledge_sources.questions import held
 from sim.scenario import Scenario
-from world_models.body import MotionReport, MotorCommand
+from world_models.body import MotionReport, MotorCommand, Ride, RideReport
 from world_models.location import Hypothesis, diagonal
 from world_models.robot import RobotModel
 from world_models.task import Command, Milestone, Outcome, PlanSketch
 
-TAKING_PART = ("interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "mission_keeper")
+TAKING_PART = ("interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "passenger",
+               "mission_keeper")
 MOST_CYCLES = 20_000
 SEEN_M, SEEN_RAD = 0.003, 0.001
 """How well a milestone is taken to tell the place, in thought."""
@@ -84,11 +85,13 @@ class PerfectWheels:
         value = change.entry.value
         if isinstance(change, Posted) and isinstance(value, MotorCommand):
             yield Post(MotionReport(value.turn_rad, value.move_m, 0.0, 0.0), (change.entry,))
+        elif isinstance(change, Posted) and isinstance(value, Ride):
+            yield Post(RideReport(value.passage, value.destination, 0.0, 0.0), (change.entry,))
 
 
 def rehearse(scenario: Scenario) -> tuple[tuple[Prospect, ...], Outcome]:
     """The milestones in the order in which they will come, and how the mission ends in thought."""
-    return rehearsed(robot_model(scenario), command(scenario))
+    return rehearsed(replace(robot_model(scenario), continuous=False), command(scenario))
 
 
 def rehearsed(robot: RobotModel, task: Command) -> tuple[tuple[Prospect, ...], Outcome]:
@@ -122,7 +125,8 @@ def _prospects(robot: RobotModel, view: View, made: Sequence[Change]) -> list[Pr
 def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Milestone) -> Prospect:
     lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
     pose = belief.world_from_robot(robot.world)
-    quality = view_quality(lines, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_ACROSS_PX)
+    mount = robot.standing_in(belief.locale).mount
+    quality = view_quality(lines, robot.camera, mount.camera_from_robot, pose, SIGMA_ACROSS_PX)
     sharp = quality.sigma_m <= GOOD_PART * _tolerance_m(view, milestone) and quality.sigma_rad <= GOOD_RAD
     verdict = "clear" if sharp and len(lines) >= LEAST_LINES else "weak"
     return Prospect(

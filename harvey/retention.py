@@ -16,8 +16,8 @@ from blackboard.index import Index
 from blackboard.level import Level
 from blackboard.retention import Forget
 from blackboard.servoing import OPEN, Discrepancy
-from world_models.body import BodyFault, Frame, Look, MotionReport, MotorCommand, Recovery
-from world_models.percepts import LineMatch, PoseFix, Segments, Tracks
+from world_models.body import BodyFault, Course, Frame, Look, MotionReport, MotorCommand, Recovery, Ride, RideReport
+from world_models.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
 from world_models.task import Certificate, Goal, Leg, Milestone, PlanSketch
 
 LAST_MOTIONS = 8
@@ -56,6 +56,13 @@ def request_is_there(view: View, fault: Entry[BodyFault]) -> bool:
     return view.get(fault.value.request) is not None
 
 
+def is_last_raised(view: View, found: Entry[Discrepancy]) -> bool:
+    """Whether it is the last that was raised to its level: by it is counted how often that level is asked."""
+    level = found.value.level
+    last = view.latest(Discrepancy, lambda other: other.level is level and other.times > 0)
+    return last is not None and last.id == found.id
+
+
 RETENTION: tuple[Forget[Any], ...] = (
     Forget(Frame, keep=2, unless=is_template),
     Forget(Segments, keep=2, unless=is_of_use),
@@ -63,13 +70,17 @@ RETENTION: tuple[Forget[Any], ...] = (
     Forget(PoseFix, keep=2, unless=named_by(FIX)),
     Forget(Certificate, keep=2),
     Forget(Milestone, keep=2, when=lambda milestone: not milestone.is_open, unless=named_by(MATCHED, SOUGHT)),
-    Forget(Discrepancy, keep=2, when=lambda found: not found.is_open),
+    Forget(Discrepancy, keep=2, when=lambda found: not found.is_open, unless=is_last_raised),
     Forget(PlanSketch, keep=2, when=lambda sketch: not sketch.is_active),
     Forget(Goal, keep=2, when=lambda goal: not goal.is_active),
     Forget(Leg, keep=2),
+    Forget(Course, keep=LAST_MOTIONS, unless=named_by(REQUEST)),
     Forget(Look, keep=LAST_MOTIONS, unless=named_by(REQUEST)),
     Forget(MotorCommand, keep=LAST_MOTIONS, unless=named_by(REQUEST)),
     Forget(MotionReport, keep=2),
+    Forget(Ride, keep=LAST_MOTIONS, unless=named_by(REQUEST)),
+    Forget(RideReport, keep=2),
+    Forget(Panorama, keep=2),
     Forget(BodyFault, keep=LAST_MOTIONS, when=lambda fault: not fault.is_open, unless=request_is_there),
     Forget(Recovery, keep=LAST_MOTIONS, when=lambda recovery: recovery.status == "over"),
     Forget(Quiescence),

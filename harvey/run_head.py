@@ -63,7 +63,7 @@ class RunHead:
         kind: str, name: str, seed: int, world: Path, robot: RobotModel, servo: Servo, command: Command, **more: Any
     ) -> RunHead:
         """The head of a run that begins now; ``more`` are the other attributes. Raises OSError for the world file."""
-        known = {f.name: getattr(robot, f.name) for f in fields(robot) if f.name not in ("world", "lens")}
+        known = {f.name: getattr(robot, f.name) for f in fields(robot) if f.init and f.name not in ("world", "lens")}
         known["camera"] = robot.lens  # the robot's model is made of the camera as it is, with its lens
         return RunHead(
             kind, name, seed, _portable(world), _sha256(world), plain(known), asdict(servo), plain(command), **more

@@ -9,6 +9,7 @@ from knowledge_sources.correlator_tracker import CorrelatorTracker
 from knowledge_sources.dead_reckoner import DeadReckoner
 from knowledge_sources.escalator import Escalator
 from knowledge_sources.expert import Expert
+from knowledge_sources.helmsman import Helmsman
 from knowledge_sources.interpreter import Interpreter
 from knowledge_sources.line_finder import LineFinder
 from knowledge_sources.matcher import Matcher
@@ -17,6 +18,7 @@ from knowledge_sources.milestone_judge import MilestoneJudge
 from knowledge_sources.milestone_selector import MilestoneSelector
 from knowledge_sources.mission_keeper import MissionKeeper
 from knowledge_sources.motor import Motor
+from knowledge_sources.passenger import Passenger
 from knowledge_sources.plan_adjuster import PlanAdjuster
 from knowledge_sources.relocalizer import Relocalizer
 from knowledge_sources.safekeeper import Safekeeper
@@ -33,6 +35,8 @@ EXPERTS: tuple[type[Expert], ...] = (
     Sketcher,
     MilestoneSelector,
     Motor,
+    Helmsman,
+    Passenger,
     DeadReckoner,
     CorrelatorTracker,
     LineFinder,
@@ -56,7 +60,8 @@ def knowledge_sources(robot: RobotModel) -> tuple[KnowledgeSource, ...]:
 def robot_model(scenario: Scenario) -> RobotModel:
     """What the robot knows: the world file without the building's details, its camera and its wheels' kind."""
     camera = scenario.camera
-    return RobotModel(load_world(scenario.world), camera.camera, camera.mount, ActuatorModel())
+    return RobotModel(load_world(scenario.world), camera.camera, camera.mount, ActuatorModel(),
+                      continuous=scenario.motion.continuous)
 
 
 def servoing(servo: Servo) -> Servoing:

@@ -20,21 +20,30 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
+from knowledge_sources.methods.edge_alignment import aligned
 from knowledge_sources.methods.rectified import Rectified
 from knowledge_sources.methods.tracking import HALF_PX, Followed, Image, begin, correct, follow
 from knowledge_sources.questions import held, open_discrepancy
 from knowledge_sources.tolerances import PLAN_PX, action_px
+from world_models.actuator import Drift
 from world_models.body import Frame
 from world_models.location import Hypothesis, covariance_tuple
 from world_models.percepts import Anchor, Track, Tracks
 from world_models.robot import RobotModel
+from world_models.visibility import visible_lines
 
 FEW = 9
 """With fewer landmarks than this, new ones are taken."""
+FAR_M = 0.8
+"""A template is given up when the robot is so far from where it was cut: it would look otherwise from here."""
 MISSES = 2
 """A landmark that is not found so often in a row is given up."""
 LEAST = 4
 """Fewer expected landmarks than this do not make a discrepancy."""
+STRETCH_M = 0.3
+"""Over so much way at the least is it learnt how the wheels drift."""
+LENGTH_PX, CONTRAST = 16.0, 0.05
+"""Model lines that are shorter, or have less contrast, say little of where templates are cut."""
 LOST_PART = 1.0 / 3.0
 """When fewer than this part of the expected landmarks agree, tracking cannot explain what it sees."""
 
@@ -46,6 +55,13 @@ class Corrected(NamedTuple):
     agreeing: int
 
 
+class Renewed(NamedTuple):
+    """The tracks, and the belief by which the new ones of them were cut."""
+
+    tracks: Tracks
+    hypothesis: Hypothesis
+
+
 class CorrelatorTracker(Expert):
     """Follows landmarks from frame to frame; revises the held hypothesis; posts what it had to correct."""
 
@@ -55,7 +71,7 @@ class CorrelatorTracker(Expert):
         Watch(Frame, (Posted,), lambda f: f.purpose == "track"),
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in ("milestone", "relocalization")),
     )
-    writes = (Tracks, Hypothesis, Discrepancy)
+    writes = (Tracks, Hypothesis, Drift, Discrepancy)
 
     def __init__(self, robot: RobotModel) -> None:
         super().__init__(robot)
@@ -71,7 +87,7 @@ class CorrelatorTracker(Expert):
         if belief is None or frame is None:
             return
         if isinstance(trigger.entry.value, Hypothesis):
-            yield from self._begun_anew(frame, belief, old)
+            yield from self._begun_anew(view, frame, belief, old)
             return
         image = self._picture(frame.value.jpeg)
         followed = self._followed(view, None if old is None else old.value, image, belief.value)
@@ -82,27 +98,48 @@ class CorrelatorTracker(Expert):
         agreeing = 0 if corrected is None else corrected.agreeing
         if expected >= LEAST and agreeing < LOST_PART * expected:
             what = f"{expected - agreeing} of {expected} landmarks are not where they were expected{_furthest(seen)}"
-            yield from self._told(view, what, math.inf, belief.value, because)
+            yield from self._told(view, what, math.inf, belief.value, [f.track for f in followed], because)
             yield self._kept(old, Tracks(frame.id, HALF_PX, ()), because)
             return
         now = belief.value if corrected is None else corrected.hypothesis
-        kept = tuple(f.track for f in followed if f.expected and f.track.misses < MISSES)
-        renewed = self._renewed(kept, old.value.anchors if old else (), frame, image, now)
-        tracks = self._kept(old, renewed, because)
+        anchors = () if old is None else old.value.anchors
+        near = self._near(anchors, now)
+        kept = tuple(
+            f.track for f in followed if f.expected and f.track.misses < MISSES and f.track.template_frame in near)
+        renewed = self._renewed(kept, anchors, frame, image, now)
+        tracks = self._kept(old, renewed.tracks, because)
         yield tracks
-        if corrected is not None:
-            correction = Revise(belief, now, (frame, belief, tracks))
+        if corrected is not None or renewed.hypothesis is not now:
+            correction = Revise(belief, renewed.hypothesis, (frame, belief, tracks))
             yield correction
+            yield from self._learnt(view, renewed.hypothesis, correction)
+        if corrected is not None:
             shift = float(np.median([math.dist(t.predicted_px, t.found_px) for t in seen if t.found_px is not None]))
             what = f"{len(seen)} landmarks are {shift:.1f} px from where they were expected"
-            yield from self._told(view, what, shift, belief.value, (correction,))
+            yield from self._told(view, what, shift, belief.value, seen, (correction,))
 
     def _begun_anew(
-        self, frame: Entry[Frame], belief: Entry[Hypothesis], old: Entry[Tracks] | None
+        self, view: View, frame: Entry[Frame], belief: Entry[Hypothesis], old: Entry[Tracks] | None
     ) -> Iterable[Effect]:
         """A milestone or a relocalization said anew where we are: landmarks are taken from there."""
         fresh = self._renewed((), (), frame, self._picture(frame.value.jpeg), belief.value)
-        yield self._kept(old, fresh, (frame, belief))
+        tracks = self._kept(old, fresh.tracks, (frame, belief))
+        yield tracks
+        drift = view.latest(Drift)
+        if drift is not None:
+            heading = fresh.hypothesis.world_from_robot(self._robot.world).heading_rad
+            yield Revise(drift, drift.value.begun(heading), (tracks,))
+        if fresh.hypothesis is not belief.value:
+            yield Revise(belief, fresh.hypothesis, (frame, belief, tracks))
+
+    def _learnt(self, view: View, belief: Hypothesis, correction: Revise) -> Iterable[Effect]:
+        """How the wheels drift, when the robot has gone far enough to tell."""
+        drift = view.latest(Drift)
+        if drift is None or drift.value.gone_m < STRETCH_M:
+            return
+        heading = belief.world_from_robot(self._robot.world).heading_rad
+        told = drift.value.learnt(self._robot.actuator, heading, math.sqrt(2.0) * belief.sigma_rad)
+        yield Revise(drift, told, (drift, correction))
 
     def _followed(self, view: View, tracks: Tracks | None, image: Image, belief: Hypothesis) -> list[Followed]:
         if tracks is None:
@@ -110,14 +147,15 @@ class CorrelatorTracker(Expert):
         frames = sorted({t.template_frame for t in tracks.items})
         pictures = {name: self._picture(view[name].value.jpeg) for name in frames}
         world = self._robot.world
-        return follow(self._robot, tracks.items, pictures, image, belief.world_from_robot(world),
-                      belief.covariance_world(world))
+        return follow(self._robot.standing_in(belief.locale), tracks.items, pictures, image,
+                      belief.world_from_robot(world), belief.covariance_world(world))
 
     def _corrected(self, belief: Hypothesis, seen: list[Track], anchors: tuple[Anchor, ...]) -> Corrected:
         """The belief after the landmarks were found."""
         world = self._robot.world
         pose, covariance, agreeing = correct(
-            self._robot, seen, anchors, belief.world_from_robot(world), belief.covariance_world(world)
+            self._robot.standing_in(belief.locale), seen, anchors, belief.world_from_robot(world),
+            belief.covariance_world(world),
         )
         hypothesis = Hypothesis.of_world(world, belief.locale, pose, covariance, "tracks", motion=belief.motion)
         return Corrected(hypothesis, agreeing)
@@ -125,18 +163,43 @@ class CorrelatorTracker(Expert):
     def _renewed(
         self, kept: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame], image: Image,
         belief: Hypothesis,
+    ) -> Renewed:
+        """New landmarks as old ones leave, cut where the model's edges say that they are."""
+        world = self._robot.world
+        if len(kept) >= FEW:
+            return Renewed(self._anchored(kept, anchors, frame, belief), belief)
+        robot, pose = self._robot.standing_in(belief.locale), belief.world_from_robot(world)
+        lines = visible_lines(
+            world, robot.camera, robot.camera_from_world(pose), min_length_px=LENGTH_PX, min_contrast=CONTRAST,
+            max_distance_m=15.0,
+        )
+        found = aligned(robot, image, lines.lines_world, pose, belief.covariance_world(world))
+        if found is not None:
+            pose = found.world_from_robot
+            belief = Hypothesis.of_world(world, belief.locale, pose, found.covariance, "tracks", motion=belief.motion)
+        items = (*kept, *begin(robot, kept, frame.id, image, pose))
+        return Renewed(self._anchored(items, anchors, frame, belief), belief)
+
+    def _near(self, anchors: tuple[Anchor, ...], belief: Hypothesis) -> frozenset[str]:
+        """The frames that were taken near enough to here for their templates to serve on."""
+        here = belief.world_from_robot(self._robot.world)
+        return frozenset(a.frame for a in anchors if math.hypot(a.x_m - here.x_m, a.y_m - here.y_m) <= FAR_M)
+
+    def _anchored(
+        self, items: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame], belief: Hypothesis
     ) -> Tracks:
-        """New landmarks as old ones leave."""
+        """The tracks, with what was believed where their templates were cut."""
         pose = belief.world_from_robot(self._robot.world)
-        items = (*kept, *begin(self._robot, kept, frame.id, image, pose)) if len(kept) < FEW else kept
         here = Anchor(frame.id, pose.x_m, pose.y_m, covariance_tuple(belief.covariance_world(self._robot.world)))
         used = {t.template_frame for t in items}
         return Tracks(frame.id, HALF_PX, items, tuple(a for a in (*anchors, here) if a.frame in used))
 
     def _told(
-        self, view: View, what: str, magnitude_px: float, belief: Hypothesis, because: tuple[object, ...]
+        self, view: View, what: str, magnitude_px: float, belief: Hypothesis, tracks: list[Track],
+        because: tuple[object, ...],
     ) -> Iterable[Effect]:
-        bounds = (action_px(self._robot, belief), PLAN_PX)
+        points = np.array([track.point_world for track in tracks])
+        bounds = (action_px(self._robot, belief, points), PLAN_PX)
         found = Discrepancy(Level.ACTION, what, magnitude_px, bounds, "px")
         last = open_discrepancy(view, Level.ACTION)
         yield Post(found, because) if last is None else Revise(last, found, because)

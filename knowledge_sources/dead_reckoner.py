@@ -16,7 +16,8 @@ from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
 from knowledge_sources.questions import held
 from knowledge_sources.tolerances import PLAN_PX
-from world_models.body import BodyFault, Look, MotionReport, MotorCommand
+from world_models.actuator import Drift
+from world_models.body import BodyFault, Course, Look, MotionReport, MotorCommand
 from world_models.frames import Pose2
 from world_models.location import Hypothesis
 
@@ -25,7 +26,8 @@ STOPPED = 0.7
 
 
 class DeadReckoner(Expert):
-    """Moves the held hypothesis by a motion report and asks for a picture to check it by.
+    """Moves the held hypothesis by a motion report, on the arc that these wheels are known to drift by, and asks for a
+    picture to check it by.
 
     What a broken-off motion lacks may have been done all the same, in part or whole, before the base stood: the belief
     becomes less sure by that.
@@ -33,7 +35,7 @@ class DeadReckoner(Expert):
 
     level = Level.ACTION
     watches = (Watch(MotionReport, (Posted,)),)
-    writes = (Hypothesis, Look, Discrepancy)
+    writes = (Hypothesis, Drift, Look, Discrepancy)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         belief = held(view)
@@ -44,25 +46,39 @@ class DeadReckoner(Expert):
         if belief is None:
             return
         world, report = self._robot.world, trigger.entry.value
-        before = belief.value.world_from_robot(world)
-        pose, covariance = self._robot.actuator.moved(
-            before, belief.value.covariance_world(world), report.turn_rad, report.move_m
+        actuator, before = self._robot.actuator, belief.value.world_from_robot(world)
+        known = view.latest(Drift)
+        drift = Drift.unknown(actuator, before.heading_rad) if known is None else known.value
+        request = view.get(trigger.entry.because[0].id)
+        on_the_move = request is not None and isinstance(request.value, Course)
+        pose, covariance = (actuator.rolled if on_the_move else actuator.moved)(
+            before, belief.value.covariance_world(world), report.turn_rad, report.move_m, drift.curvature_per_m
         )
-        there = world.locale_at(pose.position)
+        there = world.locale_at([*pose.position, world.floor_m(belief.value.locale)])
         locale = there if there and world.is_room(there) else belief.value.locale  # in a doorway: still the old room
-        command = view.latest(MotorCommand)
-        fault = None if command is None else view.latest(BodyFault, lambda f: f.request == command.id)
-        if command is not None and fault is not None:
-            lacking = command.value.turn_rad - report.turn_rad, command.value.move_m - report.move_m
-            covariance = covariance + _spread_of(pose, *lacking)
+        fault = None if request is None else view.latest(BodyFault, lambda f: f.request == request.id)
+        if request is not None and fault is not None:
+            covariance = covariance + _spread_of(pose, *self._lacking(request.value, report))
         moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=trigger.entry.id)
         step = Revise(belief, moved, (trigger.entry, belief) if fault is None else (trigger.entry, belief, fault))
         yield step
+        rolled = drift.rolled(actuator, report.turn_rad, report.move_m, on_the_spot=not on_the_move)
+        yield Post(rolled, (trigger.entry,)) if known is None else Revise(known, rolled, (trigger.entry, known))
+        if on_the_move and fault is None:
+            return  # the picture is there: it was taken on the move
         yield Post(Look("track"), (step,))
-        if fault is None and command is not None and report.move_m < STOPPED * command.value.move_m:
-            what = f"something stopped the robot: {report.move_m:.2f} m of {command.value.move_m:.2f} m are claimed"
+        if request is None or fault is not None or on_the_move:
+            return
+        if report.move_m < STOPPED * request.value.move_m:
+            what = f"something stopped the robot: {report.move_m:.2f} m of {request.value.move_m:.2f} m are claimed"
             stopped = Discrepancy(Level.ACTION, what, math.inf, (PLAN_PX, PLAN_PX), "px")
             yield Post(stopped, (trigger.entry,))
+
+    def _lacking(self, request: MotorCommand | Course, report: MotionReport) -> tuple[float, float]:
+        """What may have been done beyond what is claimed: (turn [rad], move [m])."""
+        if isinstance(request, Course):
+            return 0.0, self._robot.actuator.stopping_m()
+        return request.turn_rad - report.turn_rad, request.move_m - report.move_m
 
 
 def _spread_of(pose: Pose2, turn_rad: float, move_m: float) -> NDArray[np.float64]:

@@ -20,6 +20,10 @@ from world_models.percepts import Segments
 from world_models.robot import RobotModel
 
 
+LEAST_LENGTH_PX = 10.0
+"""Shorter segments belong to what the model lacks more often than to what it has."""
+
+
 class LineFinder(Expert):
     """Finds the segments of a frame in which a milestone, or the way back from being lost, is looked for.
 
@@ -40,7 +44,7 @@ class LineFinder(Expert):
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         frame = trigger.entry
         image = self._picture(frame.value.jpeg)
-        found = find_lines(image)
+        found = find_lines(image, min_length_px=LEAST_LENGTH_PX)
         waiting = open_milestone(view) if frame.value.purpose == "milestone" else None
         yield Post(
             Segments(
@@ -49,6 +53,7 @@ class LineFinder(Expert):
                 frozen(found.segments_px),
                 frozen(found.sigma_offset_px),
                 float(np.std(image)),
+                float(np.mean(image)),
             ),
             (frame,) if waiting is None else (frame, waiting),
         )

@@ -16,22 +16,41 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
+from knowledge_sources.methods.conviction import CONVICTION
+from knowledge_sources.methods.evidence import evidence, wheels_px
+from knowledge_sources.methods.looks import Probe, probe, small_colour
 from knowledge_sources.methods.verification import LEAST_ACCOUNTED, Verification, verify
 from knowledge_sources.questions import held, open_discrepancy
-from knowledge_sources.tolerances import PLAN_PX
-from world_models.frames import wrap_angle
+from knowledge_sources.tolerances import FLOOR_PX, PLAN_PX
+from world_models.body import Frame
+from world_models.frames import Pose2, wrap_angle
+from world_models.location import Hypothesis
 from world_models.percepts import LineMatch, PoseFix, Segments
+from world_models.robot import RobotModel
 from world_models.task import Certificate, Milestone
+from world_models.visibility import visible_lines
 
 DARK = 6.0
 """A frame of less contrast (standard deviation of its grey values) shows nothing."""
 
 
+MOST_LOOKS = 3
+"""From so many directions a milestone is looked for before it counts against the belief that it cannot be told."""
+LENGTH_PX, CONTRAST, SIGHT_M = 12.0, 0.05, 15.0
+"""Lines that are longer, clearer and nearer than this are looked for where the robot may be otherwise."""
+AS_MUCH = 0.8
+"""Another place of which this part of the agreement is seen is not ruled out."""
+
 Floats = NDArray[np.float64]
 
 
 class MilestoneJudge(Expert):
-    """Certifies a milestone from a pose fix, and posts by how much what was expected and what was seen differ."""
+    """Certifies a milestone from a pose fix, and posts by how much what was expected and what was seen differ.
+
+    Lines and the colours of faces speak for the pose (:class:`knowledge_sources.methods.evidence.Evidence`); what they
+    are worth was counted on rendered floors. A deviation may be as large as the wheels are known to err since the
+    belief was sure; where something happened that they do not explain, as large as the matcher looks (§6.1.4).
+    """
 
     level = Level.PLAN
     watches = (Watch(PoseFix, (Posted,)),)
@@ -49,7 +68,9 @@ class MilestoneJudge(Expert):
         yield verdict
         yield Revise(milestone, replace(milestone.value, status=certificate.verdict), (verdict,))
         c = certificate
-        magnitude = c.deviation_px if c.verdict == "verified" or c.deviation_px > c.tolerance_px else math.inf
+        if _may_look_again(view, c, milestone.value):
+            return
+        magnitude = c.deviation_px if c.verdict == "verified" or c.deviation_px > PLAN_PX else math.inf
         what = f"{milestone.value.what.partition(', because')[0]} is {c.verdict}"
         found = Discrepancy(Level.PLAN, what, magnitude, (0.0, PLAN_PX), "px")
         last = open_discrepancy(view, Level.PLAN)
@@ -58,15 +79,26 @@ class MilestoneJudge(Expert):
     def _certificate(self, view: View, fix: Entry[PoseFix], milestone: Entry[Milestone]) -> Certificate:
         match: LineMatch = view[fix.value.match].value
         segments: Segments = view[match.segments].value
-        m, pose = milestone.value, fix.value.world_from_robot
+        m, pose, belief = milestone.value, fix.value.world_from_robot, held(view)
+        robot = self._robot if belief is None else self._robot.standing_in(belief.value.locale)
+        before = pose if belief is None else belief.value.world_from_robot(robot.world)
+        spread = fix.value.covariance if belief is None else belief.value.covariance_world(robot.world)
         lines = np.array(m.expected, float).reshape(-1, 2, 3)
-        evidence = verify(self._robot, lines, segments.segments_px, pose)
-        deviation_px = _median_shift(np.array(m.expected_px, float).reshape(-1, 2, 2), evidence.projected_px)
-        verdict, reason = _verdict(len(lines), segments.contrast, evidence, deviation_px)
-        belief = held(view)
-        before = pose if belief is None else belief.value.world_from_robot(self._robot.world)
-        inliers = fix.value.inliers
-        residuals = fix.value.residuals_px[inliers]
+        agreed = verify(robot, lines, segments.segments_px, pose)
+        frame: Frame = view[segments.frame].value
+        faces = probe(robot, pose, small_colour(frame.jpeg), m.looks)
+        told = evidence(robot, lines, segments.segments_px, pose, fix.value.covariance, before, spread, agreed, faces)
+        p_false = CONVICTION.p_false(told)
+        tolerance_px = FLOOR_PX + wheels_px(robot, lines, before, spread + fix.value.covariance)
+        if tolerance_px > PLAN_PX or open_discrepancy(view, Level.PLAN) is not None:
+            tolerance_px = PLAN_PX
+        shift_px = _median_shift(np.array(m.expected_px, float).reshape(-1, 2, 2), agreed.projected_px)
+        verdict, reason = _verdict(len(lines), segments.contrast, agreed, faces, p_false, shift_px, tolerance_px)
+        certain = verdict != "verified" or belief is None
+        other = None if certain else _as_likely(view, robot, before, pose, segments, agreed)
+        if other is not None:
+            verdict, reason = "not testable", f"{reason}; but as much agrees at {other.id}"
+        residuals = fix.value.residuals_px[fix.value.inliers]
         return Certificate(
             milestone=milestone.id,
             fix=fix.id,
@@ -74,15 +106,23 @@ class MilestoneJudge(Expert):
             reason=reason,
             expected=len(lines),
             matched=len(np.unique(match.pairs[:, 0])),
-            inliers=int(np.count_nonzero(inliers)),
-            coverage=evidence.coverage,
+            inliers=int(np.count_nonzero(fix.value.inliers)),
+            coverage=agreed.coverage,
             residual_px=float(np.sqrt(np.mean(residuals**2))) if len(residuals) else math.inf,
             deviation_m=pose.distance_to(before),
             deviation_rad=wrap_angle(pose.heading_rad - before.heading_rad),
-            deviation_px=deviation_px,
-            tolerance_px=PLAN_PX,
-            p_false=evidence.agreement.p_false,
+            deviation_px=shift_px,
+            tolerance_px=tolerance_px,
+            p_false=p_false,
+            faces=faces.faces,
+            faces_alike=faces.agree,
         )
+
+
+def _may_look_again(view: View, certificate: Certificate, milestone: Milestone) -> bool:
+    """Whether another view of a sketch's milestone may tell what this one could not, while nothing is in doubt."""
+    told = certificate.verdict != "not testable" or not milestone.sketch
+    return not told and len(milestone.tried) + 1 < MOST_LOOKS and open_discrepancy(view, Level.PLAN) is None
 
 
 def _milestone_of(view: View, fix: PoseFix) -> Entry[Milestone] | None:
@@ -91,19 +131,39 @@ def _milestone_of(view: View, fix: PoseFix) -> Entry[Milestone] | None:
     return milestone if milestone is not None and milestone.value.status == "expected" else None
 
 
-def _verdict(expected: int, contrast: float, evidence: Verification, deviation_px: float) -> tuple[str, str]:
-    a = evidence.agreement
+def _verdict(
+    expected: int, contrast: float, agreed: Verification, faces: Probe, p_false: float, shift_px: float,
+    tolerance_px: float,
+) -> tuple[str, str]:
+    a = agreed.agreement
     if contrast < DARK:
         return "not testable", f"the frame is dark (contrast {contrast:.1f} of 255)"
     if expected < LEAST_ACCOUNTED:
         return "not testable", f"only {expected} lines are expected in this view"
-    found = f"{a.accounted} of {a.seen} lines, {evidence.coverage:.0%} of their length"
-    if not evidence.holds:
-        return "refuted", f"{found} accounted for; at a wrong place {a.chance:.0%} are by chance"
-    where = f"{found} accounted for, {deviation_px:.1f} px from where expected"
-    if deviation_px > PLAN_PX:
-        return "refuted", f"{where}: more than the {PLAN_PX:.0f} px that the plan may be adjusted by"
+    colours = f" and {round(faces.agree * faces.faces)} of {faces.faces} faces' colours" if faces.is_testable else ""
+    found = f"{a.accounted} of {a.seen} lines, {agreed.coverage:.0%} of their length,{colours} accounted for"
+    if p_false >= CONVICTION.refute:
+        return "refuted", f"{found}; at a wrong place {a.chance:.0%} are by chance"
+    where = f"{found}, {shift_px:.1f} px from where expected"
+    if shift_px > tolerance_px:
+        return "refuted", f"{where}: more than the {tolerance_px:.0f} px that the plan may be adjusted by"
+    if p_false > CONVICTION.accept or a.accounted < LEAST_ACCOUNTED:
+        return "not testable", f"{where}: not enough to tell the place by"
     return "verified", where
+
+
+def _as_likely(
+    view: View, robot: RobotModel, before: Pose2, pose: Pose2, segments: Segments, agreed: Verification
+) -> Entry[Hypothesis] | None:
+    """Another hypothesis with which the picture agrees as well, once corrected as the belief is from ``before``."""
+    correction = before.inverse() @ pose
+    for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
+        there = other.value.world_from_robot(robot.world) @ correction
+        lines = visible_lines(robot.world, robot.camera, robot.camera_from_world(there), min_length_px=LENGTH_PX,
+                              min_contrast=CONTRAST, max_distance_m=SIGHT_M).lines_world
+        if verify(robot, lines, segments.segments_px, there).coverage >= AS_MUCH * agreed.coverage:
+            return other
+    return None
 
 
 def _median_shift(before_px: Floats, after_px: Floats) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,11 +18,13 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
 from knowledge_sources.methods.lines import SIGMA_ACROSS_PX
+from knowledge_sources.methods.looks import expected_looks
 from knowledge_sources.methods.views import ViewQuality, view_quality
 from knowledge_sources.questions import deepest_sketch, held, is_over, is_settled, open_discrepancy, open_milestone
 from world_models.body import Look
 from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis
+from world_models.robot import RobotModel
 from world_models.task import Milestone, PlanSketch
 from world_models.visibility import VisibleLines, visible_lines
 
@@ -35,14 +37,17 @@ GOOD_PART = 0.3
 """A view is good enough when it tells the place to this part of the tolerance there."""
 GOOD_RAD = math.radians(0.25)
 LEAST_LINES = 10
+OTHERWISE_RAD = math.radians(20.0)
+"""Looks that differ by less show much the same."""
 GLANCES_RAD = tuple(math.radians(a) for a in (30, -30, 60, -60, 90, -90, 135, -135, 180))
 
 
 class MilestoneSelector(Expert):
     """Says what should be seen before a subgoal (M0 first), and asks to look.
 
-    It prefers the view that the robot has, then the one it will have next, then the one that would tell most. It also
-    checks the belief in between when tracking could not explain what it saw.
+    It prefers the view that the robot has, then the one it will have next, then the one that would tell most; where a
+    view could not be told, another one is tried. It also checks the belief in between when tracking could not explain
+    what it saw.
     """
 
     level = Level.PLAN
@@ -65,7 +70,7 @@ class MilestoneSelector(Expert):
         if belief is None or task is None:
             return
         if isinstance(task.value, PlanSketch):
-            yield from self._proposed(task, belief)
+            yield from self._proposed(view, task, belief)
         elif waiting is None:
             what = f"check of the belief, because {task.value.what}"
             check = Milestone("", -1, what, self._heading(belief.value))
@@ -89,12 +94,13 @@ class MilestoneSelector(Expert):
         sketch = deepest_sketch(view)
         return sketch if sketch is not None and not sketch.value.verified else None
 
-    def _proposed(self, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
+    def _proposed(self, view: View, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         """The milestone before the sketch's next subgoal, seen from the first direction that is good enough."""
         pose = belief.value.world_from_robot(self._robot.world)
-        heading = self._direction(sketch.value, pose)
-        s = sketch.value
-        milestone = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}", heading)
+        robot = self._robot.standing_in(belief.value.locale)
+        s, tried = sketch.value, _tried(view, sketch)
+        heading = self._direction(robot, s, pose, tried)
+        milestone = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}", heading, tried=tried)
         if self._faces(belief.value, milestone):
             yield from self._looked_for(None, milestone, sketch, belief)
         else:
@@ -105,33 +111,16 @@ class MilestoneSelector(Expert):
     ) -> Iterable[Effect]:
         """Predict the landmarks from the believed pose, and ask for the picture."""
         pose = belief.value.world_from_robot(self._robot.world)
-        lines = self._seen_from(pose)
-        marks = sorted({int(i) for i in lines.landmark})
-        expected = replace(
-            milestone,
-            landmarks=tuple(self._robot.world.landmarks[i].name for i in marks),
-            expected=_nested(lines.lines_world),
-            expected_px=_nested(lines.segments_px),
-            landmark_of=tuple(marks.index(int(i)) for i in lines.landmark),
-            status="expected",
-        )
+        expected = expectation(self._robot.standing_in(belief.value.locale), pose, milestone)
         wish = Post(expected, (task, belief)) if old is None else Revise(old, expected, (task, belief))
         yield wish
         yield Post(Look("milestone"), (wish,))
 
-    def _direction(self, sketch: PlanSketch, pose: Pose2) -> float:
-        """The first heading from which the view is good enough, else the best [rad, world]."""
+    def _direction(self, robot: RobotModel, sketch: PlanSketch, pose: Pose2, tried: Sequence[float]) -> float:
         before = sketch.subgoals[sketch.at - 1] if sketch.at else None
-        tolerance = before.tolerance_m if before is not None else 0.1
-        rated: list[tuple[ViewQuality, float]] = []
-        for heading in self._candidates(sketch, pose):
-            quality = self._quality(Pose2(pose.x_m, pose.y_m, heading))
-            sharp = quality.sigma_m <= GOOD_PART * tolerance and quality.sigma_rad <= GOOD_RAD
-            if sharp and quality.lines >= LEAST_LINES:
-                return heading
-            rated.append((quality, heading))
-        best = min(range(len(rated)), key=lambda i: (rated[i][0].lines < LEAST_LINES, rated[i][0].sigma_m, i))
-        return rated[best][1]
+        headings = [h for h in self._candidates(sketch, pose)
+                    if all(abs(wrap_angle(h - other)) > OTHERWISE_RAD for other in tried)]
+        return best_heading(robot, pose, headings, before.tolerance_m if before else 0.1)
 
     def _candidates(self, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
         wanted = sketch.subgoals[sketch.at - 1].destination if sketch.at else None
@@ -143,25 +132,6 @@ class MilestoneSelector(Expert):
             yield math.atan2(end.y_m - pose.y_m, end.x_m - pose.x_m)
         yield from (wrap_angle(pose.heading_rad + glance) for glance in GLANCES_RAD)
 
-    def _quality(self, pose: Pose2) -> ViewQuality:
-        robot = self._robot
-        return view_quality(
-            self._seen_from(pose).lines_world, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_ACROSS_PX
-        )
-
-    def _seen_from(self, pose: Pose2) -> VisibleLines:
-        """The clearest of the lines that should be seen: long ones with contrast."""
-        robot = self._robot
-        lines = visible_lines(
-            robot.world, robot.camera, robot.camera_from_world(pose), min_length_px=LENGTH_PX, min_contrast=CONTRAST,
-            max_distance_m=15.0,
-        )
-        if len(lines) <= LINES:
-            return lines
-        lengths = np.linalg.norm(lines.segments_px[:, 1] - lines.segments_px[:, 0], axis=1)
-        clear = np.minimum(lengths, 120.0) * np.minimum(lines.contrast, 0.3)
-        return lines[np.sort(np.argsort(-clear, kind="stable")[:LINES])]
-
     def _heading(self, belief: Hypothesis) -> float:
         return belief.world_from_robot(self._robot.world).heading_rad
 
@@ -169,5 +139,61 @@ class MilestoneSelector(Expert):
         return abs(wrap_angle(self._heading(belief) - milestone.look_heading_rad)) <= FACING_RAD
 
 
+def _tried(view: View, sketch: Entry[PlanSketch]) -> tuple[float, ...]:
+    """From where the sketch's milestone was looked for just now, in vain but without a doubt about the place."""
+    last = view.latest(Milestone)
+    if last is None or last.value.status != "not testable":
+        return ()
+    m = last.value
+    return (*m.tried, m.look_heading_rad) if (m.sketch, m.index) == (sketch.id, sketch.value.at) else ()
+
+
+def best_heading(robot: RobotModel, pose: Pose2, headings: Iterable[float], tolerance_m: float) -> float:
+    """The first heading from which the view is good enough for the tolerance, else the best [rad, world]."""
+    rated: list[tuple[ViewQuality, float]] = []
+    for heading in headings:
+        quality = _quality(robot, Pose2(pose.x_m, pose.y_m, heading))
+        sharp = quality.sigma_m <= GOOD_PART * tolerance_m and quality.sigma_rad <= GOOD_RAD
+        if sharp and quality.lines >= LEAST_LINES:
+            return heading
+        rated.append((quality, heading))
+    best = min(range(len(rated)), key=lambda i: (rated[i][0].lines < LEAST_LINES, rated[i][0].sigma_m, i))
+    return rated[best][1]
+
+
+def expectation(robot: RobotModel, pose: Pose2, milestone: Milestone) -> Milestone:
+    """The milestone with what should be seen from a pose."""
+    lines = _seen_from(robot, pose)
+    marks = sorted({int(i) for i in lines.landmark})
+    return replace(
+        milestone,
+        landmarks=tuple(robot.world.landmarks[i].name for i in marks),
+        expected=_nested(lines.lines_world),
+        expected_px=_nested(lines.segments_px),
+        landmark_of=tuple(marks.index(int(i)) for i in lines.landmark),
+        looks=expected_looks(robot, pose),
+        status="expected",
+    )
+
+
+def _quality(robot: RobotModel, pose: Pose2) -> ViewQuality:
+    return view_quality(
+        _seen_from(robot, pose).lines_world, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_ACROSS_PX
+    )
+
+
+def _seen_from(robot: RobotModel, pose: Pose2) -> VisibleLines:
+    """The clearest of the lines that should be seen: long ones with contrast."""
+    lines = visible_lines(
+        robot.world, robot.camera, robot.camera_from_world(pose), min_length_px=LENGTH_PX, min_contrast=CONTRAST,
+        max_distance_m=15.0,
+    )
+    if len(lines) <= LINES:
+        return lines
+    lengths = np.linalg.norm(lines.segments_px[:, 1] - lines.segments_px[:, 0], axis=1)
+    clear = np.minimum(lengths, 120.0) * np.minimum(lines.contrast, 0.3)
+    return lines[np.sort(np.argsort(-clear, kind="stable")[:LINES])]
+
+
 def _nested(array: NDArray[np.float64]) -> tuple[tuple[tuple[float, ...], ...], ...]:
-    return tuple(tuple(tuple(float(c) for c in p) for p in line) for line in array)
+    return tuple(tuple(map(tuple, line)) for line in array.tolist())

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Quiescence, Revised, Watch
 from blackboard.effect import Effect, Post
+from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.expert import Expert
 from knowledge_sources.questions import is_over, open_discrepancy, open_milestone
+from world_models.location import Hypothesis, Place
 from world_models.task import Goal, Outcome
 
 
@@ -33,7 +35,8 @@ class MissionKeeper(Expert):
             return
         lost = open_discrepancy(view, Level.GOAL)
         if lost is not None:
-            yield Post(Outcome("lost", f"{lost.value.what}, and nobody could tell where"), (trigger.entry, lost))
+            perhaps = view.where(Hypothesis, lambda h: h.status == "candidate")
+            yield Post(Outcome("lost", f"{lost.value.what}, {_where(perhaps)}"), (trigger.entry, lost, *perhaps))
             return
         waiting, goal = open_milestone(view), view.latest(Goal)
         what = "nobody had anything left to do"
@@ -41,3 +44,14 @@ class MissionKeeper(Expert):
             what = f"nobody answered for {waiting.id} ({waiting.value.what})"
         unmet = tuple(entry for entry in (waiting, goal) if entry is not None)
         yield Post(Outcome("failed", what), (trigger.entry, *unmet))
+
+
+def _where(perhaps: Sequence[Entry[Hypothesis]]) -> str:
+    """What is left of the question where the robot is, in words."""
+    places = []
+    for entry in perhaps:
+        h = entry.value
+        places.append(f"{Place(h.locale, h.locale_from_robot.x_m, h.locale_from_robot.y_m)} ({h.weight:.0%})")
+    if len(places) > 1:
+        return f"and it is ambiguous where: {' or '.join(places)}"
+    return f"and it is not sure where: perhaps {places[0]}" if places else "and nobody could tell where"

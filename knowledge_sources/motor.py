@@ -13,9 +13,11 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
+from knowledge_sources.methods.steering import aim, as_seen, bearing, chord_turn, progress
 from knowledge_sources.questions import (
     deepest_sketch,
     held,
+    is_in_doubt,
     is_over,
     is_settled,
     open_discrepancy,
@@ -23,6 +25,7 @@ from knowledge_sources.questions import (
     open_milestone,
     under_way,
 )
+from world_models.actuator import Drift
 from world_models.body import BodyFault, MotorCommand
 from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis
@@ -56,7 +59,7 @@ class Motor(Expert):
     writes = (MotorCommand, Leg, Discrepancy)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        if is_over(view) or open_fault(view) is not None or not is_settled(view) or _is_in_doubt(view):
+        if is_over(view) or open_fault(view) is not None or not is_settled(view) or is_in_doubt(view):
             return None
         milestone = open_milestone(view)
         if milestone is not None:
@@ -100,8 +103,9 @@ class Motor(Expert):
 
     def _increment(self, view: View, leg: Entry[Leg], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         here = belief.value.world_from_robot(self._robot.world)
-        command = self._next(leg.value, here)
-        seen = _as_seen(leg.value, here)
+        drift = view.latest(Drift)
+        command = self._next(leg.value, here, 0.0 if drift is None else drift.value.curvature_per_m)
+        seen = as_seen(leg.value, here, _aim(leg.value, here))
         discrepancy = open_discrepancy(view, Level.ACTION)
         corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
         yield from corrected
@@ -110,19 +114,20 @@ class Motor(Expert):
             return
         step = Revise(leg, replace(seen, increments=seen.increments + 1), (leg, belief, *corrected))
         yield step
-        yield Post(command, (step, belief))
+        yield Post(command, (step, belief, *(() if drift is None else (drift,))))
 
-    def _next(self, leg: Leg, here: Pose2) -> MotorCommand | None:
-        """The next increment; None on arrival."""
-        along, left = _progress(leg, here)
+    def _next(self, leg: Leg, here: Pose2, curvature_per_m: float) -> MotorCommand | None:
+        """The next increment; None on arrival. It is an arc, whose chord is to lie in the direction to be gone."""
+        along, left = progress(leg, here)
         away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
         if away <= leg.tolerance_m * 0.8 or (along <= 0.0 and abs(left) <= leg.tolerance_m * 0.8):
             return self._final_turn(leg, here)
-        turn = _bearing(_aim(leg, along), here)
+        turn = bearing(_aim(leg, here), here)
         if abs(turn) > FACING_RAD:
             return MotorCommand(self._bounded(turn), 0.0)
         actuator = self._robot.actuator
         distance = min(actuator.increment_m, actuator.commanded_m(away))
+        turn = chord_turn(turn, curvature_per_m, actuator.reach * distance)
         return MotorCommand(turn if abs(turn) > AIM_RAD / 10 else 0.0, distance)
 
     def _final_turn(self, leg: Leg, here: Pose2) -> MotorCommand | None:
@@ -137,16 +142,6 @@ class Motor(Expert):
         return turn_rad / max(1, math.ceil(abs(turn_rad) / largest))
 
 
-def _is_in_doubt(view: View) -> bool:
-    """Whether something is open above the action level that its level has not measured within its bound."""
-    for level in (Level.PLAN, Level.GOAL):
-        found = open_discrepancy(view, level)
-        if found is not None and (found.value.magnitude is None or found.value.exceeds or level is Level.GOAL):
-            return True
-    action = open_discrepancy(view, Level.ACTION)
-    return action is not None and action.value.exceeds
-
-
 def _leg_wanted(view: View) -> Entry[PlanSketch] | None:
     """The sketch that is being carried out, if its milestone is verified and its subgoal at hand is primitive."""
     sketch = deepest_sketch(view)
@@ -156,29 +151,7 @@ def _leg_wanted(view: View) -> Entry[PlanSketch] | None:
     return sketch if s.verified and s.current is not None and s.current.primitive else None
 
 
-def _progress(leg: Leg, here: Pose2) -> tuple[float, float]:
-    """What is left along the leg, and how far to the left of it the robot is [m]."""
-    dx, dy = leg.x1_m - leg.x0_m, leg.y1_m - leg.y0_m
-    length = math.hypot(dx, dy) or 1.0
-    rx, ry = leg.x1_m - here.x_m, leg.y1_m - here.y_m
-    return (rx * dx + ry * dy) / length, (rx * dy - ry * dx) / length
-
-
-def _as_seen(leg: Leg, here: Pose2) -> Leg:
-    """The leg with where the robot is beside it: the numbers from which the next increment follows."""
-    along, left = _progress(leg, here)
-    return replace(leg, to_go_m=along, left_m=left, aim_rad=_bearing(_aim(leg, along), here))
-
-
-def _bearing(point: tuple[float, float], here: Pose2) -> float:
-    """How far to the left of the robot's heading a point lies [rad]."""
-    return wrap_angle(math.atan2(point[1] - here.y_m, point[0] - here.x_m) - here.heading_rad)
-
-
-def _aim(leg: Leg, along: float) -> tuple[float, float]:
-    """The point of the line to steer at [m, world]."""
-    if along < CREEP_M:
-        return leg.x1_m, leg.y1_m
-    length = math.hypot(leg.x1_m - leg.x0_m, leg.y1_m - leg.y0_m)
-    part = min(1.0, max(0.0, (length - along + LOOKAHEAD_M) / max(length, 1e-9)))
-    return leg.x0_m + part * (leg.x1_m - leg.x0_m), leg.y0_m + part * (leg.y1_m - leg.y0_m)
+def _aim(leg: Leg, here: Pose2) -> tuple[float, float]:
+    """The point of the line to steer at [m, world]: its end, once that is near."""
+    along, _ = progress(leg, here)
+    return (leg.x1_m, leg.y1_m) if along < CREEP_M else aim(leg, along, LOOKAHEAD_M)

@@ -7,7 +7,7 @@ from blackboard.entry import Entry
 from blackboard.index import Index
 from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
-from world_models.body import BodyFault, MotionReport, MotorCommand
+from world_models.body import BodyFault, Course, MotionReport, MotorCommand
 from world_models.location import Hypothesis
 from world_models.task import Goal, Leg, Milestone, Outcome, PlanSketch
 
@@ -55,12 +55,41 @@ def under_way(view: View) -> tuple[Entry[Leg], Entry[PlanSketch]] | None:
     return (leg, sketch) if s.verified and leg.value.sketch == sketch.id and s.at == leg.value.index else None
 
 
-def is_settled(view: View) -> bool:
-    """Whether every motor command was reported and every report is in the belief: the robot stands where it thinks."""
-    belief, command, report = held(view), view.latest(MotorCommand), view.latest(MotionReport)
-    if belief is None or command is None:
+def last_motion(view: View) -> Entry[MotorCommand] | Entry[Course] | None:
+    """What was asked of the wheels last."""
+    command, course = view.latest(MotorCommand), view.latest(Course)
+    if command is None or course is None:
+        return command or course
+    return course if course.cycle > command.cycle else command
+
+
+def rolling(view: View) -> Entry[Course] | None:
+    """The motion that goes on at present; None while the robot stands, or is to come to a stand."""
+    last, course = last_motion(view), view.latest(Course)
+    return course if course is not None and course is last and course.value.is_rolling else None
+
+
+def is_heard(view: View) -> bool:
+    """Whether what was asked of the wheels last was reported, and every report is in the belief."""
+    belief, motion, report = held(view), last_motion(view), view.latest(MotionReport)
+    if belief is None or motion is None:
         return belief is not None
-    return report is not None and report.because == (command.ref,) and belief.value.motion == report.id
+    return report is not None and report.because == (motion.ref,) and belief.value.motion == report.id
+
+
+def is_settled(view: View) -> bool:
+    """Whether the robot stands, and where it thinks: no motion goes on, and every report is in the belief."""
+    return is_heard(view) and rolling(view) is None
+
+
+def is_in_doubt(view: View) -> bool:
+    """Whether something is open above the action level that its level has not measured within its bound."""
+    for level in (Level.PLAN, Level.GOAL):
+        found = open_discrepancy(view, level)
+        if found is not None and (found.value.magnitude is None or found.value.exceeds or level is Level.GOAL):
+            return True
+    action = open_discrepancy(view, Level.ACTION)
+    return action is not None and action.value.exceeds
 
 
 def open_fault(view: View) -> Entry[BodyFault] | None:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
+
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Retract, Revise
@@ -13,29 +15,34 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
-from knowledge_sources.methods.relocation import Candidate, Region, candidates
+from knowledge_sources.methods.glances import Glance, moved
+from knowledge_sources.methods.relocation import Candidate, Finding, Verdict, finding
 from knowledge_sources.questions import active_goal, held, is_over, is_settled, open_discrepancy
-from world_models.body import Look, MotorCommand
-from world_models.location import Hypothesis, Place
-from world_models.percepts import Segments
+from world_models.body import Look, MotionReport, MotorCommand
+from world_models.frames import Pose2
+from world_models.location import Hypothesis, Place, covariance_tuple
+from world_models.percepts import Glimpse, Panorama, Segments
 from world_models.task import Goal
 
-REGIONS = ((1.75, math.radians(45.0)), (1.75, math.radians(45.0)), (3.0, math.radians(90.0)), (6.0, math.pi))
-"""How far from the last belief it is sought, probe after probe: radius [m] and turn [rad]."""
 PROBES = 8
-DARK = 6.0
+"""Looks, and then it says that it does not know."""
+ROOMS = 80
+"""The most rooms that are searched, the nearest to the last belief first."""
+SAME_FLOOR_M = 0.5
+"""Rooms whose floors differ by less are on one floor."""
+DARK, DIM = 6.0, 40.0
+"""Of a dark frame the contrast and the brightness are less; a bright one without contrast shows a bare wall."""
 WAITS = 150
 """So many dark frames are waited for light."""
-TURN_RAD = math.radians(40.0)
-CLEARER = 1.3
-"""The best candidate must explain so much more than the next, or the place is ambiguous."""
 
 
 class Relocalizer(Expert):
-    """Generates hypotheses round the last belief, verifies each against the picture, and probes until one stands alone.
+    """Keeps every place of the floor that bears out what it sees, and probes until one stands alone.
 
-    A probe is a look; where that is not enough, a turn and another look. When it knows, a new top-level goal follows
-    from the place where it is to the old destination, and so new sketches (§2). When it does not, it stays lost.
+    A probe is a turn or a short safe move, and a look: the one by which the places are expected to part best. When it
+    knows, a new top-level goal follows from the place where it is to the old destination, and so new sketches (§2).
+    When the building cannot tell the places apart it stays lost, and the places stay on the board: never does it choose
+    between places that look alike.
     """
 
     level = Level.GOAL
@@ -45,7 +52,7 @@ class Relocalizer(Expert):
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "odometry"),
         Watch(Segments, (Posted,), lambda s: s.milestone == ""),
     )
-    writes = (Look, MotorCommand, Hypothesis, Goal, Discrepancy)
+    writes = (Look, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         lost = open_discrepancy(view, Level.GOAL)
@@ -58,38 +65,65 @@ class Relocalizer(Expert):
         if not isinstance(trigger.entry.value, Segments):
             yield Post(Look("probe"), (trigger.entry, lost))
             return
-        probes = _probes_since(view, lost)
-        if trigger.entry.value.contrast < DARK:
-            if len(probes) < WAITS:
+        if trigger.entry.value.contrast < DARK and trigger.entry.value.brightness < DIM:
+            if len(_probes_since(view, lost)) < WAITS:
                 yield Post(Look("probe"), (trigger.entry, lost))
             return
-        lit = sum(1 for p in probes if p.value.contrast >= DARK)
-        yield from self._considered(view, trigger.entry, lost, belief, lit)
+        yield from self._considered(view, trigger.entry, lost, belief)
 
     def _considered(
-        self, view: View, segments: Entry[Segments], lost: Entry[Discrepancy], belief: Entry[Hypothesis], probe: int
+        self, view: View, segments: Entry[Segments], lost: Entry[Discrepancy], belief: Entry[Hypothesis]
     ) -> Iterable[Effect]:
+        before = _panorama_since(view, lost)
+        glimpses = self._glimpses(view, segments, before)
+        robot = self._robot.standing_in(belief.value.locale)
+        result = finding(robot, [_glance(view, g) for g in glimpses], self._rooms(belief.value))
         for old in view.where(Hypothesis, lambda h: h.status == "candidate"):
             yield Retract(old, (segments,))
-        radius_m, turn_rad = REGIONS[min(probe, len(REGIONS)) - 1]
-        region = Region(belief.value.locale, belief.value.world_from_robot(self._robot.world), radius_m, turn_rad)
-        found = candidates(self._robot, segments.value.segments_px, region)
-        if found and _stands_alone(found):
-            yield from self._found(view, segments, lost, belief, found[0])
+        told = Panorama(glimpses, _in_words(result))
+        seen = Post(told, (segments, lost)) if before is None else Revise(before, told, (segments, lost, before))
+        yield seen
+        if result.verdict is Verdict.FOUND:
+            yield from self._found(view, (segments, seen), lost, belief, result.candidates[0])
             return
-        weights = [c.evidence.agreement.accounted * c.evidence.coverage for c in found]
-        for candidate, weight in zip(found, weights, strict=True):
-            share = weight / math.fsum(weights)
-            yield Post(self._hypothesis(candidate, belief.value, "candidate", share), (segments, belief))
-        if probe < PROBES:
-            yield Post(MotorCommand(TURN_RAD, 0.0), (segments, lost))
+        for c in result.candidates:
+            yield Post(self._hypothesis(c, belief.value, "candidate", c.weight), (segments, seen, belief))
+        if result.verdict is Verdict.PROBE and result.probe is not None and len(glimpses) < PROBES:
+            yield Post(MotorCommand(result.probe.turn_rad, result.probe.move_m), (segments, lost, seen))
+
+    def _glimpses(
+        self, view: View, segments: Entry[Segments], before: Entry[Panorama] | None
+    ) -> tuple[Glimpse, ...]:
+        """The looks so far, as seen from where the robot is now, and the new one."""
+        old = () if before is None else before.value.glimpses
+        for report in () if before is None else view.since(MotionReport, before.cycle):
+            old = tuple(self._moved(g, report.value) for g in old)
+        here = Glimpse(segments.id, Pose2(0.0, 0.0, 0.0), covariance_tuple(np.zeros((3, 3))))
+        return (*old, here)
+
+    def _moved(self, glimpse: Glimpse, report: MotionReport) -> Glimpse:
+        actuator, claim = self._robot.actuator, (report.turn_rad, report.move_m)
+        step, spread = actuator.expected(*claim), actuator.spread(*claim)
+        pose, covariance = moved(glimpse.now_from_then, np.array(glimpse.covariance), step, spread)
+        return replace(glimpse, now_from_then=pose, covariance=covariance_tuple(covariance))
+
+    def _rooms(self, belief: Hypothesis) -> list[str]:
+        """The rooms of the floor, the nearest to the last belief first: nobody is carried off to another floor."""
+        world, here = self._robot.world, belief.world_from_robot(self._robot.world)
+        container, level_m = world.locale(belief.locale).parent or belief.locale, world.floor_m(belief.locale)
+        rooms = [name for name in world.rooms_in(container) if abs(world.floor_m(name) - level_m) < SAME_FLOOR_M]
+        while len(rooms) < 2 and (above := world.locale(container).parent) is not None:  # as from an elevator's car
+            container = above
+            rooms = [name for name in world.rooms_in(container) if abs(world.floor_m(name) - level_m) < SAME_FLOOR_M]
+        away = [(_distance(world.outline(name), here), name) for name in rooms]
+        return [name for _, name in sorted(away)[:ROOMS]]
 
     def _found(
-        self, view: View, segments: Entry[Segments], lost: Entry[Discrepancy], belief: Entry[Hypothesis],
+        self, view: View, seen: tuple[Entry[Segments], Effect], lost: Entry[Discrepancy], belief: Entry[Hypothesis],
         candidate: Candidate,
     ) -> Iterable[Effect]:
         """The belief is corrected, and a new top-level goal takes the place of the old one (§2)."""
-        here = Revise(belief, self._hypothesis(candidate, belief.value, "held", 1.0), (segments, lost, belief))
+        here = Revise(belief, self._hypothesis(candidate, belief.value, "held", 1.0), (*seen, lost, belief))
         yield here
         yield Revise(lost, lost.value.corrected(), (here,))
         for level in (Level.ACTION, Level.PLAN):
@@ -99,29 +133,45 @@ class Relocalizer(Expert):
         goal = active_goal(view)
         if goal is None:
             return
-        world, pose = self._robot.world, candidate.world_from_robot
         abandon = Revise(goal, replace(goal.value, status="abandoned"), (here,))
         yield abandon
-        origin = Place.of_world(world, belief.value.locale, pose.x_m, pose.y_m)
+        pose = candidate.world_from_robot
+        origin = Place.of_world(self._robot.world, candidate.room, pose.x_m, pose.y_m)
         yield Post(Goal(origin, goal.value.destination), (here, abandon))
 
     def _hypothesis(self, candidate: Candidate, belief: Hypothesis, status: str, weight: float) -> Hypothesis:
         return Hypothesis.of_world(
-            self._robot.world, belief.locale, candidate.world_from_robot, candidate.covariance, "relocalization",
-            status=status, weight=weight, motion=belief.motion, evidence=_evidence(candidate),
+            self._robot.world, candidate.room, candidate.world_from_robot, candidate.covariance, "relocalization",
+            status=status, weight=weight, motion=belief.motion, evidence=str(candidate.evidence),
         )
 
 
-def _evidence(candidate: Candidate) -> str:
-    a = candidate.evidence.agreement
-    return (f"{a.accounted} of {a.seen} model lines that should be seen from there are in the picture,"
-            f" {candidate.evidence.coverage:.0%} of their length")
+def _in_words(result: Finding) -> str:
+    places = " or ".join(f"{c.room} ({c.weight:.0%})" for c in result.candidates)
+    if result.verdict is Verdict.FOUND:
+        return f"it is {places}, which stands alone"
+    if result.verdict is Verdict.AMBIGUOUS:
+        return f"ambiguous: {places}, which look alike from wherever could be looked"
+    if result.probe is None:
+        return f"perhaps {places}; nothing new could be seen from here"
+    move = f" and a move of {result.probe.move_m:.1f} m" if result.probe.move_m else ""
+    probe = f"a turn by {math.degrees(result.probe.turn_rad):.0f} degrees{move}"
+    return f"perhaps {places}; {probe} tells most" if places else f"no place bears it out; {probe} shows something new"
 
 
-def _stands_alone(found: tuple[Candidate, ...]) -> bool:
-    """Whether the best explains clearly more than any other."""
-    weights = [c.evidence.agreement.accounted * c.evidence.coverage for c in found]
-    return len(weights) == 1 or weights[0] >= CLEARER * weights[1]
+def _glance(view: View, glimpse: Glimpse) -> Glance:
+    return Glance(view[glimpse.segments].value.segments_px, glimpse.now_from_then, np.array(glimpse.covariance))
+
+
+def _distance(outline: object, here: Pose2) -> float:
+    """From a robot to the nearest corner of a room [m]: good enough for an order."""
+    corners = np.asarray(outline, float)
+    return float(np.min(np.hypot(corners[:, 0] - here.x_m, corners[:, 1] - here.y_m)))
+
+
+def _panorama_since(view: View, lost: Entry[Discrepancy]) -> Entry[Panorama] | None:
+    found = view.latest(Panorama)
+    return found if found is not None and found.cycle >= lost.cycle else None
 
 
 def _probes_since(view: View, lost: Entry[Discrepancy]) -> tuple[Entry[Segments], ...]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from itertools import islice
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
@@ -15,7 +14,7 @@ from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
 from knowledge_sources.questions import is_over
 from knowledge_sources.tolerances import PLAN_PX
-from world_models.body import STOP_KEY, BodyFault, MotorCommand, Recovery
+from world_models.body import STOP_KEY, BodyFault, Course, MotorCommand, Recovery
 from world_models.task import Outcome
 
 PATIENCE_S = 30.0
@@ -81,7 +80,7 @@ class Safekeeper(Expert):
             return
         closed = Revise(fault, replace(fault.value, status="over"), (recovery,))
         yield closed
-        if request is None or not isinstance(request.value, MotorCommand):
+        if request is None or not isinstance(request.value, MotorCommand | Course):
             return
         if _never_gets_on(view):
             reason = f"{STRIKES} motions in a row were broken off, the last one by: {fault.value.what}"
@@ -94,5 +93,6 @@ class Safekeeper(Expert):
 def _never_gets_on(view: View) -> bool:
     """Whether each of the last motions was broken off."""
     broken = {entry.value.request for entry in view.all(BodyFault)}
-    last = list(islice(view.newest_first(MotorCommand), STRIKES))
+    asked = sorted((*view.all(MotorCommand), *view.all(Course)), key=lambda entry: -entry.cycle)
+    last = asked[:STRIKES]
     return len(last) == STRIKES and all(command.id in broken for command in last)

@@ -101,7 +101,9 @@ class Sketcher(Expert):
         here = _place(belief.value)
         subgoals = self._between_locales(here, goal.value.destination, END_TOLERANCE_M)
         if subgoals is None:
-            reason = f"no passage leads from {here.locale} to {goal.value.destination.locale}"
+            there = goal.value.destination.locale
+            stairs = "; people can walk there, by stairs" if self._world.walk(here.locale, there) else ""
+            reason = f"no passage for wheels leads from {here.locale} to {there}{stairs}"
             yield Post(Outcome("blocked", reason), (goal, belief))
         else:
             yield Post(PlanSketch(goal.id, (), "", subgoals), (goal, belief))
@@ -119,7 +121,7 @@ class Sketcher(Expert):
             go = Revise(sketch, replace(s, verified=True, adjustments=0), (milestone, belief))
             yield go
             current = s.subgoals[s.at]
-            if not current.primitive:
+            if not current.primitive and not current.passage:
                 yield from self._refined(sketch, current, belief, go)
 
     def _is_off(self, belief: Hypothesis, subgoal: Subgoal) -> bool:
@@ -178,7 +180,8 @@ class Sketcher(Expert):
         for step in route.steps:
             before, behind = (self._before(step.passage, locale) for locale in (step.origin, step.destination))
             subgoals.append(self._subgoal(here, before, self._way_tolerance_m(step.passage)))
-            subgoals.append(Subgoal(before, behind, True, step.passage.name, WAY_TOLERANCE_M))
+            on_wheels = not isinstance(step.passage, Link)  # else it is a ride: there is nothing to drive
+            subgoals.append(Subgoal(before, behind, on_wheels, step.passage.name, WAY_TOLERANCE_M))
             here = behind
         subgoals.append(self._subgoal(here, destination, tolerance_m))
         return tuple(subgoals)
@@ -213,8 +216,12 @@ class Sketcher(Expert):
         """Straight legs round the known obstacles of one locale, none longer than LEG_M."""
         locale = subgoal.destination.locale
         here, there = belief.world_from_robot(self._world), subgoal.destination.in_world(self._world)
+
+        def floor() -> Geometry:
+            return self._free(locale, -self._robot.radius_m)
+
         for clearance in CLEARANCES_M:
-            route = shortest_route(self._free(locale, clearance), here.position, there.position)
+            route = shortest_route(self._free(locale, clearance), here.position, there.position, floor)
             if route is not None:
                 break
         else:

@@ -47,7 +47,7 @@ def blueprint(world: World, camera: Camera) -> Any:
     told = rrb.Vertical(_why(), _chapters(), _description(), row_shares=[11, 7, 5])
     seen = rrb.Horizontal(_building(world), _picture(camera), column_shares=[13, 9])
     done = rrb.Horizontal(rrb.Tabs(_decisions(), _table()), _sketch(), _close(world), column_shares=[12, 6, 6])
-    measured = rrb.Vertical(_lanes(), *_errors(), row_shares=[13, 6, 6])
+    measured = rrb.Vertical(_lanes(), *_errors(), row_shares=[19, 5, 5])
     return rrb.Blueprint(
         rrb.Horizontal(told, rrb.Vertical(seen, done, row_shares=[11, 10]), measured, column_shares=[10, 30, 8]),
         rrb.TimePanel(timeline="cycle", state="collapsed", fps=PLAYED_PER_S),
@@ -70,6 +70,10 @@ def _chapters() -> Any:
 
 
 def _building(world: World) -> Any:
+    return building_view(world, "Where he is: true robot green, believed blue, plan orange")
+
+
+def building_view(world: World, name: str) -> Any:
     """From above and a little from the south."""
     corners = np.concatenate([world.outline(name) for name in world.rooms])
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -77,7 +81,7 @@ def _building(world: World) -> Any:
     eye = rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital, position=[middle[0], middle[1] - SOUTH * size, FLAG_M + ABOVE * size],
         look_target=[middle[0], middle[1], 0.0], eye_up=[0.0, 0.0, 1.0])
-    return _space("Where he is: true robot green, believed blue, plan orange", eye)
+    return _space(name, eye)
 
 
 def _close(world: World) -> Any:

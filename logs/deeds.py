@@ -9,9 +9,10 @@ from typing import Any
 from blackboard.change import Change, Quiescence, Retracted, Revised
 from blackboard.servoing import Discrepancy
 from logs import words
-from world_models.body import BodyFault, Frame, Look, MotionReport, MotorCommand, Recovery
+from world_models.actuator import Drift
+from world_models.body import BodyFault, Course, Frame, Look, MotionReport, MotorCommand, Recovery, Ride, RideReport
 from world_models.location import Hypothesis
-from world_models.percepts import LineMatch, PoseFix, Segments, Tracks
+from world_models.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
 from world_models.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch, Resumed
 
 PURPOSES: Mapping[str, str] = {
@@ -76,7 +77,12 @@ def _milestone(milestone: Milestone, revised: bool) -> str:
 
 
 def _certificate(c: Certificate, _revised: bool) -> str:
-    return f"{c.verdict}: {c.reason}"
+    """The verdict and what it rests on most; a line has no room for all of it."""
+    return f"{c.verdict}: {', '.join(c.reason.partition(';')[0].split(', ')[:2])}"
+
+
+def _panorama(panorama: Panorama, _revised: bool) -> str:
+    return panorama.found or f"has {words.count(len(panorama.glimpses), 'look')} to find himself by"
 
 
 def _discrepancy(d: Discrepancy, _revised: bool) -> str:
@@ -90,6 +96,12 @@ def _discrepancy(d: Discrepancy, _revised: bool) -> str:
 
 def _command(command: MotorCommand, _revised: bool) -> str:
     return words.motion(command.turn_rad, command.move_m)
+
+
+def _course(course: Course, _revised: bool) -> str:
+    if not course.is_rolling:
+        return "come to a stand"
+    return f"roll on at {course.speed_m_per_s:.2f} m/s, bending by {words.degrees(course.curvature_per_m)} a metre"
 
 
 def _report(report: MotionReport, _revised: bool) -> str:
@@ -122,11 +134,16 @@ def _recovery(recovery: Recovery, _revised: bool) -> str:
 
 TELLERS: Mapping[type[Any], Callable[[Any, bool], str]] = {
     Goal: _goal, PlanSketch: _sketch, Leg: _leg, Milestone: _milestone, Certificate: _certificate,
-    Discrepancy: _discrepancy, MotorCommand: _command, MotionReport: _report, Tracks: _tracks, LineMatch: _match,
+    Discrepancy: _discrepancy, MotorCommand: _command, Course: _course, MotionReport: _report, Tracks: _tracks,
+    LineMatch: _match,
     PoseFix: _fix, BodyFault: _fault, Recovery: _recovery,
     Segments: lambda s, _: f"finds {words.count(len(s.segments_px), 'line segment')}",
     Look: lambda k, _: f"asks for a picture {PURPOSES.get(k.purpose, k.purpose)}",
+    Ride: lambda r, _: f"asks for a ride from {r.origin} to {r.destination}",
+    RideReport: lambda r, _: f"the doors open: {r.destination}, after {r.duration_s:.0f} s",
     Frame: lambda f, _: f"picture {f.number}",
+    Panorama: _panorama,
+    Drift: lambda _d, _r: "",
     Outcome: lambda o, _: f"{o.kind}: {o.reason}",
     Resumed: lambda r, _: f"goes on after cycle {r.after_cycle}, where the run was cut off",
     Quiescence: lambda _q, _r: "nothing is left to do",

@@ -33,6 +33,8 @@ class ActuatorParameters:
         distance_sigma: standard deviation of one move's length, as a part of it.
         encoder_step_m, encoder_step_rad: what the wheel encoders resolve.
         speed_m_per_s, turn_speed_rad_per_s: how fast it goes.
+        acceleration_m_per_s2: by how much a motion changes its speed that is steered on the move.
+        increment_m: after so much way on the move the wheels err anew.
         command_s: time that every command takes besides.
     """
 
@@ -49,6 +51,8 @@ class ActuatorParameters:
     encoder_step_rad: float = math.radians(0.05)
     speed_m_per_s: float = 0.4
     turn_speed_rad_per_s: float = math.radians(45.0)
+    acceleration_m_per_s2: float = 0.8
+    increment_m: float = 0.6096
     command_s: float = 0.1
 
     def __post_init__(self) -> None:
@@ -60,6 +64,9 @@ class ActuatorParameters:
             raise ValueError("expected low <= high bounds of curvature and shortfall, and a shortfall below 1, got "
                              f"{self.curvature_low_per_m}..{self.curvature_high_per_m} and "
                              f"{self.shortfall_low}..{self.shortfall_high}")
+        if not (self.acceleration_m_per_s2 > 0 and self.increment_m > 0):
+            raise ValueError("expected an acceleration and an increment > 0, got "
+                             f"{self.acceleration_m_per_s2} m/s^2, {self.increment_m} m")
         if not (self.speed_m_per_s > 0 and self.turn_speed_rad_per_s > 0):
             raise ValueError(f"expected speeds > 0, got {self.speed_m_per_s} m/s, {self.turn_speed_rad_per_s} rad/s")
 

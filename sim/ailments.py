@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from sim.body import SimulatedBody
-from world_models.body import BodyFault, Frame, MotionReport, MotorCommand
+from sim.body import WATCHDOG_S, SimulatedBody
+from world_models.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
 
 AILMENTS: Mapping[str, tuple[str, str, str]] = {
     "link_lost": ("base", "link lost", "no answer on the line"),
@@ -42,6 +42,18 @@ class AilingBody:
             return replace(found, turn_rad=self._done.turn_rad, move_m=self._done.move_m)
         return found
 
+    def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
+        """As the body does; where the line or the camera fails on the way, it comes to a stand."""
+        fault = self._fault_of("base") or self._fault_of("camera")
+        if fault is None:
+            found = self._body.steer(course)
+            if isinstance(found, BodyFault):
+                self._done = MotionReport(found.turn_rad or 0.0, found.move_m or 0.0, 0.0, found.when_s)
+            return found
+        self._done = self._body.halt(WATCHDOG_S if fault.part == "base" and fault.what != "stalled" else 0.0)
+        heard = fault.part == "camera" or fault.what == "stalled"
+        return replace(fault, turn_rad=self._done.turn_rad, move_m=self._done.move_m) if heard else fault
+
     def claim(self) -> MotionReport | BodyFault:
         """What the wheels claim of the last command, once the line is there again."""
         fault = self._fault_of("base")
@@ -52,6 +64,10 @@ class AilingBody:
     def look(self, purpose: str) -> Frame | BodyFault:
         """A picture; where the camera fails, none is taken."""
         return self._fault_of("camera") or self._body.look(purpose)
+
+    def ride(self, ride: Ride) -> RideReport | BodyFault:
+        """Whoever presses the button needs no line."""
+        return self._body.ride(ride)
 
     def wait(self, duration_s: float) -> float:
         """Simulated time passes."""

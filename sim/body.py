@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sim.actuator import ActuatorParameters, Slip, Wheels, arc_displacement, arc_steps
+from sim.actuator import STEP_M, ActuatorParameters, Slip, Wheels, arc_displacement, arc_steps
 from sim.building import Building
-from sim.faults import Ailment, Displacement, Fault, FaultWatch, LightsOff, free_displacement
+from sim.faults import Ailment, Displacement, Fault, FaultWatch, LightsOff, Occlusion, free_displacement
+from sim.occluder import Occluder
 from sim.optics import Optics
+from sim.rolling import Roll
 from sim.sensor import SensorParameters, compressed, exposed, pass_over
 from sim.truth import Truth
-from world_models.body import Frame, MotionReport, MotorCommand, Odometry
+from world_models.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Odometry, Ride, RideReport
 from world_models.camera import Camera, CameraMount
-from world_models.frames import Pose2
+from world_models.frames import Pose, Pose2
 
+BLUR_PARTS = 3
+"""Pictures of which one is made that is exposed on the move."""
 FRAME_S = 0.1
 """Time that taking a picture takes [s]."""
 WATCHDOG_S = 0.5
@@ -54,11 +60,14 @@ class SimulatedBody:
         self._wheels = Wheels.drawn(actuator or ActuatorParameters(), wheels)
         self._watch = FaultWatch.of(faults)
         self._dark_until_s = 0.0
+        self._occluders: tuple[Occluder, ...] = ()
         self._ailing: dict[str, tuple[float, float]] = {}
         self._frames = 0
         self._known: Mapping[int, bytes] = {}
+        self._helped: dict[int, int] = {}
         self._slip: Slip | None = None
         self._stuck = False
+        self._roll = Roll()
         self._counted = Pose2(0.0, 0.0, 0.0)
         x, y, turn = placing.standard_normal(3) * (put_down_sigma_m, put_down_sigma_m, put_down_sigma_rad)
         there = start @ Pose2(x, y, turn)
@@ -79,6 +88,11 @@ class SimulatedBody:
     def frames(self) -> int:
         """How many pictures were taken."""
         return self._frames
+
+    @property
+    def curvature_per_m(self) -> float:
+        """Of the arc that its wheels make of a straight way, on the average. Not for knowledge sources."""
+        return self._wheels.curvature_per_m
 
     @property
     def ailing(self) -> tuple[str, ...]:
@@ -151,6 +165,72 @@ class SimulatedBody:
         self._count(turn_rad, move_m)
         return turn_rad, move_m
 
+    def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
+        """Roll on by a course until the next picture, or come to a stand; what is steered holds from the picture on.
+
+        Returns what the encoders claim since the last call, and the picture: taken on the move, so that no time passes.
+        In contact it stands, and a fault tells so.
+        """
+        began_s, parameters = self._truth.time_s, self._wheels.parameters
+        each_s = 1.0 / self._sensor.frames_per_s
+        self._roll = self._roll.steered(min(course.speed_m_per_s, parameters.speed_m_per_s), course.curvature_per_m)
+        touched = self._roll_on(each_s)
+        while not course.is_rolling and self._roll.speed_m_per_s > 0.0 and not touched:
+            touched = self._roll_on(each_s)
+        turn, move = self._roll.claimed(self._wheels)
+        self._roll = self._roll.told(turn, move) if course.is_rolling and not touched else Roll()
+        now_s = self._truth.time_s
+        if touched:
+            return BodyFault("base", "stalled", "something is in the way", "", now_s, turn, move)
+        return MotionReport(turn, move, now_s - began_s, now_s), self._taken("track")
+
+    def halt(self, goes_on_s: float) -> MotionReport:
+        """A base that hears nothing any more on the move: it goes on for so long, and then comes to a stand."""
+        began_s = self._truth.time_s
+        touched = goes_on_s > 0.0 and self._roll_on(goes_on_s)
+        self._roll = self._roll.steered(0.0, self._roll.curvature_per_m)
+        while self._roll.speed_m_per_s > 0.0 and not touched:
+            touched = self._roll_on(1.0 / self._sensor.frames_per_s)
+        turn, move = self._roll.claimed(self._wheels)
+        self._roll = Roll()
+        return MotionReport(turn, move, self._truth.time_s - began_s, self._truth.time_s)
+
+    def _roll_on(self, duration_s: float) -> bool:
+        """Roll for a while, in steps of the simulation; whether something was touched."""
+        parameters = self._wheels.parameters
+        steps = max(1, math.ceil(duration_s * parameters.speed_m_per_s / STEP_M))
+        for _ in range(steps):
+            if self._roll.errs_anew(parameters.increment_m):
+                self._roll = self._roll.with_slip(self._wheels.slip(self._wheel_rng))
+            step, self._roll = self._roll.after(duration_s / steps, parameters.acceleration_m_per_s2)
+            before = self._truth.world_from_robot
+            if self._building.obstacles.blocks(before, before @ step):
+                self._truth = replace(self._truth, collisions=self._truth.collisions + 1)
+                self._pass(duration_s / steps)
+                return True
+            self._go(before @ step, duration_s / steps)
+        return False
+
+    def ride(self, ride: Ride) -> RideReport | BodyFault:
+        """Stand in the car until somebody presses the button and the doors open; what is told is what was asked for."""
+        began_s = self._truth.time_s
+        carried = self._building.elevators.carry(ride, self._truth, self._helped)
+        if isinstance(carried, str):
+            return BodyFault("elevator", "no ride", carried, "", began_s)
+        self._helped[carried.helper] = self._helped.get(carried.helper, 0) + 1
+        self._pass(carried.comes_s)
+        if self._building.on_floor is not None:
+            self._building = self._building.on_floor(carried.floor_m)
+        self._truth = replace(self._truth, world_from_robot=carried.world_from_robot, locale=carried.locale)
+        self._pass(carried.takes_s)
+        now_s = self._truth.time_s
+        return RideReport(ride.passage, ride.destination, now_s - began_s, now_s)
+
+    @property
+    def _standing(self) -> Pose:
+        """world_from_robot, on the floor that it stands on."""
+        return self._truth.world_from_robot.lifted(self._building.floor_m)
+
     def recall(self, pictures: Mapping[int, bytes]) -> None:
         """Pictures, by number, that are known from before: they are not made once more. All else goes on as it does."""
         self._known = pictures
@@ -158,6 +238,9 @@ class SimulatedBody:
     def look(self, purpose: str = "") -> Frame:
         """Take a picture: the JPEG bytes that the camera delivers, for the purpose of the request."""
         self._pass(FRAME_S)
+        return self._taken(purpose)
+
+    def _taken(self, purpose: str) -> Frame:
         number, self._frames = self._frames, self._frames + 1
         known = self._known.get(number)
         if known is not None:
@@ -167,10 +250,26 @@ class SimulatedBody:
 
     def picture(self) -> bytes:
         """The JPEG bytes that the camera delivers at this moment; no time passes for it, and it is not counted."""
-        camera_from_world = self._mount.camera_from_robot @ self._truth.world_from_robot.lifted().inverse()
-        radiance = self._optics.radiance(self._building.renderer, camera_from_world)
+        radiance = self._radiance()
+        for occluder in self._occluders:
+            if self._truth.time_s < occluder.until_s:
+                radiance = occluder.before(radiance)
         image = exposed(radiance, self._sensor, self._pixel_rng, lights_on=self._truth.lights_on)
         return compressed(image, self._sensor.jpeg_quality)
+
+    def _radiance(self) -> NDArray[np.float32]:
+        """(h, w, 3) what comes through the lens: on the move, the mean over the time that the picture is exposed."""
+        back_s = self._sensor.exposure_s if self._roll.speed_m_per_s > 0.0 else 0.0
+        parts = BLUR_PARTS if back_s > 0.0 else 1
+        total = self._radiance_from(self._standing)
+        for part in range(1, parts):
+            earlier = self._roll.step(-back_s * part / (parts - 1))
+            total = total + self._radiance_from((self._truth.world_from_robot @ earlier).lifted(self._building.floor_m))
+        return total if parts == 1 else np.asarray(total / parts, np.float32)
+
+    def _radiance_from(self, world_from_robot: Pose) -> NDArray[np.float32]:
+        camera_from_world = self._mount.camera_from_robot @ world_from_robot.inverse()
+        return self._optics.radiance(self._building.renderer, camera_from_world)
 
     def _turn(self, turn_rad: float) -> None:
         done = self._wheels.turned(turn_rad, self._wheel_rng)
@@ -220,6 +319,9 @@ class SimulatedBody:
     def _suffer(self, fault: Fault) -> None:
         if isinstance(fault, LightsOff):
             self._dark_until_s = self._truth.time_s + fault.duration_s
+        elif isinstance(fault, Occlusion):
+            until_s = self._truth.time_s + fault.duration_s
+            self._occluders += (Occluder.drawn(fault.part, until_s, self._fault_rng),)
         elif isinstance(fault, Ailment):
             self._ailing[fault.kind] = (self._truth.time_s, self._truth.time_s + fault.duration_s)
         elif isinstance(fault, Displacement):

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from sim.collision import Obstacles
+from sim.elevator import Elevators
 from sim.mesh import FaceLike
 from sim.renderer import Renderer
 from world_models.frames import Pose2
+
+
+NO_ELEVATORS = Elevators({}, {})
 
 
 def nowhere(_: Pose2) -> str:
@@ -24,11 +28,17 @@ class Building:
         renderer: how it looks.
         obstacles: what is solid.
         locale_at: the name of the locale at a pose in the world frame, "" outside all of them.
+        floor_m: height of the floor that the body stands on; obstacles and locales are those of this floor.
+        elevators: how one comes to another.
+        on_floor: the building for a body that stands on the floor of this height.
     """
 
     renderer: Renderer
     obstacles: Obstacles
     locale_at: Callable[[Pose2], str] = nowhere
+    floor_m: float = 0.0
+    elevators: Elevators = NO_ELEVATORS
+    on_floor: Callable[[float], Building] | None = field(default=None, repr=False)
 
     @staticmethod
     def of_faces(

@@ -25,9 +25,11 @@ class Obstacles:
     segments_world: NDArray[np.float64]
 
     @staticmethod
-    def of_faces(faces: Iterable[FaceLike]) -> Obstacles:
-        """What is drawn is what is solid: the outline on the floor of each region's part within the band."""
-        polygons = [_within_band(np.asarray(r.polygon_world, float)) for f in faces for r in (*f.front, *f.back)]
+    def of_faces(faces: Iterable[FaceLike], floor_m: float = 0.0) -> Obstacles:
+        """What is drawn is what is solid: the outline on the floor of each region's part within the band above it."""
+        floor = np.array([0.0, 0.0, floor_m])
+        polygons = [_within_band(np.asarray(r.polygon_world, float) - floor)
+                    for f in faces for r in (*f.front, *f.back)]
         parts = [_outline(polygon) for polygon in polygons if len(polygon) > 1]
         segments = np.concatenate(parts) if parts else np.zeros((0, 2, 2))
         return Obstacles(np.unique(np.round(segments, 6), axis=0))

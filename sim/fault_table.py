@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sim.ailments import AILMENTS
-from sim.faults import Ailment, Displacement, Fault, LightsOff, Moment
+from sim.faults import Ailment, Displacement, Fault, LightsOff, Moment, Occlusion
 from sim.settings import read_settings
 from world_models.location import Place
-from world_models.toml_source import Node
+from world_models.toml_source import Node, WorldError
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +24,7 @@ class FaultTable:
     turn_rad: float = 0.0
     distance_m: float = 0.0
     duration_s: float = 10.0
+    part: float = 0.2
     to_locale: str = ""
     to_x_m: float = 0.0
     to_y_m: float = 0.0
@@ -36,11 +37,20 @@ def read_fault(node: Node) -> Fault:
     moment = Moment(table.in_locale, table.after_m, table.after_s)
     if table.kind == "lights_off":
         return LightsOff(moment, table.duration_s)
+    if table.kind == "occluded":
+        return _occlusion(node, moment, table)
     if table.kind in AILMENTS:
         return Ailment(table.kind, moment, table.duration_s)
     if table.kind not in ("bump", "kidnap"):
-        raise node.fail(f"kind = bump, kidnap, lights_off or one of {', '.join(AILMENTS)}", repr(table.kind))
+        raise node.fail(f"kind = bump, kidnap, lights_off, occluded or one of {', '.join(AILMENTS)}", repr(table.kind))
     there = Place(table.to_locale, table.to_x_m, table.to_y_m, table.to_heading_rad) if table.to_locale else None
     return Displacement(
         table.kind, moment, table.forward_m, table.left_m, table.turn_rad, table.distance_m, there
     )
+
+
+def _occlusion(node: Node, moment: Moment, table: FaultTable) -> Occlusion:
+    try:
+        return Occlusion(moment, table.duration_s, table.part)
+    except ValueError as error:
+        raise WorldError(f"{node.where}: faults: {error}") from None

@@ -1,4 +1,4 @@
-"""What goes wrong from outside: bumps, kidnaps, the lights, the line, the camera. Each happens once, at its moment."""
+"""What goes wrong from outside: bumps, kidnaps, lights, view, line, camera. Each happens once, at its moment."""
 
 from __future__ import annotations
 
@@ -69,6 +69,23 @@ class LightsOff:
 
 
 @dataclass(frozen=True, slots=True)
+class Occlusion:
+    """Something hides a part of the camera's view for a while.
+
+    Attributes:
+        part: of the picture, 0..1; where it is, and how dark, is drawn.
+    """
+
+    moment: Moment = Moment()
+    duration_s: float = 10.0
+    part: float = 0.2
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.part < 1.0:
+            raise ValueError(f"expected a part of the view between 0 and 1, got {self.part}")
+
+
+@dataclass(frozen=True, slots=True)
 class Ailment:
     """Something between the mind and the body does not work for a while.
 
@@ -81,7 +98,7 @@ class Ailment:
     duration_s: float = 10.0
 
 
-Fault = Displacement | LightsOff | Ailment
+Fault = Displacement | LightsOff | Occlusion | Ailment
 
 
 def placed(fault: Fault, world: Frames) -> Fault:

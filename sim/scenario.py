@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from sim.actuator import ActuatorParameters
+from sim.elevator import Helper
 from sim.fault_table import read_fault
 from sim.faults import Fault
+from sim.moved import Moved
 from sim.optics import check_lens
 from sim.rasterizer import sample_offsets
 from sim.sensor import SensorParameters
@@ -98,6 +100,13 @@ class Servo:
 
 
 @dataclass(frozen=True, slots=True)
+class Motion:
+    """Whether legs are driven without stopping at each increment: corrected on the move, thirty times a second."""
+
+    continuous: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Limits:
     """When to give up."""
 
@@ -119,6 +128,7 @@ SECTIONS: Mapping[str, type[Any]] = {
     "actuator": ActuatorParameters,
     "sensor": SensorParameters,
     "servo": Servo,
+    "motion": Motion,
     "limits": Limits,
 }
 TEXTS = ("description", "world", "goal")
@@ -133,6 +143,8 @@ class Scenario:
         world: the world file that the robot believes in; details: the files of what only the building has.
         goal: in conceptual-dependency form, coordinates in feet.
         faults: what goes wrong, in the order of the file.
+        moved: what stands elsewhere in the building than in the robot's model.
+        rides: who presses the buttons of elevators.
         folder, data: where the file is, and its tables as read, for :func:`with_settings`.
     """
 
@@ -148,8 +160,11 @@ class Scenario:
     actuator: ActuatorParameters
     sensor: SensorParameters
     servo: Servo
+    motion: Motion
     limits: Limits
     faults: tuple[Fault, ...] = ()
+    moved: tuple[Moved, ...] = ()
+    rides: tuple[Helper, ...] = ()
     folder: Path = SCENARIOS
     data: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
@@ -224,7 +239,7 @@ def _with_setting(scenario: Scenario, key: str, value: Any) -> Scenario:
 
 
 def _scenario(source: Source, name: str, folder: Path) -> Scenario:
-    node = source.root.table(("world", "goal"), ("description", "details", "faults", *SECTIONS))
+    node = source.root.table(("world", "goal"), ("description", "details", "faults", "moved", "rides", *SECTIONS))
     sections = {key: read_settings(node[key], kind) if key in node else kind() for key, kind in SECTIONS.items()}
     details = [item.text() for item in node["details"].items()] if "details" in node else []
     return Scenario(
@@ -234,6 +249,8 @@ def _scenario(source: Source, name: str, folder: Path) -> Scenario:
         details=tuple(_file(text, ROOT / "sim" / "buildings", folder) for text in details),
         goal=_goal(node["goal"]),
         faults=tuple(read_fault(item) for item in node["faults"].items()) if "faults" in node else (),
+        moved=tuple(read_settings(item, Moved) for item in node["moved"].items()) if "moved" in node else (),
+        rides=tuple(read_settings(item, Helper) for item in node["rides"].items()) if "rides" in node else (),
         folder=folder,
         data=source.data,
         **sections,

@@ -26,6 +26,8 @@ class SensorParameters:
         read_noise: standard deviation [grey levels] in the dark.
         shot_noise: variance [grey levels^2] that each grey level of brightness adds.
         jpeg_quality: 1..100.
+        frames_per_s: how often a picture is taken on the move.
+        exposure_s: how long a picture on the move is exposed; 0: no motion blur.
         lights_off_gain: what is left of the brightness when the lights are off.
     """
 
@@ -35,12 +37,16 @@ class SensorParameters:
     read_noise: float = 1.0
     shot_noise: float = 0.015
     jpeg_quality: int = 92
+    frames_per_s: float = 30.0
+    exposure_s: float = 0.0
     lights_off_gain: float = 0.02
 
     def __post_init__(self) -> None:
-        for name in ("gain", "gain_sigma", "blur_px", "read_noise", "shot_noise", "lights_off_gain"):
+        for name in ("gain", "gain_sigma", "blur_px", "read_noise", "shot_noise", "lights_off_gain", "exposure_s"):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise ValueError(f"expected {name} >= 0, got {getattr(self, name)}")
+        if not 1.0 <= self.frames_per_s <= 1000.0:
+            raise ValueError(f"expected frames_per_s in 1..1000, got {self.frames_per_s}")
         if not 1 <= self.jpeg_quality <= 100:
             raise ValueError(f"expected jpeg_quality in 1..100, got {self.jpeg_quality}")
 

@@ -20,8 +20,8 @@ from numba import njit
 TEXTURES = ("plain", "speckle", "wood", "brick", "tiles", "carpet", "stripes", "poster")
 PLAIN, SPECKLE, WOOD, BRICK, TILES, CARPET, STRIPES, POSTER = range(8)
 
-BACKGROUND = 0.35
-"""Brightness where the building is open: nothing is seen."""
+SKY = (0.62, 0.72, 0.84)
+"""Red, green and blue where nothing is seen: indoors that is never so."""
 
 BATCH = 512
 """Points that are coloured at a time: few enough for the first cache."""
@@ -249,7 +249,8 @@ def _background(bare: Any) -> Any:
     image = np.empty((*bare.shape, 3), np.float32)
     for y in range(image.shape[0]):
         for x in range(image.shape[1]):
-            image[y, x] = np.float32(BACKGROUND) * bare[y, x]
+            for c in range(3):
+                image[y, x, c] = np.float32(SKY[c]) * bare[y, x]
     return image
 
 

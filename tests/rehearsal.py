@@ -147,8 +147,9 @@ LINES_WORLD = (((4.0, 1.5, 0.0), (4.0, 1.5, 2.0)), ((4.0, 1.5, 2.0), (4.0, 2.5, 
 
 def _expect(view: View) -> Iterable[Effect]:
     sketch = _last(view, PlanSketch)
-    yield Post(Milestone(sketch.id, 0, "the door", 0.0, ("kitchen-door",), LINES_WORLD, LINES_PX, (0, 0), "expected"),
-               (sketch,))
+    expected = Milestone(
+        sketch.id, 0, "the door", 0.0, ("kitchen-door",), LINES_WORLD, LINES_PX, (0, 0), status="expected")
+    yield Post(expected, (sketch,))
 
 
 def _find(view: View) -> Iterable[Effect]:

@@ -16,11 +16,11 @@ from world_models.regions import Finish
 
 @dataclass(frozen=True)
 class RoomLook:
-    """The finishes of a room; ``baseboard`` and ``moulding`` may be absent."""
+    """The finishes of a room; ``baseboard`` and ``moulding`` may be absent, the ``ceiling`` under the sky."""
 
     walls: Mapping[str, Finish]
     floor: Finish
-    ceiling: Finish
+    ceiling: Finish | None
     baseboard: Finish | None
     moulding: Finish | None
 
@@ -29,7 +29,8 @@ class RoomLook:
 class LocaleSpec:
     """A locale as described; ``outline`` (k, 2) [m] is ``None`` for one that only contains others.
 
-    ``wall_names`` has one name for each side of the outline, the side from vertex i to vertex i + 1.
+    ``wall_names`` has one name for each side of the outline, the side from vertex i to vertex i + 1;
+    ``wall_heights_m`` the heights of those that are lower than the room.
     """
 
     name: str
@@ -44,6 +45,7 @@ class LocaleSpec:
     source: str
     survey_m: float = 0.0
     survey_rad: float = 0.0
+    wall_heights_m: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -23,11 +23,63 @@ class MotorCommand:
 
 
 @dataclass(frozen=True, slots=True)
+class Course:
+    """A motion that goes on until it is told otherwise; each revision is a correction in mid-move (§5).
+
+    The body answers each with what the wheels claim since the one before, and with a picture that is taken on the move.
+    Without another word it comes to a stand.
+
+    Attributes:
+        leg: id of the leg entry.
+        speed_m_per_s: wanted, ahead; 0: come to a stand.
+        curvature_per_m: of the arc to steer, positive to the left.
+    """
+
+    leg: str
+    speed_m_per_s: float
+    curvature_per_m: float
+
+    def __post_init__(self) -> None:
+        if not self.speed_m_per_s >= 0.0:
+            raise ValueError(f"expected a speed ahead (>= 0 m/s), got {self.speed_m_per_s}")
+
+    @property
+    def is_rolling(self) -> bool:
+        return self.speed_m_per_s > 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class MotionReport:
     """What the wheel encoders claim was done, and how long it took."""
 
     turn_rad: float
     move_m: float
+    duration_s: float
+    sim_time_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Ride:
+    """A request to be carried: somebody may press the button.
+
+    Attributes:
+        sketch: id of the sketch entry; index: which of its subgoals.
+        passage: the link that is ridden; origin, destination: the locales that it joins.
+    """
+
+    sketch: str
+    index: int
+    passage: str
+    origin: str
+    destination: str
+
+
+@dataclass(frozen=True, slots=True)
+class RideReport:
+    """What was told when the doors opened: where this is, and how long it took."""
+
+    passage: str
+    destination: str
     duration_s: float
     sim_time_s: float
 
@@ -84,7 +136,7 @@ class BodyFault:
     """Something is wrong between the mind and the body: a request stays unanswered until it is over.
 
     Attributes:
-        part: base, camera, or user for the stop key.
+        part: base, camera, elevator, or user for the stop key.
         what: link lost, base answers nonsense, stalled, camera unplugged, frame late, frame dropped, stop key ...
         detail: in words.
         request: id of the motor command or the look that was not answered.

@@ -19,7 +19,7 @@ from world_models.landmarks import Landmark
 from world_models.locales import Doorway, Link, Locale
 from world_models.memory_frames import MemoryFrames
 from world_models.shells import Opening, Shell, Wall, along_wall, walls_of
-from world_models.things import Fault, Thing
+from world_models.things import ROBOT_TOP_M, Fault, Thing
 from world_models.world import World
 
 THICKEST_WALL_M = 0.6
@@ -222,7 +222,9 @@ def _link(spec: LinkSpec, poses: Mapping[str, Pose]) -> Link:
 def _thing(spec: ThingSpec, name: str, world_from_part: Pose) -> Thing:
     ranges = np.array([box.ranges for box in spec.boxes])
     low, high = ranges[..., 0].min(axis=0), ranges[..., 1].max(axis=0)
-    corners = [(low[0], low[1], 0), (high[0], low[1], 0), (high[0], high[1], 0), (low[0], high[1], 0)]
+    reached = ranges[ranges[:, 2, 0] + spec.up_m < ROBOT_TOP_M]
+    near, far = (reached[..., 0].min(axis=0), reached[..., 1].max(axis=0)) if len(reached) else (low, high)
+    corners = [(near[0], near[1], 0), (far[0], near[1], 0), (far[0], far[1], 0), (near[0], far[1], 0)]
     return Thing(name, spec.locale, spec.kind, world_from_part.apply(corners)[:, :2],
                  spec.up_m + float(low[2]), spec.up_m + float(high[2]),
                  float(high[1]) if spec.wall else None, spec.source)

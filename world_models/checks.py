@@ -9,7 +9,9 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
+from world_models.locales import Locale
 from world_models.outlines import distance_to_border, inside_polygon
+from world_models.things import STEP_M
 
 if TYPE_CHECKING:
     from world_models.world import World
@@ -18,11 +20,17 @@ Finding = tuple[str, str]
 """(file:line, what is wrong)."""
 
 TOLERANCE_M = 0.01
+IN_DOORWAY_M = 0.05
+"""What is nearer than this to the opening is in it."""
+
+UNDER_WALLS_M = 0.3
+"""Outdoors nobody looks over walls that are higher than this."""
 
 
 def faults_of(world: World) -> list[Finding]:
     """All findings, each kind in the order of the file."""
-    return [*_unclosed(world), *_overlapping(world), *_unreachable(world), *_misplaced(world)]
+    return [*_unclosed(world), *_overlapping(world), *_stepped(world), *_obstructed(world), *_unreachable(world),
+            *_misplaced(world)]
 
 
 def _unclosed(world: World) -> Iterator[Finding]:
@@ -33,15 +41,18 @@ def _unclosed(world: World) -> Iterator[Finding]:
         polygons = [r.polygon_world for f in faces for r in f.front]
         openings = [f.polygon_world for f in faces if f.kind == "doorway"]
         if not polygons or not _shut_in(world, name, [*polygons, *openings]):
-            yield locale.source, f"{name}: expected a room closed by floor, ceiling, walls and doors, got a gap"
+            shut = "floor and walls" if _is_outdoors(locale) else "floor, ceiling, walls and doors"
+            yield locale.source, f"{name}: expected a room closed by {shut}, got a gap"
 
 
 def _shut_in(world: World, name: str, polygons: list[NDArray[np.float64]]) -> bool:
-    """Whether every ray from a point in the room meets the front of one of these polygons."""
+    """Whether every ray from a point in the room meets the front of one of these polygons; those downward, outdoors."""
     centre = _inner_point(world.outline(name))
     base = world.world_from_locale(name).translation[2]
-    eye = np.array([*centre, base + 0.55 * world.locales[name].height_m])
-    rays = _rays()
+    locale, rays = world.locales[name], _rays()
+    eye = np.array([*centre, base + 0.55 * locale.height_m])
+    if _is_outdoors(locale):
+        eye, rays = np.array([*centre, base + UNDER_WALLS_M]), rays[rays[:, 2] < 0.0]
     hit = np.zeros(len(rays), bool)
     for polygon in polygons:
         hit |= _hit(eye, rays, polygon)
@@ -76,8 +87,42 @@ def _overlapping(world: World) -> Iterator[Finding]:
     outlines = [world.outline(name) for name in world.rooms]
     for i, j in _near_pairs(outlines):
         a, b = world.rooms[i], world.rooms[j]
-        if _overlap(outlines[i], outlines[j]):
+        if _share_height(world, a, b) and _overlap(outlines[i], outlines[j]):
             yield world.locales[b].source, f"{b}: expected a room apart from others, got one that overlaps {a}"
+
+
+def _share_height(world: World, *names: str) -> bool:
+    """Whether two rooms are not above each other."""
+    floors = [world.floor_m(name) for name in names]
+    ceilings = [floor + world.locales[name].height_m for floor, name in zip(floors, names, strict=True)]
+    return max(floors) < min(ceilings) - TOLERANCE_M
+
+
+def _is_outdoors(locale: Locale) -> bool:
+    return bool(locale.properties.get("sky"))
+
+
+def _stepped(world: World) -> Iterator[Finding]:
+    """Doorways with a step in them: wheels cannot pass."""
+    for doorway in world.doorways:
+        step_m = abs(world.floor_m(doorway.between[0]) - world.floor_m(doorway.between[1]))
+        if step_m > STEP_M:
+            yield doorway.source, (f"{doorway.name}: expected {' and '.join(doorway.between)} on one level, "
+                                   f"got a step of {step_m:.2f} m")
+
+
+def _obstructed(world: World) -> Iterator[Finding]:
+    """Things that stand or hang in an open doorway."""
+    for doorway in world.doorways:
+        for room in doorway.between:
+            left, right = doorway.threshold_of(room)
+            across, outward = (right - left) / doorway.width_m, doorway.outward_from(room)
+            for thing in world.things_of(room):
+                sideways = (thing.footprint_world - left) @ across
+                away_m = float(-((thing.footprint_world - left) @ outward).max())
+                beside = sideways.max() < TOLERANCE_M or sideways.min() > doorway.width_m - TOLERANCE_M
+                if not beside and away_m < IN_DOORWAY_M and STEP_M < thing.high_m and thing.low_m < doorway.height_m:
+                    yield thing.source, f"{thing.name}: expected the doorway {doorway.name} free, got it in there"
 
 
 def _near_pairs(outlines: list[NDArray[np.float64]]) -> Iterator[tuple[int, int]]:

@@ -144,7 +144,7 @@ class Solid:
                 return surface.level
         for other, box in enumerate(self.boxes):
             if other != index and _covers(box, self.boxes[index], side):
-                return level(box.finish, -normal)
+                return self._level(box.finish, _opposite(side))
         return None
 
     def _looks(self, index: int, axis: int, first: Side, second: Side) -> Iterator[tuple[Range, tuple[Any, Any]]]:
@@ -176,7 +176,7 @@ class Solid:
             low, high = near.ranges[other[0]]
             if low < inwards < high and near.ranges[axis][0] < middle < near.ranges[axis][1]:
                 flush = abs((high if other[1] else low) - edge) < CONTACT_M
-                return level(near.finish, self._normal(other) if flush else -self._normal(side))
+                return self._level(near.finish, other if flush else _opposite(side))
         return self._grounds[index].get(side)
 
     @cached_property
@@ -193,7 +193,7 @@ class Solid:
         """(normals, levels) of an edge between two sides; ``None`` where there is nothing to see."""
         finish, behind = self.boxes[index].finish, self._behind(index)
         normals = [self._normal(side) for side in sides]
-        own = [level(finish, normal) for normal in normals]
+        own = [self._level(finish, side) for side in sides]
         if grounds == (None, None):
             return normals, [*own, behind]
         seen = 0 if grounds[0] is None else 1
@@ -203,7 +203,23 @@ class Solid:
         return [normals[seen]] * 2, [own[seen], ground, behind]
 
     def _normal(self, side: Side) -> NDArray[np.float64]:
-        return np.asarray(self.world_from_part.rotation[:, side[0]] * (1.0 if side[1] else -1.0))
+        return self._normals[side]
+
+    @cached_property
+    def _normals(self) -> dict[Side, NDArray[np.float64]]:
+        """Of its sides, outward."""
+        return {(axis, end): np.asarray(self.world_from_part.rotation[:, axis] * (1.0 if end else -1.0))
+                for axis, end in SIDES}
+
+    @cached_property
+    def _levels(self) -> dict[tuple[Finish, Side], float]:
+        return {}
+
+    def _level(self, finish: Finish, side: Side) -> float:
+        """The brightness of a finish on a side, worked out once."""
+        if (finish, side) not in self._levels:
+            self._levels[finish, side] = level(finish, self._normal(side))
+        return self._levels[finish, side]
 
     def _behind(self, index: int) -> float:
         """Brightness behind a thin box on a wall; NaN for others."""
@@ -223,6 +239,10 @@ def left_over(whole: Range, taken: Sequence[Range], shortest: float = SHORTEST_L
         at = max(at, high)
     pieces.append((at, whole[1]))
     return [(low, high) for low, high in pieces if high - low >= shortest]
+
+
+def _opposite(side: Side) -> Side:
+    return side[0], 1 - side[1]
 
 
 def _back_to_back(box: Box, other: Box, side: Side) -> bool:

@@ -2,27 +2,43 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 
 def inside_polygon(point: NDArray[np.float64], polygon: NDArray[np.float64], margin_m: float = 0.0) -> bool:
     """Whether a point (2,) lies in a simple polygon (k, 2) or at most ``margin_m`` from its border."""
-    if distance_to_border(point, polygon) <= margin_m + 1e-9:
+    x, y = point.tolist()
+    sides = _sides(polygon)
+    if _distance(x, y, sides) <= margin_m + 1e-9:
         return True
-    a, b = polygon, np.roll(polygon, -1, axis=0)
-    crosses = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
-    a, b = a[crosses], b[crosses]
-    x = a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
-    return bool(np.count_nonzero(x > point[0]) % 2)
+    crossings = sum(1 for ax, ay, bx, by in sides if (ay > y) != (by > y) and ax + (y - ay) / (by - ay) * (bx - ax) > x)
+    return crossings % 2 == 1
 
 
 def distance_to_border(point: NDArray[np.float64], polygon: NDArray[np.float64]) -> float:
     """Distance [m] of a point (2,) from the nearest side of a polygon (k, 2)."""
-    a, b = polygon, np.roll(polygon, -1, axis=0)
-    d = b - a
-    t = np.clip(np.sum((point - a) * d, axis=1) / np.maximum(np.sum(d * d, axis=1), 1e-18), 0.0, 1.0)
-    return float(np.min(np.linalg.norm(a + t[:, None] * d - point, axis=1)))
+    x, y = point.tolist()
+    return _distance(x, y, _sides(polygon))
+
+
+def _sides(polygon: NDArray[np.float64]) -> list[tuple[float, float, float, float]]:
+    """Both ends of each side in plain numbers: there are few, and they are asked often."""
+    corners = polygon.tolist()
+    return [(ax, ay, bx, by) for (ax, ay), (bx, by) in zip(corners, (*corners[1:], corners[0]), strict=True)]
+
+
+def _distance(x: float, y: float, sides: list[tuple[float, float, float, float]]) -> float:
+    nearest = math.inf
+    for ax, ay, bx, by in sides:
+        dx, dy = bx - ax, by - ay
+        t = ((x - ax) * dx + (y - ay) * dy) / max(dx * dx + dy * dy, 1e-18)
+        t = min(max(t, 0.0), 1.0)
+        u, v = ax + t * dx - x, ay + t * dy - y
+        nearest = min(nearest, u * u + v * v)
+    return math.sqrt(nearest)
 
 
 def is_simple(outline: NDArray[np.float64]) -> bool:

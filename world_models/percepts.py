@@ -81,7 +81,7 @@ class Segments:
         milestone: id of the milestone entry for which they were sought, or "".
         segments_px: (n, 2, 2).
         sigma_px: (n,) standard deviation of their offset.
-        contrast: of the frame: standard deviation of its grey values, 0..255.
+        contrast, brightness: of the frame: standard deviation and mean of its grey values, 0..255.
     """
 
     frame: str
@@ -89,6 +89,7 @@ class Segments:
     segments_px: NDArray[np.float64]
     sigma_px: NDArray[np.float64]
     contrast: float
+    brightness: float = 128.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,3 +132,31 @@ class PoseFix:
     inliers: NDArray[np.bool_]
     residuals_px: NDArray[np.float64]
     rejected: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Glimpse:
+    """One look round while lost.
+
+    Attributes:
+        segments: id of the entry of what was seen.
+        now_from_then: where the robot was, from where it was at the newest look.
+        covariance: of that, over (x, y, heading).
+    """
+
+    segments: str
+    now_from_then: Pose2
+    covariance: Covariance
+
+
+@dataclass(frozen=True, slots=True)
+class Panorama:
+    """All looks since the robot is lost, composed by the motions between them.
+
+    Attributes:
+        glimpses: the newest last.
+        found: what was made of them, in words.
+    """
+
+    glimpses: tuple[Glimpse, ...]
+    found: str = ""

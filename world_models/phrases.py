@@ -7,7 +7,7 @@ means the point in it that is furthest from walls and from what stands about.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from world_models.world import World
 GO = re.compile(r"\s*(?:please\s+)?(?:go|drive|move|(?:bring|take|carry)\s+(?:this|it))"
                 r"(?:\s+from\s+(?P<origin>.+?))?\s+to\s+(?P<destination>.+?)\s*[.!]?\s*", re.IGNORECASE)
 FETCH = re.compile(r"\s*(?:please\s+)?(?:fetch|get)\s+(?P<what>.+?)\s*[.!]?\s*", re.IGNORECASE)
+INSIDE = re.compile(r"(?P<room>.+?)\s+(?:in|of|on)\s+(?:the\s+)?(?P<within>.+)", re.IGNORECASE)
 EMPTY = frozenset(("the", "a", "an", "of", "my"))
 SHOWN = 6
 GRID = 21
@@ -63,9 +64,26 @@ def _ends(text: str) -> tuple[str, str]:
 
 
 def room_named(words: str, world: World) -> str:
-    """The one room that answers to these words. Raises ValueError where there is none, or more than one."""
+    """The one room that answers to these words, as "Hanson's office in Engineering", where it is said in which part
+    of the world. Raises ValueError where there is none, or more than one."""
+    inside = INSIDE.fullmatch(words)
+    within = _parts_named(inside["within"], world) if inside else []
+    if inside and within:
+        return _one_of(inside["room"], words, world, within)
+    return _one_of(words, words, world, [world.root])
+
+
+def _parts_named(words: str, world: World) -> list[str]:
+    """The parts of the world, of more than one room, that answer to these words; only the smallest of what is nested."""
     asked = " ".join(sorted(words_of(words) - EMPTY))
+    found = [name for name in world.frames.named(asked) if not world.is_room(name)] if asked else []
+    return [name for name in found if not any(name in world.path_of(other)[:-1] for other in found)]
+
+
+def _one_of(asked_words: str, words: str, world: World, within: Sequence[str]) -> str:
+    asked = " ".join(sorted(words_of(asked_words) - EMPTY))
     rooms = [name for name in world.frames.named(asked) if world.is_room(name)] if asked else []
+    rooms = [name for name in rooms if set(within) & set(world.path_of(name))]
     exact = [name for name in rooms if words_of(name) == words_of(asked)]
     if len(exact) == 1:
         return exact[0]

@@ -19,6 +19,7 @@ LUMA = np.array([0.299, 0.587, 0.114])
 AMBIENT = 0.6
 LAMP = np.array([0.12, 0.04, 0.18])
 """The building's light comes from above and a little from the east: enough to tell which creases show."""
+TOWARDS_LAMP = LAMP / np.linalg.norm(LAMP)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,4 +65,4 @@ def region(name: str, polygon_world: Any, finish: Finish) -> Region:
 
 def level(finish: Finish, normal_world: Any) -> float:
     """The brightness, 0..1, that the model expects of a surface with this normal (3,)."""
-    return float(finish.luma * (AMBIENT + 0.25 * np.dot(LAMP / np.linalg.norm(LAMP), normal_world)))
+    return float(finish.luma * (AMBIENT + 0.25 * np.dot(TOWARDS_LAMP, normal_world)))

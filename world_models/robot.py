@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
@@ -23,6 +24,7 @@ class RobotModel:
             pictures are like once that is undone: everything that is predicted or found is in these pixels.
         actuator: the actuator model (§3.2).
         radius_m: of the robot's disc.
+        continuous: whether legs are driven without stopping at each increment, corrected by pictures on the move.
         lens: the camera as it is, with its distortion; unless given, it is the camera that the model is made with.
     """
 
@@ -32,11 +34,28 @@ class RobotModel:
     actuator: ActuatorModel
     radius_m: float = 0.35
     lens: Camera = _THE_CAMERA
-
+    continuous: bool = False
     def __post_init__(self) -> None:
         if self.lens is _THE_CAMERA:
             object.__setattr__(self, "lens", self.camera)
         object.__setattr__(self, "camera", self.lens.pinhole)
+
+    def standing_in(self, locale: str) -> RobotModel:
+        """The robot on the floor of a locale. Poses are told on the plan of the world: one floor up, its camera is as
+        much higher above that plan, as if it were mounted there."""
+        height_m = self.world.floor_m(locale)
+        if height_m == 0.0:
+            return self
+        if height_m not in self._raised:
+            raised = replace(self, mount=replace(self.mount, height_m=self.mount.height_m + height_m))
+            object.__setattr__(raised, "camera", self.camera)  # the same camera, by which views are remembered
+            self._raised[height_m] = raised
+        return self._raised[height_m]
+
+    @cached_property
+    def _raised(self) -> dict[float, RobotModel]:
+        """The same robot on other floors, by their height."""
+        return {}
 
     def camera_from_world(self, world_from_robot: Pose2) -> Pose:
         """Where the camera is when the robot is there."""

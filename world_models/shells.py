@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,12 @@ BASEBOARD_M, BASEBOARD_PROUD_M = 0.10, 0.015
 MOULDING_M, MOULDING_PROUD_M = 0.08, 0.04
 
 UP = np.array([0.0, 0.0, 1.0])
+
+SKY = 0.85
+"""The brightness, 0..1, that the model expects of the sky."""
+
+_Row = tuple[NDArray[np.float64], tuple[NDArray[np.float64], NDArray[np.float64]], tuple[float, float, float]]
+"""A line, the normals beside it and the brightnesses, as :class:`Edges` wants them."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +99,7 @@ def walls_of(spec: LocaleSpec, world_from_locale: Pose) -> list[Wall]:
         length = float(np.linalg.norm(end - start))
         x = np.array([*(end - start) / length, 0.0])
         frame = Pose(np.stack([x, np.cross(UP, x), UP], axis=1), np.array([*start, 0.0]))
-        walls.append(Wall(spec.name, name, world_from_locale @ frame, length, spec.height_m, spec.look.walls[name]))
+        walls.append(Wall(spec.name, name, world_from_locale @ frame, length, spec.wall_heights_m.get(name, spec.height_m), spec.look.walls[name]))
     return walls
 
 
@@ -109,19 +116,20 @@ class Shell:
     walls: tuple[Wall, ...]
     world_from_locale: Pose
 
-    @property
+    @cached_property
     def surfaces(self) -> tuple[Surface, ...]:
         """What things in the room stand on or against."""
         look, up = self.spec.look, self.world_from_locale.apply([(0.0, 0.0, 0.0), (0.0, 0.0, self.spec.height_m)])[:, 2]
+        above = [Surface(-UP, -float(up[1]), level(look.ceiling, -UP))] if look.ceiling else []
         return (
-            Surface(UP, float(up[0]), level(look.floor, UP)),
-            Surface(-UP, -float(up[1]), level(look.ceiling, -UP)),
+            Surface(UP, float(up[0]), level(look.floor, UP)), *above,
             *(surface_of(wall.polygon_world, wall.finish) for wall in self.walls),
         )
 
     def faces(self) -> list[Face]:
         """Floor, ceiling, walls and trim."""
-        faces = [self._flat("floor", self.spec.look.floor), self._flat("ceiling", self.spec.look.ceiling)]
+        look = self.spec.look
+        faces = [self._flat("floor", look.floor), *([self._flat("ceiling", look.ceiling)] if look.ceiling else [])]
         for index, wall in enumerate(self.walls):
             faces.append(_wall_face(wall))
             for solid in self._trim(index):
@@ -175,17 +183,36 @@ class Shell:
     def _wall_edges(self, index: int) -> Edges:
         wall, before = self.walls[index], self.walls[index - 1]
         look, rows = self.spec.look, []
-        low, high = trim_heights(look, wall.height_m)
+        low, high = trim_heights(look, min(wall.height_m, before.height_m))
         nan = float("nan")
         rows.append((wall.world_from_wall.apply([(0, 0, low), (0, 0, high)]),
                      (wall.inward_world, before.inward_world), (wall.level, before.level, nan)))
-        flats = (0.0, look.floor, UP, look.baseboard), (wall.height_m, look.ceiling, -UP, look.moulding)
+        flats = [(0.0, look.floor, UP, look.baseboard)]
+        if look.ceiling is None:
+            rows += self._skyline(wall, before)
+        else:
+            flats.append((wall.height_m, look.ceiling, -UP, look.moulding))
         for z, finish, normal, board in flats:
             for x in wall.free_of_openings(CASING_M) if board is None and z == 0.0 else [(0.0, wall.length_m)]:
                 if board is None and x[1] - x[0] >= SHORTEST_LINE_M:
                     rows.append((wall.world_from_wall.apply([(x[0], 0, z), (x[1], 0, z)]),
                                  (wall.inward_world, normal), (wall.level, level(finish, normal), nan)))
         return Edges.joined([Edges.of(rows), *(solid.edges() for solid in self._trim(index))])
+
+
+    def _skyline(self, wall: Wall, before: Wall) -> list[_Row]:
+        """The top of a wall under the sky, and its end where it is higher than the one before, or that one's."""
+        nan, rows = float("nan"), []
+        tops = [(wall, [(0.0, 0.0, wall.height_m), (wall.length_m, 0.0, wall.height_m)])]
+        if wall.height_m > before.height_m:
+            tops.append((wall, [(0.0, 0.0, before.height_m), (0.0, 0.0, wall.height_m)]))
+        elif before.height_m > wall.height_m:
+            end = before.length_m
+            tops.append((before, [(end, 0.0, wall.height_m), (end, 0.0, before.height_m)]))
+        for seen, line in tops:
+            normals = (seen.inward_world, seen.inward_world)
+            rows.append((seen.world_from_wall.apply(line), normals, (seen.level, SKY, nan)))
+        return rows
 
 
 def trim_heights(look: RoomLook, height_m: float) -> Range:

@@ -147,6 +147,8 @@ class Milestone:
         expected: the visible model lines, ((x0, y0, z0), (x1, y1, z1)) [m, world].
         expected_px: their expected projection, ((u0, v0), (u1, v1)).
         landmark_of: for each line, its index in ``landmarks``.
+        looks: the faces that should be seen, each as its colour (red, green, blue; 0..1) and points of it [m, world].
+        tried: headings from which it was looked for before, and could not be told [rad, world].
         status: turning (not yet looking there), expected, verified, refuted or not testable.
     """
 
@@ -158,6 +160,8 @@ class Milestone:
     expected: tuple[tuple[tuple[float, ...], ...], ...] = ()
     expected_px: tuple[tuple[tuple[float, ...], ...], ...] = ()
     landmark_of: tuple[int, ...] = ()
+    looks: tuple[tuple[tuple[float, ...], tuple[tuple[float, ...], ...]], ...] = ()
+    tried: tuple[float, ...] = ()
     status: str = "turning"
 
     @property
@@ -178,8 +182,9 @@ class Certificate:
         coverage: part of the expected line length that was found, 0..1.
         residual_px: RMS distance of the inliers.
         deviation_m, deviation_rad, deviation_px: from the belief that predicted it.
-        tolerance_px: up to where a deviation may be adjusted, from §3.2's models and §6.1.4's windows.
-        p_false: probability that as much agrees at a wrong place by chance.
+        tolerance_px: up to where the wheels may have put it (§3.2) and the plan may adjust it (§6.1.4's window).
+        p_false: probability that the pose is wrong, as counted on rendered floors where half of the places are.
+        faces, faces_alike: how many faces' colours were compared, and the part of them that is as the model says.
     """
 
     milestone: str
@@ -196,6 +201,8 @@ class Certificate:
     deviation_px: float
     tolerance_px: float
     p_false: float
+    faces: int = 0
+    faces_alike: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

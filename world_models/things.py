@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 ROBOT_TOP_M = 1.4
 """What hangs higher than this is no obstacle."""
 
+STEP_M = 0.03
+"""What is no higher than this is driven over."""
+
 FLUSH_M = 0.06
 """What stands out from its wall by no more than this is no obstacle: the robot keeps clear of the wall itself."""
 
@@ -33,7 +36,7 @@ class Thing:
         name: unique in the world.
         locale: where it stands.
         kind: the part that it is made from.
-        footprint_world: (4, 2) rectangle on the floor that holds it [m].
+        footprint_world: (4, 2) rectangle on the floor [m] that holds it, as far as the robot could hit it, or all of it.
         low_m, high_m: its extent above the floor.
         proud_m: how far it stands out from its wall; ``None`` for one that stands free.
         source: file:line where it is placed.
@@ -51,4 +54,4 @@ class Thing:
     @property
     def in_the_way(self) -> bool:
         """Whether the robot could hit it."""
-        return self.low_m < ROBOT_TOP_M and (self.proud_m is None or self.proud_m > FLUSH_M)
+        return self.low_m < ROBOT_TOP_M and self.high_m > STEP_M and (self.proud_m is None or self.proud_m > FLUSH_M)

@@ -6,7 +6,7 @@ import re
 import tomllib
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +20,28 @@ class WorldError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """One TOML file: its name for messages, its data and the line on which each value starts."""
+    """One TOML file.
+
+    Attributes:
+        name: for messages; data: its tables; lines: the line on which each value starts.
+        folder: from where files that it names are looked for.
+        text: as it was read.
+        depth: how many files named each other until this one was named.
+    """
 
     name: str
     data: Mapping[str, Any]
     lines: Mapping[Key, int]
+    folder: Path = Path()
+    text: str = ""
+    depth: int = 0
 
     @staticmethod
-    def read(path: Path) -> Source:
+    def read(path: Path, depth: int = 0) -> Source:
         """Raises WorldError where the file is missing, not text or not TOML."""
         try:
-            return Source.parse(path.read_bytes().decode("utf-8").replace("\r\n", "\n"), path.name)
+            text = path.read_bytes().decode("utf-8").replace("\r\n", "\n")
+            return replace(Source.parse(text, path.name), folder=path.parent, depth=depth)
         except OSError as error:
             raise WorldError(f"{path}: expected a readable file, got: {error.strerror}") from None
         except UnicodeDecodeError as error:
@@ -48,7 +59,7 @@ class Source:
             told = re.search(r"at line (\d+)", str(error))
             line = told.group(1) if told else text.count("\n") + 1
             raise WorldError(f"{name}:{line}: expected TOML, got: {error}") from None
-        return Source(name, data, line_numbers(text))
+        return Source(name, data, line_numbers(text), text=text)
 
     @property
     def root(self) -> Node:

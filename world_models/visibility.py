@@ -25,7 +25,6 @@ from world_models.shadows import (
     clipped_spans,
     hidden_points,
     lengths_px,
-    over_corners,
     overlap,
     pieces,
     rectangles,
@@ -140,8 +139,9 @@ def _visible_lines(
     index = np.flatnonzero(_named(scene, scene.line_locales, locales) & (contrast >= min_contrast))
     lines = camera_from_world.apply(scene.edges.lines_world[index]).reshape(-1, 2, 3)
     span = clipped_spans(lines, view.window)
-    lines, keep = pieces(lines, span), span[:, 1] - span[:, 0] > SHORTEST_PIECE
-    keep[keep] &= lengths_px(camera.project(lines[keep])) >= min_length_px
+    ahead = np.flatnonzero(span[:, 1] - span[:, 0] > SHORTEST_PIECE)
+    index, lines = index[ahead], pieces(lines[ahead], span[ahead])
+    keep = lengths_px(camera.project(lines)) >= min_length_px
     keep[keep] &= np.linalg.norm(lines[keep], axis=2).min(axis=1) < max_distance_m
     keep[keep] &= overlap(rectangles(lines[keep]), view.windows_for(scene.line_locales[index[keep]]))
     index, lines = index[keep], lines[keep]
@@ -212,10 +212,11 @@ class _View:
         centre = pose.inverse().translation
         facing = scene.planes_world[:, :3] @ centre - scene.planes_world[:, 3] > 1e-6
         index = np.flatnonzero(facing)
+        depths = scene.polygons_world[index] @ pose.rotation[2]
+        index = index[depths.max(axis=1, initial=-np.inf) + pose.translation[2] > NEAR_M]
         polygons = pose.apply(scene.polygons_world[index])
         windows = rectangles(polygons)
-        keep = (over_corners(np.maximum, polygons[..., 2]) > NEAR_M) & overlap(
-            windows, self.windows_for(scene.surface_locales[index]))
+        keep = overlap(windows, self.windows_for(scene.surface_locales[index]))
         index, polygons, windows = index[keep], polygons[keep], windows[keep]
         planes = np.column_stack([scene.planes_world[index, :3] @ pose.rotation.T, scene.planes_world[index, 3]])
         planes[:, 3] += planes[:, :3] @ pose.translation

@@ -27,6 +27,9 @@ from world_models.things import Fault, Thing
 
 __all__ = ["Fault", "Thing", "World"]
 
+NEAR_FLOOR_M = 0.5
+"""A camera so far above a room's ceiling, or below its floor, may still be in its doorway."""
+
 SCENES = 32
 """How many joined scenes are kept."""
 
@@ -100,6 +103,10 @@ class World:
         """The frame of a locale."""
         return self._pose(name)[0]
 
+    def floor_m(self, name: str) -> float:
+        """Height of a locale's floor [m, world]."""
+        return float(self.world_from_locale(name).translation[2])
+
     def _pose(self, name: str) -> tuple[Pose, Pose]:
         """The frame of a locale, and its inverse."""
         if name not in self._poses:
@@ -151,14 +158,32 @@ class World:
 
     def rooms_near(self, point_world: Any, margin_m: float) -> tuple[str, ...]:
         """The rooms whose rectangle on the plan is at most so far from a point (2,) or (3,) [m, world]."""
-        x, y = (float(value) for value in np.asarray(point_world, float)[:2])
-        return tuple(name for name in self.frames.near(x, y, margin_m) if self.is_room(name))
+        x, y, *z = (float(value) for value in np.asarray(point_world, float))
+        rooms = (name for name in self.frames.near(x, y, margin_m) if self.is_room(name))
+        return tuple(name for name in rooms if not z or self._reaches(name, z[0]))
+
+    def _reaches(self, name: str, z_m: float) -> bool:
+        """Whether a height is between floor and ceiling of a locale, or not far from there."""
+        base = self.floor_m(name)
+        return base - NEAR_FLOOR_M <= z_m <= base + self.locale(name).height_m + NEAR_FLOOR_M
 
     def route(self, origin: str, destination: str) -> Route | None:
         """The way from room to room, at the highest level at which they differ; None where there is none."""
         for name in (origin, destination):
             self.locale(name)
         return find_route(self.frames, origin, destination)
+
+    def walk(self, origin: str, destination: str) -> list[str] | None:
+        """The rooms of the way with the fewest passages for people, who can use stairs too; None where there is none.
+
+        It looks at the passages of the whole world.
+        """
+        ways: nx.Graph = nx.Graph(passage.between for passage in (*self.doorways, *self.links))
+        try:
+            way: list[str] = nx.shortest_path(ways, origin, destination)
+        except (nx.NetworkXNoPath, nx.NodeNotFound):
+            return None
+        return way
 
     def passage(self, name: str) -> Doorway | Link:
         """Raises ValueError where no doorway or link has this name."""

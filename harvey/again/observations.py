@@ -15,11 +15,12 @@ from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref
 from harvey.errors import BadInput
 from harvey.records import EntryRecord
-from world_models.body import BodyFault, Frame, MotionReport, Recovery
+from world_models.body import BodyFault, Frame, MotionReport, Recovery, RideReport
 from world_models.task import Command, Outcome, Resumed
 
 OBSERVED: Mapping[str, type[Any]] = {
-    t.__name__: t for t in (Command, MotionReport, Frame, BodyFault, Recovery, Quiescence, Outcome, Resumed)
+    t.__name__: t
+    for t in (Command, MotionReport, RideReport, Frame, BodyFault, Recovery, Quiescence, Outcome, Resumed)
 }
 """The types of value that come from outside."""
 

@@ -7,6 +7,7 @@ pictures that are known are not made once more. Where the body answers otherwise
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from blackboard.scheduler import Port
 from harvey.errors import BadInput
 from harvey.records import EntryRecord, as_line
 from sim.actuator import ActuatorParameters
-from world_models.body import MotorCommand
+from world_models.body import Course, MotorCommand
 from world_models.task import Resumed
 
 RESUME = "resume"
@@ -45,12 +46,16 @@ class Reliving:
                            f"expected {pair[1][:120]}, got {pair[0][:120]}")
 
     def answer(self, change: Change, broken_off: bool) -> Iterable[Effect]:
-        """What the port answers; a command that was broken off is carried out in part.
+        """What the port answers; a command that was broken off is carried out in part, and a motion on the move stands.
 
         How much of it follows from the seed: when the process ended, nobody could say how far the robot was.
         """
         value = change.entry.value
-        if broken_off and isinstance(value, MotorCommand):
+        if broken_off and isinstance(value, Course):
+            old = change.entry
+            stopped = replace(value, speed_m_per_s=0.0)
+            change = Posted(Entry(old.id, old.revision, stopped, old.author, old.cycle, old.because))
+        elif broken_off and isinstance(value, MotorCommand):
             number = int(change.entry.id.rpartition("-")[2])
             part = float(np.random.default_rng([self._seed, number]).random())
             old = change.entry

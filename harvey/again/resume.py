@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from blackboard.change import Change, Posted
+from blackboard.change import Change, Posted, Retracted
 from blackboard.effect import Post
 from blackboard.journal import Decision, Sink
 from harvey.again.reliving import RESUME, Reliving
@@ -28,7 +28,7 @@ from harvey.run_head import HARDWARE, RunHead
 from logs.camera_file import Pictures
 from sim.assembly import Stage, set_stage
 from sim.scenario import ROOT, ScenarioError, scenario_from_tables
-from world_models.body import MotorCommand
+from world_models.body import Course, MotorCommand
 from world_models.task import Outcome, Resumed
 
 
@@ -138,6 +138,8 @@ def _tell_of_the_crash(mission: Mission, stage: Stage, last: Decision) -> None:
 
 
 def _is_command(change: Change) -> bool:
+    if isinstance(change.entry.value, Course):
+        return not isinstance(change, Retracted)
     return isinstance(change, Posted) and isinstance(change.entry.value, MotorCommand)
 
 

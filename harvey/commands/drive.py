@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 OPTIONS: Mapping[str, tuple[str, str, str]] = {
     "world": ("world", "FILE", "the building: a world file, or the name of one that comes with Harvey"),
-    "goal": ("goal", "GOAL", 'from where to where, feet in each locale: "(ptrans (hall (3,4,0)) (kitchen (6,5,0)))"'),
+    "goal": ("goal", "GOAL", 'from where to where: "Go from the hall to the kitchen", middle to middle; or in feet '
+             'in each locale: "(ptrans (hall (3,4,0)) (kitchen (6,5,0)))"'),
     "heading": ("start.heading_deg", "DEGREES", "where the robot looks at the start, in the first locale's frame"),
     "base": ("base.port", "BASE", "denning:PORT, p2os:PORT or create2:PORT, as create2:/dev/ttyUSB0"),
     "camera": ("camera.source", "CAMERA", "number of a device, a video file, or a URL"),
@@ -67,11 +68,12 @@ def _run(args: Namespace) -> int:
 def _mission(args: Namespace) -> HardwareMission:
     from harvey.campaign import settings_of
     from harvey.hardware.mission import load_mission
+    from world_models.store_schema import SUFFIXES
 
     given = {OPTIONS[name][0]: value for name in OPTIONS if (value := getattr(args, name)) is not None}
     settings: dict[str, Any] = {**dict(settings_of(args.settings)), **given}
     for key in ("world", "camera.calibration"):  # named on the command line: relative to where we are
-        if str(settings.get(key, "")).endswith(".toml"):
+        if str(settings.get(key, "")).endswith((".toml", *SUFFIXES)):
             settings[key] = str(Path(settings[key]).resolve())
     if args.mission is None and not {"world", "goal"} <= set(settings):
         raise BadInput("expected MISSION.toml, or --world and --goal at least")

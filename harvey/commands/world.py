@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,7 +24,8 @@ def _arguments(parser: ArgumentParser) -> None:
                         help="a world file (.toml, compiled: .world), or the name of one that comes with the project;"
                              " import: a building (.ifc, .gml)")
     parser.add_argument("--details", metavar="FILE", action="append", default=[], help="add what only the building has")
-    parser.add_argument("--out", metavar="FILE", help="show: draw the plan there, as SVG; compile: the .world file;"
+    parser.add_argument("--out", metavar="FILE", help="show: draw the plan there, as .svg or .png, or the building for"
+                                                      " the viewer, as .rrd; compile: the .world file;"
                                                       " import: the .toml file")
 
 
@@ -103,24 +105,54 @@ def _inventory(world: World) -> str:
 
 def _show(world: World, out: str | None) -> int:
     print(f"{world.name}: {_inventory(world)}")
-    for name in world.locales:
+    for name in _downward(world, world.root):
         doors = ", ".join(d.name for d in world.doorways_of(name))
         things = count(len(world.things_of(name)), "thing")
         inside = f"{things}, doorways: {doors or 'none'}" if world.is_room(name) else ""
         print(f"{'  ' * len(world.path_of(name))}{name}{': ' + inside if inside else ''}")
     if out is not None:
         _draw(world, Path(out))
-        print(f"plan drawn in {out}")
+        print(f"drawn in {out}")
     return 0
 
 
-def _draw(world: World, out: Path) -> None:
-    from world_models.plan_view import plan_svg
+def _downward(world: World, name: str) -> Iterator[str]:
+    """A locale and all in it, each before what it contains."""
+    yield name
+    for child in world.children_of(name):
+        yield from _downward(world, child)
 
+
+def _draw(world: World, out: Path) -> None:
+    from logs.errors import RecordingError
+
+    draw = {".svg": _svg, ".png": _png, ".rrd": _recording}.get(out.suffix)
+    if draw is None:
+        raise BadInput(f"--out: expected a name that ends in .svg, .png or .rrd, got {str(out)!r}")
     try:
-        out.write_text(plan_svg(world), encoding="utf-8")
+        draw(world, out)
+    except RecordingError as error:
+        raise BadInput(f"--out {out}: {error}") from None
     except OSError as error:
         raise BadInput(f"--out {out}: expected a file to write to, got: {error.strerror}") from None
+
+
+def _svg(world: World, out: Path) -> None:
+    from world_models.plan_view import plan_svg
+
+    out.write_text(plan_svg(world), encoding="utf-8")
+
+
+def _png(world: World, out: Path) -> None:
+    from harvey.plan_picture import draw_plan
+
+    draw_plan(world, out)
+
+
+def _recording(world: World, out: Path) -> None:
+    from logs.building_recording import record_building
+
+    record_building(world, out)
 
 
 COMMAND = Command(
@@ -128,7 +160,8 @@ COMMAND = Command(
     (
         ("harvey world check my_floor.toml", "faults with file and line; exit code 2 where there are any"),
         ("harvey world show research_center", "rooms, doorways and what is in them"),
-        ("harvey world show research_center --out plan.svg", "and the plan as a drawing"),
+        ("harvey world show campus --out plan.png", "and the plan as a picture, storey beside storey (.svg: a drawing)"),
+        ("harvey world show campus --out campus.rrd", "and the building for the viewer: rerun campus.rrd"),
         ("harvey world import house.ifc --out house.toml", "what was used of a building, guessed and left out"),
         ("harvey world compile campus.toml --out campus.world", "for worlds that are too large to read at once"),
     ),

@@ -17,6 +17,7 @@ from harvey.experiments.agenda_load import ALL, AS_IN_MISSIONS, ONE, PART_CYCLES
 from harvey.experiments.agenda_mission import Cost, mission_cost
 from harvey.experiments.report import Cell, Report
 from harvey.progress import stages
+from logs.journal_file import HELD_LINES
 
 PENDING = (10, 100, 1_000, 10_000, 100_000)
 QUICK_PENDING = (10, 1_000, 10_000)
@@ -151,9 +152,10 @@ def _notes(parts: int) -> tuple[str, ...]:
     absent = [peer for peer in ("py_trees", "clips") if not agenda_peers.has(peer)]
     return (
         "Counted: activations that are created, rated, queued, and then either chosen, asked again and executed, or"
-        " obviated because their trigger became stale; each with its decision as a JSON line in a file, which the"
-        " operating system has before the next cycle begins (logs.journal_file, as in a run; what moves motors is"
-        " forced onto the disk as well, and there is none of that here).",
+        " obviated because their trigger became stale; each with its decision as a JSON line in a file"
+        " (logs.journal_file, as in a run). Nothing here is observed and nothing moves motors, so up to"
+        f" {HELD_LINES} lines are handed to the operating system at once; a decision on an observation is handed over"
+        " in its cycle, and one that moves motors is forced onto the disk.",
         f"Processor time of {PART_CYCLES} cycles: the best of {parts} such parts, beside it the median one, which also"
         " shows what else the machine was doing. A bare Python call took"
         f" {1e9 * call_s:.0f} ns here.",

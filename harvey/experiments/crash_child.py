@@ -19,7 +19,7 @@ from harvey.mission import Around, run_mission
 from harvey.ports import Body
 from harvey.run_directory import RunDirectory
 from harvey.run_head import RunHead
-from world_models.body import BodyFault, Frame, MotionReport, MotorCommand
+from world_models.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
 
 MOTION_S = 0.05
 """A motion takes so long here, so that a process may well be killed in the middle of one."""
@@ -41,11 +41,17 @@ class Remembered:
         self._memory.write(b'{"ended": true}\n')
         return report
 
+    def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
+        return self._body.steer(course)
+
     def claim(self) -> MotionReport | BodyFault:
         return self._body.claim()
 
     def look(self, purpose: str) -> Frame | BodyFault:
         return self._body.look(purpose)
+
+    def ride(self, ride: Ride) -> RideReport | BodyFault:
+        return self._body.ride(ride)
 
     def wait(self, duration_s: float) -> float:
         return self._body.wait(duration_s)

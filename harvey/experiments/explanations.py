@@ -1,45 +1,33 @@
 """Does every decision of recorded missions rest on something, how fast is ``why``, and does a replay decide the same?
 
-Missions of every scenario, faulty ones included, are driven and kept under ``runs/explanations/``; then every decision
-is walked down to goal, model or camera frame, ``harvey why`` is asked as a user would ask it, in a process of its own,
-and the run is decided again from its observations. A mission that was done by the same code is not done again, so a
-campaign that was broken off goes on where it was.
+Missions of every scenario, faulty ones included, are driven and kept; then every decision is walked down to goal, model
+or camera frame, ``harvey why`` is asked as a user would ask it, in a process of its own, and the run is decided again
+from its observations.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
-import multiprocessing
 import os
 import resource
-import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from tqdm import tqdm
-
-from harvey.campaign import WORKERS, Task, run_task
-from harvey.errors import BadInput
+from harvey.campaign import Task, run_task
 from harvey.experiments.report import Report
+from harvey.experiments.trials import campaign_folder, found_by_all
 from harvey.explain.hour import HOUR_CYCLES, write_hour
 from harvey.explain.journal import JournalHistory
 from harvey.explain.reach import GOAL, KINDS, MODEL, SENSOR, check
-from harvey.run_directory import RUNS, RunDirectory
+from harvey.run_directory import RunDirectory
 from sim.scenario import list_scenarios
 
-FOLDER = RUNS / "explanations"
-KEPT = "explained.json"
 MISSIONS = 100
 SHORT_CYCLES = "25"
 TRIES = 2
-PACKAGES = ("blackboard", "world_models", "knowledge_sources", "sim", "logs", "harvey")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,13 +35,12 @@ class Explained:
     """What was found of one mission.
 
     Attributes:
-        code: of which code; scenario, seed, outcome: of the mission.
+        scenario, seed, outcome: of the mission.
         decisions: all; explained: those that rest on something; goal, model, sensor: how many reach each.
         why_s: how long ``harvey why`` took for the outcome, start of the process included.
         same: how many decisions a replay decides the same, to the byte.
     """
 
-    code: str
     scenario: str
     seed: int
     outcome: str
@@ -78,72 +65,31 @@ class Hour:
 
 def run(quick: bool, seed: int) -> Report:
     """Measure. Quick: three missions of 25 cycles."""
-    tasks, code = _tasks(quick, seed), _code()
-    found = sorted(_all(tasks, code), key=lambda e: (e.scenario, e.seed))
-    return _report(found, _hour(tasks[0]), seed)
+    folder = campaign_folder("explanations", seed, quick=quick)
+    tasks = _tasks(quick, seed, folder)
+    found = sorted(found_by_all(explained, tasks, Explained, folder, "mission"), key=lambda e: (e.scenario, e.seed))
+    return _report(found, _hour(tasks[0]), seed, folder)
 
 
-def _tasks(quick: bool, seed: int) -> list[Task]:
+def _tasks(quick: bool, seed: int, folder: Path) -> list[Task]:
     names = ("bump", "hallway-kidnap", "lab-to-allens-office") if quick else list_scenarios()
     settings = (("limits.max_cycles", SHORT_CYCLES),) if quick else ()
     each = 1 if quick else -(-MISSIONS // len(names))
-    folder = FOLDER / ("quick" if quick else "full")
     pairs = [(name, seed + k) for k in range(each) for name in names]
     return [Task(name, settings, s, folder / f"{name}-{s}") for name, s in (pairs if quick else pairs[:MISSIONS])]
 
 
-def _code() -> str:
-    """The code that decides, as a digest."""
-    digest = hashlib.sha256()
-    root = Path(__file__).resolve().parents[2]
-    for package in PACKAGES:
-        for path in sorted((root / package).rglob("*.py")) + sorted((root / package).rglob("*.toml")):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _all(tasks: Sequence[Task], code: str) -> Iterator[Explained]:
-    """Each mission, explained, as it is done."""
-    spawn = multiprocessing.get_context("spawn")
-    with (
-        ProcessPoolExecutor(min(WORKERS, len(tasks)), mp_context=spawn, initializer=_become_worker) as pool,
-        tqdm(total=len(tasks), unit="mission", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar,
-    ):
-        futures = [pool.submit(explained, task, code) for task in tasks]
-        try:
-            for future in as_completed(futures):
-                bar.update()
-                yield future.result()
-        except BrokenProcessPool:
-            raise BadInput("a worker process was killed from outside, as when memory runs out") from None
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for child in multiprocessing.active_children():
-                child.terminate()
-            raise
-
-
-def _become_worker() -> None:
-    """The parent decides when to stop."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def explained(task: Task, code: str) -> Explained:
-    """One mission, driven if it was not yet, and what is found of it."""
+def explained(task: Task) -> Explained:
+    """One mission, driven, and what is found of it."""
     if task.out is None:
         raise ValueError("expected a task that keeps its run, got one that keeps nothing")
-    kept = task.out.with_name(f"{task.out.name}.{KEPT}")
-    if kept.is_file() and (known := json.loads(kept.read_text(encoding="utf-8")))["code"] == code:
-        return Explained(**known)
     result = run_task(task)
     run = RunDirectory(task.out)
     found = check(JournalHistory(run.journal))
-    one = Explained(
-        code, task.scenario, task.seed, result.outcome, found.decisions, found.reached, found.by_kind[GOAL],
+    return Explained(
+        task.scenario, task.seed, result.outcome, found.decisions, found.reached, found.by_kind[GOAL],
         found.by_kind[MODEL], found.by_kind[SENSOR], _asked(run.path)[0], _same(run),
     )
-    kept.write_text(json.dumps(asdict(one)) + "\n", encoding="utf-8")
-    return one
 
 
 def _same(run: RunDirectory) -> int:
@@ -183,7 +129,7 @@ def _hour(task: Task) -> Hour:
     return Hour(len(history.cycles), length / 1e6, clock_s, processor_s)
 
 
-def _report(found: Sequence[Explained], hour: Hour, seed: int) -> Report:
+def _report(found: Sequence[Explained], hour: Hour, seed: int, folder: Path) -> Report:
     names = list(dict.fromkeys(e.scenario for e in found))
     rows = [_row(name, [e for e in found if e.scenario == name]) for name in names]
     decisions, explained_, same = (sum(getattr(e, key) for e in found) for key in ("decisions", "explained", "same"))
@@ -194,7 +140,7 @@ def _report(found: Sequence[Explained], hour: Hour, seed: int) -> Report:
          "why s", "replays equal"),
         (*rows, _row("all", found)),
         (
-            f"Seeds from {seed}; the runs are kept under {FOLDER}. why s: the slowest harvey why RUN, start of the"
+            f"Seeds from {seed}; the runs are kept under {folder}. why s: the slowest harvey why RUN, start of the"
             " process included, while two processes drove missions.",
             "A decision is explained if everything that it made rests on the goal, the model or a camera frame by"
             " reasons that are all in the journal; where it made nothing, what woke the expert has to.",

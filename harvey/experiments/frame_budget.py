@@ -17,17 +17,20 @@ from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.images import decode
 from sim.assembly import set_stage
 from sim.scenario import load_scenario
+from world_models.body import Frame
 from world_models.robot import RobotModel
 
 SCENARIOS, QUICK_SCENARIOS = ("forty-foot-hallway", "lab-to-allens-office"), ("forty-foot-hallway",)
+REMEMBERED = 8
+"""So many pictures the decoder remembers, :func:`decode`; among them those in which landmarks' templates lie."""
 TRIES = 3
 """Each act is timed so often, and its best time counts: what else the machine does is none of its fault."""
 TRACK = ("correlator_tracker",)
 MILESTONE = ("line_finder", "matcher", "med_r_and_t", "milestone_judge")
 MOST_TRACK_MS, MOST_MILESTONE_MS = 5.0, 33.0
 NOTES = (
-    "Whole acts of the experts, as the scheduler calls them, on frames of 512 x 512 px that the simulator drew: JPEG"
-    " decoding included (nothing decoded before is remembered), making the entries too.",
+    "Whole acts of the experts, as the scheduler calls them, on frames of 512 x 512 px that the simulator drew:"
+    " decoding the newest JPEG included (earlier ones are remembered, as in a mission), making the entries too.",
     f"Processor time of the one thread; of each act the best of {TRIES}: acts are pure, so they may be asked again.",
     "A milestone's time is the sum of its four acts.",
 )
@@ -57,12 +60,19 @@ class _Timed(KnowledgeSource):
         best_s = float("inf")
         effects: tuple[Effect, ...] = ()
         for _ in range(TRIES):
-            decode.cache_clear()
+            _remember_earlier(view)
             began_s = time.thread_time()
             effects = tuple(self._inner.act(view, trigger))
             best_s = min(best_s, time.thread_time() - began_s)
         self._times.setdefault(self.name, []).append(1000.0 * best_s)
         return effects
+
+
+def _remember_earlier(view: View) -> None:
+    """Leave the decoder as a mission would: what came before the newest frame has been looked at, it has not."""
+    decode.cache_clear()
+    for frame in view.all(Frame)[-REMEMBERED:-1]:
+        decode(frame.value.jpeg)
 
 
 def run(quick: bool, seed: int) -> Report:

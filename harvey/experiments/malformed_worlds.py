@@ -1,12 +1,14 @@
 """World files that somebody has spoilt: each must give a clear error, or a world that can be checked.
 
 Texts are cut, doubled, swapped and filled with what does not belong there; values of sound files are made huge, tiny,
-negative, of another type, or the name of something else; compiled worlds lose and change bytes. A time limit a file
-finds what never ends.
+negative, of another type, or the name of something else; compiled worlds lose and change bytes; building files of
+other formats (IndoorGML, IFC) are spoilt in the same ways before they are imported. A time limit a file finds what
+never ends.
 """
 
 from __future__ import annotations
 
+import multiprocessing
 import re
 import signal
 import sys
@@ -14,21 +16,31 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
 
 import numpy as np
 from tqdm import tqdm
 
+from harvey.experiments.malformed_buildings_text import GML, IFC
 from harvey.experiments.malformed_worlds_text import SMALL
 from harvey.experiments.report import Report
+from world_models.importers import BuildingError, import_building
 from world_models.store import compile_file, load_world, read_world
 from world_models.toml_source import Source, WorldError
 
 FILES, QUICK_FILES = 10_000, 400
-LIMIT_S = 20.0
+WORKERS = 2
+CHUNK, QUICK_CHUNK = 100, 20
+"""Files that a worker takes at once."""
+IFC_EVERY = 50
+"""One file of so many is IFC: reading one takes a process of its own."""
+LIMIT_S = 30.0
 """No file takes longer, on a machine that does other things too."""
 
 TOKEN = re.compile(r'"[^"\n]*"|[\w.+-]+|[^\w\s]|\s+')
@@ -39,30 +51,75 @@ JUNK = ("-1", "0", "1e400", "1e-300", "nan", "inf", "-3.5", "99999999", "9" * 40
 
 def run(quick: bool, seed: int) -> Report:
     """Spoil, read and check so many files."""
-    files = QUICK_FILES if quick else FILES
-    tally: dict[str, Counter[str]] = {name: Counter() for name, _ in SPOILERS}
-    slowest, wrong = 0.0, []
-    with tempfile.TemporaryDirectory() as folder:
-        sound = _compiled(Path(folder))
-        for number in tqdm(range(files), file=sys.stderr, disable=not sys.stderr.isatty(), leave=False):
-            rng = np.random.default_rng([seed, number])
-            name, spoil = SPOILERS[number % len(SPOILERS)]
-            began = time.perf_counter()
-            verdict = judged(spoil(rng, sound), Path(folder))
-            slowest = max(slowest, time.perf_counter() - began)
-            tally[name][verdict.split(":")[0]] += 1
-            if verdict.startswith(("traceback", "hang", "unclear")):
-                wrong.append(f"file {number} ({name}): {verdict}")
+    files, chunk = (QUICK_FILES, QUICK_CHUNK) if quick else (FILES, CHUNK)
+    found = list(_found(files, chunk, seed))
+    tally: dict[str, Counter[str]] = {}
+    for one in found:
+        tally.setdefault(one.spoiler, Counter())[one.verdict.split(":")[0]] += 1
+    wrong = [f"file {number} ({one.spoiler}): {one.verdict}" for number, one in enumerate(found)
+             if one.verdict.startswith(("traceback", "hang", "unclear"))]
     rows = tuple((name, sum(seen.values()), seen["error"], seen["sound"], seen["faults"], seen["traceback"],
                   seen["hang"], seen["unclear"]) for name, seen in tally.items())
     return Report(
         "Malformed worlds",
         ("spoilt by", "files", "clear error", "sound", "with faults", "traceback", "hang", "unclear"), rows,
-        notes=(f"{files} files, seed {seed}; the slowest took {slowest:.2f} s (limit {LIMIT_S:.0f} s).",
+        notes=(f"{files} files, seed {seed}; the slowest took {max(one.seconds for one in found):.2f} s (limit"
+               f" {LIMIT_S:.0f} s).",
+               "words, lines, values, characters: of a world's text; bytes: of a compiled world (SQLite); IndoorGML,"
+               " IFC: building files, spoilt in words and lines, then imported."
+               + ("" if _with_ifc() else " No IFC file was tried: ifcopenshell is not installed."),
                "with faults: a world that could be read, whose check names what is wrong, with file and line.",
                "unclear: an error or fault that does not say file, what was expected and what came.", *wrong[:10]),
         claims=((f"all {files}: a clear error or a checked world, never a traceback or a hang", not wrong),),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What became of one file: how it was spoilt, ``judged``, and how long that took."""
+
+    spoiler: str
+    verdict: str
+    seconds: float
+
+
+def _found(files: int, chunk: int, seed: int) -> Iterator[Found]:
+    """All files in order, from two worker processes."""
+    parts = [range(first, min(first + chunk, files)) for first in range(0, files, chunk)]
+    spawn = multiprocessing.get_context("spawn")
+    with (ProcessPoolExecutor(WORKERS, mp_context=spawn) as pool,
+          tqdm(total=files, unit="file", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar):
+        for found in pool.map(judged_all, parts, [seed] * len(parts)):
+            bar.update(len(found))
+            yield from found
+
+
+def judged_all(numbers: Sequence[int], seed: int) -> list[Found]:
+    """What becomes of the files with these numbers."""
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        sound = _compiled(Path(folder))
+        for number in numbers:
+            name, suffix, spoil = spoiler_of(number)
+            content = spoil(np.random.default_rng([seed, number]), sound)
+            began = time.perf_counter()
+            verdict = judged(content, Path(folder), suffix)
+            found.append(Found(name, verdict, time.perf_counter() - began))
+    return found
+
+
+def _with_ifc() -> bool:
+    return find_spec("ifcopenshell") is not None
+
+
+Spoiler = Callable[[np.random.Generator, bytes], str | bytes]
+
+
+def spoiler_of(number: int) -> tuple[str, str, Spoiler]:
+    """How the file of this number is spoilt: name, ending of the file, and how."""
+    if number % IFC_EVERY == IFC_EVERY - 1 and _with_ifc():
+        return SPOILERS[-1]
+    return SPOILERS[number % (len(SPOILERS) - 1)]
 
 
 class _TooLongError(BaseException):
@@ -88,14 +145,14 @@ def _limited(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def judged(content: str | bytes, folder: Path) -> str:
+def judged(content: str | bytes, folder: Path, suffix: str = ".toml") -> str:
     """``error``, ``sound`` or ``faults``; or what must not be: ``traceback: ...``, ``hang``, ``unclear: ...``."""
     try:
         with _limited(LIMIT_S):
-            return _read(content, folder)
-    except WorldError as error:
+            return _read(content, folder / f"world{suffix}")
+    except (WorldError, BuildingError) as error:
         told = str(error)
-        clear = told.startswith("world.") and "expected" in told and "got" in told
+        clear = "world." in told and "expected" in told and ("got" in told or isinstance(error, BuildingError))
         return "error" if clear else f"unclear: {told}"
     except _TooLongError:
         return "hang"
@@ -103,16 +160,18 @@ def judged(content: str | bytes, folder: Path) -> str:
         return f"traceback: {error!r}"
 
 
-def _read(content: str | bytes, folder: Path) -> str:
+def _read(content: str | bytes, path: Path) -> str:
     if isinstance(content, bytes):
-        path = folder / "world.world"
         path.write_bytes(content)
         world = load_world(path)
         world.locales.values()
         faces, faults = world.faces, world.check()
         assert faces is not None
+    elif path.suffix == ".toml":
+        faults = read_world(Source.parse(content, path.name)).check()
     else:
-        faults = read_world(Source.parse(content, "world.toml")).check()
+        path.write_text(content, encoding="utf-8")
+        faults = read_world(Source.parse(import_building(path).text, "world.toml")).check()
     unclear = [str(f) for f in faults if "expected" not in f.what or "got" not in f.what or not f.source]
     if unclear and not isinstance(content, bytes):
         return f"unclear: {unclear[0]}"
@@ -125,40 +184,50 @@ def _compiled(folder: Path) -> bytes:
     return (folder / "sound.world").read_bytes()
 
 
-def _tokens(rng: np.random.Generator, _sound: bytes) -> str:
+def _words(text: str) -> Spoiler:
     """Words and signs changed, taken out, put in or swapped."""
-    tokens = TOKEN.findall(SMALL)
-    for _ in range(int(rng.integers(1, 5))):
-        at, other = (int(i) for i in rng.integers(len(tokens), size=2))
-        match int(rng.integers(5)):
-            case 0:
-                tokens[at] = JUNK[int(rng.integers(len(JUNK)))]
-            case 1:
-                del tokens[at]
-            case 2:
-                tokens.insert(at, JUNK[int(rng.integers(len(JUNK)))])
-            case 3:
-                tokens[at], tokens[other] = tokens[other], tokens[at]
-            case _:
-                tokens[at] = tokens[other]
-    return "".join(tokens)
+    def spoil(rng: np.random.Generator, _sound: bytes) -> str:
+        tokens = TOKEN.findall(text)
+        for _ in range(int(rng.integers(1, 5))):
+            at, other = (int(i) for i in rng.integers(len(tokens), size=2))
+            match int(rng.integers(5)):
+                case 0:
+                    tokens[at] = JUNK[int(rng.integers(len(JUNK)))]
+                case 1:
+                    del tokens[at]
+                case 2:
+                    tokens.insert(at, JUNK[int(rng.integers(len(JUNK)))])
+                case 3:
+                    tokens[at], tokens[other] = tokens[other], tokens[at]
+                case _:
+                    tokens[at] = tokens[other]
+        return "".join(tokens)
+
+    return spoil
 
 
-def _lines(rng: np.random.Generator, _sound: bytes) -> str:
+def _lines(text: str) -> Spoiler:
     """Lines taken out, doubled or moved, or the end cut off."""
-    lines = SMALL.splitlines(keepends=True)
-    for _ in range(int(rng.integers(1, 4))):
-        at, other = (int(i) for i in rng.integers(len(lines), size=2))
-        match int(rng.integers(4)):
-            case 0:
-                del lines[at]
-            case 1:
-                lines.insert(other, lines[at])
-            case 2:
-                lines[at], lines[other] = lines[other], lines[at]
-            case _:
-                lines = lines[: max(2, at)]
-    return "".join(lines)
+    def spoil(rng: np.random.Generator, _sound: bytes) -> str:
+        lines = text.splitlines(keepends=True)
+        for _ in range(int(rng.integers(1, 4))):
+            at, other = (int(i) for i in rng.integers(len(lines), size=2))
+            match int(rng.integers(4)):
+                case 0:
+                    del lines[at]
+                case 1:
+                    lines.insert(other, lines[at])
+                case 2:
+                    lines[at], lines[other] = lines[other], lines[at]
+                case _:
+                    lines = lines[: max(2, at)]
+        return "".join(lines)
+
+    return spoil
+
+
+def _either(one: Spoiler, other: Spoiler) -> Spoiler:
+    return lambda rng, sound: (one if rng.random() < 0.7 else other)(rng, sound)
 
 
 def _values(rng: np.random.Generator, _sound: bytes) -> str:
@@ -197,5 +266,13 @@ def _bytes(rng: np.random.Generator, sound: bytes) -> bytes:
     return bytes(content)
 
 
-SPOILERS: tuple[tuple[str, Callable[[np.random.Generator, bytes], str | bytes]], ...] = (
-    ("words", _tokens), ("lines", _lines), ("values", _values), ("characters", _characters), ("bytes", _bytes))
+def _building(text: str) -> Spoiler:
+    """A building file, a line an element, spoilt in its words or its lines."""
+    return _either(_words(text), _lines(text.replace("><", ">\n<")))
+
+
+SPOILERS: tuple[tuple[str, str, Spoiler], ...] = (
+    ("words", ".toml", _words(SMALL)), ("lines", ".toml", _lines(SMALL)), ("values", ".toml", _values),
+    ("characters", ".toml", _characters), ("bytes", ".world", _bytes), ("IndoorGML", ".gml", _building(GML)),
+    ("IFC", ".ifc", _building(IFC)))
+"""IFC is the last."""

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+from tqdm import tqdm
 
+from harvey.experiments.chart import OURS, PAPER, PEER, chart
 from harvey.experiments.matcher_peer import ransac_icp, told
 from harvey.experiments.matcher_scenes import (
     BESIDE_PX,
@@ -23,6 +27,7 @@ from harvey.experiments.matcher_scenes import (
     match_scene,
 )
 from harvey.experiments.report import Cell, Report
+from harvey.experiments.trials import campaign_folder
 from knowledge_sources.methods.matching import match_lines
 from knowledge_sources.methods.matching_fit import Similarity2
 
@@ -33,8 +38,11 @@ TRIES = 3
 """Each trial's time is the best of so many: what else the machine does is none of the matcher's fault."""
 WITHIN_PX = 1.0
 LEAST_SUCCESS, MOST_MS = 0.95, 10.0
-BAR = 40
+CURVES = (("ours", "ours: likelihood, 3 peaks", OURS), ("peer", "RANSAC + ICP", PEER), ("paper", "paper's way", PAPER))
+"""What is drawn: which way, its name and its colour."""
+TICKS_MS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 
+Size = tuple[int, int]
 Way = Callable[[MatchScene, np.random.Generator], Similarity2]
 
 
@@ -72,19 +80,21 @@ def run(quick: bool, seed: int, trials: int | None = None) -> Report:
     """Each size with each way, on the same trials."""
     count = trials or (QUICK_TRIALS if quick else TRIALS)
     rows: list[tuple[Cell, ...]] = []
-    times: dict[tuple[int, int], Score] = {}
-    for size in SIZES:
+    found: dict[Size, dict[str, Score]] = {}
+    for size in tqdm(SIZES, unit="size", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False):
         solvable, scores = _scored(size, count, np.random.default_rng([seed, *size]))
-        times[size] = scores["ours"]
+        found[size] = scores
         label = f"{size[0]} model x {size[1]} data lines"
         rows.append((label, solvable, *(str(scores[name]) for name in WAYS)))
-    main = times[MAIN]
+    main = found[MAIN]["ours"]
+    picture = campaign_folder("matcher", seed, quick=quick) / "growth.png"
+    _draw(found, picture)
     label = f"{MAIN[0]} x {MAIN[1]}"
     return Report(
         "2D matching: success within 1 px of the solvable, median time",
         ("size", "solvable", "paper's way", "peer (RANSAC + ICP)", "steepest, 3 peaks", "ours: likelihood"),
         tuple(rows),
-        notes=(*_notes(count, seed), "Growth of our median time, logarithmic:", *_picture(times)),
+        notes=(*_notes(count, seed), f"The growth of the times as a picture: {picture}"),
         claims=(
             (f"{label}: at least 95 % of the solvable within 1 px", main.success >= LEAST_SUCCESS),
             (f"{label}: in at most {MOST_MS:.0f} ms (median)", main.time_ms <= MOST_MS),
@@ -145,10 +155,14 @@ def _notes(count: int, seed: int) -> tuple[str, ...]:
     )
 
 
-def _picture(times: Mapping[tuple[int, int], Score]) -> list[str]:
-    """A bar a size, from 0.1 ms to 1 s."""
-    lines = []
-    for (model, data), score in times.items():
-        length = round(BAR * (math.log10(max(score.time_ms, 0.1)) + 1.0) / 4.0)
-        lines.append(f"{model:>4} x {data:<4} {'#' * length} {score.time_ms:.1f} ms")
-    return lines
+def _draw(found: Mapping[Size, Mapping[str, Score]], path: Path) -> None:
+    """Median times over the size of the problem, with the bound at the size that has one."""
+    pairs = [model * data for model, data in found]
+    with chart(path, "2D matching: time as problems grow", "model lines x data lines", "median time [ms]") as axes:
+        for name, shown, colour in CURVES:
+            axes.loglog(pairs, [scores[name].time_ms for scores in found.values()], "o-", color=colour, label=shown)
+        axes.loglog(MAIN[0] * MAIN[1], MOST_MS, "kv", label=f"at most {MOST_MS:.0f} ms at {MAIN[0]} x {MAIN[1]}")
+        axes.set_xticks(pairs, [f"{model} x {data}" for model, data in found])
+        axes.set_ylim(1.0, 100.0)
+        axes.set_yticks(TICKS_MS, [f"{tick:g}" for tick in TICKS_MS])
+        axes.minorticks_off()

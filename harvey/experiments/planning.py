@@ -29,7 +29,7 @@ PAPER_MS = 5 * 60 * 1000.0
 BOUND_MS = 100.0
 REPETITIONS, QUICK_REPETITIONS = 40, 10
 PLANNERS = ("interpreter", "sketcher", "milestone_selector")
-TAKING_PART = (*PLANNERS, "motor", "dead_reckoner", "mission_keeper")
+TAKING_PART = (*PLANNERS, "motor", "dead_reckoner", "passenger", "mission_keeper")
 
 
 class Clock:
@@ -39,17 +39,20 @@ class Clock:
         self.ms = dict.fromkeys(PLANNERS, 0.0)
         self.steps_ms: list[float] = []
         self.sketches = self.milestones = 0
-        self._last = time.process_time()
+        self.begin()
+
+    def begin(self) -> None:
+        """The next decision begins now."""
+        self._began = time.process_time()
 
     def __call__(self, decision: Decision) -> None:
         now = time.process_time()
         if decision.chosen is not None and decision.chosen.source.name in self.ms:
-            self.steps_ms.append(1000.0 * (now - self._last))
+            self.steps_ms.append(1000.0 * (now - self._began))
             self.ms[decision.chosen.source.name] += self.steps_ms[-1]
         values = [change.entry.value for change in decision.made if change.entry.revision == 0]
         self.sketches += sum(1 for value in values if isinstance(value, PlanSketch))
         self.milestones += sum(1 for value in values if isinstance(value, Milestone))
-        self._last = time.process_time()
 
 
 def run(quick: bool, seed: int) -> Report:
@@ -93,11 +96,28 @@ def _planned(known: RobotModel, scenario: Scenario) -> Clock:
 
 def planned(robot: RobotModel, scenario: Scenario) -> Clock:
     """Plan and drive a scenario's mission in thought."""
-    experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
-    clock = Clock()
-    scheduler = Scheduler([*experts, Believer()], ports=(PerfectWheels(),), sinks=(clock,))
-    scheduler.tell([Post(command(scenario))], "user")
-    while scheduler.view.latest(Outcome) is None:
-        if scheduler.step() is None:
-            scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
-    return clock
+    thought = Thought(robot, scenario)
+    while thought.step():
+        pass
+    return thought.clock
+
+
+class Thought:
+    """A scenario's mission in thought, decision by decision.
+
+    Attributes:
+        clock: what was planned so far, and how long it took.
+    """
+
+    def __init__(self, robot: RobotModel, scenario: Scenario) -> None:
+        experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
+        self.clock = Clock()
+        self._scheduler = Scheduler([*experts, Believer()], ports=(PerfectWheels(),), sinks=(self.clock,))
+        self._scheduler.tell([Post(command(scenario))], "user")
+
+    def step(self) -> bool:
+        """Decide once more; False when there is an outcome."""
+        self.clock.begin()
+        if self._scheduler.step() is None:
+            self._scheduler.tell([Post(Quiescence(self._scheduler.cycle))], "scheduler")
+        return self._scheduler.view.latest(Outcome) is None

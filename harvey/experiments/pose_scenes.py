@@ -8,6 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from knowledge_sources.methods.pose.descent import information_inverse
+from knowledge_sources.methods.pose.image_error import image_jacobian
+from knowledge_sources.methods.pose.lines import line_set
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -48,10 +51,10 @@ class PoseScene:
         )
 
 
-def campus() -> PoseScene:
+def campus(ahead_m: float = 0.0) -> PoseScene:
     """30 lines of 9 landmarks, 55 to 300 feet ahead: 4 lamp posts, 2 telephone poles, 3 buildings.
 
-    World x right, y ahead, z up; the camera stands at the origin, 1.2 m high, and looks along y.
+    World x right, y ahead, z up; the camera stands ``ahead_m`` along y, 1.2 m high, and looks along y.
     """
     parts = [_post(x, y, 5.0, 1.2) for x, y in ((-6.0, 17.0), (7.0, 24.0), (-9.0, 36.0), (12.0, 48.0))]
     parts += [_post(x, y, 9.0, 2.4) for x, y in ((-4.0, 29.0), (5.0, 62.0))]
@@ -60,7 +63,7 @@ def campus() -> PoseScene:
         _building(8.0, 75.0, 20.0, 14.0, 16.0),
         _building(-10.0, 91.0, 14.0, 10.0, 20.0),
     ]
-    return _seen(parts)
+    return _seen(parts, ahead_m)
 
 
 def corridor(doors: int = 6) -> PoseScene:
@@ -136,6 +139,19 @@ def position_error_ft(found: Pose, truth: Pose) -> Array:
     return np.asarray(np.array([-apart[1], -apart[0], apart[2]]) * FEET_PER_M)
 
 
+def information(scene: PoseScene, sigma_px: float) -> Array:
+    """(6, 6) Fisher information of the lines on the pose's left perturbation, at the truth."""
+    lines, truth = line_set(scene.lines_world, scene.segments_px, scene.camera, sigma_px), scene.camera_from_world
+    slopes = image_jacobian(lines, truth.rotation, truth.translation)[1].reshape(-1, 6) / sigma_px
+    return np.asarray(slopes.T @ slopes)
+
+
+def position_limit_ft(scene: PoseScene, sigma_px: float) -> Array:
+    """(3,) deviation of the camera's position in the paper's axes that no unbiased estimate stays below [ft]."""
+    variance = np.diag(information_inverse(information(scene, sigma_px)))[3:]
+    return np.asarray(np.sqrt(variance[[1, 0, 2]]) * FEET_PER_M)
+
+
 def drawn_prior(truth: Pose, shift_m: float, turn_rad: float, rng: np.random.Generator) -> Pose:
     """The truth moved by uniform errors of up to ``shift_m`` and ``turn_rad`` along and about each camera axis."""
     return truth.perturbed(rng.uniform(-turn_rad, turn_rad, 3), rng.uniform(-shift_m, shift_m, 3))
@@ -160,11 +176,11 @@ def _building(x: float, y: float, wide: float, deep: float, high: float) -> Arra
     )
 
 
-def _seen(parts: list[Array]) -> PoseScene:
+def _seen(parts: list[Array], ahead_m: float = 0.0) -> PoseScene:
     """What the camera sees of all lines, as if nothing hid anything."""
     lines = np.concatenate(parts)
     names = np.repeat(np.arange(len(parts)), [len(p) for p in parts])
     ahead = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    camera_from_world = Pose(ahead, -ahead @ np.array([0.0, 0.0, EYE_M]))
+    camera_from_world = Pose(ahead, -ahead @ np.array([0.0, ahead_m, EYE_M]))
     segments, visible = CAMPUS_CAMERA.project_segments(lines, camera_from_world)
     return PoseScene(lines[visible], segments[visible], names[visible], CAMPUS_CAMERA, camera_from_world)

@@ -17,19 +17,21 @@ from harvey.experiments.pose_scenes import (
     drawn_prior,
     end_noise,
     fragmented,
+    information,
     position_error_ft,
     rho_theta_noise,
 )
 from harvey.experiments.report import Cell, Report
 from knowledge_sources.methods.pose import PoseEstimate, r_and_t, r_and_t_ml, r_then_t
-from knowledge_sources.methods.pose.image_error import image_jacobian
-from knowledge_sources.methods.pose.lines import line_set
 from world_models.frames import Pose
 
 Array = NDArray[np.float64]
 Solver = Callable[..., PoseEstimate]
+Triples = tuple[tuple[float, ...], tuple[float, ...]]
+Totals = dict[tuple[str, int, float], float]
+"""Mean absolute errors summed over the axes [ft], by method, lines and noise."""
 
-PAPER: Mapping[tuple[int, float], tuple[tuple[float, ...], tuple[float, ...]]] = {
+PAPER: Mapping[tuple[int, float], Triples] = {
     (5, 1.0): ((11.44, 13.96, 51.16), (0.21, 2.03, 1.16)),
     (5, 5.0): ((32.69, 39.85, 149.40), (1.08, 10.14, 6.20)),
     (10, 1.0): ((9.24, 8.83, 8.84), (0.02, 1.73, 0.08)),
@@ -45,10 +47,13 @@ CHOSEN: Mapping[int, tuple[int, ...]] = {
 """Which of the campus's lines, by hand: posts near, corners and roofs far."""
 PRIOR_M, PRIOR_RAD = 1.0, 0.05
 SIGMA_PX = 0.5
+FEW, MANY = 100, 1000
+MOST_RATIO = 1.03
 NOTES = (
     "Geometry ours: 45 degree camera, 512 px, 30 lines of 9 landmarks 55 to 300 ft ahead; the paper's is not printed.",
     "Noise uniform +-a in rho and theta (not of full width a), about the image's centre (not each segment's middle).",
-    "Paper's axes: x up, y lateral, z ahead. Mean absolute errors in feet.",
+    "Paper's axes: x up, y lateral, z ahead. Mean absolute errors in feet. Which axis is the weakest follows from the"
+    " geometry: in the paper it is the lateral one, here the height.",
     f"Prior off by up to {PRIOR_M} m and {math.degrees(PRIOR_RAD):.0f} degrees on each camera axis. Unit weights.",
     f"Limit: ends with Gaussian noise of {SIGMA_PX} px across the segment; RMS error over the Cramér-Rao bound, all "
     "six directions alike, and how often the 95 % ellipsoid holds the truth.",
@@ -56,39 +61,63 @@ NOTES = (
 
 
 def run(quick: bool, seed: int, samples: int | None = None) -> Report:
-    """The table at 100 samples (quick) or 1,000, and the limit."""
-    count = samples or (100 if quick else 1000)
+    """The table at 100 samples, as in the paper, and (unless quick) at 1,000; then the limit."""
+    count = samples or (FEW if quick else MANY)
     rng, peer = np.random.default_rng(seed), Peer.found()
     scene = campus()
     rows: list[tuple[Cell, ...]] = []
-    claims: list[tuple[str, bool]] = []
+    totals: Totals = {}
     for (n, noise), paper in PAPER.items():
-        part = scene.take(np.array(CHOSEN[n]))
-        errors = _errors(part, noise, count, rng, peer)
-        label = f"{n} lines, {noise:.0f} px, {noise:.0f} deg"
-        theirs = _triple(errors["peer"]) if peer else NOT_INSTALLED
-        rows.append((f"{label}: R then T", _triple(paper[0]), None, _triple(errors["r_then_t"])))
-        rows.append((f"{label}: R and T", _triple(paper[1]), None, _triple(errors["r_and_t"])))
-        rows.append((f"{label}: R and T, likelihood", None, theirs, _triple(errors["r_and_t_ml"])))
-        worse = float(np.sum(errors["r_then_t"])), float(np.sum(errors["r_and_t"]))
-        claims.append((f"{label}: R and T beats R then T", worse[1] < worse[0]))
+        errors = _errors(scene.take(np.array(CHOSEN[n])), noise, count, rng, peer)
+        rows += _rows(f"{n} lines, {noise:.0f} px, {noise:.0f} deg", paper, errors, peer)
+        for name in ("r_then_t", "r_and_t"):
+            totals[name, n, noise] = float(np.sum(np.mean(errors[name], axis=0)))
+    claims = _claims(totals)
     for n in (5, 10, 30):
         for whole in (True, False):
             ratio, held = _limit(scene.take(np.array(CHOSEN[n])), whole, count, rng)
             label = f"{n} {'whole' if whole else 'fragmented'} lines"
-            rows.append((f"{label}: RMS over the bound, 95 % ellipsoid holds", None, None, f"{ratio:.3f}  {held:.1%}"))
-            if n >= 10 and not quick:
-                claims.append((f"{label}: within 1.03 of the bound", ratio <= 1.03))
+            rows.append((f"{label}: RMS over the bound, 95 % ellipsoid holds", None, None, None,
+                         f"{ratio:.3f}  {held:.1%}"))
+            if n >= 10 and count >= MANY:
+                claims.append((f"{label}: R and T, likelihood within {MOST_RATIO} of the bound", ratio <= MOST_RATIO))
                 claims.append((f"{label}: the 95 % ellipsoid holds 93 to 97 %", 0.93 <= held <= 0.97))
-    columns = ("what", "paper x y z [ft]", "peer (PoseLib, TRIVIAL)", "ours x y z [ft]")
-    notes = (*NOTES, f"{count} samples, seed {seed}.")
+    columns = ("what", "paper x y z [ft]", "peer (PoseLib, TRIVIAL)", f"ours, first {min(count, FEW)}",
+               f"ours, all {count}")
+    notes = (*NOTES, f"{count} samples, seed {seed}. The peer's figures are of all {count}.")
     return Report("Table 2: translation errors on noisy lines", columns, tuple(rows), notes, tuple(claims))
+
+
+def _rows(label: str, paper: Triples, errors: Mapping[str, Array], peer: Peer | None) -> list[tuple[Cell, ...]]:
+    """Mean absolute errors by method; ``errors`` (samples, 3) each."""
+    theirs = _mean(errors["peer"]) if peer else NOT_INSTALLED
+    named = (("R then T", "r_then_t", _triple(paper[0]), None), ("R and T", "r_and_t", _triple(paper[1]), None),
+             ("R and T, likelihood", "r_and_t_ml", None, theirs))
+    return [
+        (f"{label}: {name}", told, peers, _mean(errors[key][:FEW]), _mean(errors[key]))
+        for name, key, told, peers in named
+    ]
+
+
+def _claims(totals: Totals) -> list[tuple[str, bool]]:
+    """Order and growth of the paper's table, in errors summed over the axes."""
+    claims = [
+        (f"{n} lines, {noise:.0f} px: R and T beats R then T",
+         totals["r_and_t", n, noise] < totals["r_then_t", n, noise])
+        for n, noise in PAPER
+    ]
+    for name, shown in (("r_then_t", "R then T"), ("r_and_t", "R and T")):
+        grows = all(totals[name, n, 5.0] > totals[name, n, 1.0] for n in CHOSEN)
+        falls = all(totals[name, 5, a] > totals[name, 10, a] > totals[name, 30, a] for a in (1.0, 5.0))
+        claims.append((f"{shown}: errors grow with the noise, at 5, 10 and 30 lines", grows))
+        claims.append((f"{shown}: errors fall from 5 to 10 to 30 lines, at both noises", falls))
+    return claims
 
 
 def _errors(
     scene: PoseScene, noise: float, count: int, rng: np.random.Generator, peer: Peer | None
 ) -> dict[str, Array]:
-    """(3,) mean absolute error [ft] of each method on the same samples."""
+    """(samples, 3) absolute error [ft] of each method on the same samples."""
     centre = np.array([scene.camera.cx, scene.camera.cy])
     found: dict[str, list[Array]] = {"r_then_t": [], "r_and_t": [], "r_and_t_ml": [], "peer": []}
     for _ in range(count):
@@ -100,7 +129,7 @@ def _errors(
         if peer:
             theirs = peer.refined(scene.lines_world, segments, scene.camera, prior, loss="TRIVIAL")
             found["peer"].append(_error(theirs, scene))
-    return {name: np.mean(errors, axis=0) if errors else np.zeros(3) for name, errors in found.items()}
+    return {name: np.array(errors).reshape(-1, 3) for name, errors in found.items()}
 
 
 def _error(pose: Pose, scene: PoseScene) -> Array:
@@ -112,7 +141,7 @@ def _limit(scene: PoseScene, whole: bool, count: int, rng: np.random.Generator) 
     truth = scene.camera_from_world
     sizes, held = [], []
     fixed = scene if whole else fragmented(scene, rng)
-    bound = _information(fixed)
+    bound = information(fixed, SIGMA_PX)
     for _ in range(count):
         segments = end_noise(fixed.segments_px, SIGMA_PX, rng)
         prior = drawn_prior(truth, PRIOR_M, PRIOR_RAD, rng)
@@ -124,12 +153,8 @@ def _limit(scene: PoseScene, whole: bool, count: int, rng: np.random.Generator) 
     return float(np.sqrt(np.mean(sizes) / 6.0)), float(np.mean(held))
 
 
-def _information(scene: PoseScene) -> Array:
-    """(6, 6) Fisher information at the truth."""
-    lines = line_set(scene.lines_world, scene.segments_px, scene.camera, SIGMA_PX)
-    truth = scene.camera_from_world
-    slopes = image_jacobian(lines, truth.rotation, truth.translation)[1].reshape(-1, 6) / SIGMA_PX
-    return np.asarray(slopes.T @ slopes)
+def _mean(errors: Array) -> str:
+    return _triple(np.mean(errors, axis=0))
 
 
 def _triple(values: Any) -> str:

@@ -20,7 +20,7 @@ from knowledge_sources.drivers.video_camera import CameraFault, VideoCamera
 from knowledge_sources.drivers.video_file import write_video
 from sim.assembly import Stage, set_stage
 from sim.scenario import load_scenario, with_settings
-from world_models.body import BodyFault, Frame, MotionReport, MotorCommand
+from world_models.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
 from world_models.frames import Pose2, wrap_angle
 from world_models.percepts import PoseFix
 from world_models.task import Certificate, Outcome
@@ -63,6 +63,10 @@ class Recording:
         self.motions.append(self._body.execute(command))
         return self.motions[-1]
 
+    def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
+        """As the body does."""
+        return self._body.steer(course)
+
     def claim(self) -> MotionReport | BodyFault:
         """As the body does."""
         return self._body.claim()
@@ -73,6 +77,10 @@ class Recording:
         if isinstance(found, Frame):
             self.frames.append(found)
         return found
+
+    def ride(self, ride: Ride) -> RideReport | BodyFault:
+        """As the body does."""
+        return self._body.ride(ride)
 
     def wait(self, duration_s: float) -> float:
         """As the body does."""
@@ -94,6 +102,10 @@ class Repeating:
         """The next recorded motion, whatever is asked for."""
         return next(self._motions, None) or BodyFault("base", "link lost", "the recorded motions end here", "", 0.0)
 
+    def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
+        """None is recorded."""
+        return BodyFault("base", "base refuses", "no motion that is steered on the move is recorded", "", 0.0)
+
     def claim(self) -> MotionReport | BodyFault:
         """Nothing more is known."""
         return self.execute(MotorCommand(0.0, 0.0))
@@ -104,6 +116,10 @@ class Repeating:
             return self._camera.look(purpose)
         except CameraFault as fault:
             return BodyFault("camera", fault.kind, fault.detail, "", 0.0)
+
+    def ride(self, ride: Ride) -> RideReport | BodyFault:
+        """None is recorded."""
+        return BodyFault("elevator", "no ride", "none is recorded", "", 0.0)
 
     def wait(self, duration_s: float) -> float:
         """Nothing changes by waiting."""

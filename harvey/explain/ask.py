@@ -27,11 +27,11 @@ from harvey.errors import BadInput
 from harvey.explain.history import History
 from harvey.explain.links import words
 from harvey.records import EntryRecord
-from world_models import body, location, percepts, task
+from world_models import actuator, body, location, percepts, task
 
 TYPES: Mapping[str, type[Any]] = {
     name: kind
-    for module in (body, location, percepts, task) for name, kind in vars(module).items() if isinstance(kind, type)
+    for module in (actuator, body, location, percepts, task) for name, kind in vars(module).items() if isinstance(kind, type)
 } | {"Discrepancy": Discrepancy, "Quiescence": Quiescence}
 KINDS: Mapping[str, type[Change]] = {"Posted": Posted, "Revised": Revised, "Retracted": Retracted}
 

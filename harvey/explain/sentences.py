@@ -149,6 +149,11 @@ def _hypothesis(v: Value) -> str:
     return f"{v['status']}: in {v['locale']} at {where}, by {v['basis']}{evidence}"
 
 
+def _panorama(v: Value) -> str:
+    looks = len(v["glimpses"])
+    return f"after {looks} {'look' if looks == 1 else 'looks'} round: {v['found']}"
+
+
 def _pose(p: Value) -> str:
     return f"{point(p['x_m'], p['y_m'])}, heading {degrees(p['heading_rad'])}"
 
@@ -240,6 +245,29 @@ def _quiescence(v: Value) -> str:
     return f"nothing was left to do after cycle {v['cycle']}"
 
 
+def _course(v: Value) -> str:
+    if v["speed_m_per_s"] <= 0.0:
+        return "come to a stand"
+    bend = math.degrees(v["curvature_per_m"])
+    side = "left" if bend >= 0.0 else "right"
+    return f"roll on at {v['speed_m_per_s']:.2f} m/s, bending by {abs(bend):.2f} degrees a metre to the {side}"
+
+
+def _drift(v: Value) -> str:
+    bend = math.degrees(v["curvature_per_m"])
+    side = "left" if bend >= 0.0 else "right"
+    return (f"these wheels drift by {abs(bend):.2f} degrees a metre to the {side}"
+            f" (+-{math.degrees(v['sigma_per_m']):.2f}), by what was seen until {metres(v['gone_m'])} ago")
+
+
+def _ride(v: Value) -> str:
+    return f"Harvey stands in the elevator and asks for a ride from {v['origin']} to {v['destination']}"
+
+
+def _ride_report(v: Value) -> str:
+    return f"somebody pressed the button, and after {number(v['duration_s']):.0f} s the doors opened at {v['destination']}"
+
+
 def _root(variance: Any) -> float:
     return math.sqrt(max(0.0, number(variance)))
 
@@ -247,8 +275,8 @@ def _root(variance: Any) -> float:
 MAKERS: Mapping[str, Callable[[Value], str]] = {
     "Command": _command, "Goal": _goal, "PlanSketch": _plan_sketch, "Leg": _leg, "Milestone": _milestone,
     "Certificate": _certificate, "Outcome": _outcome, "Tracks": _tracks, "Segments": _segments,
-    "LineMatch": _line_match, "PoseFix": _pose_fix, "Hypothesis": _hypothesis,
+    "LineMatch": _line_match, "PoseFix": _pose_fix, "Hypothesis": _hypothesis, "Panorama": _panorama,
     "MotorCommand": _motion, "MotionReport": _motion_report, "Look": _look, "Frame": _frame,
     "Discrepancy": _discrepancy, "Quiescence": _quiescence, "Resumed": _resumed, "BodyFault": _body_fault,
-    "Recovery": _recovery,
+    "Recovery": _recovery, "Drift": _drift, "Course": _course, "Ride": _ride, "RideReport": _ride_report,
 }

@@ -14,7 +14,7 @@ from harvey.units import turn
 
 def in_one_sentence(history: History, command: EntryRecord) -> str:
     """Why the robot moved as it did; "" for entries that are no motor command."""
-    if command.type != "MotorCommand":
+    if command.type not in ("MotorCommand", "Course"):
         return ""
     parts = list(_because(history, command))
     return f"Harvey was told to {sentence(command)} {', '.join(parts)}." if parts else ""

@@ -7,6 +7,8 @@ kind of thing once, at the place nearest to what is explained, and says by name 
 from __future__ import annotations
 
 import itertools
+import math
+from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from textwrap import fill
@@ -22,6 +24,8 @@ from harvey.units import number
 MOST = 24
 """So many things are told at the most."""
 MOST_PLAIN, MOST_MET = 12, 200
+TIMED_WITHIN = 100
+"""A time is looked for in so many decisions, backwards."""
 WIDTH = 120
 
 
@@ -83,7 +87,7 @@ def _plain_steps(history: History, record: EntryRecord) -> Iterator[Step]:
 def headline(record: EntryRecord) -> str:
     """What the entry is, as something that Harvey did where it is an act."""
     v, said = record.value, sentence(record)
-    if record.type == "MotorCommand":
+    if record.type in ("MotorCommand", "Course"):
         return f"Harvey was told to {said}."
     if record.type == "Look":
         return f"A picture was taken {PURPOSES.get(v.get('purpose'), '')}".rstrip() + "."
@@ -111,11 +115,18 @@ def rated(c: Candidate) -> str:
 
 
 def _time(history: History, record: EntryRecord) -> str:
-    timed = nearest(history, record, ("Frame", "MotionReport"))
-    try:
-        return f", {number(timed.value['sim_time_s']):.1f} s into the run," if timed is not None else ""
-    except STRANGE:
-        return ""
+    """The newest time that anything from outside told when the entry came about, which need not rest on that."""
+    cycles = history.cycles
+    for cycle in reversed(cycles[: bisect_right(cycles, record.cycle)][-TIMED_WITHIN:]):
+        told = [found for found in map(_time_of, history.decision(cycle).observed) if found is not None]
+        if told:
+            return f", {max(told):.1f} s into the run,"
+    return ""
+
+
+def _time_of(record: EntryRecord) -> float | None:
+    value = record.value.get("sim_time_s") if isinstance(record.value, Mapping) else None
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
 
 
 @dataclass(slots=True)
@@ -162,6 +173,10 @@ class _Teller:
             frame = reason(self.history, record, "Frame")
             yield from self._one(key, "seen", facts.puzzled(record, frame), record, frame)
         elif record.type == "Hypothesis":
+            if record.value["status"] == "candidate":
+                maybe = f"It may have stood at {facts.pose(record.value)} ({number(record.value['weight']):.0%})."
+                yield from self._one(record.id, "thought", maybe, record)
+                return
             text = f"It believed that it stood at {facts.pose(record.value)}."
             yield from self._one(key, "believed", text, record)
         elif record.type not in FOLDED:
@@ -259,14 +274,18 @@ SAY: Mapping[str, Callable[[History, EntryRecord], str]] = {
 LABELS: Mapping[str, str] = {
     "Leg": "driving", "Milestone": "looked for", "Discrepancy": "doubted", "PlanSketch": "plan", "Goal": "goal",
     "Command": "command", "Tracks": "seen", "Frame": "picture", "MotionReport": "wheels", "MotorCommand": "motion",
-    "Look": "look", "Segments": "seen", "BodyFault": "fault", "Recovery": "recovery",
+    "Course": "motion",
+    "Look": "look", "Segments": "seen", "Panorama": "thought", "BodyFault": "fault", "Recovery": "recovery",
+    "Ride": "ride", "RideReport": "ride",
 }
 FOLDED = frozenset({"PoseFix", "LineMatch", "Segments", "Certificate"})
 """Told by the sentences of what rests on them."""
 SEVERAL = frozenset({"Discrepancy", "Goal", "PlanSketch", "BodyFault"})
 """Of these a story may tell more than one."""
 FOLLOW: Mapping[str, tuple[str, ...]] = {
-    "MotorCommand": ("Leg", "Milestone", "Segments", "Discrepancy", "Hypothesis"),
+    "MotorCommand": ("Leg", "Milestone", "Segments", "Panorama", "Discrepancy", "Hypothesis"),
+    "Panorama": ("Panorama",),
+    "Course": ("Leg", "Discrepancy", "Hypothesis"),
     "Leg": ("Hypothesis",),
     "Milestone": ("Certificate", "Discrepancy", "Hypothesis"),
     "Certificate": ("Milestone",),
@@ -279,8 +298,10 @@ FOLLOW: Mapping[str, tuple[str, ...]] = {
     "Goal": ("PlanSketch", "Hypothesis"),
     "PlanSketch": ("Milestone", "Leg", "PlanSketch", "Hypothesis"),
     "Look": ("Milestone", "Discrepancy", "Segments", "Hypothesis"),
-    "Frame": ("Look",),
-    "MotionReport": ("MotorCommand",),
+    "Frame": ("Look", "Course"),
+    "MotionReport": ("MotorCommand", "Course"),
+    "Ride": ("PlanSketch", "Hypothesis"),
+    "RideReport": ("Ride",),
 }
 """Which reasons a story follows, in which order; of a type that is not named here, all."""
 

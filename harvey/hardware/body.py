@@ -10,7 +10,7 @@ from typing import Protocol
 
 from knowledge_sources.drivers.base import Base, BaseFault
 from knowledge_sources.drivers.video_camera import CameraFault, VideoCamera
-from world_models.body import STOP_KEY, BodyFault, Frame, MotionReport, MotorCommand, Odometry
+from world_models.body import STOP_KEY, BodyFault, Course, Frame, MotionReport, MotorCommand, Odometry, Ride, RideReport
 
 BASE_WORDS: Mapping[str, str] = {
     "silent": "link lost",
@@ -80,14 +80,17 @@ class HardwareBody:
     Args:
         clock: the time that claims and faults are dated by [s].
         pause: waits so long [s]; None: on the wall clock, or until the robot is stopped for good.
+        carried: somebody who sees to a ride in an elevator; None: nobody does.
     """
 
     def __init__(
-        self, base: Base, eye: Eye, *, clock: Callable[[], float], pause: Callable[[float], object] | None = None
+        self, base: Base, eye: Eye, *, clock: Callable[[], float], pause: Callable[[float], object] | None = None,
+        carried: Callable[[Ride], RideReport | BodyFault] | None = None,
     ) -> None:
         self._base, self._eye, self._clock = base, eye, clock
         self._stopped, self._heeded = threading.Event(), threading.Event()
         self._pause = pause or self._stopped.wait
+        self._carried = carried
         self._why = ""
         self._began_s = 0.0
         self._before: Odometry | None = None
@@ -105,6 +108,11 @@ class HardwareBody:
             self._done = fault.done
             return self._base_fault(fault)
 
+    def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
+        """These bases are told how far to go before they set off, and by nobody on the way."""
+        detail = "it cannot be steered on the move: drive it with motion.continuous=off"
+        return BodyFault("base", "base refuses", detail, "", self._clock(), 0.0, 0.0)
+
     def claim(self) -> MotionReport | BodyFault:
         """What the wheels count since before the last command, once the base says that it stands."""
         if self._stopped.is_set():
@@ -118,6 +126,14 @@ class HardwareBody:
     def look(self, purpose: str) -> Frame | BodyFault:
         """A picture."""
         return self._stop_fault() if self._stopped.is_set() else self._eye.look(purpose)
+
+    def ride(self, ride: Ride) -> RideReport | BodyFault:
+        """Stand in the car while somebody sees to the ride."""
+        if self._stopped.is_set():
+            return self._stop_fault()
+        if self._carried is None:
+            return BodyFault("elevator", "no ride", "nobody is told to press the button", "", self._clock())
+        return self._carried(ride)
 
     def wait(self, duration_s: float) -> float:
         """Stand still for a while."""

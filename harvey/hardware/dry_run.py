@@ -22,7 +22,7 @@ from knowledge_sources.milestone_judge import DARK
 from world_models.camera import Camera, CameraMount
 from world_models.camera_file import load_camera
 from world_models.location import Place
-from world_models.ptrans import parse_ptrans
+from world_models.phrases import places_of
 from world_models.robot import RobotModel
 from world_models.store import load_world
 from world_models.toml_source import WorldError
@@ -132,10 +132,10 @@ class DryRun:
                            f"{mount.height_m:.2f} m above the floor")
 
     def _plan(self, robot: RobotModel) -> Iterator[Check]:
-        origin, destination = parse_ptrans(self._mission.goal)
-        unknown = [p.locale for p in (origin, destination) if p.locale not in robot.world.locales]
-        if unknown:
-            yield Check("goal", f"there is no {unknown[0]}", f"name one of {', '.join(robot.world.rooms)}")
+        try:
+            origin, destination = places_of(self._mission.goal, robot.world)
+        except ValueError as error:
+            yield Check("goal", str(error), "name one room for each end: harvey world show")
             return
         lost = [p for p in (origin, destination) if not _is_inside(robot.world, p)]
         if lost:

@@ -16,7 +16,8 @@ from sim.scenario import ROOT, Arrival, Servo, Start
 from sim.settings import known_keys, merged, near, parsed, read_settings
 from world_models.actuator import ActuatorModel
 from world_models.location import diagonal
-from world_models.ptrans import parse_ptrans
+from world_models.phrases import check_command
+from world_models.store_schema import SUFFIXES
 from world_models.task import Command
 from world_models.toml_source import Node, Source, WorldError
 
@@ -93,7 +94,7 @@ class HardwareMission:
     Attributes:
         name: the file's, without its ending.
         world, calibration: files that are to be there.
-        goal: in conceptual-dependency form, coordinates in feet.
+        goal: in words, or in conceptual-dependency form with coordinates in feet.
         folder, data: where the file is, and its tables as read.
     """
 
@@ -169,12 +170,12 @@ def _mission(root: Node, name: str, folder: Path) -> HardwareMission:
 
 def _world(text: str, folder: Path) -> Path:
     """A world that comes with the project, by its bare name, or any file, relative to the mission's folder."""
-    return folder / text if text.endswith(".toml") else ROOT / "world_models" / "worlds" / f"{text}.toml"
+    return folder / text if text.endswith((".toml", *SUFFIXES)) else ROOT / "world_models" / "worlds" / f"{text}.toml"
 
 
 def _goal(node: Node) -> str:
     try:
-        parse_ptrans(node.text())
+        check_command(node.text())
     except WorldError:
         raise
     except ValueError as error:

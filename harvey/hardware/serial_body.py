@@ -52,7 +52,8 @@ def reached(body: SimulatedBody, kind: str) -> Iterator[Body]:
     clock = None if kind == "denning" else lambda: body.truth.time_s
     base = _base(kind, Wired(AilingLine(_emulator(kind, body), body), clock))
     try:
-        yield HardwareBody(base, AilingBody(body), clock=lambda: body.truth.time_s, pause=body.wait)
+        yield HardwareBody(base, AilingBody(body), clock=lambda: body.truth.time_s, pause=body.wait,
+                           carried=body.ride)
     finally:
         base.close()
 

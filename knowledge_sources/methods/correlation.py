@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods import correlation_kernels as kernels
-from knowledge_sources.methods.correlation_align import align
+from knowledge_sources.methods.correlation_align import located, second_best
 from knowledge_sources.methods.images import checked_grey, noise_sigma
 
 _MARGIN_PX = 4
-_LOBE_PX = 2
+_SAME_PX = 2
 """Up to here from the best place, another local maximum is the same place."""
 
 
@@ -138,27 +138,45 @@ def correlate(
     half = template.half_px
     patch = template.patch(scale, border=1)
     view = np.ascontiguousarray(pixels[v0 - half : v1 + half + 1, u0 - half : u1 + half + 1], np.float32)
-    score = _scores(patch, view)
-    row, column = divmod(int(np.argmax(score)), score.shape[1])
-    start = np.array([column, row], float) + kernels.summit(score, row, column)
-    place, covariance, aligned = align(patch, view, start, template.noise, search_px)
-    last = np.array(score.shape[::-1]) - 1
-    at_border = row in (0, last[1]) or column in (0, last[0]) or bool(np.any((place < 0) | (place > last)))
-    if at_border:  # what lies beyond the window has not been looked at
-        place, aligned = start, -1.0
-    position = place + np.array([u0, v0])
-    peak = max(float(score[row, column]), aligned)
-    second = kernels.second_best(score, row, column, _LOBE_PX, half // 2)
-    return Correlation(position, covariance, peak, second, at_border, position - predicted)
+    score = _scores(np.ascontiguousarray(patch[1:-1, 1:-1]), view)
+    u, v, uu, uv, vv, peak, second, at_border = located(patch, view, score, template.noise, float(search_px))
+    position = np.array([u + u0, v + v0])
+    covariance = np.array([[uu, uv], [uv, vv]])
+    return Correlation(position, covariance, peak, second, bool(at_border), position - predicted)
 
 
-def corner_strength(image: Any, centre_px: Any, half_px: int = 12) -> float:
-    """Root of the smaller eigenvalue of the mean squared gradient [grey levels / px]: 0 on a wall or along an edge."""
-    window, centre = _cut_out(image, centre_px, half_px)
-    cut = kernels.patch(window, float(centre[0]), float(centre[1]), half_px, 1, 1.0)
-    uu, uv, vv = kernels.gradient_energy(cut)
-    least = 0.5 * (uu + vv) - math.hypot(0.5 * (uu - vv), uv)
-    return math.sqrt(max(least, 0.0)) / (2 * half_px + 1)
+def corner_strengths(image: Any, centres_px: Any, half_px: int = 12) -> NDArray[np.float64]:
+    """(n,) how much of a corner the patches round centres (n, 2) are, to the next pixel [grey levels / px].
+
+    The root of the smaller eigenvalue of the mean squared gradient: 0 on a wall or along an edge.
+
+    Raises:
+        ValueError: a patch does not lie in the image.
+    """
+    pixels = checked_grey(image)
+    centres = np.rint(np.asarray(centres_px, float).reshape(-1, 2)).astype(np.int64)
+    last = np.array(pixels.shape[::-1]) - 1 - half_px
+    if np.any((centres < half_px) | (centres > last)):
+        raise ValueError(f"expected patches of half-width {half_px} inside the image, got centres {centres_px!r}")
+    strengths: NDArray[np.float64] = kernels.corner_strengths(pixels, centres, half_px)
+    return strengths
+
+
+def rival(image: Any, centre_px: Any, half_px: int, search_px: float) -> float:
+    """How well, -1 to 1, the patch round a centre (u, v), to the next pixel, correlates with the best other place.
+
+    The quick form of :func:`self_correlation` for choosing landmarks.
+    """
+    pixels, centre = checked_grey(image), np.rint(np.asarray(centre_px, float))
+    window = _window(pixels.shape, centre, search_px, half_px)
+    if window is None:
+        raise ValueError(f"expected a patch of half-width {half_px} inside the image, got centre {centre_px!r}")
+    u0, u1, v0, v1 = window
+    view = np.ascontiguousarray(pixels[v0 - half_px : v1 + half_px + 1, u0 - half_px : u1 + half_px + 1], np.float32)
+    row, column = int(centre[1]) - v0, int(centre[0]) - u0
+    size = 2 * half_px + 1
+    score = _scores(np.ascontiguousarray(view[row : row + size, column : column + size]), view)
+    return float(second_best(score, row, column, _SAME_PX, half_px // 2))
 
 
 def self_correlation(image: Any, centre_px: Any, half_px: int, search_px: float) -> Correlation:
@@ -180,14 +198,14 @@ def _window(
     """First and last column and row of the centres searched, all of whose patches lie in the image."""
     if predicted.shape != (2,) or not np.all(np.isfinite(predicted)):
         raise ValueError(f"expected a finite prediction (u, v), got {predicted}")
-    u0, u1 = max(math.floor(predicted[0] - search), half), min(math.ceil(predicted[0] + search), shape[1] - 1 - half)
-    v0, v1 = max(math.floor(predicted[1] - search), half), min(math.ceil(predicted[1] + search), shape[0] - 1 - half)
+    u, v = predicted.tolist()
+    u0, u1 = max(math.floor(u - search), half), min(math.ceil(u + search), shape[1] - 1 - half)
+    v0, v1 = max(math.floor(v - search), half), min(math.ceil(v + search), shape[0] - 1 - half)
     return (u0, u1, v0, v1) if u0 <= u1 and v0 <= v1 else None
 
 
 def _scores(patch: NDArray[np.float32], view: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Normalised correlation of a patch (without its border of one) at every place of a window; -1 on what is plain."""
-    inner = np.ascontiguousarray(patch[1:-1, 1:-1])
-    score = np.asarray(cv2.matchTemplate(view, inner, cv2.TM_CCOEFF_NORMED), np.float32)
+    """Normalised correlation of a patch at every place of a window; -1 on what is plain."""
+    score = np.asarray(cv2.matchTemplate(view, patch, cv2.TM_CCOEFF_NORMED), np.float32)
     score[~np.isfinite(score)] = -1.0
     return score

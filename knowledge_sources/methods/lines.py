@@ -1,7 +1,7 @@
 """Straight edges of an image, to a small part of a pixel, each with its standard deviations (§1.2, §6.1).
 
-Without a prediction the whole image is searched (LSD, of the gradient-orientation family that Burns began); with one,
-only bands round the predicted lines: perception as a blind man uses his cane (Figure 1).
+Without a prediction the whole image is searched, region by region of like gradients (Burns); with one, only bands round
+the predicted lines: perception as a blind man uses his cane (Figure 1).
 """
 
 from __future__ import annotations
@@ -9,16 +9,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.images import grey_float, noise_sigma
 from knowledge_sources.methods.lines_focus import find_in_bands
-from knowledge_sources.methods.lines_refine import Refined, refine
+from knowledge_sources.methods.lines_refine import NOISE_GAIN, Refined, refine, smoothed
+from knowledge_sources.methods.lines_regions import line_regions
 
-LSD_OFFSET_PX = -0.123
-"""LSD's segments lie this far off, in u and in v [px]: half a pixel of its 0.8 scaling. Measured on rendered edges."""
+LEAST_GRADIENT = 4.0
+"""Pixels of a lesser gradient are no edge when the whole image is searched [grey levels per px]."""
+_SIGNIFICANT = 4.0
+"""Nor are those that do not stand so many standard deviations of the noise above zero."""
 
 SIGMA_END_PX = 0.7
 """Standard deviation of an end along its segment [px]: samples are 2 px apart. Measured on rendered corners."""
@@ -57,6 +59,12 @@ class LineSegments:
     def lengths_px(self) -> NDArray[np.float64]:
         """(n,) lengths [px]."""
         return np.asarray(np.linalg.norm(self.segments_px[:, 1] - self.segments_px[:, 0], axis=1))
+
+    @property
+    def sigma_ends_px(self) -> NDArray[np.float64]:
+        """(n, 2) standard deviation of an end along its segment and across it [px], the same for both ends."""
+        across = np.hypot(self.sigma_offset_px, 0.5 * self.lengths_px * self.sigma_angle_rad)
+        return np.stack([np.full(len(self), SIGMA_END_PX), across], axis=1)
 
     def take(self, index: Any) -> LineSegments:
         """Those that an index array or a mask chooses."""
@@ -116,18 +124,19 @@ def find_lines(
     Raises:
         ValueError: the image is not (h, w), the predictions are not (m, 2, 2), or a limit is not positive.
 
-    Source: §1.2 [21, 6], §6.1.4; R. Grompone von Gioi et al., LSD, IPOL 2012.
+    Source: §1.2 [21, 6], §6.1.4.
     """
     pixels = grey_float(image)
     if not (band_px > 0 and min_length_px > 0):
         raise ValueError(f"expected positive band_px and min_length_px, got {band_px} and {min_length_px}")
-    noise = noise_sigma(pixels)
+    noise, smooth = noise_sigma(pixels), smoothed(pixels)
     if predicted_px is None:
-        rough = _whole_image(image, pixels)
-        fit = refine(pixels, rough, np.ones(len(rough)), noise, (2, 2))
+        least = max(LEAST_GRADIENT, _SIGNIFICANT * NOISE_GAIN * noise)
+        rough = line_regions(smooth, least, min_length_px)
+        fit = refine(smooth, rough, np.ones(len(rough)), noise, (2, 2))
         return _checked(fit, np.full(len(rough), -1, np.intp), min_length_px, min_contrast, systematic_px)
     near = find_in_bands(pixels, _predictions(predicted_px), noise, band_px, min_length_px, max_turn_rad)
-    fit = refine(pixels, near.segments_px, near.sign, noise, (2,))
+    fit = refine(smooth, near.segments_px, near.sign, noise, (2,))
     return _checked(fit, near.predicted, min_length_px, min_contrast, systematic_px)
 
 
@@ -138,19 +147,6 @@ def _predictions(predicted_px: Any) -> NDArray[np.float64]:
     if predicted.ndim != 3 or predicted.shape[1:] != (2, 2):
         raise ValueError(f"expected predicted lines of shape (m, 2, 2), got {predicted.shape}")
     return predicted
-
-
-def _whole_image(image: Any, pixels: NDArray[np.float32]) -> NDArray[np.float64]:
-    """LSD's segments (n, 2, 2) of 5 px and more, brighter side on the right, its constant offset removed [px]."""
-    eight_bit = np.asarray(image)
-    if eight_bit.dtype != np.uint8:
-        eight_bit = np.clip(np.rint(pixels), 0, 255).astype(np.uint8)
-    detector = cv2.createLineSegmentDetector(cv2.LSD_REFINE_NONE)
-    lines = detector.detect(np.ascontiguousarray(eight_bit))[0]
-    if lines is None:
-        return np.zeros((0, 2, 2))
-    segments = np.asarray(lines, float).reshape(-1, 2, 2)[:, ::-1] - LSD_OFFSET_PX  # LSD has it on the left
-    return np.asarray(segments[np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1) >= 5.0])
 
 
 def _checked(

@@ -8,17 +8,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.lines_sample import sample
+compiled = njit(cache=True, error_model="numpy")
 
 SMOOTHING_PX = 0.8
 """Standard deviation of the smoothing before differentiation [px]."""
 
+NOISE_GAIN = 1.0 / (math.sqrt(8.0 * math.pi) * SMOOTHING_PX**2)
+"""Standard deviation of the smoothed gradient of white noise of deviation one [1/px]."""
+
 _SPACING_PX = 2.0
+_LEAST_SAMPLES = 5
 _EDGE_BLUR_PX = 1.1
 """Standard deviation of a sharp edge's gradient profile after pixel area, smoothing and differencing [px]."""
 
@@ -60,24 +66,13 @@ class Refined:
     support: NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class _Rulers:
-    """Sample places along all segments, one after another: `start` is the first of each, `owner` whose each is."""
-
-    origin: NDArray[np.float64]
-    along: NDArray[np.float64]
-    across: NDArray[np.float64]
-    half: NDArray[np.float64]
-    t: NDArray[np.float64]
-    owner: NDArray[np.intp]
-    start: NDArray[np.intp]
-
-    def total(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(np.add.reduceat(values, self.start, axis=0))
+def smoothed(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The image (h, w) as it is differentiated."""
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), SMOOTHING_PX), np.float32)
 
 
 def refine(
-    image: NDArray[np.float32],
+    smooth: NDArray[np.float32],
     segments_px: NDArray[np.float64],
     sign: NDArray[np.float64],
     noise: float,
@@ -86,178 +81,165 @@ def refine(
     """Refine rough segments of an image.
 
     Args:
+        smooth: (h, w), see :func:`smoothed`.
         segments_px: (n, 2, 2), of non-zero length.
         sign: (n,) 1 where the right-hand side is the brighter one, else -1.
         noise: standard deviation of the pixel noise [grey levels].
         reaches_px: how far across to look, in as many passes.
     """
-    if not len(segments_px):
-        empty = np.zeros(0)
-        return Refined(np.zeros((0, 2, 2)), empty, empty, empty, empty)
-    smooth = np.asarray(cv2.GaussianBlur(image, (0, 0), SMOOTHING_PX), np.float32)
-    rulers = _rulers(segments_px)
-    for reach in reaches_px[:-1]:
-        rulers = _rulers(_moved(rulers, _fit(rulers, *_peaks(smooth, rulers, sign, reach), noise), cut=False))
-    fit = _fit(rulers, *_peaks(smooth, rulers, sign, reaches_px[-1]), noise)
-    return Refined(
-        _moved(rulers, fit, cut=True),
-        np.sqrt(fit.variance_offset),
-        np.sqrt(fit.variance_slope),
-        sign * fit.gradient * math.sqrt(2.0 * math.pi) * _EDGE_BLUR_PX,
-        fit.support,
-    )
+    peak = noise * math.sqrt(3.0 / (16.0 * math.pi)) / SMOOTHING_PX**3 * _EDGE_BLUR_PX**2
+    segments, sign = np.array(segments_px, float, order="C"), np.array(sign, float)
+    ends, facts = _refined(smooth, segments, sign, peak, np.array(reaches_px, np.int64))
+    contrast = sign * facts[:, 2] * math.sqrt(2.0 * math.pi) * _EDGE_BLUR_PX
+    return Refined(ends, np.sqrt(facts[:, 0]), np.sqrt(facts[:, 1]), contrast, facts[:, 3])
 
 
-def _rulers(segments: NDArray[np.float64]) -> _Rulers:
-    delta = segments[:, 1] - segments[:, 0]
-    length = np.linalg.norm(delta, axis=1)
-    along = delta / length[:, None]
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    counts = np.maximum(np.rint(length / _SPACING_PX).astype(np.intp), 5)
-    start = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    owner = np.repeat(np.arange(len(segments)), counts)
-    place = (np.arange(len(owner)) - start[owner] + 0.5) / counts[owner] - 0.5
-    return _Rulers(segments.mean(axis=1), along, across, length / 2.0, place * length[owner], owner, start)
+@compiled
+def _refined(smooth: Any, segments: Any, sign: Any, noise_peak: float, reaches: Any) -> tuple[Any, Any]:
+    """Ends (n, 2, 2), and (n, 4) variance of offset and of slope, gradient, support."""
+    ends, facts = segments.copy(), np.zeros((len(segments), 4))
+    for i in range(len(segments)):
+        for turn in range(len(reaches)):
+            end = ends[i]
+            u, v = 0.5 * (end[0, 0] + end[1, 0]), 0.5 * (end[0, 1] + end[1, 1])
+            along_u, along_v = end[1, 0] - end[0, 0], end[1, 1] - end[0, 1]
+            length = math.hypot(along_u, along_v)
+            along_u, along_v = along_u / length, along_v / length
+            t, peaks, heights = _peaks(smooth, u, v, along_u, along_v, length, sign[i], reaches[turn])
+            offset, slope, inlier = _fit(t, peaks, heights, noise_peak, facts[i])
+            low, high = -0.5 * length, 0.5 * length
+            on = np.flatnonzero(inlier)
+            if turn == len(reaches) - 1 and len(on):  # cut to the outermost samples that lie on the line
+                half = 0.5 * length / len(t)
+                low, high = t[on[0]] - half, t[on[-1]] + half
+            for e, at in enumerate((low, high)):
+                off = offset + slope * at
+                end[e, 0], end[e, 1] = u + at * along_u - off * along_v, v + at * along_v + off * along_u
+    return ends, facts
 
 
-def _gradient(
-    smooth: NDArray[np.float32], rulers: _Rulers, reach: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Gradient across (samples, 2 reach + 1) [1/px] at offsets -reach .. reach px, and the samples' places."""
-    offsets = np.arange(-reach - 1, reach + 2, dtype=float)
-    on_line = rulers.origin[rulers.owner] + rulers.t[:, None] * rulers.along[rulers.owner]
-    normal = rulers.across[rulers.owner]
-    x = on_line[:, :1] + normal[:, :1] * offsets
-    y = on_line[:, 1:] + normal[:, 1:] * offsets
-    profile = sample(smooth, x, y).astype(np.float64)
-    return (profile[:, 2:] - profile[:, :-2]) / 2.0, on_line
-
-
+@compiled
 def _peaks(
-    smooth: NDArray[np.float32], rulers: _Rulers, sign: NDArray[np.float64], reach: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Offset [px] and height of each sample's gradient peak; height 0 where there is none inside the reach."""
-    gradient, on_line = _gradient(smooth, rulers, reach)
-    gradient *= sign[rulers.owner, None]
-    rows = np.arange(len(gradient))
-    best = np.clip(np.argmax(gradient, axis=1), 1, 2 * reach - 1)
-    left, mid, right = gradient[rows, best - 1], gradient[rows, best], gradient[rows, best + 1]
-    inside = (mid > 0) & (mid >= left) & (mid >= right) & (left > 0) & (right > 0)
-    # A blurred step has a Gaussian gradient: its logarithm is the parabola.
-    a, b, c = (np.log(np.where(inside, v, 1.0)) for v in (left, mid, right))
-    bend = np.maximum(2.0 * b - a - c, 1e-9)
-    shift = np.clip(0.5 * (c - a) / bend, -0.5, 0.5) - _phase_bias(on_line, rulers, best - reach, bend)
-    return best - reach + shift, np.where(inside, mid, 0.0)
+    smooth: Any, u: float, v: float, along_u: float, along_v: float, length: float, sign: float, reach: int
+) -> tuple[Any, Any, Any]:
+    """Places along a segment (n,) [px], the gradient's peak across it at each [px] and its height.
+
+    The height is 0 where there is no peak within the reach.
+    """
+    count = max(round(length / _SPACING_PX), _LEAST_SAMPLES)
+    t, peaks, heights = np.empty(count), np.zeros(count), np.zeros(count)
+    profile, gradient = np.empty(2 * reach + 3), np.empty(2 * reach + 1)
+    for k in range(count):
+        t[k] = ((k + 0.5) / count - 0.5) * length
+        on_u, on_v = u + t[k] * along_u, v + t[k] * along_v
+        for j in range(len(profile)):
+            profile[j] = _read(smooth, on_u - (j - reach - 1) * along_v, on_v + (j - reach - 1) * along_u)
+        best = 0
+        for j in range(len(gradient)):
+            gradient[j] = 0.5 * sign * (profile[j + 2] - profile[j])
+            if gradient[j] > gradient[best]:
+                best = j
+        best = min(max(best, 1), 2 * reach - 1)
+        left, mid, right = gradient[best - 1], gradient[best], gradient[best + 1]
+        if left <= 0.0 or right <= 0.0 or mid < left or mid < right:
+            continue
+        # A blurred step has a Gaussian gradient: its logarithm is the parabola.
+        a, b, c = math.log(left), math.log(mid), math.log(right)
+        bend = max(2.0 * b - a - c, 1e-9)
+        shift = min(max(0.5 * (c - a) / bend, -0.5), 0.5)
+        off = best - reach
+        bias = _phase_bias(on_u - off * along_v, on_v + off * along_u, -along_v, along_u, bend)
+        peaks[k], heights[k] = off + shift - bias, mid
+    return t, peaks, heights
 
 
-def _phase_bias(
-    on_line: NDArray[np.float64], rulers: _Rulers, offset: NDArray[np.intp], bend: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """How far bilinear reading moves a peak [px].
+@compiled
+def _read(image: Any, u: float, v: float) -> float:
+    """The image between pixels, linearly; the border value continues outside."""
+    height, width = image.shape
+    u, v = min(max(u, 0.0), width - 1.0), min(max(v, 0.0), height - 1.0)
+    x, y = min(int(u), width - 2), min(int(v), height - 2)
+    right, low = u - x, v - y
+    above = image[y, x] + right * (image[y, x + 1] - image[y, x])
+    below = image[y + 1, x] + right * (image[y + 1, x + 1] - image[y + 1, x])
+    return float(above + low * (below - above))
+
+
+@compiled
+def _phase_bias(u: float, v: float, normal_u: float, normal_v: float, bend: float) -> float:
+    """How far linear reading moves a peak [px].
 
     At a fraction f of a pixel it weighs the neighbours by 1 - f and f: unbiased in the mean, but skewed, with third
     moment f (1 - f) (1 - 2 f). On a vertical edge all samples share f and nothing averages out. How far that skew moves
     the top of the parabola was computed for a step behind lenses of several blurs; the parabola's bend tells which.
     """
-    normal = rulers.across[rulers.owner]
-    f = (on_line + offset[:, None] * normal) % 1.0
-    skew = np.sum(normal**3 * (f * (1.0 - f) * (1.0 - 2.0 * f)), axis=1)
-    return np.asarray(skew * np.interp(bend, _BENDS, _SHIFT_PER_SKEW))
+    f, g = u % 1.0, v % 1.0
+    skew = normal_u**3 * f * (1.0 - f) * (1.0 - 2.0 * f) + normal_v**3 * g * (1.0 - g) * (1.0 - 2.0 * g)
+    k = 0
+    while k < len(_BENDS) - 2 and bend > _BENDS[k + 1]:
+        k += 1
+    share = min(max((bend - _BENDS[k]) / (_BENDS[k + 1] - _BENDS[k]), 0.0), 1.0)
+    return skew * (_SHIFT_PER_SKEW[k] + share * (_SHIFT_PER_SKEW[k + 1] - _SHIFT_PER_SKEW[k]))
 
 
-@dataclass(frozen=True, slots=True)
-class _Fit:
-    offset: NDArray[np.float64]
-    slope: NDArray[np.float64]
-    variance_offset: NDArray[np.float64]
-    variance_slope: NDArray[np.float64]
-    gradient: NDArray[np.float64]
-    support: NDArray[np.float64]
-    inlier: NDArray[np.bool_]
+@compiled
+def _fit(t: Any, peaks: Any, heights: Any, noise_peak: float, facts: Any) -> tuple[float, float, Any]:
+    """The line offset + slope t through the peaks by reweighted least squares, and which of them lie on it (n,).
 
-
-def _fit(rulers: _Rulers, peak: NDArray[np.float64], height: NDArray[np.float64], noise: float) -> _Fit:
-    """Lines offset + slope * t through the peaks of each segment, by reweighted least squares."""
-    owner, t = rulers.owner, rulers.t
-    weight = height**2
-    scale = np.full(len(rulers.start), 0.5)
+    ``facts`` receives the variance of the offset and of the slope, the gradient, and the share of peaks on the line.
+    """
+    count = len(t)
+    weights, tukey, scale = heights**2, np.ones(count), 0.5
     for _ in range(3):
-        offset, slope, _ = _weighted_line(rulers, peak, weight)
-        residual = peak - offset[owner] - slope[owner] * t
-        u = residual / (4.0 * np.maximum(scale, 0.05)[owner])
-        tukey = np.where(np.abs(u) < 1.0, (1.0 - u**2) ** 2, 0.0)
-        weight = height**2 * tukey
-        mass = rulers.total(weight)
-        scale = np.sqrt(rulers.total(weight * residual**2) / np.where(mass > 0, mass, 1.0))
-    offset, slope, moments = _weighted_line(rulers, peak, weight)
-    residual = peak - offset[owner] - slope[owner] * t
-    mass, middle, spread = moments
-    gradient = rulers.total(weight * height) / np.where(mass > 0, mass, 1.0)
-    inlier = (tukey > 0.1) & (height > _END_SHARE * _strongest_near(height, owner))
-    count = rulers.total(inlier.astype(float))
-    variance = _peak_variance(rulers, weight, residual, mass, count, gradient, noise)
-    effective = mass**2 / np.maximum(rulers.total(weight**2), 1e-12)
-    per_mean = _CORRELATION * variance / np.maximum(effective, 1.0)
-    variance_slope = per_mean / np.maximum(spread, 1e-6)
-    variance_offset = per_mean + middle**2 * variance_slope
-    samples = np.diff(np.append(rulers.start, len(owner)))
-    return _Fit(offset, slope, variance_offset, variance_slope, gradient, count / samples, inlier)
+        offset, slope, mass, middle, spread = _weighted_line(t, peaks, weights)
+        bound, seen, mass = 4.0 * max(scale, 0.05), 0.0, 0.0
+        for k in range(count):
+            residual = peaks[k] - offset - slope * t[k]
+            tukey[k] = max(1.0 - (residual / bound) ** 2, 0.0) ** 2
+            weights[k] = heights[k] ** 2 * tukey[k]
+            mass, seen = mass + weights[k], seen + weights[k] * residual**2
+        scale = math.sqrt(seen / mass) if mass > 0.0 else 0.0
+    offset, slope, mass, middle, spread = _weighted_line(t, peaks, weights)
+    safe = mass if mass > 0.0 else 1.0
+    gradient = squares = seen = 0.0
+    inlier = np.zeros(count, np.bool_)
+    for k in range(count):
+        gradient, squares = gradient + weights[k] * heights[k] / safe, squares + weights[k] ** 2
+        seen += weights[k] * (peaks[k] - offset - slope * t[k]) ** 2 / safe
+        strongest = heights[max(k - 2, 0) : k + 3].max()
+        inlier[k] = tukey[k] > 0.1 and heights[k] > _END_SHARE * strongest
+    found = float(np.sum(inlier))
+    variance = _peak_variance(seen, found, gradient, noise_peak)
+    per_mean = _CORRELATION * variance / max(mass**2 / max(squares, 1e-12), 1.0)
+    facts[1] = per_mean / max(spread, 1e-6)
+    facts[0] = per_mean + middle**2 * facts[1]
+    facts[2], facts[3] = gradient, found / count
+    return offset, slope, inlier
 
 
-def _strongest_near(height: NDArray[np.float64], owner: NDArray[np.intp]) -> NDArray[np.float64]:
-    """The greatest height among the two samples on either side, of the same segment, and the sample itself."""
-    strongest = height.copy()
-    for k in (1, 2):
-        same = owner[k:] == owner[:-k]
-        strongest[k:] = np.maximum(strongest[k:], np.where(same, height[:-k], 0.0))
-        strongest[:-k] = np.maximum(strongest[:-k], np.where(same, height[k:], 0.0))
-    return strongest
-
-
-def _peak_variance(
-    rulers: _Rulers,
-    weight: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    mass: NDArray[np.float64],
-    count: NDArray[np.float64],
-    gradient: NDArray[np.float64],
-    noise: float,
-) -> NDArray[np.float64]:
+@compiled
+def _peak_variance(seen: float, found: float, gradient: float, noise_peak: float) -> float:
     """Variance of one peak [px^2]: what the noise predicts, corrected by the scatter that is seen.
 
     White noise of deviation s, smoothed by sigma, has a second derivative of variance 3 s^2 / (16 pi sigma^6); a peak
-    of height g and width b has curvature g / b^2; the quotient is the peak's displacement.
+    of height g and width b has curvature g / b^2; the quotient, ``noise_peak`` / g, is the peak's displacement.
     """
-    predicted = noise * math.sqrt(3.0 / (16.0 * math.pi)) / SMOOTHING_PX**3 * _EDGE_BLUR_PX**2
-    prior = (predicted / np.maximum(gradient, 1e-6)) ** 2 + _FLOOR_PX**2
-    seen = rulers.total(weight * residual**2) / np.where(mass > 0, mass, 1.0)
-    freedom = np.maximum(count - 2.0, 0.0)
-    return (_PRIOR_PEAKS * prior + freedom * seen * count / np.maximum(freedom, 1.0)) / (_PRIOR_PEAKS + freedom)
+    prior = (noise_peak / max(gradient, 1e-6)) ** 2 + _FLOOR_PX**2
+    freedom = max(found - 2.0, 0.0)
+    scatter = freedom * seen * found / max(freedom, 1.0)
+    return (_PRIOR_PEAKS * prior + scatter) / (_PRIOR_PEAKS + freedom)
 
 
-def _weighted_line(
-    rulers: _Rulers, peak: NDArray[np.float64], weight: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[NDArray[np.float64], ...]]:
+@compiled
+def _weighted_line(t: Any, peaks: Any, weights: Any) -> tuple[float, float, float, float, float]:
     """Offset at t = 0 and slope, with the weights' sum, mean place and variance of place along the line."""
-    t = rulers.t
-    terms = np.stack([np.ones_like(t), t, t * t, peak, t * peak], axis=1)
-    mass, t1, t2, p1, tp = rulers.total(weight[:, None] * terms).T
-    safe = np.where(mass > 0, mass, 1.0)
+    mass = t1 = t2 = p1 = tp = 0.0
+    for k in range(len(t)):
+        w = weights[k]
+        mass, t1, t2 = mass + w, t1 + w * t[k], t2 + w * t[k] * t[k]
+        p1, tp = p1 + w * peaks[k], tp + w * t[k] * peaks[k]
+    safe = mass if mass > 0.0 else 1.0
     middle, level = t1 / safe, p1 / safe
-    spread = np.maximum(t2 / safe - middle**2, 0.0)
-    slope = np.where(spread > 0.25, (tp / safe - middle * level) / np.maximum(spread, 0.25), 0.0)
-    return level - slope * middle, slope, (mass, middle, spread)
-
-
-def _moved(rulers: _Rulers, fit: _Fit, cut: bool) -> NDArray[np.float64]:
-    """The segments on their fitted lines, cut at the outermost samples that lie on the line if so asked."""
-    low, high = -rulers.half, rulers.half
-    if cut:
-        spacing = 2.0 * rulers.half / np.diff(np.append(rulers.start, len(rulers.t)))
-        first = np.minimum.reduceat(np.where(fit.inlier, rulers.t, np.inf), rulers.start) - spacing / 2.0
-        last = np.maximum.reduceat(np.where(fit.inlier, rulers.t, -np.inf), rulers.start) + spacing / 2.0
-        some = np.isfinite(first) & np.isfinite(last)
-        low, high = np.where(some, first, low), np.where(some, last, high)
-    t = np.stack([low, high], axis=1)
-    v = fit.offset[:, None] + fit.slope[:, None] * t
-    return rulers.origin[:, None] + t[..., None] * rulers.along[:, None] + v[..., None] * rulers.across[:, None]
+    spread = max(t2 / safe - middle * middle, 0.0)
+    slope = (tp / safe - middle * level) / spread if spread > 0.25 else 0.0
+    return level - slope * middle, slope, mass, middle, spread

@@ -29,6 +29,11 @@ class Terms:
     omission_rate: float
     anchor_weights: tuple[float, float, float]
 
+    @property
+    def arrays(self) -> tuple[Array, Array, float]:
+        """Of the omission, as the compiled loops take them."""
+        return self.omission_scale, self.lengths, self.omission_rate
+
     def omission(self, uncovered: Array, lines: NDArray[np.intp]) -> Array:
         """Weighted omission (...) of model lines whose share ``uncovered`` (...) the data do not account for."""
         if self.omission_rate == 0.0:

@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching_fit import Fits
+from knowledge_sources.methods.matching_neighbours import flips, swaps
 from knowledge_sources.methods.matching_objective import Terms
 
 Array = NDArray[np.float64]
@@ -44,6 +45,11 @@ class PairSpace:
     lines: int
     anchor: Array
     fit: Callable[[Array], Fits]
+
+    @property
+    def arrays(self) -> tuple[Array | Mask | Index, ...]:
+        """As the compiled loops take them."""
+        return self.forms, self.masks, self.model, self.data, self.anchor
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,72 +148,21 @@ def flipped(space: PairSpace, chosen: Mask, move: int) -> Mask:
 
 def flip_errors(space: PairSpace, terms: Terms, chosen: Mask) -> Array:
     """(p,) E_match of every neighbour, each one flip away."""
-    counts = _counts(space, chosen)
-    rival = _rivals(space, chosen)
-    sign = np.where(chosen, -1.0, 1.0)
-    forms = space.anchor + space.forms[chosen].sum(axis=0) + sign[:, None, None] * space.forms
-    robs = rival >= 0
-    forms[robs] -= space.forms[rival[robs]]
-    errors = space.fit(forms).errors
-    return np.asarray(errors + _omission_after(space, terms, chosen, counts, rival))
-
-
-def _omission_after(space: PairSpace, terms: Terms, chosen: Mask, counts: Array, rival: Index) -> Array:
-    """(p,) omission of every neighbour."""
-    covered = (counts > 0).mean(axis=1)
-    lines = np.arange(space.lines)
-    now = terms.omission(1.0 - covered, lines)
-    gained, lost = _shares(space.masks, counts, space.model)
-    after = covered[space.model] + np.where(chosen, -lost, gained)
-    change = terms.omission(1.0 - after, space.model) - now[space.model]
-    robs = rival >= 0
-    other = rival[robs]
-    victim = space.model[other]
-    change[robs] += terms.omission(1.0 - covered[victim] + lost[other], victim) - now[victim]
-    return np.asarray(now.sum() + change)
-
-
-@njit(cache=True, error_model="numpy")
-def _shares(masks: Any, counts: Any, model: Any) -> tuple[Any, Any]:
-    """(p,) share of its model line that each pair covers and nobody else, (p,) and that it covers alone."""
-    pairs, cells = masks.shape
-    gained, lost = np.zeros(pairs), np.zeros(pairs)
-    for p in range(pairs):
-        for c in range(cells):
-            if masks[p, c]:
-                held = counts[model[p], c]
-                gained[p] += held == 0.0
-                lost[p] += held == 1.0
-        gained[p] /= cells
-        lost[p] /= cells
-    return gained, lost
+    forms, omission = flips(space.arrays, terms.arrays, chosen)
+    return np.asarray(space.fit(forms).errors + omission)
 
 
 def _best_swap(
     space: PairSpace, terms: Terms, chosen: Mask, error: float
 ) -> tuple[int, int, float] | None:
     """The best exchange (pair out, pair in, E_match) within a model line, if it lowers the match error."""
-    inside, outside = np.flatnonzero(chosen), np.flatnonzero(~chosen)
-    a, b = np.nonzero(space.model[inside][:, None] == space.model[outside][None])
-    if not len(a):
+    moves, forms, omission = swaps(space.arrays, terms.arrays, chosen)
+    if not len(moves):
         return None
-    out, into = inside[a], outside[b]
-    counts = _counts(space, chosen)
-    rival = _rivals(space, chosen)[into]
-    forms = space.anchor + space.forms[chosen].sum(axis=0) + space.forms[into] - space.forms[out]
-    robs = rival >= 0
-    forms[robs] -= space.forms[rival[robs]]
-    line = space.model[into]
-    after = counts[line] - space.masks[out] + space.masks[into]
-    covered = (counts > 0).mean(axis=1)
-    now = terms.omission(1.0 - covered, np.arange(space.lines))
-    change = terms.omission(1.0 - (after > 0).mean(axis=1), line) - now[line]
-    victim = space.model[rival[robs]]
-    lost = (space.masks[rival[robs]] & (counts[victim] == 1)).mean(axis=1)
-    change[robs] += terms.omission(1.0 - covered[victim] + lost, victim) - now[victim]
-    errors = space.fit(forms).errors + now.sum() + change
+    errors = space.fit(forms).errors + omission
     best = int(np.argmin(errors))
-    return (int(out[best]), int(into[best]), float(errors[best])) if errors[best] < error - GAIN else None
+    out, into = moves[best].tolist()
+    return (out, into, float(errors[best])) if errors[best] < error - GAIN else None
 
 
 def _counts(space: PairSpace, chosen: Mask) -> Array:
@@ -224,13 +179,6 @@ def _counted(masks: Any, model: Any, chosen: Any, lines: int) -> Any:
             for c in range(masks.shape[1]):
                 counts[model[p], c] += masks[p, c]
     return counts
-
-
-def _rivals(space: PairSpace, chosen: Mask) -> Index:
-    """(p,) the chosen pair that holds the data line of a pair not chosen, or -1."""
-    holder = np.full(int(space.data.max(initial=-1)) + 1, -1, dtype=np.intp)
-    holder[space.data[chosen]] = np.flatnonzero(chosen)
-    return np.where(chosen, -1, holder[space.data])
 
 
 def _pick(errors: Array, error: float, strategy: Strategy, last: int) -> int:

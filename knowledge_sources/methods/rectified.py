@@ -6,6 +6,8 @@ as it came and to straighten their ends; ``harvey experiment lens`` measures bot
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +17,10 @@ from world_models.camera import Camera
 
 
 class Rectified:
-    """Decodes pictures of a camera with lens distortion as those of one without."""
+    """Decodes pictures of a camera with lens distortion as those of one without.
+
+    As :func:`decode` it remembers the last few: landmarks' templates lie in earlier pictures.
+    """
 
     def __init__(self, lens: Camera, pinhole: Camera) -> None:
         """``lens``: the camera as it is; ``pinhole``: what its pictures are put into, without distortion."""
@@ -23,10 +28,16 @@ class Rectified:
             raise ValueError(f"expected a camera without distortion to put pictures into, got {pinhole}")
         self._size = lens.width, lens.height
         self._places = None if lens.distortion is None else _places(lens, pinhole)
+        self._straightened = lru_cache(maxsize=8)(self._straighten)
 
     def __call__(self, jpeg: bytes) -> NDArray[np.uint8]:
         """The grey picture (h, w) uint8 in compressed bytes. Raises ValueError: the bytes are not a picture."""
-        return self.image(decode(jpeg))
+        return decode(jpeg) if self._places is None else self._straightened(jpeg)
+
+    def _straighten(self, jpeg: bytes) -> NDArray[np.uint8]:
+        image = self.image(decode(jpeg))
+        image.setflags(write=False)
+        return image
 
     def image(self, raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """A picture (h, w[, 3]) uint8 of the camera, without its distortion. Raises ValueError for one of another size.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -10,6 +10,7 @@ import networkx as nx
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry.polygon import orient
 
 Floats = NDArray[np.float64]
 SLACK_M = 1e-6
@@ -18,33 +19,41 @@ SLACK_M = 1e-6
 def free_space(outline: Any, obstacles: Sequence[Any], clearance_m: float) -> shapely.Geometry:
     """Where the robot's centre may be: the room's polygon (k, 2) shrunk, less the obstacles' (k, 2) grown [m]."""
     room = shapely.Polygon(np.asarray(outline, float)).buffer(-clearance_m, join_style="mitre")
-    grown = [shapely.Polygon(np.asarray(o, float)).buffer(clearance_m, join_style="mitre") for o in obstacles]
-    return room.difference(shapely.union_all(grown)) if grown else room
+    if not len(obstacles):
+        return room
+    rings = shapely.linearrings(np.concatenate([np.asarray(o, float) for o in obstacles]),
+                                indices=np.repeat(np.arange(len(obstacles)), [len(o) for o in obstacles]))
+    grown = shapely.buffer(shapely.polygons(rings), clearance_m, join_style="mitre")
+    return room.difference(shapely.union_all(grown))
 
 
 def is_clear(free: shapely.Geometry, a: Any, b: Any) -> bool:
     """Whether the straight line between two points (2,) stays in the free space."""
-    return bool(free.buffer(SLACK_M).covers(shapely.LineString([np.asarray(a, float), np.asarray(b, float)])))
+    line = shapely.LineString([np.asarray(a, float), np.asarray(b, float)])
+    return bool(free.covers(line) or free.buffer(SLACK_M).covers(line))
 
 
-def shortest_route(free: shapely.Geometry, start: Any, goal: Any) -> list[Floats] | None:
+def shortest_route(
+    free: shapely.Geometry, start: Any, goal: Any, floor: Callable[[], shapely.Geometry]
+) -> list[Floats] | None:
     """Way points [(2,), ...] from start to goal, both included; None where there is no way.
 
-    An end that lies in the margin round the free space is first joined to the nearest free point.
+    An end that lies in the margin round the free space is first joined to the nearest free point to which a straight
+    line leads over the open ``floor`` (the free space of a robot without a width), which is asked for only then.
     """
     ends = [np.asarray(start, float), np.asarray(goal, float)]
-    inner = [_nearest_free(free, p) for p in ends]
+    inner = [_nearest_free(free, p, floor) for p in ends]
     if any(p is None for p in inner):
         return None
-    nodes = [p for p in inner if p is not None] + _corners(free)
+    nodes = np.array([*(p for p in inner if p is not None), *_bends(free)])
     slack = free.buffer(SLACK_M)
+    shapely.prepare(slack)
     graph: nx.Graph = nx.Graph()
     graph.add_nodes_from(range(len(nodes)))
     pairs = np.array(list(combinations(range(len(nodes)), 2)))
-    shapely.prepare(slack)
-    clear = shapely.covers(slack, shapely.linestrings(np.array(nodes)[pairs]))
-    for i, j in pairs[clear].tolist():
-        graph.add_edge(i, j, weight=float(np.linalg.norm(nodes[i] - nodes[j])))
+    pairs = pairs[shapely.covers(slack, shapely.linestrings(nodes[pairs]))]
+    lengths = np.linalg.norm(nodes[pairs[:, 0]] - nodes[pairs[:, 1]], axis=1)
+    graph.add_weighted_edges_from(zip(*pairs.T.tolist(), lengths.tolist(), strict=True))
     try:
         way = nx.shortest_path(graph, 0, 1, weight="weight")
     except nx.NetworkXNoPath:
@@ -52,16 +61,40 @@ def shortest_route(free: shapely.Geometry, start: Any, goal: Any) -> list[Floats
     return _without_repeats([ends[0], *(nodes[i] for i in way), ends[1]])
 
 
-def _nearest_free(free: shapely.Geometry, point: Floats) -> Floats | None:
-    if free.is_empty:
-        return None
-    nearest = shapely.shortest_line(shapely.Point(point), free)
-    return np.asarray(shapely.get_coordinates(nearest)[-1])
+def _nearest_free(free: shapely.Geometry, point: Floats, floor: Callable[[], shapely.Geometry]) -> Floats | None:
+    """Of what is nearest in each part of the free space, and of its corners: the nearest that is not behind a barrier."""
+    parts = [part for part in shapely.get_parts(free) if not part.is_empty]
+    nearest = [shapely.get_coordinates(shapely.shortest_line(shapely.Point(point), part))[-1] for part in parts]
+    if any(float(np.linalg.norm(p - point)) <= SLACK_M for p in nearest):
+        return point
+    there = sorted((*nearest, *_corners(free)), key=lambda p: float(np.linalg.norm(p - point)))
+    open_floor = floor()
+    return next((np.asarray(p) for p in there if is_clear(open_floor, point, p)), None)
 
 
-def _corners(free: shapely.Geometry) -> list[Floats]:
-    """The distinct vertices of the free space, in a fixed order."""
-    return list(np.unique(np.round(shapely.get_coordinates(free), 9), axis=0))
+def _corners(free: shapely.Geometry) -> Floats:
+    """(n, 2) the distinct vertices of the free space, in a fixed order."""
+    return _distinct(shapely.get_coordinates(free))
+
+
+def _bends(free: shapely.Geometry) -> Floats:
+    """(n, 2) the vertices about which a shortest way may bend: those that stand into the free space."""
+    found = [np.zeros((0, 2))]
+    for part in shapely.get_parts(free):
+        if not part.is_empty:
+            inwards = orient(part)
+            found += [_standing_in(np.asarray(ring.coords)[:-1, :2]) for ring in (inwards.exterior, *inwards.interiors)]
+    return _distinct(np.concatenate(found))
+
+
+def _standing_in(ring: Floats) -> Floats:
+    """The corners of a ring at which it turns right; what it bounds is on its left."""
+    came, goes = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    return np.asarray(ring[came[:, 0] * goes[:, 1] - came[:, 1] * goes[:, 0] < 0.0])
+
+
+def _distinct(points: Floats) -> Floats:
+    return np.asarray(np.unique(np.round(points, 9), axis=0))
 
 
 def _without_repeats(points: list[Floats]) -> list[Floats]:

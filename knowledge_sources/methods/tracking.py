@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.correlation import (
-    Template,
-    corner_strength,
+    Correlation,
+    corner_strengths,
     correlate,
     extract_template,
     fits,
-    self_correlation,
+    rival,
 )
 from knowledge_sources.methods.pose.planar import point_jacobian
 from knowledge_sources.methods.pose.planar_from_points import planar_from_points
@@ -43,6 +43,8 @@ UNIQUE = 0.8
 UNIQUE_PX = 14.0
 SEARCH_PX = (6.0, 48.0)
 SIGMAS = 4.0
+LEAST_SIGMA_PX = 0.3
+"""A landmark's place is no surer than this, however sharp its peak: the model's corner is not quite the picture's."""
 SCALES = (0.55, 1.8)
 """How much larger or smaller than its template a landmark may have become."""
 
@@ -76,14 +78,15 @@ def follow(
         return []
     depth, predicted, spread = _predicted(robot, np.array([t.point_world for t in tracks]), pose, covariance)
     out = []
-    for track, z, at, sigma in zip(tracks, depth, predicted, spread, strict=True):
-        t = replace(track, predicted_px=(float(at[0]), float(at[1])), found_px=None)
-        scale = t.template_depth_m / max(float(z), NEAR_M)
-        if z > NEAR_M and fits(image.shape, at, HALF_PX + 2) and SCALES[0] <= scale <= SCALES[1]:
-            template = extract_template(pictures[t.template_frame], t.template_px, HALF_PX)
-            out.append(Followed(_correlated(t, template, image, float(sigma), scale), True))
-        else:
-            out.append(Followed(t, False))
+    for track, z, at, sigma in zip(tracks, depth.tolist(), predicted, spread.tolist(), strict=True):
+        scale = track.template_depth_m / max(z, NEAR_M)
+        expected = z > NEAR_M and fits(image.shape, at, HALF_PX + 2) and SCALES[0] <= scale <= SCALES[1]
+        found = None
+        if expected:
+            template = extract_template(pictures[track.template_frame], track.template_px, HALF_PX)
+            search = min(max(SIGMAS * sigma + 2.0, SEARCH_PX[0]), SEARCH_PX[1])
+            found = correlate(template, image, at, search, scale=scale)
+        out.append(Followed(_updated(track, at, found, expected), expected))
     return out
 
 
@@ -111,15 +114,17 @@ def begin(robot: RobotModel, kept: tuple[Track, ...], frame: str, image: Image, 
     points = visible_points(
         robot.world, robot.camera, camera_from_world, margin_px=HALF_PX + 4.0, min_contrast=0.08, max_distance_m=15.0
     )
-    strength = np.array([corner_strength(image, px, HALF_PX) for px in points.points_px])
-    taken = [np.array(t.found_px or t.predicted_px) for t in kept]
+    strength = corner_strengths(image, points.points_px, HALF_PX)
+    free = strength >= LEAST_CORNER
+    for track in kept:
+        free &= _apart(points.points_px, track.found_px or track.predicted_px)
     new: list[Track] = []
     for i in np.argsort(-strength, kind="stable"):
-        if strength[i] < LEAST_CORNER or len(taken) >= TRACKS:
-            break
         px, point = points.points_px[i], points.points_world[i]
-        if all(np.linalg.norm(px - other) >= SPACING_PX for other in taken) and _is_unique(image, px):
-            taken.append(px)
+        if len(kept) + len(new) >= TRACKS:
+            break
+        if free[i] and rival(image, px, HALF_PX, UNIQUE_PX) < UNIQUE:
+            free &= _apart(points.points_px, px)
             name = robot.world.landmarks[points.landmark[i]].name
             new.append(_begun(point, px, float(camera_from_world.apply(point)[2]), name, frame))
     return tuple(new)
@@ -137,23 +142,28 @@ def _predicted(
     return p[:, 2], robot.camera.project(ahead), np.sqrt(np.max(spread, axis=1))
 
 
-def _is_unique(image: Image, px: Floats) -> bool:
-    return bool(self_correlation(image, px, HALF_PX, UNIQUE_PX).second_peak < UNIQUE)
+def _apart(points_px: Floats, taken_px: Any) -> NDArray[np.bool_]:
+    """(n,) which points (n, 2) lie far enough from a landmark that is taken."""
+    return np.asarray(np.sum((points_px - taken_px) ** 2, axis=1) >= SPACING_PX**2)
 
 
-def _correlated(track: Track, template: Template, image: Image, sigma: float, scale: float) -> Track:
-    search = min(max(SIGMAS * sigma + 2.0, SEARCH_PX[0]), SEARCH_PX[1])
-    found = correlate(template, image, np.array(track.predicted_px), search, scale=scale)
-    if found is None or found.peak < LEAST_PEAK or found.at_border or found.peak - found.second_peak < LEAST_MARGIN:
-        return replace(track, misses=track.misses + 1, peak=-1.0 if found is None else found.peak)
+def _updated(track: Track, predicted_px: Floats, found: Correlation | None, expected: bool) -> Track:
+    """A track as of the newest frame; what correlates badly, ambiguously or at the window's border is not found."""
+    predicted = (float(predicted_px[0]), float(predicted_px[1]))
+    if not expected:
+        return replace(track, predicted_px=predicted, found_px=None)
+    if found is None or found.peak < LEAST_PEAK or found.at_border or found.distinctiveness < LEAST_MARGIN:
+        peak = -1.0 if found is None else found.peak
+        return replace(track, predicted_px=predicted, found_px=None, peak=peak, misses=track.misses + 1)
     at = (float(found.position_px[0]), float(found.position_px[1]))
-    return replace(track, found_px=at, peak=float(found.peak), sigma_px=max(0.3, float(found.sigma_px)), misses=0)
+    sigma = max(LEAST_SIGMA_PX, found.sigma_px)
+    return replace(track, predicted_px=predicted, found_px=at, peak=found.peak, sigma_px=sigma, misses=0)
 
 
 def _begun(point: Floats, px: Floats, depth_m: float, landmark: str, frame: str) -> Track:
     x, y, z = (float(c) for c in point)
     at = (float(px[0]), float(px[1]))
-    return Track(landmark, (x, y, z), frame, at, float(depth_m), at, at, 1.0, 0.3)
+    return Track(landmark, (x, y, z), frame, at, float(depth_m), at, at, 1.0, LEAST_SIGMA_PX)
 
 
 def _inherited(pose: Pose2, seen: list[Track], anchors: tuple[Anchor, ...]) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,9 @@ from world_models.world import World
 HEAD_HIGH_M = 1.8
 """A surface that faces down and hangs higher than this is a ceiling, and left out: one looks in from above."""
 
+STOREY_M = 0.5
+"""Rooms whose floors differ by less are of one storey."""
+
 SOFT_LIGHT = 0.75
 LAMP_LIGHT = 0.35
 
@@ -30,7 +34,8 @@ class Building:
 
     def begin(self, tape: Tape) -> None:
         tape.fix(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        tape.fix(BUILDING, _mesh(self._world))
+        for path, mesh in _meshes(self._world):
+            tape.fix(path, mesh)
         tape.fix(NAMES, _names(self._world))
         tape.fix(DOORWAYS, _doorways(self._world))
 
@@ -38,11 +43,23 @@ class Building:
         """Buildings do not change."""
 
 
-def _mesh(world: World) -> Any:
-    """All surfaces as one mesh that shows from their visible sides only, so that no wall stands in one's way."""
+def _meshes(world: World) -> Iterator[tuple[str, Any]]:
+    """A mesh for each storey, so that one can take the upper ones off; they are one where there is only one."""
+    regions = [(face, region) for face in world.faces for region in (*face.front, *face.back)]
+    colours = np.array([region.colour for _, region in regions])
+    floors = {name: world.floor_m(name) for name in world.rooms}
+    levels = np.array([floors.get(face.locale, 0.0) for face, _ in regions])
+    storeys = np.unique(np.round(levels, 1))
+    for number, level_m in enumerate(storeys):
+        of_storey = np.abs(levels - level_m) < STOREY_M
+        path = BUILDING if len(storeys) == 1 else f"{BUILDING}/storey-{number}"
+        yield path, _mesh(world, colours, of_storey, float(level_m))
+
+
+def _mesh(world: World, colours: NDArray[np.float64], of_storey: NDArray[np.bool_], floor_m: float) -> Any:
+    """The surfaces of a storey as a mesh that shows from their visible sides only: no wall stands in one's way."""
     polygons, normals = world.scene.polygons_world, world.scene.planes_world[:, :3]
-    colours = np.array([region.colour for face in world.faces for region in (*face.front, *face.back)])
-    shown = (normals[:, 2] > -0.5) | (polygons[..., 2].min(axis=1) < HEAD_HIGH_M)
+    shown = of_storey & ((normals[:, 2] > -0.5) | (polygons[..., 2].min(axis=1) < floor_m + HEAD_HIGH_M))
     light = SOFT_LIGHT + LAMP_LIGHT * normals @ (LAMP / np.linalg.norm(LAMP))
     lit = np.clip(255.0 * light[:, None] * colours, 0, 255).astype(np.uint8)[shown]
     corners = polygons.shape[1]
@@ -60,7 +77,7 @@ def _triangles(count: int, corners: int) -> NDArray[np.int64]:
 
 
 def _names(world: World) -> Any:
-    middles = [[*world.outline(name).mean(axis=0), 0.05] for name in world.rooms]
+    middles = [[*world.outline(name).mean(axis=0), world.floor_m(name) + 0.05] for name in world.rooms]
     return rr.Points3D(middles, labels=list(world.rooms), show_labels=True, radii=0.02, colors=[NAME])
 
 
@@ -68,5 +85,6 @@ def _doorways(world: World) -> Any:
     strips = []
     for doorway in world.doorways:
         (a, b), (c, d) = doorway.thresholds_world
-        strips.append([[*corner, 0.02] for corner in (a, b, c, d, a)])
+        height_m = world.floor_m(doorway.between[0]) + 0.02
+        strips.append([[*corner, height_m] for corner in (a, b, c, d, a)])
     return rr.LineStrips3D(strips, colors=[DOOR], radii=0.03)

@@ -95,5 +95,5 @@ def _verdict(certificate: Certificate, mirror: Mirror) -> str:
     entry = mirror.get(certificate.milestone)
     what = entry.value.what if entry and isinstance(entry.value, Milestone) else certificate.milestone
     if certificate.verdict == "verified":
-        return f"{what}: belief was {words.metres(certificate.deviation_m)} off"
+        return f"{what}: {words.metres(certificate.deviation_m)} off"
     return f"{certificate.reason} ({what})"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,8 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from logs.mirror import Mirror, Moment
-from logs.palette import EXPECTED, FOUND, MATCHED, PLANNED, REJECTED, Colour
-from logs.paths import DRIFTS, LANDMARK_NAMES, WINDOWS
+from logs.palette import DONE, EXPECTED, FOUND, MATCHED, PLANNED, REJECTED, Colour
+from logs.paths import DRIFTS, LANDMARK_NAMES, WAITING, WINDOWS
 from logs.paths import EXPECTED as EXPECTED_PATH
 from logs.paths import MATCHED as MATCHED_PATH
 from logs.paths import REJECTED as REJECTED_PATH
@@ -48,6 +49,7 @@ class Image:
         self._size = camera.width, camera.height
         self._lens, self._pinhole = camera, camera.pinhole
         self._shown: dict[str, None] = {}
+        self._waits = False
 
     def begin(self, tape: Tape) -> None:
         for path, colour, width in STYLES:
@@ -57,8 +59,14 @@ class Image:
         tape.fix(WINDOWS, rr.Boxes2D.from_fields(radii=thin))
         tape.fix(DRIFTS, rr.Arrows2D.from_fields(colors=[PLANNED], radii=thin))
 
+        tape.fix(WAITING, rr.Points2D.from_fields(show_labels=True, colors=[DONE], radii=thin))
+
     def log(self, tape: Tape, moment: Moment) -> None:
+        if not self._waits and not moment.mirror.all(Frame):
+            self._wait(tape, [np.divide(self._size, 2)], ["no picture yet"])
         if moment.touched(Frame):
+            if self._waits:
+                self._wait(tape, NO_POINTS, ())
             self._wipe(tape, moment.mirror)
         for milestone in moment.changed(Milestone)[-1:]:
             self._expected(tape, milestone.value)
@@ -70,6 +78,10 @@ class Image:
             self._inliers(tape, moment.mirror, fix.value)
         for tracks in moment.changed(Tracks)[-1:]:
             self._tracks(tape, tracks.value)
+
+    def _wait(self, tape: Tape, spots: Any, labels: Sequence[str]) -> None:
+        self._waits = bool(labels)
+        tape.log(WAITING, rr.Points2D, positions=np.array(spots, float).reshape(-1, 2), labels=labels)
 
     def _wipe(self, tape: Tape, mirror: Mirror) -> None:
         """A new picture: nothing found in the last one holds; what is expected does while its milestone is open."""

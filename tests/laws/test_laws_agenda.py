@@ -60,7 +60,7 @@ class AgendaMachine(RuleBasedStateMachine):
         """As the scheduler does with the chosen one when the next best raises."""
         activation = self.model[pick % len(self.model)]
         self.agenda.take(activation)
-        self.agenda.add(activation)
+        self.agenda.put_back(activation)
 
     @invariant()
     def the_best_is_what_sorting_finds(self) -> None:
@@ -79,7 +79,7 @@ class AgendaMachine(RuleBasedStateMachine):
 
     @invariant()
     def what_was_taken_does_not_pile_up(self) -> None:
-        assert all(len(heap) <= 2 * len(self.model) + 40 for heap in self.agenda._heaps)
+        assert all(len(queues) <= 2 * len(self.model) + 40 for queues in self.agenda._levels)
 
 
 TestAgenda = AgendaMachine.TestCase
@@ -93,4 +93,16 @@ def test_a_long_life_leaves_nothing_behind() -> None:
         activation = Activation(number, EXPERTS[number % 6], Posted(entry), 0.5, 1)
         agenda.add(activation)
         agenda.take(activation)
-    assert len(agenda) == 0 and not agenda._by_entry and sum(len(heap) for heap in agenda._heaps) < 100
+    assert len(agenda) == 0 and not agenda._by_entry and sum(map(len, agenda._levels)) < 100
+
+
+def test_ratings_that_nobody_gives_any_more_leave_nothing_behind() -> None:
+    """One is better than all others, which come and go, each with a rating of its own."""
+    agenda = Agenda()
+    agenda.add(Activation(1, EXPERTS[0], Posted(Entry("Note-1", 0, Note("a"), "user", 0)), 1.0, 1))
+    for number in range(2, 2000):
+        entry = Entry(f"Note-{number}", 0, Note("a"), "user", 0)
+        activation = Activation(number, EXPERTS[0], Posted(entry), 1.0 / number, 1)
+        agenda.add(activation)
+        agenda.take(activation)
+    assert len(agenda) == 1 and sum(map(len, agenda._levels)) < 40

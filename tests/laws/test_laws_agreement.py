@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.agreement import agreement, coverage
-from knowledge_sources.methods.chamfer import chamfer_maps, chamfer_score, sample_lines
+from knowledge_sources.methods.chamfer import chamfer_maps, chamfer_scores
+from knowledge_sources.methods.vantage import sample_lines
 from knowledge_sources.methods.views import view_quality
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
@@ -83,11 +84,15 @@ def test_the_right_pose_is_unlikely_by_chance_and_clutter_is_not(seed: int) -> N
 def test_the_true_pose_scores_best_by_chamfer(seed: int, turn: float) -> None:
     lines, here = model_lines(seed), Pose2(0.0, 0.0, 0.0)
     seen = projected(lines, here)
-    maps = chamfer_maps(seen[~np.isnan(seen).any(axis=(1, 2))], CAMERA.width, CAMERA.height)
-    points, directions = sample_lines(lines)
+    maps = chamfer_maps(seen[~np.isnan(seen).any(axis=(1, 2))], CAMERA)
+    points, directions, _ = sample_lines(lines)
+    everything = np.array([0, len(points)]), np.arange(len(points)), np.zeros(1, np.int64)
 
     def score(pose: Pose2) -> float:
-        return chamfer_score(maps, CAMERA, MOUNT.camera_from_robot @ pose.lifted().inverse(), points, directions)
+        at = np.array([[pose.x_m, pose.y_m, pose.heading_rad]])
+        near, chance, count = chamfer_scores(
+            maps, CAMERA, MOUNT.camera_from_robot, at, points, directions, *everything)[0]
+        return float((near - chance) / (count + 10.0))
 
     best = score(here)
     assert 0.0 <= best <= 1.0

@@ -10,7 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.correlation import corner_strength, correlate, extract_template, self_correlation
+from knowledge_sources.methods.correlation import (
+    corner_strengths,
+    correlate,
+    extract_template,
+    rival,
+    self_correlation,
+)
 
 SIZE = 96
 few = settings(deadline=None, max_examples=25)
@@ -123,7 +129,7 @@ def test_along_an_edge_the_position_is_not_known(angle: float, offset: float) ->
     assert values[1] > 1.0
     assert abs(axes[:, 0] @ normal) > 0.95
     assert found.distinctiveness < 0.1
-    assert corner_strength(image, middle(), 10) < 2.0
+    assert corner_strengths(image, middle(), 10)[0] < 2.0
 
 
 @few
@@ -135,7 +141,7 @@ def test_a_corner_is_known_both_ways_and_stands_alone(seed: int) -> None:
     found = self_correlation(image + 2.0 * rng.standard_normal(image.shape), middle(), 10, 8.0)
     assert found.sigma_px < 0.1
     assert found.distinctiveness > 0.2
-    assert corner_strength(image, middle(), 10) > 8.0
+    assert corner_strengths(image, middle(), 10)[0] > 8.0
 
 
 @few
@@ -187,3 +193,35 @@ def test_a_blank_wall_is_known_nowhere(search: float) -> None:
         assert found.peak < 0.5
         sigmas.append(found.sigma_px)
     assert np.quantile(sigmas, 0.1) > 0.25 * search
+
+
+@few
+@given(seeds, st.integers(-20, 20), st.integers(-20, 20))
+def test_the_rival_of_a_patch_is_the_second_peak_of_its_own_correlation(seed: int, du: int, dv: int) -> None:
+    image, place = pattern(seed), middle((du, dv))
+    assert rival(image, place, 8, 12.0) == pytest.approx(self_correlation(image, place, 8, 12.0).second_peak, abs=1e-3)
+
+
+@few
+@given(st.integers(6, 12), st.floats(0.0, 5.0))
+def test_a_repeated_pattern_has_a_rival_once_its_period_is_in_the_window(period: int, phase: float) -> None:
+    v, u = np.mgrid[0:SIZE, 0:SIZE]
+    image = 128.0 + 50.0 * np.cos(2 * np.pi * (u + phase) / period) * np.cos(2 * np.pi * v / 17.0)
+    assert rival(image, middle(), 10, period + 2.0) > 0.95
+    assert rival(image, middle(), 10, period / 2.0 - 0.6) < 0.95
+
+
+@few
+@given(seeds)
+def test_corner_strength_is_the_same_turned_mirrored_and_negated(seed: int) -> None:
+    image, places = pattern(seed), np.array([[30.0, 41.0], [48.0, 48.0], [60.0, 33.0]])
+    expected = corner_strengths(image, places, 9)
+    turned = corner_strengths(np.ascontiguousarray(image.T), places[:, ::-1], 9)
+    mirrored = corner_strengths(np.ascontiguousarray(image[:, ::-1]), np.abs(places - (SIZE - 1, 0)), 9)
+    for other in (turned, mirrored, corner_strengths(255.0 - image, places, 9)):
+        np.testing.assert_allclose(other, expected, rtol=1e-9)
+
+
+def test_corner_strength_asks_for_patches_inside_the_image() -> None:
+    with pytest.raises(ValueError, match="expected patches of half-width 10 inside the image"):
+        corner_strengths(pattern(0), [[5.0, 40.0]], 10)

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.location import Location, Verdict, locate
-from knowledge_sources.methods.matching_space import SpaceMatch, match_in_space
+from knowledge_sources.methods.matching_posed import PosedMatch
+from knowledge_sources.methods.matching_space import match_in_space
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -52,7 +53,7 @@ def apart(found: Pose, other: Pose) -> float:
     return max(float(shift), 10.0 * found.angle_to(other))
 
 
-def matched(lines: Array, data: Array, prior: Pose) -> SpaceMatch:
+def matched(lines: Array, data: Array, prior: Pose) -> PosedMatch:
     return match_in_space(lines, data, CAMERA, prior, SPREAD)
 
 

@@ -157,6 +157,7 @@ def test_every_revision_can_be_read_back_from_the_archive(program: list[Rule]) -
         with Archive(Path(folder) / "journal.jsonl") as archive:
             for _ in range(8):
                 run(scheduler, 3)
+                journal.flush()
                 for ref, record in told.items():
                     found = archive.read(ref)
                     assert found is not None and {k: v for k, v in found.items() if k != "change"} == record

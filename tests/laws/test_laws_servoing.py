@@ -139,7 +139,9 @@ class ServoMachine(RuleBasedStateMachine):
             assert not isinstance(change, Retracted)
             self.found[change.entry.ref] = change.entry.value
         for change in decision.made:
-            if change.entry.author == "escalator" and isinstance(change, Posted):
+            if change.entry.author == "escalator" and isinstance(change, Posted) and isinstance(
+                change.entry.value, Discrepancy
+            ):
                 (reason,) = change.entry.because
                 closed = self.found[reason]
                 assert closed.status == "escalated" and closed.magnitude > closed.bound

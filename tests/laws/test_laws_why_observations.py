@@ -19,7 +19,7 @@ from blackboard.journal import change_record, plain
 from harvey.again.observations import effect_of, value_of
 from harvey.errors import BadInput
 from harvey.records import EntryRecord
-from world_models.body import Frame, MotionReport
+from world_models.body import Frame, MotionReport, RideReport
 from world_models.task import Command, Outcome
 
 numbers = st.floats(allow_nan=False) | st.integers(-3, 3)
@@ -27,6 +27,7 @@ headings = st.floats(-7.0, 7.0)
 covariances = st.tuples(*[st.tuples(numbers, numbers, numbers)] * 3)
 observations = st.one_of(
     st.builds(MotionReport, numbers, numbers, numbers, numbers),
+    st.builds(RideReport, st.text(max_size=5), st.text(max_size=5), numbers, numbers),
     st.builds(Frame, st.binary(max_size=20), st.integers(0, 9), numbers, st.text(max_size=5)),
     st.builds(Command, st.text(max_size=9), headings, st.none() | headings, covariances),
     st.builds(Quiescence, st.integers(0, 10**6)),

@@ -25,7 +25,7 @@ from harvey.explain.journal import JournalHistory
 from harvey.explain.links import reason
 from harvey.explain.milestone import milestone_story, milestones
 from harvey.explain.reach import check
-from harvey.explain.story import lines_of, story
+from harvey.explain.story import decided, lines_of, story
 from harvey.explain.why_not import in_cycle
 from harvey.minds import mind_of
 from harvey.run_head import RunHead
@@ -106,6 +106,18 @@ def test_a_motion_is_told_in_one_sentence_down_to_segments_and_model(history: Hi
     assert len(tracked) >= 5
     assert [h for h in tracked if "line to follow" in h and "match" in h and not MOTION.match(h)] == []
     assert sum(MOTION.match(h) is not None for h in tracked) >= 5
+
+
+def test_the_time_that_is_told_is_the_newest_that_was_observed(history: History) -> None:
+    """Also where a decision rests on an older picture than the last."""
+    now, told = None, 0
+    for decision in history.decisions():
+        times = [r.value["sim_time_s"] for r in decision.observed if r.type in ("Frame", "MotionReport")]
+        now = times[-1] if times else now
+        for made in decision.made if now is not None else ():
+            assert f", {now:.1f} s into the run," in decided(history, made)
+            told += 1
+    assert told > 100
 
 
 def test_the_numbers_of_a_story_are_those_of_the_entries(history: History) -> None:

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from harvey.experiments import corridor, figure12, matcher
+from harvey.experiments import corridor, figure12, matcher, trials
 from harvey.experiments.corridor_data import FOLDER, load_corridor
 from harvey.experiments.report import Report
 
+PNG = b"\x89PNG"
 needs_photographs = pytest.mark.skipif(
     not (FOLDER / "corridor.json").is_file(), reason="the corridor photographs are not beside the repository"
 )
+
+
+@pytest.fixture(autouse=True)
+def kept_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Pictures go to a folder of the test's own."""
+    monkeypatch.setattr(trials, "RUNS", tmp_path)
+
+
+def here(work: Callable[[Any], Any], jobs: Sequence[Any], *_: Any) -> list[Any]:
+    """In this process, nothing kept."""
+    return [work(job) for job in jobs]
 
 
 def failing(report: Report) -> list[str]:
@@ -28,11 +42,12 @@ def test_figure_12_falls_at_each_step_and_ends_where_the_figure_does() -> None:
     assert failing(report) == []
 
 
-def test_the_matcher_keeps_to_the_truth_as_problems_grow() -> None:
+def test_the_matcher_keeps_to_the_truth_as_problems_grow(tmp_path: Path) -> None:
     """Whatever else the machine does: times are not asserted."""
     report = matcher.run(quick=True, seed=0, trials=3)
     assert [row[0] for row in report.rows] == [f"{m} model x {k} data lines" for m, k in matcher.SIZES]
     assert [claim for claim in failing(report) if "median" not in claim] == []
+    assert (tmp_path / "experiments" / "matcher" / "quick-0" / "growth.png").read_bytes().startswith(PNG)
 
 
 def test_the_matcher_s_figures_come_from_the_seed() -> None:
@@ -45,8 +60,11 @@ def test_the_matcher_s_figures_come_from_the_seed() -> None:
 
 
 @needs_photographs
-def test_poses_in_the_photographs_come_back() -> None:
+def test_poses_in_the_photographs_come_back(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(corridor, "found_by_all", here)
     assert failing(corridor.run(quick=True, seed=0, seeds=1)) == []
+    pictures = sorted((tmp_path / "experiments" / "corridor" / "quick-0").glob("frame-*.png"))
+    assert len(pictures) == 6 and all(picture.read_bytes().startswith(PNG) for picture in pictures)
 
 
 def test_without_photographs_the_report_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

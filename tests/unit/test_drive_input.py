@@ -41,6 +41,21 @@ def test_a_missions_file_is_read_and_options_go_before_it() -> None:
     assert mission.calibration == FLAT / "camera.toml"
 
 
+@pytest.mark.parametrize(("goal", "told"), [
+    ("Go from the hall to the kitchen", "from (hall"),
+    ("Bring this from the hall to the cellar", "no room of flat answers to 'the cellar'"),
+    ("(ptrans (hall (4,3,0)) (attic (6,5,0)))", "got 'attic'"),
+])
+def test_a_goal_may_be_said_in_words_and_is_understood_before_anything_moves(
+    goal: str, told: str, tmp_path: Path
+) -> None:
+    (tmp_path / "camera.toml").write_text(camera_text(Camera.from_field_of_view(1.1), CameraMount(0.7)))
+    mission = load_mission(FLAT / "mission.toml", {"goal": goal, "camera.calibration": str(tmp_path / "camera.toml")})
+    with DryRun(mission, tmp_path / "run", lambda: 0.0) as dry:
+        found = next(check for check in dry.run() if check.what == "goal")
+    assert told in found.found and found.ok == told.startswith("from")
+
+
 @pytest.mark.parametrize(("text", "told"), [
     ('goal = "here"\nworld = "flat.toml"', "m.toml:1: goal"),
     (f'goal = "{GOAL}"', "expected the key 'world'"),

@@ -7,7 +7,7 @@ import pytest
 
 from blackboard.journal import Decision, decision_line, decision_record
 from logs import disk
-from logs.journal_file import JournalError, JournalFile, read_journal
+from logs.journal_file import HELD_LINES, JournalError, JournalFile, is_acted_on, read_journal
 from rehearsal import play
 from world_models.body import Look, MotorCommand
 
@@ -27,11 +27,44 @@ def test_every_decision_comes_back(tmp_path: Path, forced: bool) -> None:
     assert list(read_journal(tmp_path / "journal.jsonl")) == [decision_record(d) for d in decisions]
 
 
-def test_a_line_is_in_the_file_before_the_next_sink_is_told(tmp_path: Path) -> None:
+def test_what_is_not_in_the_file_follows_from_what_is(tmp_path: Path) -> None:
+    """Held back are only decisions after the last that took up an observation, or on which a port acts."""
     path = tmp_path / "journal.jsonl"
-    seen: list[bool] = []
-    play([JournalFile(path), lambda d: seen.append(path.read_text().splitlines()[-1] == decision_line(d))])
-    assert seen and all(seen)
+    decisions: list[Decision] = []
+    held: list[int] = []
+
+    def sink(decision: Decision) -> None:
+        decisions.append(decision)
+        there = path.read_text().splitlines()
+        assert there == [decision_line(d) for d in decisions[: len(there)]]
+        late = decisions[len(there):]
+        assert not any(d.observed or is_acted_on(d) for d in late)
+        held.append(len(late))
+
+    play([JournalFile(path), sink])
+    assert 0 < max(held) < HELD_LINES and 0 in held
+
+
+def test_what_is_held_back_is_not_much(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    journal, decisions = JournalFile(path, forced=lambda _decision: False), []
+    play([decisions.append])
+    silent = decisions[0]._replace(observed=())
+    for number in range(1, 3 * HELD_LINES + 2):
+        journal(silent._replace(cycle=number))
+        assert len(path.read_bytes().splitlines()) == number // HELD_LINES * HELD_LINES
+    journal.close()
+    assert [d["cycle"] for d in read_journal(path)] == list(range(1, 3 * HELD_LINES + 2))
+
+
+def test_what_is_drawn_is_told_in_the_words_of_the_journal(tmp_path: Path) -> None:
+    """Whoever asks for a line gets it, and the file has the same lines in the same order."""
+    path = tmp_path / "journal.jsonl"
+    journal = JournalFile(path)
+    drawn: list[str] = []
+    play([journal, lambda decision: drawn.append(journal.line(decision))])
+    journal.close()
+    assert path.read_text().splitlines() == drawn
 
 
 def test_the_remembered_line_is_that_of_the_decision(tmp_path: Path) -> None:

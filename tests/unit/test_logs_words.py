@@ -3,7 +3,8 @@
 from blackboard.board import Blackboard
 from blackboard.effect import Post
 from blackboard.journal import Decision
-from logs.deeds import Deeds
+from harvey.wiring import knowledge_sources, robot_model
+from logs.deeds import TELLERS, Deeds
 from logs.loggers.decisions import COLUMNS, log_level, row, sentence
 from logs.loggers.sketch_tree import NO_SKETCH, outline
 from logs.loggers.why import story
@@ -11,7 +12,9 @@ from logs.mirror import Mirror
 from logs.mood import mood
 from logs.words import numerous
 from rehearsal import play
+from sim.scenario import load_scenario
 from world_models.body import BodyFault, Recovery
+from world_models.location import Hypothesis
 
 
 def played(until: str = "") -> tuple[list[Decision], Mirror]:
@@ -51,6 +54,12 @@ def test_every_type_on_the_board_has_its_words() -> None:
     for decision in played()[0]:
         for change in decision.made:
             assert not deeds.tell(change).startswith(("posted ", "revised "))
+
+
+def test_whatever_an_expert_may_write_has_its_words() -> None:
+    robot = robot_model(load_scenario("lab-to-allens-office"))
+    written = {kind for expert in knowledge_sources(robot) for kind in expert.writes}
+    assert len(written) > 10 and written <= {*TELLERS, Hypothesis}
 
 
 def faulty(status: str) -> Mirror:

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from harvey.cli import main
+from harvey.experiments.imported_building import drawn
+from harvey.experiments.imported_floors import pairs_of
 from world_models.importers import BuildingError, Imported, import_building
 from world_models.importers.cuts import door_between, wide_opening
 from world_models.importers.outlines import apart, cleaned, facing, squared
@@ -105,6 +107,27 @@ def test_a_wheeled_robot_changes_floors_of_the_university_by_elevator(university
     route = world.route("room1-deans-office", "restroom4")
     assert route is not None
     assert [world.passage(s.passage.name) for s in route.steps if s.passage.name.startswith("elevator")]
+
+
+@no_gml
+def test_between_floors_of_the_university_only_stairs_are_not_for_wheels(university: tuple[Imported, World]) -> None:
+    world = university[1]
+    pairs = pairs_of(world, university[0].network)
+    assert len(pairs) == 166 and all(pair.walked and pair.length_m for pair in pairs)
+    assert sum(pair.driven is not None for pair in pairs) == 63
+    assert world.walk("corridor3", "corridor2") is not None and world.route("corridor3", "corridor2") is None
+    lifts = [pair for pair in pairs if pair.driven and any("elevator" in room for room in pair.driven)]
+    assert len(lifts) == 63, "nothing but an elevator joins floors on wheels"
+
+
+@no_ifc
+def test_errands_in_the_duplex_are_between_rooms_that_wheels_can_reach(duplex: tuple[Imported, World]) -> None:
+    world = duplex[1]
+    errands = list(drawn(world, 50, 0))
+    assert [e.number for e in errands] == list(range(50)) and errands == list(drawn(world, 50, 0))
+    assert all(e.origin != e.destination and world.route(e.origin, e.destination) for e in errands)
+    rooms = {room for e in errands for room in (e.origin, e.destination)}
+    assert not rooms & {"a105-stair", "b105-room", "r301-roof"} and len(rooms) == 18
 
 
 def test_touching_rooms_are_put_apart_and_opened() -> None:

@@ -1,7 +1,10 @@
 """The inner loops of the pose family, compiled: descents on one set of lines, and many subsets at once.
 
 What each computes is said in plain numpy in `image_error` and `plane_error`, and the tests hold the two together.
-Jitted functions of this file call only one another, because numba's cache does not follow calls into other files.
+Jitted functions of this file call only one another: numba's cache looks at a function's own file, so that after a
+change in another file, into which it calls, the old result goes on being used, and nothing says so (tried with numba
+0.68). Hence one long file, from above to below: the lines made ready, six unknowns, subsets, the floor's three
+unknowns, normal equations, algebra.
 
 ``lines`` is :attr:`LineSet.arrays`. Rotations R (3, 3) and translations T (3,) are ``camera_from_world``; steps are
 left perturbations (turn, shift) (6,).

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,16 @@ from world_models.frames import Pose
 
 MEDIAN_CHI2_2 = 1.386
 """Median of the chi-squared law with two degrees of freedom: a line has two residuals."""
+MOST_WRONG = 0.45
+"""Share of wrong lines up to which the median is to hold."""
+TIE = -2.0 * math.log(1.0 - 0.5 / (1.0 - MOST_WRONG))
+"""Medians up to this are no evidence either way: where so many lines are wrong, the median of all is a high quantile of
+the right ones' chi-squared law (1 - exp(-x / 2))."""
 SUBSET = 3
 CONCENTRATED = 16
 """So many of the best candidates are solved again on the lines that fit them best."""
+ROUNDS = 6
+"""So often, at most, lines are taken out or back and the pose is solved for again."""
 LEAST_SCALE = 0.3
 """Lines that agree better than this share of ``sigma_px`` do not make others outliers."""
 
@@ -42,7 +50,9 @@ def med_r_and_t(
     """The pose of the subset with the least median squared error, then the rest without the outliers.
 
     Source: §6.2.4, E_m, steps 1-4. Each subset is solved by R and T; the errors whose median is taken are measured
-    in the image, in units of ``sigma_px``, where they are alike for near and far lines. Holds to about 45 % outliers.
+    in the image, in units of ``sigma_px``, where they are alike for near and far lines. Medians that this noise cannot
+    tell apart are ties, and step 3's threshold decides between them: the pose under which more lines stay. Holds to
+    about 45 % outliers.
 
     Args:
         landmark_ids: n hashable names: the landmark version (3-landmark subsets). ``None``: the line version.
@@ -56,9 +66,11 @@ def med_r_and_t(
         return r_and_t_ml(model_lines_world, segments_px, camera, prior, sigma_px=sigma_px)
     turns, shifts = with_concentrated(lines, *candidates)
     errors = squared_distances(lines, turns, shifts)
-    best = int(np.argmin(np.median(errors, axis=1)))
-    scale = _robust_scale(float(np.median(errors[best])), len(lines))
-    bound = 2.0 * (cutoff * scale) ** 2
+    medians = np.median(errors, axis=1)
+    least = float(medians.min())
+    bound = 2.0 * (cutoff * _robust_scale(least, len(lines))) ** 2
+    tied = np.flatnonzero(medians <= max(least, TIE))
+    best = int(tied[np.argmin(np.minimum(errors[tied], bound).sum(axis=1))])
     return refined_on(lines, prior, (turns[best], shifts[best]), errors[best] <= bound, bound)
 
 
@@ -90,14 +102,22 @@ def subset_candidates(
 
 
 def refined_on(lines: LineSet, prior: Pose, start: PoseState, near: Mask, bound: float) -> PoseEstimate:
-    """R and T, with the likelihood's finish, on the lines kept; reasons for the others (§6.2.4, steps 3 and 4)."""
+    """R and T, with the likelihood's finish, on the lines kept; reasons for the others (§6.2.4, steps 3 and 4).
+
+    Both steps again while the pose so found keeps other lines: what a subset's noise had put too far may come back.
+    """
     near = near & (lines.lengths_px > 1e-9)
     if int(np.count_nonzero(near)) < SUBSET:
         return prior_estimate(lines, prior, NO_SUBSET)
-    end, reason = likeliest(lines.take(near), prior, start=start)
-    rotation, translation = end.state
-    errors = squared_distances(lines, rotation, translation)
-    rejected = reasons(lines, rotation, translation, near & (errors <= 2.0 * bound))
+    for _ in range(ROUNDS):
+        end, reason = likeliest(lines.take(near), prior, start=start)
+        start = rotation, translation = end.state
+        fine = squared_distances(lines, rotation, translation) <= bound
+        rejected = reasons(lines, rotation, translation, fine)
+        again = np.array([r is None for r in rejected], bool)
+        if np.array_equal(again, near) or int(np.count_nonzero(again)) < SUBSET:
+            break
+        near = again
     covariance = information_inverse(end.normal.hessian)
     estimate = estimate_at(
         lines, rotation, translation, covariance, rejected, end.normal.cost, end.iterations, reason

@@ -1,0 +1,50 @@
+"""The plan of a world as a picture (PNG)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from world_models.plan_view import GROUND, Shape, plan_of
+from world_models.world import World
+
+DOTS_A_METRE, MOST_DOTS = 30.0, 6000.0
+LOOKS: Mapping[str, tuple[str, str]] = {
+    "room": ("#f7f4ea", "#222222"), "outdoors": ("#b9cf9d", "#3c5a2c"), "obstacle": ("#c9a676", "#5b4327"),
+    "board": ("#6d8fb3", "#34516f"), "paving": ("#e3ded0", "#8a8678"), "doorway": ("#bfe3b4", "#3c7a2c"),
+}
+"""Face and edge of each kind of surface."""
+LINES: Mapping[str, tuple[str, float]] = {"leaf": ("#8c1d1d", 2.4), "axis": ("#b03030", 1.0)}
+
+
+def draw_plan(world: World, out: Path) -> None:
+    """Write the plan as a PNG. Raises OSError."""
+    from matplotlib.figure import Figure
+
+    plan = plan_of(world)
+    scale = min(DOTS_A_METRE, MOST_DOTS / float(plan.size.max()))
+    figure = Figure(figsize=(plan.size[0] * scale / 100.0, plan.size[1] * scale / 100.0), dpi=100, facecolor=GROUND)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_xlim(0.0, plan.size[0])
+    axes.set_ylim(0.0, plan.size[1])
+    axes.set_axis_off()
+    for order, shape in enumerate(plan.shapes):
+        x, y = shape.points.T
+        if shape.kind in LOOKS:
+            face, edge = LOOKS[shape.kind]
+            axes.fill(x, y, facecolor=face, edgecolor=edge, linewidth=0.8, zorder=order)
+        elif shape.kind in LINES:
+            colour, width = LINES[shape.kind]
+            axes.plot(x, y, color=colour, linewidth=width, zorder=order)
+        elif shape.kind == "link":
+            axes.plot(x, y, "o", color="#7d4fa3", markersize=5, zorder=order)
+        else:
+            bold = shape.kind == "title"
+            axes.text(x[0], y[0], shape.text, ha="center", va="center", color="white" if bold else "#222222",
+                      fontsize=_points(shape, scale), fontweight="bold" if bold else "normal", zorder=order)
+    figure.savefig(out, format="png")
+
+
+def _points(shape: Shape, scale: float) -> float:
+    """Size of letters: a third of a metre high."""
+    return (0.7 if shape.kind == "title" else 0.42) * scale * 72.0 / 100.0

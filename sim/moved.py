@@ -1,0 +1,57 @@
+"""Things that somebody has moved: they are in the building, but not where the model has them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.faces import Face
+from world_models.regions import Region
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """One of a scenario's ``[[moved]]``.
+
+    Attributes:
+        thing: its name, as "hallway/fire-hose".
+        x_m, y_m: how far it was moved in the world frame [m].
+    """
+
+    thing: str
+    x_m: float = 0.0
+    y_m: float = 0.0
+
+
+def with_moved(faces: Sequence[Face], moved: Sequence[Moved]) -> tuple[Face, ...]:
+    """The faces of a building in which things stand elsewhere.
+
+    Raises:
+        ValueError: there is no such thing.
+    """
+    for thing in moved:
+        if not any(_is_of(face, thing) for face in faces):
+            raise ValueError(f"expected a thing of the building, as locale/name, got {thing.thing!r}")
+    return tuple(_put(face, [thing for thing in moved if _is_of(face, thing)]) for face in faces)
+
+
+def _is_of(face: Face, moved: Moved) -> bool:
+    return face.name == moved.thing or face.name.startswith(f"{moved.thing}/")
+
+
+def _put(face: Face, moved: Sequence[Moved]) -> Face:
+    if not moved:
+        return face
+    by_m = np.sum([(thing.x_m, thing.y_m, 0.0) for thing in moved], axis=0)
+    return replace(
+        face, polygon_world=face.polygon_world + by_m,
+        front=tuple(_shifted(region, by_m) for region in face.front),
+        back=tuple(_shifted(region, by_m) for region in face.back),
+    )
+
+
+def _shifted(region: Region, by_m: NDArray[np.float64]) -> Region:
+    return replace(region, polygon_world=region.polygon_world + by_m)
