@@ -18,14 +18,16 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import RAISED, Scheduler
 from harvey.wiring import command, knowledge_sources, robot_model
+from knowledge_sources.methods.conviction import CONVICTION
 from knowledge_sources.methods.lines import SIGMA_ACROSS_PX
+from knowledge_sources.methods.outlook import least_p_false, lookalike
 from knowledge_sources.methods.verification import LEAST_ACCOUNTED
 from knowledge_sources.methods.views import view_quality
 from knowledge_sources.milestone_selector import GOOD_PART, GOOD_RAD, LEAST_LINES
 from knowledge_sources.questions import held
 from sim.scenario import Scenario
 from world_models.body import MotionReport, MotorCommand, Ride, RideReport
-from world_models.location import Hypothesis, diagonal
+from world_models.location import Hypothesis, Place, diagonal
 from world_models.robot import RobotModel
 from world_models.task import Command, Milestone, Outcome, PlanSketch
 
@@ -46,7 +48,10 @@ class Prospect:
         look_heading_rad: in which direction [rad, world].
         landmarks: how many; lines: how many of their lines.
         sigma_m, sigma_rad: how well they will tell the place.
-        verdict: clear, weak or not testable.
+        p_false: probability of a wrong place that would be stated if all were seen where it is expected.
+        alike: another place of the same locale that looks like it, in words, or "".
+        verdict: clear; weak (it would not tell the place well, or not surely); ambiguous (another place looks like
+            it); or not testable (hardly anything of it is seen from the path).
     """
 
     what: str
@@ -59,6 +64,8 @@ class Prospect:
     sigma_m: float
     sigma_rad: float
     verdict: str
+    p_false: float = 0.0
+    alike: str = ""
 
 
 class Believer(KnowledgeSource):
@@ -128,11 +135,16 @@ def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Mile
     mount = robot.standing_in(belief.locale).mount
     quality = view_quality(lines, robot.camera, mount.camera_from_robot, pose, SIGMA_ACROSS_PX)
     sharp = quality.sigma_m <= GOOD_PART * _tolerance_m(view, milestone) and quality.sigma_rad <= GOOD_RAD
-    verdict = "clear" if sharp and len(lines) >= LEAST_LINES else "weak"
+    standing = robot.standing_in(belief.locale)
+    seen = len(lines) >= LEAST_ACCOUNTED
+    p_false = least_p_false(standing, pose, lines, np.array(diagonal(SEEN_M, SEEN_RAD))) if seen else 1.0
+    other = lookalike(standing, belief.locale, pose, lines) if seen else None
+    clear = sharp and len(lines) >= LEAST_LINES and p_false <= CONVICTION.accept
     return Prospect(
         milestone.what, belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m,
         milestone.look_heading_rad, len(milestone.landmarks), len(lines), quality.sigma_m, quality.sigma_rad,
-        verdict if len(lines) >= LEAST_ACCOUNTED else "not testable",
+        "not testable" if not seen else "ambiguous" if other is not None else "clear" if clear else "weak",
+        p_false, "" if other is None else str(Place.of_world(robot.world, belief.locale, other.x_m, other.y_m)),
     )
 
 

@@ -50,13 +50,15 @@ def several(results: Sequence[MissionResult]) -> str:
 
 def prospects(ahead: Sequence[Prospect]) -> str:
     """The milestones to come, one a row."""
-    columns = ("milestone", "in", "x m", "y m", "looking", "landmarks", "lines", "place mm", "heading deg", "verdict")
+    columns = ("milestone", "in", "x m", "y m", "looking", "landmarks", "lines", "place mm", "heading deg",
+               "p wrong", "verdict")
     return table(columns, [_prospect(p) for p in ahead])
 
 
 def _prospect(p: Prospect) -> tuple[str, ...]:
     return (p.what, p.locale, f"{p.x_m:.2f}", f"{p.y_m:.2f}", f"{math.degrees(p.look_heading_rad):.0f}",
-            str(p.landmarks), str(p.lines), f"{p.sigma_m * 1000:.1f}", f"{math.degrees(p.sigma_rad):.2f}", p.verdict)
+            str(p.landmarks), str(p.lines), f"{p.sigma_m * 1000:.1f}", f"{math.degrees(p.sigma_rad):.2f}",
+            f"{p.p_false:.1g}", f"{p.verdict}: {p.alike} looks like it" if p.alike else p.verdict)
 
 
 def _cells(r: MissionResult) -> tuple[str, ...]:

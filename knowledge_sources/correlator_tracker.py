@@ -202,7 +202,8 @@ class CorrelatorTracker(Expert):
         bounds = (action_px(self._robot, belief, points), PLAN_PX)
         found = Discrepancy(Level.ACTION, what, magnitude_px, bounds, "px")
         last = open_discrepancy(view, Level.ACTION)
-        yield Post(found, because) if last is None else Revise(last, found, because)
+        if last is None or not last.value.exceeds:  # what is beyond its bound already is not for landmarks to close
+            yield Post(found, because) if last is None else Revise(last, found, because)
 
     @staticmethod
     def _kept(old: Entry[Tracks] | None, tracks: Tracks, because: tuple[object, ...]) -> Effect:

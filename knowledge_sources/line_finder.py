@@ -19,7 +19,6 @@ from world_models.frames import frozen
 from world_models.percepts import Segments
 from world_models.robot import RobotModel
 
-
 LEAST_LENGTH_PX = 10.0
 """Shorter segments belong to what the model lacks more often than to what it has."""
 

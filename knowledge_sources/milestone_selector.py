@@ -77,7 +77,7 @@ class MilestoneSelector(Expert):
             yield from self._looked_for(None, check, task, belief)
         else:
             here = replace(waiting.value, look_heading_rad=self._heading(belief.value))
-            yield from self._looked_for(waiting, here, task, belief)
+            yield from self._looked_for(waiting, here, task, belief, _car_of(view.get(here.sketch), here.index))
 
     def _task(self, view: View) -> Entry[Any] | None:
         """What asks for a look now: a doubt, a milestone that is faced, or a sketch whose milestone is due."""
@@ -102,16 +102,17 @@ class MilestoneSelector(Expert):
         heading = self._direction(robot, s, pose, tried)
         milestone = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}", heading, tried=tried)
         if self._faces(belief.value, milestone):
-            yield from self._looked_for(None, milestone, sketch, belief)
+            yield from self._looked_for(None, milestone, sketch, belief, _car_of(sketch, s.at))
         else:
             yield Post(milestone, (sketch, belief))
 
     def _looked_for(
-        self, old: Entry[Milestone] | None, milestone: Milestone, task: Entry[Any], belief: Entry[Hypothesis]
+        self, old: Entry[Milestone] | None, milestone: Milestone, task: Entry[Any], belief: Entry[Hypothesis],
+        car: str = "",
     ) -> Iterable[Effect]:
-        """Predict the landmarks from the believed pose, and ask for the picture."""
+        """Predict the landmarks from the believed pose, but those in a car, and ask for the picture."""
         pose = belief.value.world_from_robot(self._robot.world)
-        expected = expectation(self._robot.standing_in(belief.value.locale), pose, milestone)
+        expected = expectation(self._robot.standing_in(belief.value.locale), pose, milestone, car)
         wish = Post(expected, (task, belief)) if old is None else Revise(old, expected, (task, belief))
         yield wish
         yield Post(Look("milestone"), (wish,))
@@ -120,7 +121,7 @@ class MilestoneSelector(Expert):
         before = sketch.subgoals[sketch.at - 1] if sketch.at else None
         headings = [h for h in self._candidates(sketch, pose)
                     if all(abs(wrap_angle(h - other)) > OTHERWISE_RAD for other in tried)]
-        return best_heading(robot, pose, headings, before.tolerance_m if before else 0.1)
+        return best_heading(robot, pose, headings, before.tolerance_m if before else 0.1, _car(sketch, sketch.at))
 
     def _candidates(self, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
         wanted = sketch.subgoals[sketch.at - 1].destination if sketch.at else None
@@ -139,6 +140,16 @@ class MilestoneSelector(Expert):
         return abs(wrap_angle(self._heading(belief) - milestone.look_heading_rad)) <= FACING_RAD
 
 
+def _car_of(sketch: Entry[PlanSketch] | None, index: int) -> str:
+    return "" if sketch is None else _car(sketch.value, index)
+
+
+def _car(sketch: PlanSketch, index: int) -> str:
+    """The elevator's car in which the subgoal before a milestone ends, after a ride: it looks alike on every floor."""
+    before = sketch.subgoals[index - 1] if index > 0 else None
+    return before.destination.locale if before is not None and before.passage and not before.primitive else ""
+
+
 def _tried(view: View, sketch: Entry[PlanSketch]) -> tuple[float, ...]:
     """From where the sketch's milestone was looked for just now, in vain but without a doubt about the place."""
     last = view.latest(Milestone)
@@ -148,11 +159,13 @@ def _tried(view: View, sketch: Entry[PlanSketch]) -> tuple[float, ...]:
     return (*m.tried, m.look_heading_rad) if (m.sketch, m.index) == (sketch.id, sketch.value.at) else ()
 
 
-def best_heading(robot: RobotModel, pose: Pose2, headings: Iterable[float], tolerance_m: float) -> float:
+def best_heading(
+    robot: RobotModel, pose: Pose2, headings: Iterable[float], tolerance_m: float, car: str = ""
+) -> float:
     """The first heading from which the view is good enough for the tolerance, else the best [rad, world]."""
     rated: list[tuple[ViewQuality, float]] = []
     for heading in headings:
-        quality = _quality(robot, Pose2(pose.x_m, pose.y_m, heading))
+        quality = _quality(robot, Pose2(pose.x_m, pose.y_m, heading), car)
         sharp = quality.sigma_m <= GOOD_PART * tolerance_m and quality.sigma_rad <= GOOD_RAD
         if sharp and quality.lines >= LEAST_LINES:
             return heading
@@ -161,9 +174,9 @@ def best_heading(robot: RobotModel, pose: Pose2, headings: Iterable[float], tole
     return rated[best][1]
 
 
-def expectation(robot: RobotModel, pose: Pose2, milestone: Milestone) -> Milestone:
-    """The milestone with what should be seen from a pose."""
-    lines = _seen_from(robot, pose)
+def expectation(robot: RobotModel, pose: Pose2, milestone: Milestone, car: str = "") -> Milestone:
+    """The milestone with what should be seen from a pose; in an elevator's car, what is seen out of it."""
+    lines = _seen_from(robot, pose, car)
     marks = sorted({int(i) for i in lines.landmark})
     return replace(
         milestone,
@@ -176,18 +189,21 @@ def expectation(robot: RobotModel, pose: Pose2, milestone: Milestone) -> Milesto
     )
 
 
-def _quality(robot: RobotModel, pose: Pose2) -> ViewQuality:
+def _quality(robot: RobotModel, pose: Pose2, car: str) -> ViewQuality:
     return view_quality(
-        _seen_from(robot, pose).lines_world, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_ACROSS_PX
+        _seen_from(robot, pose, car).lines_world, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_ACROSS_PX
     )
 
 
-def _seen_from(robot: RobotModel, pose: Pose2) -> VisibleLines:
-    """The clearest of the lines that should be seen: long ones with contrast."""
+def _seen_from(robot: RobotModel, pose: Pose2, car: str = "") -> VisibleLines:
+    """The clearest of the lines that should be seen, long ones with contrast, but none of those in a car."""
     lines = visible_lines(
         robot.world, robot.camera, robot.camera_from_world(pose), min_length_px=LENGTH_PX, min_contrast=CONTRAST,
         max_distance_m=15.0,
     )
+    if car:
+        marks = robot.world.landmarks
+        lines = lines[np.array([car not in (marks[i].locale, marks[i].neighbour) for i in lines.landmark], bool)]
     if len(lines) <= LINES:
         return lines
     lengths = np.linalg.norm(lines.segments_px[:, 1] - lines.segments_px[:, 0], axis=1)

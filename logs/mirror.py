@@ -24,9 +24,11 @@ class Mirror:
         self._kept = kept
         self._by_type: dict[type[Any], dict[str, Entry[Any]]] = {}
         self._by_id: dict[str, Entry[Any]] = {}
+        self._answers: dict[Callable[[Mirror], Any], Any] = {}
 
     def take(self, change: Change) -> None:
         """Follow one change."""
+        self._answers.clear()
         entry = change.entry
         same = self._by_type.setdefault(type(entry.value), {})
         if isinstance(change, Retracted):
@@ -37,6 +39,13 @@ class Mirror:
             if len(same) > self._kept:
                 oldest = next(iter(same))
                 del same[oldest], self._by_id[oldest]
+
+    def ask(self, question: Callable[[Mirror], T]) -> T:
+        """The answer to a question about the board; until something changes it is worked out once."""
+        if question not in self._answers:
+            self._answers[question] = question(self)
+        answer: T = self._answers[question]
+        return answer
 
     def get(self, id: str) -> Entry[Any] | None:
         """The current revision of an entry, or None."""

@@ -14,7 +14,7 @@ from logs.errors import RecordingError
 
 APPLICATION = "harvey"
 
-FLUSH_CYCLES, LIVE_FLUSH_CYCLES = 64, 4
+FLUSH_CYCLES, LIVE_FLUSH_CYCLES = 128, 4
 """A crash loses at most so many cycles of the recording (the journal loses none, so they can be drawn again); whoever
 watches sees it so late."""
 

@@ -7,8 +7,8 @@ in = "house"
 at = [0, 0, {z}]
 size = [8, 2.6]
 walls = {walls}
-things = [ ["floor-{floor}", "north", 1.1], ["pillar", "north", {pillar}], ["notice-board", "south", 3.6],
-  ["picture", "west", 1.5], ["picture", "north", 4.9], ["hose-cabinet", "south", 5.6], ["white-board", "east", 1.2] ]
+things = [ ["floor-{floor}", "north", {sign}], ["pillar", "north", {pillar}], ["notice-board", "south", 3.6],
+  ["picture", "west", {sign}], ["picture", "north", 4.9], ["hose-cabinet", "south", 5.6], ["white-board", "east", 1.2] ]
 """
 WALLS = ('["sand", "brick", "cream", "sky"]', '["sage", "sky", "sand", "cream"]', '["sky", "sage", "cream", "brick"]')
 
@@ -26,7 +26,8 @@ def tower(floors: int = 2, *, storey_m: float = 3.6, turn_deg: float = 0.0, hall
             f'[locales.elevator]\nkind = "elevator"\nin = "house"\nat = [{hall_stop_m - 1.05!r}, -2.25]\n']
     for floor in range(1, floors + 1):
         z = (floor - 1) * storey_m
-        text.append(HALL.format(floor=floor, z=z, walls=WALLS[(floor - 1) % 3], pillar=2.4 + 0.5 * floor))
+        text.append(HALL.format(floor=floor, z=z, walls=WALLS[(floor - 1) % 3], pillar=2.4 + 0.5 * floor,
+                                sign=0.5 + 0.3 * floor))
         text.append(f'[locales.car-{floor}]\nkind = "landing"\nin = "elevator"\nat = [0, 0, {z}]\nsize = [2.1, 2.1]\n'
                     'height = 2.4\nwalls = "steel"\nmoulding = "none"\nfloor = "rubber"\n'
                     'things = [ ["panels", "west", 1.05], ["panels", "south", 1.05], ["panels", "east", 1.05] ]\n')

@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from harvey.again.reliving import interrupted_in
 from harvey.experiments.report import Cell, Report
+from harvey.experiments.short_missions import HALLWAY, OFFICE, fault
 from harvey.records import read_records
 from harvey.run_directory import RUNS
 
@@ -32,34 +33,12 @@ CYCLE_S = 0.06
 """A kill falls up to so long after a decision: about what a cycle takes."""
 RETELLING_S = 12.0
 """A kill of a process that resumes falls up to so long after its start."""
-OFFICE = """
-world = "research_center"
-details = ["research_center_details"]
-goal = "(ptrans (allens-office (7,4,0)) (allens-office (13,12,0)))"
-
-[start]
-heading_deg = 60.0
-put_down_sigma_m = 0.02
-put_down_sigma_deg = 1.0
-"""
-HALLWAY = """
-world = "research_center"
-details = ["research_center_details"]
-goal = "(ptrans (hallway (4,4,0)) (hallway (24,4,0)))"
-
-[start]
-heading_deg = 0.0
-put_down_sigma_in = 0.5
-"""
-BUMP = '\n[[faults]]\nkind = "bump"\nin_locale = "hallway"\nafter_ft = 7.0\nleft_m = 0.3\nturn_deg = 10.0\n'
-DARK = '\n[[faults]]\nkind = "lights_off"\nin_locale = "hallway"\nafter_ft = 5.0\nduration_s = 8.0\n'
-LINK = '\n[[faults]]\nkind = "link_lost"\nin_locale = "hallway"\nafter_ft = 6.0\nduration_s = 4.0\n'
 TEXTS: Mapping[str, str] = {
     "office": OFFICE,
     "hallway": HALLWAY,
-    "hallway, bumped": HALLWAY + BUMP,
-    "hallway, dark": HALLWAY + DARK,
-    "hallway, link lost": HALLWAY + LINK,
+    "hallway, bumped": HALLWAY + fault("bump", "hallway", 7.0, left_m=0.3, turn_deg=10.0),
+    "hallway, dark": HALLWAY + fault("lights_off", "hallway", 5.0, duration_s=8.0),
+    "hallway, link lost": HALLWAY + fault("link_lost", "hallway", 6.0, duration_s=4.0),
 }
 MAIN = "lab-to-allens-office"
 FULL: Mapping[str, int] = {"office": 100, "hallway": 30, "hallway, bumped": 30, "hallway, dark": 15,

@@ -15,7 +15,7 @@ from harvey.experiments.milestones import calibration_error, judged_on, reliabil
 from harvey.experiments.milestones_trials import Judged
 from harvey.experiments.report import Report
 from harvey.experiments.trials import campaign_folder
-from knowledge_sources.methods.conviction import CONVICTION, FITTED, TERMS, Conviction, fitted, terms
+from knowledge_sources.methods.conviction import CONVICTION, FITTED, TERMS, Conviction, Weights, fitted, unseen
 
 Floats = NDArray[np.float64]
 FIRST_FLOOR, FLOORS, EACH = 1000, 30, 180
@@ -36,29 +36,29 @@ def run(quick: bool, seed: int) -> Report:
     how = (f"{len(told)} cases of {floors} floors from {first} on: harvey experiment milestones-calibrate"
            f"{' --quick' if quick else ''} --seed {seed}")
     (folder / "conviction.toml").write_text(as_toml(found, how), encoding="utf-8")
-    rows = [(name, now, new) for name, now, new in zip(
-        (*TERMS, "bias", "accept up to", "refute from"),
-        (*CONVICTION.weights, CONVICTION.bias, CONVICTION.accept, CONVICTION.refute),
-        (*found.weights, found.bias, found.accept, found.refute), strict=True)]
+    weights = CONVICTION.seeing, found.seeing, CONVICTION.blind, found.blind
+    rows = list(zip((*TERMS, "bias"), *((*w.each, w.bias) for w in weights), strict=True))
+    rows += [("accept up to", CONVICTION.accept, found.accept, None, None),
+             ("refute from", CONVICTION.refute, found.refute, None, None)]
     error = calibration_error(reliability(told))
     return Report(
-        "What evidence for a milestone is worth", ("evidence", "in use", "fitted now"), tuple(rows),
+        "What evidence for a milestone is worth",
+        ("evidence", "in use", "fitted now", "lines alone: in use", "fitted now"), tuple(rows),
         notes=(
             f"From {how}.", f"With what is in use, stated and found differ by {error:.2%} on average over these cases.",
             f"To go by it: cp {folder / 'conviction.toml'} {FITTED.relative_to(FITTED.parents[2])}",
         ),
-        claims=(("no evidence speaks against a pose", min(found.weights) >= 0.0),),
+        claims=(("no evidence speaks against a pose", min(*found.seeing.each, *found.blind.each) >= 0.0),),
     )
 
 
 def conviction_of(told: Sequence[Judged]) -> Conviction:
     """The weights for what was judged, and the limits."""
     evidence, right = np.array([j.evidence for j in told]), np.array([not j.is_wrong for j in told])
-    weighed = fitted(evidence, right, CONVICTION.accept, CONVICTION.refute)
-    p = 1.0 / (1.0 + np.exp(np.clip(terms(evidence) @ np.array(weighed.weights) + weighed.bias, -700.0, 700.0)))
+    seeing, blind = fitted(evidence, right), fitted(unseen(evidence), right)
+    p = seeing.p_false(evidence)
     weight = np.where(right, 1.0 / max(1, right.sum()), 1.0 / max(1, (~right).sum()))
-    accept, refute = accept_limit(p, weight), refute_limit(p, weight)
-    return Conviction(weighed.weights, weighed.bias, accept, refute)
+    return Conviction(seeing, blind, accept_limit(p, weight), refute_limit(p, weight))
 
 
 def accept_limit(p: Floats, weight: Floats) -> float:
@@ -77,11 +77,15 @@ def refute_limit(p: Floats, weight: Floats) -> float:
 
 def as_toml(conviction: Conviction, how: str) -> str:
     """The file of weights, with how they were made."""
-    weights = "\n".join(f"{name} = {weight:.5f}" for name, weight in zip(TERMS, conviction.weights, strict=True))
     return (
         f"# What evidence for a pose is worth, in log odds; see conviction.py. Fitted on\n# {how}\n"
         f"# accept: below it lie {FALSE_ACCEPTS:.2%} of the wrong places; refute: above it {FALSE_REJECTS:.1%} of the"
-        f" right ones.\n"
-        f"bias = {conviction.bias:.5f}\naccept = {conviction.accept:.3g}\nrefute = {conviction.refute:.4g}\n\n"
-        f"[weights]\n{weights}\n"
+        f" right ones.\naccept = {conviction.accept:.3g}\nrefute = {conviction.refute:.4g}\n"
+        f"\n[seeing]   # lines and the colours of faces\n{_table(conviction.seeing)}"
+        f"\n[blind]   # lines alone, where no colours can be compared\n{_table(conviction.blind)}"
     )
+
+
+def _table(weights: Weights) -> str:
+    return "".join(f"{name} = {value:.5f}\n" for name, value in zip((*TERMS, "bias"), (*weights.each, weights.bias),
+                                                                  strict=True))

@@ -25,7 +25,7 @@ PAPER_SERVOED_X = (0.13, 0.13, 0.13, 0.13, 0.06, 0.0, -0.13, -0.13, -0.38, -0.25
 MOST_IN, RMS_IN = 0.38, 0.1
 """Servoed: the worst of the table, and what is asked of the root mean square."""
 DRIVES, ON_THE_MOVE = 1000, 40
-QUICK_DRIVES, QUICK_ON_THE_MOVE, QUICK_FEET = 3, 1, 8
+QUICK_DRIVES, QUICK_ON_THE_MOVE, QUICK_FEET = 2, 1, 6
 WORST = 5
 MOST_SEEDS = 10
 
@@ -133,7 +133,7 @@ def _drift_claim(drives: Sequence[Driven]) -> tuple[str, bool]:
 
 def _worst(drives: Sequence[Driven], folder: Path) -> list[str]:
     """The worst drives, made once more and kept as runs, so that they can be looked at and asked."""
-    order = sorted(drives, key=lambda d: -max(abs(x) for x in d.x_in))[: min(WORST, len(drives) // 2)]
+    order = sorted(drives, key=lambda d: -max(abs(x) for x in d.x_in))[: min(WORST, len(drives) // 10)]
     told = []
     for one in order:
         out = folder / f"seed-{one.seed}"

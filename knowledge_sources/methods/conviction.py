@@ -8,7 +8,6 @@ a mission it is so far less often, so that the probability is no smaller than it
 
 from __future__ import annotations
 
-import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,31 +29,52 @@ RIDGE = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Conviction:
+class Weights:
     """What evidence is worth.
 
     Attributes:
-        weights: of each term of the evidence (:data:`TERMS`), none negative.
+        each: of each term of the evidence (:data:`TERMS`), none negative.
         bias: log odds of a right pose with no evidence at all.
+    """
+
+    each: tuple[float, ...]
+    bias: float
+
+    def p_false(self, evidence: Floats) -> Floats:
+        """(n,) probability that the pose is wrong, of evidence (n, k)."""
+        odds = terms(evidence) @ np.array(self.each) + self.bias
+        return np.asarray(1.0 / (1.0 + np.exp(np.clip(odds, -700.0, 700.0))))
+
+    @staticmethod
+    def of_table(table: dict[str, Any]) -> Weights:
+        """As ``conviction.toml`` has them."""
+        return Weights(tuple(float(table[name]) for name in TERMS), float(table["bias"]))
+
+
+@dataclass(frozen=True, slots=True)
+class Conviction:
+    """How sure evidence makes.
+
+    Attributes:
+        seeing: weights where the colours of faces can be compared; blind: where only lines can.
         accept, refute: with p_false at most ``accept`` a pose is verified, from ``refute`` on it is refuted.
     """
 
-    weights: tuple[float, ...]
-    bias: float
+    seeing: Weights
+    blind: Weights
     accept: float
     refute: float
 
     def p_false(self, evidence: Evidence) -> float:
         """Probability that the pose is wrong."""
-        parts = terms(evidence.values[None])[0].tolist()
-        odds = self.bias + math.fsum(w * x for w, x in zip(self.weights, parts, strict=True))
-        return 1.0 / (1.0 + math.exp(min(max(odds, -700.0), 700.0)))
+        weights = self.seeing if evidence.faces_tested > 0.0 else self.blind
+        return float(weights.p_false(evidence.values[None])[0])
 
     @staticmethod
     def of_table(table: dict[str, Any]) -> Conviction:
         """As ``conviction.toml`` has it."""
-        weights = tuple(float(table["weights"][name]) for name in TERMS)
-        return Conviction(weights, float(table["bias"]), float(table["accept"]), float(table["refute"]))
+        return Conviction(Weights.of_table(table["seeing"]), Weights.of_table(table["blind"]),
+                          float(table["accept"]), float(table["refute"]))
 
 
 def terms(evidence: Floats) -> Floats:
@@ -68,7 +88,7 @@ CONVICTION = Conviction.of_table(tomllib.loads(FITTED.read_text("utf-8")))
 """As it was fitted."""
 
 
-def fitted(evidence: Floats, is_right: NDArray[np.bool_], accept: float, refute: float) -> Conviction:
+def fitted(evidence: Floats, is_right: NDArray[np.bool_]) -> Weights:
     """The weights under which what was seen (n, k) is likeliest, right and wrong places counting the same in all."""
     share = np.where(is_right, 0.5 / max(1, np.count_nonzero(is_right)), 0.5 / max(1, np.count_nonzero(~is_right)))
     sign = np.where(is_right, 1.0, -1.0)
@@ -84,4 +104,11 @@ def fitted(evidence: Floats, is_right: NDArray[np.bool_], accept: float, refute:
     bounds = [(0.0, None)] * len(TERMS) + [(None, None)]
     found = minimize(cost, np.zeros(rows.shape[1]), jac=True, bounds=bounds, method="L-BFGS-B",
                      options={"maxiter": 2000, "ftol": 1e-14, "gtol": 1e-9})
-    return Conviction(tuple(float(w) for w in found.x[:-1]), float(found.x[-1]), accept, refute)
+    return Weights(tuple(float(w) for w in found.x[:-1]), float(found.x[-1]))
+
+
+def unseen(evidence: Floats) -> Floats:
+    """The evidence (n, k) as it would be if no face could be compared."""
+    blind = evidence.copy()
+    blind[:, [NAMES.index("faces"), NAMES.index("faces_tested")]] = 0.0
+    return blind

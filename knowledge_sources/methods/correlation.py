@@ -15,12 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods import correlation_kernels as kernels
-from knowledge_sources.methods.correlation_align import located, second_best
+from knowledge_sources.methods.correlation_align import LOBE_PX, located, second_best
 from knowledge_sources.methods.images import checked_grey, noise_sigma
 
 _MARGIN_PX = 4
-_SAME_PX = 2
-"""Up to here from the best place, another local maximum is the same place."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,17 +164,20 @@ def rival(image: Any, centre_px: Any, half_px: int, search_px: float) -> float:
     """How well, -1 to 1, the patch round a centre (u, v), to the next pixel, correlates with the best other place.
 
     The quick form of :func:`self_correlation` for choosing landmarks.
+
+    Raises:
+        ValueError: the patch does not lie in the image.
     """
     pixels, centre = checked_grey(image), np.rint(np.asarray(centre_px, float))
     window = _window(pixels.shape, centre, search_px, half_px)
-    if window is None:
+    if window is None or not fits(pixels.shape, centre, half_px):
         raise ValueError(f"expected a patch of half-width {half_px} inside the image, got centre {centre_px!r}")
     u0, u1, v0, v1 = window
     view = np.ascontiguousarray(pixels[v0 - half_px : v1 + half_px + 1, u0 - half_px : u1 + half_px + 1], np.float32)
     row, column = int(centre[1]) - v0, int(centre[0]) - u0
     size = 2 * half_px + 1
     score = _scores(np.ascontiguousarray(view[row : row + size, column : column + size]), view)
-    return float(second_best(score, row, column, _SAME_PX, half_px // 2))
+    return float(second_best(score, row, column, LOBE_PX, half_px // 2))
 
 
 def self_correlation(image: Any, centre_px: Any, half_px: int, search_px: float) -> Correlation:

@@ -18,7 +18,7 @@ _DIRECTION_LEAK = 3e-4
 _FLOOR_PX = 0.02
 """What interpolation and rounding leave in a position [px]."""
 
-_LOBE_PX = 2
+LOBE_PX = 2
 """Up to here from the best place, another local maximum is the same place."""
 
 Place = tuple[float, float, float, float, float, float, float, bool]
@@ -51,7 +51,7 @@ def located(patch: Any, view: Any, score: Any, noise: float, search: float) -> P
     border = border or u < 0.0 or u > last_u or v < 0.0 or v > last_v
     if border:
         u, v, correlation = start_u, start_v, -1.0
-    second = second_best(score, row, column, _LOBE_PX, (patch.shape[0] - 3) // 4)
+    second = second_best(score, row, column, LOBE_PX, (patch.shape[0] - 3) // 4)
     return u, v, uu, uv, vv, max(float(score[row, column]), correlation), second, border
 
 

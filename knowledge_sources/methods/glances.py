@@ -15,6 +15,8 @@ from world_models.frames import Pose, Pose2, wrap_angle
 
 Floats = NDArray[np.float64]
 RIGHT = 0.5 * math.pi
+SEEN_RAD = math.radians(0.3)
+"""How well level lines tell a turn."""
 MOST_OFF_RAD = math.radians(20.0)
 """Motions say better than this which of four directions is meant."""
 
@@ -55,9 +57,16 @@ def squared(glances: Sequence[Glance], camera: Camera, camera_from_robot: Pose) 
             off = math.remainder(now - direction - pose.heading_rad, RIGHT)
             if abs(off) < MOST_OFF_RAD:
                 turned = Pose2(pose.x_m, pose.y_m, wrap_angle(pose.heading_rad + off))
-                glance = replace(glance, now_from_then=turned)
+                glance = replace(glance, now_from_then=turned, spread=_known_turn(glance.spread))
         out.append(glance)
     return (*out, glances[-1])
+
+
+def _known_turn(spread: Floats) -> Floats:
+    """The covariance (3, 3) once the turn is known from what is seen."""
+    out = np.zeros((3, 3))
+    out[:2, :2], out[2, 2] = spread[:2, :2], min(float(spread[2, 2]), SEEN_RAD**2)
+    return out
 
 
 def moved(now_from_then: Pose2, covariance: Floats, step: Pose2, spread: Floats) -> tuple[Pose2, Floats]:

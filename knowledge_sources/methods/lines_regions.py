@@ -41,7 +41,8 @@ def line_regions(smooth: NDArray[np.float32], least_gradient: float, least_lengt
         least_length_px: shorter segments are dropped [px].
     """
     places, units, strengths, index = _edge_pixels(smooth, float(least_gradient))
-    order = np.argsort(np.rint(-_LEVELS * strengths).astype(np.int16), kind="stable")  # sorted by radix
+    levels = np.rint(np.minimum(_LEVELS * strengths, 32767.0)).astype(np.int16)
+    order = np.argsort(-levels, kind="stable")  # whole numbers of two bytes are sorted by radix
     members, first = _grown(places, units, index, order, math.cos(TURN_RAD), GAP_PX)
     segments: NDArray[np.float64] = _segments(places, units, members, first, float(least_length_px))
     return segments

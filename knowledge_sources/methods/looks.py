@@ -43,7 +43,7 @@ DARK = 4.0
 """Grey levels that are added before a ratio is taken: noise in the dark is not a colour."""
 ALIKE_LEVEL, ALIKE_TINT = 0.3, 0.1
 """Logarithms of brightness and colour that differ less than this agree: faces are lit by as much more or less."""
-LEAST_FACES = 3
+LEAST_FACES, MOST_CHANCE = 3, 0.8
 CORNERS = 8
 """Regions of more corners are not probed."""
 WHITE = Finish((1.0, 1.0, 1.0))
@@ -65,8 +65,8 @@ class Probe:
 
     @property
     def is_testable(self) -> bool:
-        """Whether there was enough to compare with each other."""
-        return self.faces >= LEAST_FACES
+        """Whether there was enough to compare, and of different colours."""
+        return self.faces >= LEAST_FACES and self.chance <= MOST_CHANCE
 
 
 NOTHING = Probe(0, 0.0, 0.0)
@@ -132,6 +132,13 @@ def _at(image: NDArray[Any], parts: Floats) -> NDArray[Any]:
     return np.asarray(image[row, column])
 
 
+def imagined(looks: Sequence[Look]) -> Probe:
+    """The probe of a picture in which all is as the model says."""
+    if len(looks) < LEAST_FACES:
+        return NOTHING
+    return _told(meant := _logs(np.array([colour for colour, _ in looks])), meant)
+
+
 def _compared(seen: Floats, labels: NDArray[np.int32], face: NDArray[np.int64], colours: Floats) -> Probe:
     """From the colours (n, 3) and regions (n,) seen at points of faces (n,) that have these colours (f, 3)."""
     tested = [f for f in range(len(colours)) if np.count_nonzero(face == f) >= 2]
@@ -142,10 +149,18 @@ def _compared(seen: Floats, labels: NDArray[np.int32], face: NDArray[np.int64], 
         mine = np.flatnonzero(face == f)
         most = np.bincount(labels[mine]).argmax()
         own.append(np.median(seen[mine[labels[mine] == most]], axis=0))
-    had, meant = np.log(np.array(own) + DARK), np.log(255.0 * colours[tested] + DARK)
-    dealt = np.stack([np.roll(meant, shift, axis=0) for shift in range(len(tested))])
+    return _told(np.log(np.array(own) + DARK), _logs(colours[tested]))
+
+
+def _logs(colours: Floats) -> Floats:
+    return np.asarray(np.log(255.0 * colours + DARK))
+
+
+def _told(had: Floats, meant: Floats) -> Probe:
+    """From the logarithms of the colours (f, 3) that faces had, and that they should have."""
+    dealt = np.stack([np.roll(meant, shift, axis=0) for shift in range(len(meant))])
     alike = _alike(had - dealt)
-    return Probe(len(tested), float(alike[0]), float(np.mean(alike[1:])))
+    return Probe(len(meant), float(alike[0]), float(np.mean(alike[1:])))
 
 
 def _alike(ratios: Floats) -> Floats:

@@ -147,7 +147,10 @@ def _minimised(forms: Any) -> tuple[Any, Any]:
                 rest = forms[k, a, b]
                 for c in range(b):
                     rest -= factor[a, c] * factor[b, c]
-                factor[a, b] = math.sqrt(rest) if a == b and a < unknowns else rest / factor[b, b] if a > b else rest
+                if b < a:
+                    factor[a, b] = rest / factor[b, b]
+                else:
+                    factor[a, b] = math.sqrt(rest) if a < unknowns else rest
         errors[k] = max(factor[unknowns, unknowns], 0.0)
         for a in range(unknowns - 1, -1, -1):
             rest = -factor[unknowns, a]

@@ -115,9 +115,7 @@ def begin(robot: RobotModel, kept: tuple[Track, ...], frame: str, image: Image, 
         robot.world, robot.camera, camera_from_world, margin_px=HALF_PX + 4.0, min_contrast=0.08, max_distance_m=15.0
     )
     strength = corner_strengths(image, points.points_px, HALF_PX)
-    free = strength >= LEAST_CORNER
-    for track in kept:
-        free &= _apart(points.points_px, track.found_px or track.predicted_px)
+    free = (strength >= LEAST_CORNER) & _apart(points.points_px, [t.found_px or t.predicted_px for t in kept])
     new: list[Track] = []
     for i in np.argsort(-strength, kind="stable"):
         px, point = points.points_px[i], points.points_world[i]
@@ -143,8 +141,9 @@ def _predicted(
 
 
 def _apart(points_px: Floats, taken_px: Any) -> NDArray[np.bool_]:
-    """(n,) which points (n, 2) lie far enough from a landmark that is taken."""
-    return np.asarray(np.sum((points_px - taken_px) ** 2, axis=1) >= SPACING_PX**2)
+    """(n,) which points (n, 2) lie far enough from every landmark (k, 2) that is taken."""
+    away = points_px[:, None] - np.asarray(taken_px, float).reshape(-1, 2)
+    return np.asarray(np.all(away[..., 0] ** 2 + away[..., 1] ** 2 >= SPACING_PX**2, axis=1))
 
 
 def _updated(track: Track, predicted_px: Floats, found: Correlation | None, expected: bool) -> Track:

@@ -36,7 +36,7 @@ class Lanes:
         self._act(tape, lane(decision.chosen) if decision.chosen else "")
         self._set(tape, FOCUS, str(decision.focus))
         if moment.touched(*MOOD_KINDS):
-            self._set(tape, HARVEY, mood(moment.mirror).word)
+            self._set(tape, HARVEY, moment.mirror.ask(mood).word)
         if moment.touched(BodyFault):
             self._ail(tape, moment)
 

@@ -79,7 +79,7 @@ def in_truth(held: Held | None, truth: Pose2 | None) -> str:
 
 
 def _headline(mirror: Mirror) -> str:
-    return mood(mirror).line
+    return mirror.ask(mood).line
 
 
 def _ended(mirror: Mirror) -> str:
@@ -114,7 +114,7 @@ def _believes(mirror: Mirror) -> str:
 
 
 def _does(mirror: Mirror) -> str:
-    leg = leg_under_way(mirror)
+    leg = mirror.ask(leg_under_way)
     sketch = mirror.latest(PlanSketch, lambda s: s.is_active and s.current is not None)
     if leg is None or sketch is None:
         return "stands still" + (f"; next: {_next(sketch.value)}." if sketch else ".")
@@ -126,7 +126,7 @@ def _does(mirror: Mirror) -> str:
 
 def _is_halted(mirror: Mirror) -> bool:
     """Nothing moves while something above the action level is in doubt."""
-    return mood(mirror).word in ("doubts", "is lost", "is in trouble")
+    return mirror.ask(mood).word in ("doubts", "is lost", "is in trouble")
 
 
 def _next(sketch: PlanSketch) -> str:

@@ -222,6 +222,8 @@ def test_corner_strength_is_the_same_turned_mirrored_and_negated(seed: int) -> N
         np.testing.assert_allclose(other, expected, rtol=1e-9)
 
 
-def test_corner_strength_asks_for_patches_inside_the_image() -> None:
+def test_corner_strength_and_rival_ask_for_patches_inside_the_image() -> None:
+    with pytest.raises(ValueError, match="expected a patch of half-width 10 inside the image"):
+        rival(pattern(0), [5.0, 40.0], 10, 12.0)
     with pytest.raises(ValueError, match="expected patches of half-width 10 inside the image"):
         corner_strengths(pattern(0), [[5.0, 40.0]], 10)

@@ -63,7 +63,8 @@ class ScriptedTracker(Expert):
         assert belief is not None
         if not found.exceeds:
             yield Revise(belief, replace(belief.value, covariance=SURE, basis="tracks"), (trigger.entry,))
-        yield Post(found, (trigger.entry,)) if last is None else Revise(last, found, (trigger.entry,))
+        if last is None or not last.value.exceeds:
+            yield Post(found, (trigger.entry,)) if last is None else Revise(last, found, (trigger.entry,))
 
 
 class ScriptedJudge(Expert):
@@ -84,8 +85,8 @@ class ScriptedJudge(Expert):
         here, nothing = belief.value.world_from_robot(self._robot.world), np.zeros((0, 2))
         fix = Post(PoseFix("", here, np.array(SURE), nothing[:, 0] > 0, nothing, ()), (trigger.entry,))
         yield fix
-        yield Post(Certificate(milestone.id, _next_fix(view), verdict, "", 9, 9, 9, 1.0, 0.5, 0.0, 0.0, px, PLAN_PX, 0.0),
-                   (fix, milestone))
+        told = Certificate(milestone.id, _next_fix(view), verdict, "", 9, 9, 9, 1.0, 0.5, 0.0, 0.0, px, PLAN_PX, 0.0)
+        yield Post(told, (fix, milestone))
         yield Revise(milestone, replace(milestone.value, status=verdict), (fix,))
         found = Discrepancy(Level.PLAN, "a milestone is elsewhere", px, (0.0, PLAN_PX), "px")
         yield Post(found, (fix,)) if last is None else Revise(last, found, (fix,))
@@ -130,12 +131,13 @@ class ScriptedBody:
 
     def __init__(self) -> None:
         self.says: dict[str, float] = {"track": 1.0, "milestone": 1.0, "probe": 1.0}
+        self.is_stuck = False
         self._number = 0
 
     def answer(self, change: Change) -> Iterable[Effect]:
         value, entry = change.entry.value, change.entry
         if isinstance(value, MotorCommand) and isinstance(change, Posted):
-            yield Post(MotionReport(value.turn_rad, value.move_m, 1.0, 0.0), (entry,))
+            yield Post(MotionReport(value.turn_rad, 0.0 if self.is_stuck else value.move_m, 1.0, 0.0), (entry,))
         elif isinstance(value, Course):
             yield Post(MotionReport(0.0, value.speed_m_per_s / 4.0, 0.25, 0.0), (entry,))
             yield self._picture(entry, "track")
@@ -298,6 +300,13 @@ def test_whatever_pictures_go_on_saying_the_mission_ends_and_says_how(
         assert ladder.outcome.kind == "reached" and not raised
     if milestone > PLAN_PX:
         assert ladder.outcome.kind == "lost"
+
+
+def test_a_robot_that_something_stops_again_and_again_gives_up() -> None:
+    ladder = Ladder()
+    ladder.body.is_stuck = True
+    ladder.go_on(3000)
+    assert ladder.outcome is not None and ladder.outcome.kind == "blocked" and str(MOST_CHECKS) in ladder.outcome.reason
 
 
 @settings(max_examples=10, deadline=None)

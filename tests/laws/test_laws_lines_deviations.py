@@ -115,7 +115,8 @@ def test_an_end_is_known_across_as_well_as_its_line_is_there() -> None:
     along, across = found.sigma_ends_px.T
     np.testing.assert_array_equal(along, SIGMA_END_PX)
     assert np.all(across > found.sigma_offset_px)
-    np.testing.assert_allclose(across**2 - found.sigma_offset_px**2, (found.lengths_px * found.sigma_angle_rad / 2) ** 2)
+    lever = 0.5 * found.lengths_px * found.sigma_angle_rad
+    np.testing.assert_allclose(across**2 - found.sigma_offset_px**2, lever**2)
 
 
 @settings(deadline=None, max_examples=15)

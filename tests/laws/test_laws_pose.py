@@ -165,6 +165,33 @@ def test_few_lines_never_make_a_prior_worse(scene: PoseScene, count: int, seed: 
         assert weighed(found.camera_from_world, truth) <= weighed(prior, truth) * 1.02 + 1e-6
 
 
+@pytest.mark.parametrize("count", [1, 2, 3])
+@given(scene=scenes, seed=seeds)
+@settings(max_examples=25, deadline=None, derandomize=True)
+def test_nor_do_few_noisy_lines(count: int, scene: PoseScene, seed: int) -> None:
+    """In directions of which they say little, their noise does not carry the pose away."""
+    rng = np.random.default_rng(seed)
+    scene = some(scene, rng, count)
+    truth, segments = scene.camera_from_world, end_noise(scene.segments_px, SIGMA_PX, rng)
+    prior = drawn_prior(truth, 0.1, 0.01, rng)
+    for solver in (r_and_t_ml, med_r_and_t, trunc_r_and_t):
+        found = solve(solver, scene, segments, prior)
+        assert weighed(found.camera_from_world, truth) <= weighed(prior, truth) * 1.02 + 1e-6
+
+
+@pytest.mark.parametrize("solver", [r_then_t, r_and_t], ids=lambda f: f.__name__)
+@given(scene=scenes, count=st.integers(0, 2), seed=seeds)
+@quick
+def test_the_paper_s_two_hand_back_the_prior_below_three_lines(
+    solver: Solver, scene: PoseScene, count: int, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    scene = some(scene, rng, count)
+    prior = drawn_prior(scene.camera_from_world, 0.1, 0.01, rng)
+    found = solve(solver, scene, scene.segments_px, prior)
+    assert same(found.camera_from_world, prior) and not found.ok
+
+
 def weighed(found: Pose, truth: Pose) -> float:
     apart = found @ truth.inverse()
     move = np.concatenate([apart.rotation_vector, apart.translation])

@@ -15,12 +15,11 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
 import sys
 from pathlib import Path
-sys.path.insert(0, sys.argv[2])
-from conftest import SHORT
+from harvey.experiments.short_missions import OFFICE
 from harvey.mission import run_mission
 from sim.assembly import set_stage
 from sim.scenario import parse_scenario
-run_mission(set_stage(parse_scenario(SHORT, "across-allens-office")), 3, out=Path(sys.argv[1]))
+run_mission(set_stage(parse_scenario(OFFICE, "across-allens-office")), 3, out=Path(sys.argv[1]))
 """
 
 
@@ -45,5 +44,5 @@ def test_another_python_writes_the_same_journal(short_stage: Stage, tmp_path: Pa
         pytest.skip("no environment with another Python is here: make environment PYTHON=python3.13 VENV=.venv-3.13")
     here, there = tmp_path / "here", tmp_path / "there"
     run_mission(short_stage, 3, out=here)
-    subprocess.run([python, "-c", PROGRAM, there, Path(__file__).parent], cwd=ROOT, check=True, timeout=300)
+    subprocess.run([python, "-c", PROGRAM, there], cwd=ROOT, check=True, timeout=300)
     assert (here / "journal.jsonl").read_bytes() == (there / "journal.jsonl").read_bytes()

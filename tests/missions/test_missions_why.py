@@ -17,6 +17,7 @@ import pytest
 from blackboard.knowledge_source import KnowledgeSource
 from harvey.campaign import Task, run_task
 from harvey.cli import main
+from harvey.experiments.short_missions import OFFICE, fault
 from harvey.explain.ask import AskedView, board_at, changes, why_absent
 from harvey.explain.diff_cause import grounds, parting, same
 from harvey.explain.history import History
@@ -30,24 +31,7 @@ from harvey.explain.why_not import in_cycle
 from harvey.minds import mind_of
 from harvey.run_head import RunHead
 
-BUMPED = """
-description = "Across Allen's office, with a bump on the way."
-world = "research_center"
-details = ["research_center_details"]
-goal = "(ptrans (allens-office (7,4,0)) (allens-office (13,12,0)))"
-
-[start]
-heading_deg = 60.0
-put_down_sigma_m = 0.02
-put_down_sigma_deg = 1.0
-
-[[faults]]
-kind = "bump"
-in_locale = "allens-office"
-after_ft = 3.0
-left_m = 0.3
-turn_deg = 10.0
-"""
+BUMPED = OFFICE + fault("bump", "allens-office", 3.0, left_m=0.3, turn_deg=10.0)
 MOTION = re.compile(
     r"Harvey was told to .+ because the line to follow lay .+ (left|right) of where it believed that it faced,"
     r" because in camera frame \d+ .+ px (left|right|above|below).* its prediction at .+ \(Tracks-1\.\d+\),"

@@ -10,7 +10,7 @@ import numpy as np
 from knowledge_sources.methods.pose import kernels
 from knowledge_sources.methods.pose.descent import Descent, Normal, descend, normal_equations, rotations
 from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
-from knowledge_sources.methods.pose.guard import FEW_LINES, all_kept, estimate_at, guarded
+from knowledge_sources.methods.pose.guard import FEW_LINES, all_kept, estimate_at, guarded, prior_estimate
 from knowledge_sources.methods.pose.kernels import PLANES
 from knowledge_sources.methods.pose.lines import TINY, LandmarkIds, LineSet, check_landmarks, line_set
 from knowledge_sources.methods.pose.plane_error import (
@@ -60,6 +60,8 @@ def r_and_t(
         raise ValueError(f'expected objective "E1" or "E2", got {objective!r}')
     lines = line_set(model_lines_world, segments_px, camera, sigma_px)
     check_landmarks(landmark_ids, len(lines))
+    if len(lines) < 3:
+        return prior_estimate(lines, prior, FEW_LINES)
     weights = line_weights(lines, weighting)
     end = solve_e1(lines, prior, weights)
     steps = end.iterations
@@ -72,9 +74,8 @@ def r_and_t(
         scale = 1.0 / np.maximum(np.sum(camera_ends(lines, rotation, translation) ** 2, axis=-1), TINY)
     covariance = propagated_covariance(lines, rotation, translation, weights[:, None] * scale)
     kept = all_kept(lines, rotation, translation)
-    reason = FEW_LINES if len(lines) < 3 else None
     return guarded(
-        lines, prior, estimate_at(lines, rotation, translation, covariance, kept, end.normal.cost, steps, reason)
+        lines, prior, estimate_at(lines, rotation, translation, covariance, kept, end.normal.cost, steps, None)
     )
 
 

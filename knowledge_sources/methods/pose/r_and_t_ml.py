@@ -39,6 +39,8 @@ from world_models.frames import Pose
 
 UNUSUAL = 3.0
 """Standard deviations by which the sum of squares may exceed its mean where the lines are explained."""
+MOST_PULL = 10.0
+"""Logarithm of the greatest weight of a prior, in weak ones, under which a pose is tried."""
 LEAST = np.diag(WEAK_INFORMATION).copy()
 """Knowing less than this in some direction, the lines do not decide the pose."""
 
@@ -59,7 +61,8 @@ def r_and_t_ml(
     Started from E1 (§6.2.2), whose basin is wide but whose optimum is not efficient where depths vary.
 
     With ``prior_covariance`` (6, 6) of the prior's left perturbation the prior is one more measurement. Without it
-    the prior only decides directions that the lines leave open (fewer than 3 lines, or parallel ones).
+    the prior only decides what the lines leave open: parallel ones, or three and fewer, move it no further than their
+    noise demands.
     """
     if prior_covariance is None:
         found = _explained(model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px)
@@ -89,12 +92,37 @@ def likeliest(
     """Descend to the likeliest pose from ``start`` (E1's optimum if None), and why the prior had to help."""
     if information is not None:
         return ml_descent(lines, start or _best_start(lines, prior), prior, information), None
-    if len(lines) >= 3:
-        end = ml_descent(lines, start or _best_start(lines, prior))
-        if not open_direction(end.normal.hessian):
-            return end, None
-    reason = FEW_LINES if len(lines) < 3 else UNDECIDED
-    return ml_descent(lines, (prior.rotation, prior.translation), prior, WEAK_INFORMATION), reason
+    if len(lines) < 3:
+        return _cautious(lines, prior), FEW_LINES
+    end = ml_descent(lines, start or _best_start(lines, prior))
+    undecided = open_direction(end.normal.hessian)
+    if len(lines) > 3 and not undecided:
+        return end, None
+    return _cautious(lines, prior), UNDECIDED if undecided else None
+
+
+def _cautious(lines: LineSet, prior: Pose) -> Descent[PoseState]:
+    """The pose nearest to the prior that explains the lines to their noise, or as well as any near it does.
+
+    Three lines or fewer are fitted to a hair by many poses, and in directions of which they say little their noise
+    would carry the pose far. How good the prior is nobody said, so they move it no further than they must (Morozov's
+    discrepancy principle: its weight is the greatest under which the lines are explained to their noise). The
+    covariance is that of a weak prior, since the pull says nothing of how right the prior is.
+    """
+    here = (prior.rotation, prior.translation)
+    freedom, state = 2.0 * len(lines), here
+    allowed = freedom + UNUSUAL * math.sqrt(2.0 * freedom)
+    if _chi2(lines, *here) > allowed:
+        state = ml_descent(lines, here, prior, WEAK_INFORMATION).state
+        low, high = 0.0, MOST_PULL if _chi2(lines, *state) <= allowed else 0.0
+        while high - low > 0.1:
+            middle = 0.5 * (low + high)
+            trial = ml_descent(lines, here, prior, 10.0**middle * WEAK_INFORMATION).state
+            if _chi2(lines, *trial) <= allowed:
+                state, low = trial, middle
+            else:
+                high = middle
+    return compiled_descent(IMAGE, lines, np.ones(len(lines)), state, prior, WEAK_INFORMATION, 0)
 
 
 def _explained(

@@ -16,7 +16,7 @@ from knowledge_sources.methods.pose.descent import (
     rotations,
 )
 from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
-from knowledge_sources.methods.pose.guard import FEW_LINES, all_kept, estimate_at, guarded
+from knowledge_sources.methods.pose.guard import FEW_LINES, all_kept, estimate_at, guarded, prior_estimate
 from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, check_landmarks, line_set
 from knowledge_sources.methods.pose.plane_error import (
     Weighting,
@@ -48,6 +48,8 @@ def r_then_t(
     """
     lines = line_set(model_lines_world, segments_px, camera, sigma_px)
     check_landmarks(landmark_ids, len(lines))
+    if len(lines) < 3:
+        return prior_estimate(lines, prior, FEW_LINES)
     weights = line_weights(lines, weighting)
     end = _solve_rotation(lines, prior, weights)
     rotation = end.state
@@ -56,9 +58,8 @@ def r_then_t(
     cost = float(np.sum(weights[:, None] * misses**2))
     covariance = _covariance(lines, rotation, translation, weights)
     kept = all_kept(lines, rotation, translation)
-    reason = FEW_LINES if len(lines) < 3 else None
     return guarded(
-        lines, prior, estimate_at(lines, rotation, translation, covariance, kept, cost, end.iterations, reason)
+        lines, prior, estimate_at(lines, rotation, translation, covariance, kept, cost, end.iterations, None)
     )
 
 
