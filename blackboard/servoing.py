@@ -30,8 +30,8 @@ class Discrepancy:
         bounds: up to what the action and the plan level may correct it; the goal level has no bound.
         unit: of magnitude and bounds.
         status: open, corrected (success comes back down), or escalated.
-        tried: what was being tried when it was raised to this level, "" where it arose here.
-        times: how often this level was asked so while that was being tried, this time included.
+        tried: where it was escalated: what was being tried when it was.
+        times: and how often one was escalated from this level while that was tried, this one included.
     """
 
     level: Level

@@ -11,11 +11,12 @@ from sim.body import SimulatedBody
 from sim.truth import cross_track_m
 from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis
+from world_models.percepts import PoseFix
 from world_models.robot import RobotModel
-from world_models.task import Goal, Leg, Milestone, Outcome, PlanSketch
+from world_models.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch
 
 FALSE_M = 0.15
-"""A milestone is accepted falsely when the robot is further than this from where it believes it is after it."""
+"""A milestone is accepted falsely when the robot is further than this from the pose that was certified."""
 FALSE_RAD = 0.06
 """Or turned by more than this."""
 
@@ -88,6 +89,7 @@ class Referee(Counts):
         self.milestones["false_accepts"] = 0
         self.max_cross_track_m = 0.0
         self._leg: Leg | None = None
+        self._fix: Pose2 | None = None
         self._gone = 0
 
     def __call__(self, decision: Decision) -> None:
@@ -97,8 +99,10 @@ class Referee(Counts):
             value = change.entry.value
             if isinstance(value, Leg):
                 self._leg = value if value.status == "moving" else None
-            elif isinstance(value, Hypothesis) and value.is_held and value.basis == "milestone":
-                self.milestones["false_accepts"] += self._is_false(value)
+            elif isinstance(value, PoseFix):
+                self._fix = value.world_from_robot
+            elif isinstance(value, Certificate) and value.verdict == "verified" and self._fix is not None:
+                self.milestones["false_accepts"] += self._is_false(self._fix)
 
     def _follow(self) -> None:
         """How far the robot truly strayed from the leg that it was driving since the last decision."""
@@ -109,8 +113,8 @@ class Referee(Counts):
             self.max_cross_track_m = max(self.max_cross_track_m, *strayed, 0.0)
         self._gone = len(track)
 
-    def _is_false(self, value: Hypothesis) -> bool:
-        believed, true = value.world_from_robot(self._robot.world), self._body.truth.world_from_robot
+    def _is_false(self, believed: Pose2) -> bool:
+        true = self._body.truth.world_from_robot
         turned = abs(wrap_angle(believed.heading_rad - true.heading_rad))
         return believed.distance_to(true) > FALSE_M or turned > FALSE_RAD
 

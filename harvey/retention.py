@@ -16,6 +16,7 @@ from blackboard.index import Index
 from blackboard.level import Level
 from blackboard.retention import Forget
 from blackboard.servoing import OPEN, Discrepancy
+from knowledge_sources.questions import last_escalated
 from world_models.body import BodyFault, Course, Frame, Look, MotionReport, MotorCommand, Recovery, Ride, RideReport
 from world_models.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
 from world_models.task import Certificate, Goal, Leg, Milestone, PlanSketch
@@ -56,10 +57,9 @@ def request_is_there(view: View, fault: Entry[BodyFault]) -> bool:
     return view.get(fault.value.request) is not None
 
 
-def is_last_raised(view: View, found: Entry[Discrepancy]) -> bool:
-    """Whether it is the last that was raised to its level: by it is counted how often that level is asked."""
-    level = found.value.level
-    last = view.latest(Discrepancy, lambda other: other.level is level and other.times > 0)
+def is_last_of_its_level(view: View, found: Entry[Discrepancy]) -> bool:
+    """Whether it is the last that its level passed up: by it is counted how often it does."""
+    last = last_escalated(view, found.value.level)
     return last is not None and last.id == found.id
 
 
@@ -70,7 +70,7 @@ RETENTION: tuple[Forget[Any], ...] = (
     Forget(PoseFix, keep=2, unless=named_by(FIX)),
     Forget(Certificate, keep=2),
     Forget(Milestone, keep=2, when=lambda milestone: not milestone.is_open, unless=named_by(MATCHED, SOUGHT)),
-    Forget(Discrepancy, keep=2, when=lambda found: not found.is_open, unless=is_last_raised),
+    Forget(Discrepancy, keep=2, when=lambda found: not found.is_open, unless=is_last_of_its_level),
     Forget(PlanSketch, keep=2, when=lambda sketch: not sketch.is_active),
     Forget(Goal, keep=2, when=lambda goal: not goal.is_active),
     Forget(Leg, keep=2),

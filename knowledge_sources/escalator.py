@@ -11,7 +11,7 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
-from knowledge_sources.questions import deepest_sketch, is_over
+from knowledge_sources.questions import deepest_sketch, is_over, last_escalated
 from world_models.task import Outcome
 
 MOST_CHECKS = 20
@@ -41,12 +41,11 @@ class Escalator(Expert):
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         closed, raised = trigger.entry.value.escalated()
-        close = Revise(trigger.entry, closed, trigger.entry.because)
-        yield close
-        tried = _tried(view, raised.level)
-        last = view.latest(Discrepancy, lambda d: d.level is raised.level and d.times > 0)
+        tried, last = _tried(view, raised.level), last_escalated(view, closed.level)
         times = 1 + (last.value.times if last is not None and last.value.tried == tried else 0)
-        yield Post(replace(raised, tried=tried, times=times), (close,))
+        close = Revise(trigger.entry, replace(closed, tried=tried, times=times), trigger.entry.because)
+        yield close
+        yield Post(raised, (close,))
         if times >= (MOST_CHECKS if raised.level is Level.PLAN else MOST_LOST) and not is_over(view):
             kind, why = GIVEN_UP[raised.level]
             yield Post(Outcome(kind, f"{why.format(times=times)} {closed.what}"), (close,))

@@ -94,5 +94,6 @@ class Passenger(Expert):
         turn = behind.heading_rad - before.heading_rad
         c, s = np.cos(turn), np.sin(turn)
         turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        covariance = turned @ belief.covariance_world(world) @ turned.T + np.diag([LEVEL_M**2, LEVEL_M**2, LEVEL_RAD**2])
+        uneven = np.diag([LEVEL_M**2, LEVEL_M**2, LEVEL_RAD**2])
+        covariance = turned @ belief.covariance_world(world) @ turned.T + uneven
         return Hypothesis.of_world(world, destination, pose, covariance, "ride", motion=belief.motion)

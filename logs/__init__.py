@@ -1,4 +1,5 @@
 """The diary: everything that a person sees of a run. The only importer of rerun.
 
-Read in this order: journal_file, mirror, mood, deeds, tape, paths, loggers/, blueprint, sink, reader, overview, look.
+Read in this order: journal_file, mirror, mood, deeds, tape, paths, loggers/, blueprint, sink, reader, overview, look,
+moments, contact_sheet.
 """

@@ -13,7 +13,7 @@ from world_models.world import World
 
 
 def record_building(world: World, out: Path) -> None:
-    """Write the building's surfaces, storey by storey, its doorways and the names of its rooms. Raises RecordingError."""
+    """Write the building's surfaces, storey by storey, its doorways and room names. Raises RecordingError."""
     look = rrb.Blueprint(building_view(world, world.name), rrb.TimePanel(state="hidden"), auto_views=False)
     tape = Tape(out, f"building of {world.name}", world.name, look)
     try:

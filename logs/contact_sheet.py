@@ -27,7 +27,7 @@ CAPTION_IN = 0.34
 PIXELS_PER_IN = 100
 LETTERS = 104
 """So many fit into a caption."""
-QUALITY = 82
+QUALITY = 68
 
 
 def contact_sheet(recording: Path, sheet: Path, pictures: Path | None = None) -> tuple[list[Moment], list[str]]:

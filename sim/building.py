@@ -11,7 +11,6 @@ from sim.mesh import FaceLike
 from sim.renderer import Renderer
 from world_models.frames import Pose2
 
-
 NO_ELEVATORS = Elevators({}, {})
 
 

@@ -121,7 +121,7 @@ def _obstructed(world: World) -> Iterator[Finding]:
                 sideways = (thing.footprint_world - left) @ across
                 away_m = float(-((thing.footprint_world - left) @ outward).max())
                 beside = sideways.max() < TOLERANCE_M or sideways.min() > doorway.width_m - TOLERANCE_M
-                if not beside and away_m < IN_DOORWAY_M and STEP_M < thing.high_m and thing.low_m < doorway.height_m:
+                if not beside and away_m < IN_DOORWAY_M and thing.high_m > STEP_M and thing.low_m < doorway.height_m:
                     yield thing.source, f"{thing.name}: expected the doorway {doorway.name} free, got it in there"
 
 

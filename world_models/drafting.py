@@ -179,7 +179,8 @@ class Draft:
         """Of the walls that are lower than the room: only under the sky, or one could look out."""
         if node is None:
             return {}
-        return {name: self.shelf.length(item, 0.1, height_m) for name, item in node.table(optional=tuple(names)).entries()}
+        walls = node.table(optional=tuple(names))
+        return {name: self.shelf.length(item, 0.1, height_m) for name, item in walls.entries()}
 
     def _look(self, node: Node, wall_names: Sequence[str]) -> RoomLook:
         walls = self._given(node, "walls")
@@ -204,7 +205,9 @@ class Draft:
         """The value of a key of this table, or else of the defaults."""
         return node.get(key) or (self.defaults[key][0] if key in self.defaults else None)
 
-    def _length(self, node: Node, key: str, low_m: float, high_m: float, otherwise_m: float, default: str = "") -> float:
+    def _length(
+        self, node: Node, key: str, low_m: float, high_m: float, otherwise_m: float, default: str = ""
+    ) -> float:
         """A length of this table, or else of the defaults, which may be of a file in other units [m]."""
         if key in node:
             return self.shelf.length(node[key], low_m, high_m)
@@ -283,7 +286,7 @@ class Draft:
         kind = node["kind"].choice("elevator", "stairs")
         for i, j in combinations(range(len(rooms)), 2):
             own = name if len(rooms) == 2 else f"{name}-{i + 1}-{j + 1}"
-            if own in [passage.name for passage in (*self.doors, *self.links)]:
+            if own in [door.name for door in self.doors] + [link.name for link in self.links]:
                 raise node.fail("a name that no door has", repr(own))
             self.links.append(LinkSpec(own, kind, (rooms[i], rooms[j]), (stops[i], stops[j]), node.where))
 

@@ -74,7 +74,7 @@ def room_named(words: str, world: World) -> str:
 
 
 def _parts_named(words: str, world: World) -> list[str]:
-    """The parts of the world, of more than one room, that answer to these words; only the smallest of what is nested."""
+    """The parts of the world, of more than one room, that answer to these words; of what is nested the smallest."""
     asked = " ".join(sorted(words_of(words) - EMPTY))
     found = [name for name in world.frames.named(asked) if not world.is_room(name)] if asked else []
     return [name for name in found if not any(name in world.path_of(other)[:-1] for other in found)]

@@ -1,7 +1,7 @@
 """Where things are put: a table for each, or rows of the same part, at several places, along a wall or on the floor.
 
-A row is ``["pillar", "north", 15.2, 36.5]`` (along a wall) or ``["desk", [3, 4, 90]]`` (x, y and degrees). A place may be
-``{ from = 4, to = 40, step = 9 }``; a text behind a place names what stands there; a table at the end holds for all.
+A row is ``["pillar", "north", 15.2, 36.5]`` (along a wall) or ``["desk", [3, 4, 90]]`` (x, y and degrees). A place may
+be ``{ from = 4, to = 40, step = 9 }``; a text behind a place names what stands there; a table at the end holds for all.
 """
 
 from __future__ import annotations

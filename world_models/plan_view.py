@@ -138,7 +138,8 @@ GROUND = "#777"
 _STYLE = """<style>
 .room { fill: #f7f4ea; stroke: #222; stroke-width: 2 } .outdoors { fill: #b9cf9d; stroke: #3c5a2c; stroke-width: 2 }
 .obstacle { fill: #c9a676; stroke: #5b4327 } .board { fill: #6d8fb3; stroke: #34516f }
-.paving { fill: #e3ded0; stroke: #8a8678 } .doorway { fill: #bfe3b4; stroke: #3c7a2c } .leaf { stroke: #8c1d1d; stroke-width: 5; fill: none }
+.paving { fill: #e3ded0; stroke: #8a8678 } .doorway { fill: #bfe3b4; stroke: #3c7a2c }
+.leaf { stroke: #8c1d1d; stroke-width: 5; fill: none }
 .link { fill: #7d4fa3; stroke: #3f2756 }
 .axis { stroke: #b03030; stroke-width: 2; fill: none } text { font: 16px sans-serif; text-anchor: middle; fill: #222 }
 text.title { font-size: 20px; font-weight: bold; fill: #fff }

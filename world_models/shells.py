@@ -99,7 +99,8 @@ def walls_of(spec: LocaleSpec, world_from_locale: Pose) -> list[Wall]:
         length = float(np.linalg.norm(end - start))
         x = np.array([*(end - start) / length, 0.0])
         frame = Pose(np.stack([x, np.cross(UP, x), UP], axis=1), np.array([*start, 0.0]))
-        walls.append(Wall(spec.name, name, world_from_locale @ frame, length, spec.wall_heights_m.get(name, spec.height_m), spec.look.walls[name]))
+        height = spec.wall_heights_m.get(name, spec.height_m)
+        walls.append(Wall(spec.name, name, world_from_locale @ frame, length, height, spec.look.walls[name]))
     return walls
 
 

@@ -36,7 +36,7 @@ class Thing:
         name: unique in the world.
         locale: where it stands.
         kind: the part that it is made from.
-        footprint_world: (4, 2) rectangle on the floor [m] that holds it, as far as the robot could hit it, or all of it.
+        footprint_world: (4, 2) rectangle on the floor [m] that holds it, or what of it the robot could hit.
         low_m, high_m: its extent above the floor.
         proud_m: how far it stands out from its wall; ``None`` for one that stands free.
         source: file:line where it is placed.

@@ -178,7 +178,8 @@ class World:
 
         It looks at the passages of the whole world.
         """
-        ways: nx.Graph = nx.Graph(passage.between for passage in (*self.doorways, *self.links))
+        passages: tuple[Doorway | Link, ...] = (*self.doorways, *self.links)
+        ways: nx.Graph = nx.Graph(passage.between for passage in passages)
         try:
             way: list[str] = nx.shortest_path(ways, origin, destination)
         except (nx.NetworkXNoPath, nx.NodeNotFound):

@@ -134,7 +134,9 @@ def _tell_of_the_crash(mission: Mission, stage: Stage, last: Decision) -> None:
     refs = tuple(str(entry.ref) for entry in broken_off)
     scheduler.tell([Post(Resumed(scheduler.cycle, refs), tuple(broken_off))], RESUME)
     for entry in broken_off:
-        scheduler.tell(reliving.answer(Posted(entry), True), mission.port.name)
+        for effect in reliving.answer(Posted(entry), True):
+            mission.diary.keep(effect)
+            scheduler.tell([effect], mission.port.name)
 
 
 def _is_command(change: Change) -> bool:

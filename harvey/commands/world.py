@@ -160,7 +160,7 @@ COMMAND = Command(
     (
         ("harvey world check my_floor.toml", "faults with file and line; exit code 2 where there are any"),
         ("harvey world show research_center", "rooms, doorways and what is in them"),
-        ("harvey world show campus --out plan.png", "and the plan as a picture, storey beside storey (.svg: a drawing)"),
+        ("harvey world show campus --out plan.png", "and the plan, storey beside storey (or .svg)"),
         ("harvey world show campus --out campus.rrd", "and the building for the viewer: rerun campus.rrd"),
         ("harvey world import house.ifc --out house.toml", "what was used of a building, guessed and left out"),
         ("harvey world compile campus.toml --out campus.world", "for worlds that are too large to read at once"),

@@ -30,12 +30,12 @@ ROOMS_ALONG = 7
 WALL_FT = 0.5
 DOOR_FT, LINED_FT = 3.3, 2.1
 """Width of a doorway, and how far from its middle nothing else hangs."""
-INWARD = {"south": (0.0, 1.0, 0.0), "east": (-1.0, 0.0, 0.0), "north": (0.0, -1.0, 0.0), "west": (1.0, 0.0, 0.0)}
-ACROSS = {"south": "north", "north": "south", "east": "west", "west": "east"}
+INWARD: Mapping[str, tuple[float, float, float]] = {"south": (0.0, 1.0, 0.0), "east": (-1.0, 0.0, 0.0), "north": (0.0, -1.0, 0.0), "west": (1.0, 0.0, 0.0)}
+ACROSS: Mapping[str, str] = {"south": "north", "north": "south", "east": "west", "west": "east"}
 EVEN_LIGHT = 0.62
 """In a symmetric corridor every wall and board gives back so much of its colour, whichever way it faces."""
 
-HALF_FT = {
+HALF_FT: Mapping[str, float] = {
     "picture": 1.0, "notice-board": 1.5, "white-board": 1.7, "sign": 0.4, "window": 2.6, "blackboard": 5.0,
     "pillar": 0.8, "hose-cabinet": 1.1, "fountain": 0.7, "exit-sign": 0.7, "desk": 2.8, "bookshelf": 1.8,
     "file-cabinet": 0.75, "cupboard": 1.6, "rack": 1.0,
@@ -50,7 +50,7 @@ IN_ROOMS = (*DEEP, *DEEP, "picture", "notice-board", "white-board", "sign", "win
 FRAMES = ("walnut", "navy", "rust", "teal", "dark-steel", "oak")
 LEAVES = ("oak", "teal", "navy", "mustard", "red", "steel", "brown")
 PANELS = (None, "pane", "kick-plate", "louvre")
-CLUTTER = {"socket": 0.15, "switch": 0.15, "poster": 0.9, "leaflet": 0.5, "conduit": 0.1, "carton": 0.7, "basket": 0.5}
+CLUTTER: Mapping[str, float] = {"socket": 0.15, "switch": 0.15, "poster": 0.9, "leaflet": 0.5, "conduit": 0.1, "carton": 0.7, "basket": 0.5}
 
 
 @dataclass(frozen=True, eq=False)

@@ -99,7 +99,7 @@ def _claims(anywhere: Sequence[Found], twins: Sequence[Found]) -> tuple[tuple[st
 
 def _badness(trial: Kidnap, found: Found) -> tuple[bool, bool, int, float]:
     good = found.verdict == "ambiguous" if trial.symmetric else is_right(found)
-    return is_wrong(found), not good, found.probes, found.error_m
+    return is_wrong(found), not good, found.probes, 0.0 if trial.symmetric else found.error_m
 
 
 def _worst(trials: Sequence[Kidnap], found: Sequence[Found], folder: Path) -> Iterator[str]:

@@ -197,7 +197,7 @@ def scenario_text(trial: Kidnap) -> str:
     floor = floor_of(trial)
     room, there, belief = _drawn(trial, floor)
     place = Place.of_world(floor.world, room, there.x_m, there.y_m, there.heading_rad)
-    goal, spot = _anywhere(floor.world, floor.corridors, np.random.default_rng([trial.floor, trial.number, 1]))
+    goal, spot = _anywhere(floor.world, (belief.locale,), np.random.default_rng([trial.floor, trial.number, 1]))
     end = Place.of_world(floor.world, goal, spot.x_m, spot.y_m)
     return f'''description = "Carried off to {room} at once. Written by harvey experiment kidnap."
 world = "floor-{floor.seed}.toml"

@@ -20,7 +20,7 @@ from knowledge_sources.methods.conviction import CONVICTION, FITTED, TERMS, Conv
 Floats = NDArray[np.float64]
 FIRST_FLOOR, FLOORS, EACH = 1000, 30, 180
 QUICK_FLOORS, QUICK_EACH = 1, 45
-FALSE_ACCEPTS, FALSE_REJECTS = 0.001, 0.005
+FALSE_ACCEPTS, FALSE_REJECTS = 0.001, 0.002
 """Parts of the wrong and of the right places, by the fitted probabilities, that the limits let through."""
 LIMITS = np.geomspace(1e-5, 0.1, 81)
 REFUTED = np.linspace(0.5, 0.999, 500)

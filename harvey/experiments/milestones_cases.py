@@ -157,6 +157,7 @@ def _places(here: Site, kind: str, rng: np.random.Generator) -> tuple[Pose2 | No
     """Where the robot believes to be, and the wrong place; None where it would not stand free."""
     corridor = kind == "the other side" or rng.random() < 0.6
     names = here.floor.corridors if corridor else here.floor.rooms
+    other: Pose2 | None
     if kind == "another door":
         believed, other = _at_doors(here, rng)
     else:

@@ -22,7 +22,7 @@ def draw_case(robot: RobotModel, case: Case, path: Path) -> None:
     from matplotlib.figure import Figure
 
     view = certified(robot, case)
-    certificate, fix, segments = (view.latest(kind) for kind in (Certificate, PoseFix, Segments))
+    certificate, fix, segments = view.latest(Certificate), view.latest(PoseFix), view.latest(Segments)
     assert certificate is not None and fix is not None and segments is not None
     lines = np.array(case.milestone.expected, float).reshape(-1, 2, 3)
     agreed = verify(robot, lines, segments.value.segments_px, fix.value.world_from_robot)

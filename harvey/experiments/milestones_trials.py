@@ -97,7 +97,7 @@ def certified(robot: RobotModel, case: Case) -> View:
 
 def _judged(robot: RobotModel, floor: int, number: int, case: Case) -> Judged:
     view = certified(robot, case)
-    certificate, fix, segments = (view.latest(kind) for kind in (Certificate, PoseFix, Segments))
+    certificate, fix, segments = view.latest(Certificate), view.latest(PoseFix), view.latest(Segments)
     assert certificate is not None and fix is not None and segments is not None
     c, pose, covariance = certificate.value, fix.value.world_from_robot, np.asarray(fix.value.covariance)
     lines = np.array(case.milestone.expected, float).reshape(-1, 2, 3)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from harvey.experiments.pose_peer import NOT_INSTALLED, Peer
 from harvey.experiments.pose_scenes import PoseScene, campus, drawn_prior, end_noise, wrong_landmarks
@@ -38,7 +40,8 @@ def run(quick: bool, seed: int, trials: int | None = None) -> Report:
     """Medians [µs], and ours over the peer's from the same turns."""
     count, peer, rng = trials or (QUICK_TRIALS if quick else TRIALS), Peer.found(), np.random.default_rng(seed)
     scene = _scene()
-    rounds = [_times_s(_calls(scene, peer, rng)) for _ in range(count + 1)][1:]  # the first one compiles
+    turns = tqdm(range(count + 1), unit="trial", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False)
+    rounds = [_times_s(_calls(scene, peer, rng)) for _ in turns][1:]  # the first one compiles
     us = {name: float(np.median([times[name] for times in rounds])) * 1e6 for name in rounds[0]}
     rows = (
         ("one pose, least squares in the image", _against(us, "r_and_t_ml", "refine")),

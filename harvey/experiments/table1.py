@@ -28,6 +28,8 @@ DRIVES, ON_THE_MOVE = 1000, 40
 QUICK_DRIVES, QUICK_ON_THE_MOVE, QUICK_FEET = 2, 1, 6
 WORST = 5
 MOST_SEEDS = 10
+MOVING = "#2e8b57"
+"""The colour of what is corrected on the move."""
 
 
 def run(quick: bool, seed: int) -> Report:
@@ -148,20 +150,24 @@ def _draw(stopping: Sequence[Driven], rolling: Sequence[Driven], pictures: Seque
     with chart(pictures[0], "Figure 11: servoed and unservoed", "z, along the line [in]", "x, to its right [in]",
                (9.0, 5.0)) as axes:
         for number, d in enumerate(stopping[:60]):
-            label = {"label": "unservoed"} if number == 0 else {}
-            axes.plot([0.0, *d.open_z_in], [0.0, *d.open_x_in], color=PEER, alpha=0.35, linewidth=0.8, **label)
-            label = {"label": "servoed"} if number == 0 else {}
-            axes.plot(d.way_z_in, d.way_x_in, color=OURS, alpha=0.35, linewidth=0.8, **label)
+            axes.plot([0.0, *d.open_z_in], [0.0, *d.open_x_in], color=PEER, alpha=0.35, linewidth=0.8,
+                      label=_once(number, "unservoed"))
+            axes.plot(d.way_z_in, d.way_x_in, color=OURS, alpha=0.35, linewidth=0.8, label=_once(number, "servoed"))
         for number, d in enumerate(rolling[:20]):
-            label = {"label": "servoed on the move"} if number == 0 else {}
-            axes.plot(d.way_z_in, d.way_x_in, color="#2e8b57", alpha=0.5, linewidth=0.8, **label)
+            axes.plot(d.way_z_in, d.way_x_in, color=MOVING, alpha=0.5, linewidth=0.8,
+                      label=_once(number, "servoed on the move"))
         axes.plot((0.0, *PAPER_Z), (0.0, *PAPER_X), "o--", color=PAPER, markersize=3, label="paper, unservoed")
         axes.plot((0.0, *PAPER_SERVOED_Z, 456.0), (0.0, *PAPER_SERVOED_X, 0.0), "s-", color="black", markersize=3,
                   label="paper, servoed")
         axes.set_ylim(-12.0, 12.0)
     with chart(pictures[1], "How far from the line, servoed", "|x| at the end of an increment [in]", "part below it"
                ) as axes:
-        for drives, colour, label in ((stopping, OURS, "stopping"), (rolling, "#2e8b57", "on the move")):
+        for drives, colour, label in ((stopping, OURS, "stopping"), (rolling, MOVING, "on the move")):
             x = np.sort(np.abs(_all(drives)))
             axes.step(x, np.arange(1, len(x) + 1) / len(x), where="post", color=colour, label=label)
         axes.axvline(MOST_IN, color=PAPER, linestyle="--", label="the paper's worst")
+
+
+def _once(number: int, label: str) -> str:
+    """A label for the first of many lines only; what begins with a _ is not shown."""
+    return label if number == 0 else "_"

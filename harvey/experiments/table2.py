@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
+from tqdm import tqdm
 
 from harvey.experiments.pose_peer import NOT_INSTALLED, Peer
 from harvey.experiments.pose_scenes import (
@@ -67,7 +69,8 @@ def run(quick: bool, seed: int, samples: int | None = None) -> Report:
     scene = campus()
     rows: list[tuple[Cell, ...]] = []
     totals: Totals = {}
-    for (n, noise), paper in PAPER.items():
+    shown = tqdm(PAPER.items(), unit="row", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False)
+    for (n, noise), paper in shown:
         errors = _errors(scene.take(np.array(CHOSEN[n])), noise, count, rng, peer)
         rows += _rows(f"{n} lines, {noise:.0f} px, {noise:.0f} deg", paper, errors, peer)
         for name in ("r_then_t", "r_and_t"):

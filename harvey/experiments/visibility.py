@@ -20,6 +20,7 @@ from sim.projection import Lens, view_of
 from sim.rasterizer import sample_offsets, visible_patches
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
+from world_models.outlines import inside_polygon
 from world_models.store import read_world
 from world_models.toml_source import Source
 from world_models.visibility import hidden
@@ -29,6 +30,8 @@ CAMERA = Camera.from_field_of_view(math.radians(65.0), 256, 256)
 MOUNT = CameraMount(1.0, 0.1)
 HOUSES, QUICK_HOUSES, VIEWS, RAYS = 60, 8, 6, 300
 LEAST = 0.999
+ROBOT_M = 0.35
+"""Radius of the robot that carries the camera."""
 SAMPLES = 4
 
 
@@ -46,7 +49,7 @@ def run(quick: bool, seed: int) -> Report:
         "Visibility by the model against the renderer", ("what", "ours"),
         (("houses", houses), ("points", asked), ("agree", agreed), ("agree, part of all", part),
          ("most that disagree in one house", worst[2])),
-        notes=(f"Seed {seed}; {VIEWS} views a house, up to {RAYS} rays a view.",),
+        notes=(f"Seed {seed}; {VIEWS} views a house from where a robot finds room, up to {RAYS} rays a view.",),
         claims=((f"the two agree on {LEAST:.1%} of the points ({part:.4%})", part >= LEAST),),
     )
 
@@ -91,9 +94,13 @@ def house(rng: np.random.Generator) -> str:
 
 
 def _somewhere(world: World, rng: np.random.Generator) -> Pose2:
-    outline = world.outline(str(rng.choice(world.rooms)))
-    x, y = rng.uniform(outline.min(axis=0) + 0.3, outline.max(axis=0) - 0.3)
-    return Pose2(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
+    """Where a robot finds room; a camera nearer to a surface sees into it."""
+    while True:
+        room = str(rng.choice(world.rooms))
+        outline = world.outline(room)
+        point = rng.uniform(outline.min(axis=0) + ROBOT_M, outline.max(axis=0) - ROBOT_M)
+        if not any(inside_polygon(point, footprint, ROBOT_M) for footprint in world.obstacles(room)):
+            return Pose2(float(point[0]), float(point[1]), float(rng.uniform(-math.pi, math.pi)))
 
 
 def _points(world: World, pose: Pose, seen: NDArray[np.int16], rng: np.random.Generator, rays: int

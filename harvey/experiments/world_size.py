@@ -51,8 +51,8 @@ def run(quick: bool, seed: int) -> Report:
     return Report(
         "The same mission in worlds of any size", COLUMNS, rows,
         notes=(
-            f"Mission: {goal}, seed {seed}. Times are of the processor. In one process the minds in all worlds decide in"
-            f" turn, each with the file opened anew: {repetitions[0]} times to the first motor command and"
+            f"Mission: {goal}, seed {seed}. Times are of the processor. In one process the minds in all worlds decide"
+            f" in turn, each with the file opened anew: {repetitions[0]} times to the first motor command and"
             f" {repetitions[1]} times the whole mission in thought. What is compared are the times of one repetition,"
             " taken within moments of each other, and told is the median of these ratios, so that others' work on the"
             " machine counts less. In the table is the least time of each decision.",

@@ -265,7 +265,8 @@ def _ride(v: Value) -> str:
 
 
 def _ride_report(v: Value) -> str:
-    return f"somebody pressed the button, and after {number(v['duration_s']):.0f} s the doors opened at {v['destination']}"
+    opened = f"after {number(v['duration_s']):.0f} s the doors opened at {v['destination']}"
+    return f"somebody pressed the button, and {opened}"
 
 
 def _root(variance: Any) -> float:

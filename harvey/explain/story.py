@@ -165,18 +165,21 @@ class _Teller:
 
     def _tell(self, record: EntryRecord, above: EntryRecord) -> Iterator[Step]:
         """An entry that something rests on, then what it rests on itself."""
-        key = record.id if record.type in SEVERAL else record.type
+        perhaps = record.type == "Hypothesis" and record.value["status"] == "candidate"
+        key = record.id if record.type in SEVERAL or perhaps else record.type
         if key in self.told or record.ref in self.met or len(self.told) > MOST or len(self.met) > MOST_MET:
             return
         self.met.add(record.ref)
         if record.type == "Segments" and above.type in ("MotorCommand", "Look"):
             frame = reason(self.history, record, "Frame")
             yield from self._one(key, "seen", facts.puzzled(record, frame), record, frame)
+        elif perhaps:
+            text = f"It may have stood at {facts.pose(record.value)} ({number(record.value['weight']):.0%})."
+            yield from self._one(key, "thought", text, record)
+            for below in self._below(record, "Panorama"):
+                yield from self._tell(below, record)
+            return
         elif record.type == "Hypothesis":
-            if record.value["status"] == "candidate":
-                maybe = f"It may have stood at {facts.pose(record.value)} ({number(record.value['weight']):.0%})."
-                yield from self._one(record.id, "thought", maybe, record)
-                return
             text = f"It believed that it stood at {facts.pose(record.value)}."
             yield from self._one(key, "believed", text, record)
         elif record.type not in FOLDED:

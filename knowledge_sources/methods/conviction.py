@@ -90,7 +90,8 @@ CONVICTION = Conviction.of_table(tomllib.loads(FITTED.read_text("utf-8")))
 
 def fitted(evidence: Floats, is_right: NDArray[np.bool_]) -> Weights:
     """The weights under which what was seen (n, k) is likeliest, right and wrong places counting the same in all."""
-    share = np.where(is_right, 0.5 / max(1, np.count_nonzero(is_right)), 0.5 / max(1, np.count_nonzero(~is_right)))
+    right, wrong = max(1, int(np.count_nonzero(is_right))), max(1, int(np.count_nonzero(~is_right)))
+    share = np.where(is_right, 0.5 / right, 0.5 / wrong)
     sign = np.where(is_right, 1.0, -1.0)
     rows = np.column_stack([terms(evidence), np.ones(len(evidence))])
 

@@ -29,6 +29,8 @@ STEPS = np.array([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.7, 0.7, 0.0), (0.7, -0.7,
 """Ways off the pose (x, y [m], heading [rad]) of each of which lines must tell."""
 MOST_PX_PER_M = 400.0
 MOST_SIGMAS = 6.0
+REACH = 4.0
+"""Of three numbers that go together, one in a thousand lies further out than so many deviations."""
 LEAST_PROBABILITY = 1e-12
 
 
@@ -98,12 +100,12 @@ def _part(of: Floats, all_of_it: Floats) -> float:
 
 def wheels_px(robot: RobotModel, lines_world: Floats, pose: Pose2, covariance: Floats) -> float:
     """How far the lines (m, 2, 3) may lie from where they were expected, by the covariance (3, 3) of the place: the
-    median over them of 3 deviations across each [px]."""
+    median over them of :data:`REACH` deviations across each [px]."""
     if not len(lines_world):
         return 0.0
     _, across = _across(robot, lines_world, pose)
     middle = across.mean(axis=1)
-    return 3.0 * float(np.median(np.sqrt(np.einsum("nk,kl,nl->n", middle, covariance, middle))))
+    return REACH * float(np.median(np.sqrt(np.einsum("nk,kl,nl->n", middle, covariance, middle))))
 
 
 def _told(robot: RobotModel, lines_world: Floats, pose: Pose2) -> Floats:

@@ -28,7 +28,7 @@ from world_models.regions import Finish, level
 from world_models.robot import RobotModel
 
 Floats = NDArray[np.float64]
-Look = tuple[tuple[float, float, float], tuple[tuple[float, float, float], ...]]
+Look = tuple[tuple[float, ...], tuple[tuple[float, ...], ...]]
 """What should be seen of a face: its colour (red, green, blue; 0..1, as bright as the model has it), and points of it
 that are in sight [m, world]."""
 

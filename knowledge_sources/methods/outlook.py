@@ -1,4 +1,5 @@
-"""Before it is seen: how well could a milestone be told at best, and does another place of the building look like it?"""
+"""Before it is seen: how surely could a milestone be told at best, and does another place of the building look like it?
+"""
 
 from __future__ import annotations
 
@@ -52,7 +53,7 @@ def _colours(robot: RobotModel, pose: Pose2) -> Floats:
 
 
 def _alike(robot: RobotModel, locale: str, pose: Pose2) -> Iterator[Pose2]:
-    """Where a locale may repeat itself: turned half round about its middle, and as far from every other of its doors."""
+    """Where a locale may repeat itself: turned half round about its middle, and as far from each other of its doors."""
     corners = robot.world.outline(locale)
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     yield Pose2(2.0 * float(middle[0]) - pose.x_m, 2.0 * float(middle[1]) - pose.y_m,

@@ -62,7 +62,7 @@ def shortest_route(
 
 
 def _nearest_free(free: shapely.Geometry, point: Floats, floor: Callable[[], shapely.Geometry]) -> Floats | None:
-    """Of what is nearest in each part of the free space, and of its corners: the nearest that is not behind a barrier."""
+    """Of what is nearest in each free part, and of all corners: the nearest that is not behind a barrier."""
     parts = [part for part in shapely.get_parts(free) if not part.is_empty]
     nearest = [shapely.get_coordinates(shapely.shortest_line(shapely.Point(point), part))[-1] for part in parts]
     if any(float(np.linalg.norm(p - point)) <= SLACK_M for p in nearest):

@@ -96,17 +96,18 @@ def _vantage(world: World, room: str, eye_m: float) -> Vantage:
 
 
 def _places(world: World, room: str) -> Floats:
-    """(n, 2) points of a grid in the room's free space [m, world]."""
+    """(n, 2) points of a grid in the room's free space, and of its open doorways as far as their middle [m, world]."""
+    sills = [d.thresholds_world.mean(axis=1)[:: 1 if d.between[0] == room else -1] for d in world.doorways_of(room)]
+    in_doorways = np.array([point for own, other in sills for point in (own, 0.5 * (own + other))]).reshape(-1, 2)
     free = free_space(world.outline(room), world.obstacles(room), ROOM_M)
     if free.is_empty:
-        return np.zeros((0, 2))
+        return in_doorways
     x0, y0, x1, y1 = (float(v) for v in free.bounds)
     xs = np.arange(math.ceil(x0 / STEP_M), math.floor(x1 / STEP_M) + 1) * STEP_M
     ys = np.arange(math.ceil(y0 / STEP_M), math.floor(y1 / STEP_M) + 1) * STEP_M
     grid = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=-1).reshape(-1, 2)
     shapely.prepare(free)
-    inside: Floats = grid[shapely.intersects_xy(free, grid[:, 0], grid[:, 1])]
-    return inside
+    return np.concatenate([grid[shapely.intersects_xy(free, grid[:, 0], grid[:, 1])], in_doorways])
 
 
 def _axis(lines_world: Floats) -> float:

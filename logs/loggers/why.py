@@ -17,7 +17,7 @@ from logs.mirror import Mirror, Moment
 from logs.mood import MOOD_KINDS, leg_under_way, mood
 from logs.paths import WHY
 from logs.tape import Tape
-from world_models.body import BodyFault, MotorCommand, Recovery
+from world_models.body import BodyFault, Frame, Look, MotorCommand, Recovery
 from world_models.frames import Pose2
 from world_models.location import Hypothesis
 from world_models.percepts import LineMatch, PoseFix, Segments, Tracks
@@ -212,14 +212,11 @@ def _chain(mirror: Mirror, entry: Entry[Any]) -> list[str]:
     met = {entry.id}
     while entry.because and len(parts) < MOST_REASONS:
         known = mirror.get(entry.because[0].id)
-        if known is None or known.ref == entry.ref:
+        if known is None or known.id in met:
             break
         entry = known
-        if entry.id not in met:
-            met.add(entry.id)
-            parts.append(_reason(entry))
-        elif entry.ref.revision == 0:
-            break
+        met.add(entry.id)
+        parts += [reason] if (reason := _reason(entry)) else []
     return parts
 
 
@@ -231,8 +228,13 @@ def _reason(entry: Entry[Any]) -> str:
         return f"as {entry.id} has it for {value.locale or 'the route'}"
     if isinstance(value, Goal):
         return f"on the way to {value.destination.locale}"
-    return f"because of {entry.ref}"
+    if isinstance(value, Discrepancy):
+        return f"because of {value.what}"
+    return "" if isinstance(value, UNSAID) else f"because of {entry.ref}"
 
+
+UNSAID = (Look, Frame, Segments)
+"""What stands between an order and its reason, and says nothing to a person."""
 
 BELIEVES, TRULY = "He believes", "In truth"
 

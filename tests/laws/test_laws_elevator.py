@@ -77,7 +77,7 @@ def check_subgoal(world: World, subgoal: Subgoal) -> None:
 
 @settings(deadline=None, max_examples=4)
 @given(towers(), st.data())
-def test_sketches_keep_clear_of_barriers_on_every_floor_and_keep_what_is_verified(world: World, data: st.DataObject) -> None:
+def test_sketches_pass_no_barrier_on_any_floor_and_keep_what_is_verified(world: World, data: st.DataObject) -> None:
     halls = [room for room in world.rooms if room.startswith("hall")]
     origin, destination = data.draw(st.permutations(halls))[:2]
     made, outcome = driven(world, origin, destination)
@@ -98,7 +98,7 @@ def test_sketches_keep_clear_of_barriers_on_every_floor_and_keep_what_is_verifie
 
 @settings(deadline=None, max_examples=20)
 @given(towers(), st.floats(-3.0, 3.0), st.floats(0.0, 0.3))
-def test_a_location_told_on_another_floor_comes_back_and_never_surer(world: World, heading: float, sigma: float) -> None:
+def test_a_location_told_on_another_floor_comes_back_no_surer(world: World, heading: float, sigma: float) -> None:
     here = Location("car-1", Pose2(1.0, 0.9, heading), diagonal(sigma, 0.1))
     for there in world.rooms:
         back = seen_from(world, seen_from(world, here, there), here.locale)

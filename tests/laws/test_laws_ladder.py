@@ -295,7 +295,7 @@ def test_whatever_pictures_go_on_saying_the_mission_ends_and_says_how(
     ladder.go_on(6000)
     assert ladder.outcome is not None
     raised = [d for d in ladder.seen.values() if d.times]
-    assert all(d.times <= (MOST_CHECKS if d.level is Level.PLAN else MOST_LOST) for d in raised)
+    assert all(d.times <= (MOST_CHECKS if d.level is Level.ACTION else MOST_LOST) for d in raised)
     if track <= ACTION_PX and milestone <= PLAN_PX:
         assert ladder.outcome.kind == "reached" and not raised
     if milestone > PLAN_PX:

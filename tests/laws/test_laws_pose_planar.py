@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -153,6 +154,21 @@ def test_few_lines_never_make_a_prior_worse(heading: float, count: int, seed: in
         )
         before, after = off(prior, truth), off(found.world_from_robot, truth)
         assert after @ information @ after <= before @ information @ before * 1.05 + 1e-9
+
+
+@pytest.mark.parametrize("count", [1, 3])
+@given(heading=headings, seed=seeds)
+@settings(max_examples=15, deadline=None, derandomize=True)
+def test_nor_do_few_noisy_lines_of_a_prior_that_nobody_weighed(count: int, heading: float, seed: int) -> None:
+    """Measured as a weak prior weighs errors."""
+    truth = Pose2(4.0, -2.0, heading)
+    lines, segments, rng = seen(truth, seed)
+    rows = rng.permutation(len(lines))[:count]
+    prior = near(truth, rng)
+    found = planar_from_lines(lines[rows], segments[rows], CAMERA, MOUNT, prior, sigma_px=SIGMA_PX)
+    information = planar_prior(prior, None).information
+    before, after = off(prior, truth), off(found.world_from_robot, truth)
+    assert after @ information @ after <= before @ information @ before * 1.05 + 1e-9
 
 
 @given(heading=headings, seed=seeds)

@@ -23,14 +23,14 @@ from harvey.mission import run_mission
 from harvey.wiring import knowledge_sources, robot_model
 from sim.assembly import set_stage
 from sim.scenario import load_scenario
-from world_models.body import Frame, MotionReport
+from world_models.body import Frame, MotionReport, RideReport
 from world_models.robot import RobotModel
 from world_models.task import Command
 
 FOLDER = Path(__file__).parents[2] / "knowledge_sources"
 FILES = {path.stem: path for path in sorted(FOLDER.glob("*.py"))}
 TREES = {stem: ast.parse(path.read_text(encoding="utf-8")) for stem, path in FILES.items()}
-FROM_OUTSIDE = {Command, MotionReport, Frame, Quiescence}
+FROM_OUTSIDE = {Command, MotionReport, RideReport, Frame, Quiescence}
 """What nobody on the board writes: the user, the body and the clock of the mission do."""
 
 

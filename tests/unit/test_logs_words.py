@@ -1,7 +1,8 @@
 """What the diary says in words: sentences, levels, the tree's labels and the story."""
 
 from blackboard.board import Blackboard
-from blackboard.effect import Post
+from blackboard.effect import Post, Revise
+from blackboard.entry import Ref
 from blackboard.journal import Decision
 from harvey.wiring import knowledge_sources, robot_model
 from logs.deeds import TELLERS, Deeds
@@ -13,8 +14,9 @@ from logs.mood import mood
 from logs.words import numerous
 from rehearsal import play
 from sim.scenario import load_scenario
-from world_models.body import BodyFault, Recovery
+from world_models.body import BodyFault, MotorCommand, Recovery
 from world_models.location import Hypothesis
+from world_models.task import Leg
 
 
 def played(until: str = "") -> tuple[list[Decision], Mirror]:
@@ -132,3 +134,16 @@ def test_the_story_tells_of_a_discrepancy_and_of_being_lost() -> None:
     lost = story(played()[1])
     assert lost.startswith("### The end: reached\n\n**The end:** reached: there.")
     assert "he is lost" in lost
+
+
+def test_an_order_whose_reasons_go_round_in_a_circle_is_told() -> None:
+    """The mirror knows the newest revisions only, so the older of two may seem to rest on the newer."""
+    mirror, board = Mirror(), Blackboard()
+    leg = Leg("PlanSketch-1", 0, 0.0, 0.0, 1.0, 0.0, 0.1)
+    for effect in (Post(leg), Post(MotorCommand(0.1, 0.0), (Ref("Leg-1", 0),))):
+        for change in board.apply([effect], author="motor", cycle=1):
+            mirror.take(change)
+    again = Revise(board.view["Leg-1"], leg, (Ref("MotorCommand-1", 0),))
+    for change in board.apply([again], author="motor", cycle=2):
+        mirror.take(change)
+    assert "**His last order:** turn 5.7° left, to follow Leg-1." in story(mirror)

@@ -1,4 +1,4 @@
-"""The short forms of world files: rows of things and doors, included files, copies of floors; each fault with its line."""
+"""The short forms of world files: rows of things and doors, included files, copies; each fault with its line."""
 
 from pathlib import Path
 
@@ -26,7 +26,8 @@ def house(more: str) -> World:
     return read_world(Source.parse(HEAD + more, "house.toml"))
 
 
-LONG = """things = [ { part = "chest", wall = "north", along = 1 }, { part = "chest", wall = "north", along = 3, name = "big" },
+LONG = """things = [
+  { part = "chest", wall = "north", along = 1 }, { part = "chest", wall = "north", along = 3, name = "big" },
   { part = "chest", wall = "south", along = 2, up = 0.5 }, { part = "chest", wall = "south", along = 4, up = 0.5 },
   { part = "chest", at = [3, 2], turn = 90 }, { part = "chest", at = [4, 2] }, { part = "chest", at = [6, 2] } ]
 """
@@ -51,7 +52,7 @@ def test_a_row_of_doors_is_several_doors() -> None:
 
 @pytest.mark.parametrize(("more", "message"), [
     ('things = [ ["chest"] ]', "house.toml:10: locales.hall.things.0: expected an array of at least 2 elements"),
-    ('things = [\n["chest", "north"] ]', "house.toml:11: locales.hall.things.0: expected a part, a wall or none, and at"),
+    ('things = [\n["chest", "north"] ]', "house.toml:11: locales.hall.things.0: expected a part, a wall or none"),
     ('things = [ ["sink", "north", 1] ]', "things.0.0: expected one of the parts chest, got 'sink'"),
     ('things = [ ["chest", "up", 1] ]', "things.0.1: expected one of south, east, north, west, got 'up'"),
     ('things = [ ["chest", "north", [1, 2]] ]', "things.0.2: expected a number along the wall, or { from"),
@@ -66,12 +67,12 @@ def test_a_row_of_doors_is_several_doors() -> None:
     ("sky = 1\n", "house.toml:10: locales.hall.sky: expected true or false"),
     ('[locales.attic]\nlike = "cellar"\n', "house.toml:11: locales.attic.like: expected a locale of this file"),
     ('[locales.attic]\nlike = "attic"\n', "house.toml:11: locales.attic.like: expected a locale of this file"),
-    ('[locales.attic]\nfrom = "nowhere"\n', "house.toml:11: locales.attic.from: expected a .toml file that is there, or"),
-    ('[locales.attic]\nfrom = "typical_floor"\nof = "moon"\n', "house.toml:12: locales.attic.of: expected one of hallway"),
+    ('[locales.attic]\nfrom = "nowhere"\n', "house.toml:11: locales.attic.from: expected a .toml file that is"),
+    ('[locales.attic]\nfrom = "typical_floor"\nof = "moon"\n', "house.toml:12: locales.attic.of: expected one of hall"),
     ('[locales.attic]\nfrom = "typical_floor"\nwithout = ["moon"]\n',
      "house.toml:12: locales.attic.without.0: expected a locale, door, link or thing"),
-    ('[locales.attic]\nfrom = "typical_floor"\nadd = { moon = [] }\n', "locales.attic.add.moon: expected one of the loc"),
-    ('[locales.attic]\nfrom = "typical_floor"\nsize = [1, 2]\n', "house.toml:12: locales.attic.size: expected one of the k"),
+    ('[locales.attic]\nfrom = "typical_floor"\nadd = { moon = [] }\n', "locales.attic.add.moon: expected one of"),
+    ('[locales.attic]\nfrom = "typical_floor"\nsize = [1, 2]\n', "house.toml:12: locales.attic.size: expected one of"),
     ('[links]\nlift = { kind = "elevator", between = ["hall", "hall"], stop = [1, 1, 0] }\n',
      "house.toml:11: links.lift.between: expected different locales"),
     ('[doors]\nd = { between = ["hall"], wall = "north", along = { from = 1, to = 2, step = 0 } }\n',

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from knowledge_sources.methods.pose import kernels
+from knowledge_sources.methods.pose.caution import least_move, most_unexplained
 from knowledge_sources.methods.pose.descent import Descent, Normal, information_inverse
 from knowledge_sources.methods.pose.estimate import BEHIND, Array, Mask, PlanarEstimate
 from knowledge_sources.methods.pose.guard import reasons
@@ -34,6 +36,8 @@ FINALISTS = 8
 WIDENING = (4.0, 2.0, 1.0, 1.0)
 """In the polish of the finalists, round by round, by how much the squared bound on inliers is wider."""
 ROUNDS = 8
+FEW_LINES = 3
+"""So many leave their noise hardly any freedom to show itself: without a stated covariance they go warily."""
 
 
 def planar_from_lines(
@@ -59,7 +63,8 @@ def planar_from_lines(
         model_lines_world: (n, 2, 3) [m]. segments_px: (n, 2, 2); several segments may share a model line.
         camera_from_robot: the mount. prior: ``world_from_robot``.
         prior_covariance: (3, 3) of (x, y, heading): the prior is one more measurement. ``None``: it only decides
-            directions that the lines leave open.
+            directions that the lines leave open; those, and three lines or
+            fewer, move it as little as their noise allows.
         landmark_ids: n names; pairs within one landmark are not tried as candidates.
         sigma_px: of the segment ends across the line, one number or (n,).
         robust: False takes every line as right.
@@ -158,10 +163,11 @@ def _settled(
     if not belief.given:
         alone = PlanarPrior(belief.mean, np.zeros((3, 3)), True)
         hessian = _descend(kept, state, alone, mount, iterations=0).normal.hessian
-        if _decided(hessian, belief):
+        reason = None if _decided(hessian, belief) else FEW
+        if reason is None and len(kept) > FEW_LINES:
             state = _descend(kept, state, alone, mount).state
         else:
-            reason = FEW
+            state = _cautious(kept, belief, mount)
     rotation, translation = camera_states(state, mount)
     rejected = reasons(lines, rotation, translation, near)
     if np.isinf(bound):
@@ -171,6 +177,18 @@ def _settled(
     if costs[0] > costs[1] + 1.0:
         state, reason = belief.mean, NOT_BETTER
     return _estimate(lines, state, belief, mount, rejected, cost_bound, reason)
+
+
+def _cautious(lines: LineSet, belief: PlanarPrior, mount: Pose) -> Array:
+    """The state nearest to the prior that explains the lines, see :func:`least_move`."""
+
+    def pulled(weight: float) -> Array:
+        return _descend(lines, belief.mean, replace(belief, information=weight * belief.information), mount).state
+
+    def unexplained(state: Array) -> float:
+        return float(np.sum(kernels.floor_squares(lines.arrays, np.array(state), mounted(mount))))
+
+    return least_move(belief.mean, pulled, unexplained, most_unexplained(2.0 * len(lines)))
 
 
 def _decided(hessian: Array, belief: PlanarPrior) -> bool:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
 from knowledge_sources.methods.pose import kernels
+from knowledge_sources.methods.pose.caution import least_move, most_unexplained
 from knowledge_sources.methods.pose.descent import Descent, information_inverse
 from knowledge_sources.methods.pose.estimate import BEHIND, Array, PoseEstimate
 from knowledge_sources.methods.pose.guard import (
@@ -37,10 +37,6 @@ from knowledge_sources.methods.pose.subset_poses import squared_distances
 from world_models.camera import Camera
 from world_models.frames import Pose
 
-UNUSUAL = 3.0
-"""Standard deviations by which the sum of squares may exceed its mean where the lines are explained."""
-MOST_PULL = 10.0
-"""Logarithm of the greatest weight of a prior, in weak ones, under which a pose is tried."""
 LEAST = np.diag(WEAK_INFORMATION).copy()
 """Knowing less than this in some direction, the lines do not decide the pose."""
 
@@ -102,26 +98,14 @@ def likeliest(
 
 
 def _cautious(lines: LineSet, prior: Pose) -> Descent[PoseState]:
-    """The pose nearest to the prior that explains the lines to their noise, or as well as any near it does.
-
-    Three lines or fewer are fitted to a hair by many poses, and in directions of which they say little their noise
-    would carry the pose far. How good the prior is nobody said, so they move it no further than they must (Morozov's
-    discrepancy principle: its weight is the greatest under which the lines are explained to their noise). The
-    covariance is that of a weak prior, since the pull says nothing of how right the prior is.
-    """
+    """See :func:`least_move`. The covariance is that of a weak prior: the pull says nothing of how right it is."""
     here = (prior.rotation, prior.translation)
-    freedom, state = 2.0 * len(lines), here
-    allowed = freedom + UNUSUAL * math.sqrt(2.0 * freedom)
-    if _chi2(lines, *here) > allowed:
-        state = ml_descent(lines, here, prior, WEAK_INFORMATION).state
-        low, high = 0.0, MOST_PULL if _chi2(lines, *state) <= allowed else 0.0
-        while high - low > 0.1:
-            middle = 0.5 * (low + high)
-            trial = ml_descent(lines, here, prior, 10.0**middle * WEAK_INFORMATION).state
-            if _chi2(lines, *trial) <= allowed:
-                state, low = trial, middle
-            else:
-                high = middle
+    state = least_move(
+        here,
+        lambda weight: ml_descent(lines, here, prior, weight * WEAK_INFORMATION).state,
+        lambda state: _chi2(lines, *state),
+        most_unexplained(2.0 * len(lines)),
+    )
     return compiled_descent(IMAGE, lines, np.ones(len(lines)), state, prior, WEAK_INFORMATION, 0)
 
 
@@ -138,7 +122,7 @@ def _explained(
     fine, rotation, translation, covariance, cost, steps, distances, front = kernels.explained_from(
         model, camera.undistort(ends_px), (camera.fx, camera.fy, camera.cx, camera.cy), checked_sigma(sigma_px, n),
         (np.array(prior.rotation), np.array(prior.translation)), LEAST,
-        freedom + UNUSUAL * math.sqrt(2.0 * freedom), OVERLAP_SLACK_PX,
+        most_unexplained(freedom), OVERLAP_SLACK_PX,
     )
     if not fine:
         return None

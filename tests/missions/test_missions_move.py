@@ -1,0 +1,102 @@
+"""Motions that are steered on the move: thirty pictures a second, all through the board, and the same once more."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import pytest
+
+from harvey.again.replay import pictures_of, replayed
+from harvey.again.resume import remains_of, resume
+from harvey.minds import mind_of
+from harvey.mission import run_mission
+from harvey.records import read_records
+from harvey.run_directory import RunDirectory
+from harvey.run_head import RunHead
+from sim.assembly import Stage, set_stage
+from sim.scenario import parse_scenario, with_settings
+
+SCENARIO = """
+world = "research_center"
+details = ["research_center_details"]
+goal = "(ptrans (hallway (4,4,0)) (hallway (11,4,0)))"
+[motion]
+continuous = true
+"""
+KIDNAP = """
+[[faults]]
+kind = "kidnap"
+in_locale = "hallway"
+after_ft = 3.0
+distance_m = 0.8
+turn_deg = 15.0
+"""
+SEED = 0
+
+
+@pytest.fixture(scope="module")
+def stage() -> Stage:
+    return set_stage(parse_scenario(SCENARIO, "on-the-move"))
+
+
+@pytest.fixture(scope="module")
+def run(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
+    out = RunDirectory(tmp_path_factory.mktemp("runs") / "move")
+    result = run_mission(stage, SEED, out=out.path)
+    assert result.outcome == "reached" and result.collisions == 0
+    assert result.final_error_m < 0.0254 and result.max_cross_track_m < 0.02
+    return out
+
+
+def decided_again(run: RunDirectory) -> bool:
+    with mind_of(RunHead.read(run.path)) as mind:
+        return all(told.same for told in replayed(run, pictures_of(run), mind.scheduler()))
+
+
+def test_each_picture_on_the_move_corrects_the_course_and_all_of_it_is_decided_again_to_the_byte(
+    run: RunDirectory,
+) -> None:
+    records = list(read_records(run.journal))
+    courses = [e for r in records for e in r.made if e.type == "Course"]
+    assert courses[0].change == "Posted" and len(courses) > 60
+    assert len({e.value["curvature_per_m"] for e in courses}) > 0.9 * (len(courses) - 2)
+    taken = [e.value["sim_time_s"] for r in records for e in r.observed
+             if e.type == "Frame" and e.because[0].startswith("Course-1.")]
+    steps = [b - a for a, b in itertools.pairwise(taken)][:-1]
+    assert all(abs(step - 1.0 / 30.0) < 1e-9 for step in steps)
+    assert decided_again(run)
+
+
+def test_a_run_that_is_cut_off_on_the_move_goes_on(run: RunDirectory, stage: Stage, tmp_path: Path) -> None:
+    """The robot has come to a stand by then; what the wheels claim of that is told, and it sets off again."""
+    lines = run.journal.read_bytes().splitlines(keepends=True)
+    rolling = [r.cycle for r in read_records(run.journal) if any(e.type == "Course" for e in r.made)]
+    cut = RunDirectory(tmp_path / "cut")
+    cut.path.mkdir()
+    for name in ("run.json", "camera.mjpeg"):
+        (cut.path / name).write_bytes((run.path / name).read_bytes())
+    cut.journal.write_bytes(b"".join(lines[: rolling[30]]))
+    assert resume(cut, remains_of(cut), stage=stage).outcome == "reached"
+    told = next(e for r in read_records(cut.journal) for e in r.observed if e.type == "Resumed")
+    assert told.value["interrupted"] == [next(
+        e.ref for r in read_records(cut.journal) if r.cycle == rolling[30] for e in r.made if e.type == "Course")]
+    assert decided_again(cut)
+
+
+def test_who_is_carried_off_on_the_move_stops_at_once(tmp_path: Path) -> None:
+    stage = set_stage(parse_scenario(SCENARIO + KIDNAP, "carried-off"))
+    run = RunDirectory(tmp_path / "run")
+    result = run_mission(stage, SEED, out=run.path)
+    assert result.outcome == "reached" and result.collisions == 0 and result.milestones["false_accepts"] == 0
+    records = list(read_records(run.journal))
+    at = next(i for i, r in enumerate(records) for e in r.made if e.type == "Discrepancy" and e.author
+              == "correlator_tracker" and e.value["magnitude"] in ("inf", float("inf")))
+    after = [e for r in records[at + 1: at + 4] for e in r.made if e.type in ("Course", "MotorCommand")]
+    assert [(e.type, e.value["speed_m_per_s"], e.author) for e in after] == [("Course", 0.0, "helmsman")]
+
+
+def test_it_is_a_setting_like_any_other() -> None:
+    plain = parse_scenario(SCENARIO.partition("[motion]")[0], "plain")
+    assert not plain.motion.continuous
+    assert with_settings(plain, {"motion.continuous": "on"}).motion.continuous
