@@ -50,8 +50,9 @@ class Face:
 
 def area_vector(polygon_world: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3,) the normal of a flat polygon (k, 3) times its area (Newell)."""
-    p = polygon_world - polygon_world[0]
-    return np.asarray(0.5 * np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0))
+    x, y, z = (polygon_world - polygon_world[0]).T
+    u, v, w = (np.concatenate([c[1:], c[:1]]) for c in (x, y, z))
+    return np.asarray(0.5 * np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1).sum(axis=0))
 
 
 def painted(name: str, locale: str, polygon_world: Any, finish: Finish, **more: Any) -> Face:

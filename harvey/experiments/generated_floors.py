@@ -30,7 +30,9 @@ ROOMS_ALONG = 7
 WALL_FT = 0.5
 DOOR_FT, LINED_FT = 3.3, 2.1
 """Width of a doorway, and how far from its middle nothing else hangs."""
-INWARD: Mapping[str, tuple[float, float, float]] = {"south": (0.0, 1.0, 0.0), "east": (-1.0, 0.0, 0.0), "north": (0.0, -1.0, 0.0), "west": (1.0, 0.0, 0.0)}
+INWARD: Mapping[str, tuple[float, float, float]] = {
+    "south": (0.0, 1.0, 0.0), "east": (-1.0, 0.0, 0.0), "north": (0.0, -1.0, 0.0), "west": (1.0, 0.0, 0.0),
+}
 ACROSS: Mapping[str, str] = {"south": "north", "north": "south", "east": "west", "west": "east"}
 EVEN_LIGHT = 0.62
 """In a symmetric corridor every wall and board gives back so much of its colour, whichever way it faces."""
@@ -50,7 +52,9 @@ IN_ROOMS = (*DEEP, *DEEP, "picture", "notice-board", "white-board", "sign", "win
 FRAMES = ("walnut", "navy", "rust", "teal", "dark-steel", "oak")
 LEAVES = ("oak", "teal", "navy", "mustard", "red", "steel", "brown")
 PANELS = (None, "pane", "kick-plate", "louvre")
-CLUTTER: Mapping[str, float] = {"socket": 0.15, "switch": 0.15, "poster": 0.9, "leaflet": 0.5, "conduit": 0.1, "carton": 0.7, "basket": 0.5}
+CLUTTER: Mapping[str, float] = {
+    "socket": 0.15, "switch": 0.15, "poster": 0.9, "leaflet": 0.5, "conduit": 0.1, "carton": 0.7, "basket": 0.5,
+}
 
 
 @dataclass(frozen=True, eq=False)

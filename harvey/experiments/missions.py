@@ -7,7 +7,7 @@ from the hallway on, the lights go out for two seconds, and the robot is bumped 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from harvey.units import INCH_M
 GOOD, BAD = "lab-to-allens-office", "rough-day"
 SCENARIOS = (GOOD, BAD)
 SEEDS, QUICK_SEEDS = 1_000, 1
-WANTED = {GOOD: 0.995, BAD: 0.98}
+WANTED: Mapping[str, float] = {GOOD: 0.995, BAD: 0.98}
 """Parts of the missions that must end within an inch."""
 DECLARED = ("reached", "lost", "blocked", "failed")
 WORST = 5
@@ -116,7 +116,7 @@ def _claims(name: str, ended: Sequence[Ended]) -> list[tuple[str, bool]]:
     return claims
 
 
-def _draw(by_scenario: dict[str, list[Ended]], path: Path) -> None:
+def _draw(by_scenario: Mapping[str, list[Ended]], path: Path) -> None:
     with chart(path, "Final errors", "true distance from the goal [mm]", "part of the missions below it") as axes:
         for (name, ended), colour in zip(by_scenario.items(), (OURS, PEER), strict=True):
             errors = np.sort([1000.0 * e.error_m for e in ended])

@@ -91,7 +91,9 @@ def sum_of(clock: Clock) -> float:
 
 
 def _planned(known: RobotModel, scenario: Scenario) -> Clock:
-    return planned(replace(known, world=World(known.world.frames)), scenario)
+    world = World(known.world.frames)
+    world.memo["looks"] = known.world.memo.setdefault("looks", {})  # surfaces in arrays, laid out once
+    return planned(replace(known, world=world), scenario)
 
 
 def planned(robot: RobotModel, scenario: Scenario) -> Clock:

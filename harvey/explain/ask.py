@@ -31,7 +31,8 @@ from world_models import actuator, body, location, percepts, task
 
 TYPES: Mapping[str, type[Any]] = {
     name: kind
-    for module in (actuator, body, location, percepts, task) for name, kind in vars(module).items() if isinstance(kind, type)
+    for module in (actuator, body, location, percepts, task) for name, kind in vars(module).items()
+    if isinstance(kind, type)
 } | {"Discrepancy": Discrepancy, "Quiescence": Quiescence}
 KINDS: Mapping[str, type[Change]] = {"Posted": Posted, "Revised": Revised, "Retracted": Retracted}
 
