@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -19,7 +20,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.regions import segment_regions
-from world_models.camera import NEAR_M
+from world_models.camera import NEAR_M, Camera
 from world_models.faces import area_vector
 from world_models.frame_source import Packet
 from world_models.frames import Pose2
@@ -83,20 +84,35 @@ def expected_looks(robot: RobotModel, pose: Pose2) -> tuple[Look, ...]:
     parts = [_surfaces(robot.world.memo, packets[key]) for key in sorted(packets)]
     corners, colours, normals = (np.concatenate([part[i] for part in parts]) for i in range(3))
     centre = camera_from_world.inverse().translation
-    facing = np.flatnonzero(np.sum(normals * (centre - corners[:, 0]), axis=1) > 1e-6)
+    facing = np.flatnonzero(np.einsum("ij,ij->i", normals, centre - corners[:, 0]) > 1e-6)
     near = camera_from_world.apply(corners[facing].reshape(-1, 3)).reshape(-1, CORNERS, 3)
-    facing, near = facing[near[..., 2].max(axis=1) > NEAR_M], near[near[..., 2].max(axis=1) > NEAR_M]
-    if not len(facing):
+    boxes = _boxes(near)
+    rays, (left, top, right, bottom) = _rays(camera)
+    in_view = np.flatnonzero((near[..., 2].max(axis=1) > NEAR_M) & (boxes[:, 0] <= right) & (boxes[:, 2] >= left)
+                             & (boxes[:, 1] <= bottom) & (boxes[:, 3] >= top))
+    facing = facing[in_view]
+    turned = normals[facing] @ camera_from_world.rotation.T
+    surface, depth = _first_hits(near[in_view], turned, boxes[in_view], rays)
+    hit = np.unique(surface[surface >= 0])
+    if not len(hit):
         return ()
-    keys, group = np.unique(np.round(np.column_stack([colours, normals])[facing], 4), axis=0, return_inverse=True)
-    rays = camera.rays(_samples(camera.width, camera.height)).reshape(-1, 3)
-    rays = np.ascontiguousarray(rays / rays[:, 2:])
-    surface, depth = _first_hits(near, normals[facing] @ camera_from_world.rotation.T, _boxes(near), rays)
-    of = np.where(surface >= 0, group.ravel()[surface], -1).reshape(-1, 5)
+    appearance = np.round(np.column_stack([colours, normals])[facing[hit]], 4)
+    keys, group = np.unique(appearance, axis=0, return_inverse=True)
+    group_of = np.full(len(facing) + 1, -1)  # the last one stands for no surface
+    group_of[hit] = group.ravel()
+    of = group_of[surface].reshape(-1, 5)
     whole = np.flatnonzero((of[:, 0] >= 0) & np.all(of == of[:, :1], axis=1))
     at = rays[::5][whole] * depth[::5][whole, None]
     points = camera_from_world.inverse().apply(at).reshape(-1, 3)
     return tuple(_look(keys[g, :3], points[of[whole, 0] == g]) for g in _largest(of[whole, 0]))
+
+
+@lru_cache(maxsize=8)
+def _rays(camera: Camera) -> tuple[Floats, Floats]:
+    """Rays (n, 3), z = 1, through the samples of a picture, five together, and the rectangle round them (4,)."""
+    rays = camera.rays(_samples(camera.width, camera.height)).reshape(-1, 3)
+    rays = np.ascontiguousarray(rays / rays[:, 2:])
+    return rays, np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)])
 
 
 def small_colour(jpeg: bytes) -> NDArray[np.uint8]:
@@ -223,27 +239,33 @@ def _boxes(corners: Floats) -> Floats:
 def _first_hits(corners: Any, normals: Any, boxes: Any, rays: Any) -> Any:
     """Which of the polygons (m, k, 3), in the camera's frame, each ray (x, y, 1) meets first (-1: none), and how deep.
 
-    A point of a polygon's plane is in it where it is on the same side of all planes through the eye and one edge.
+    The rays are five round each sample of the grid. A point of a polygon's plane is in it where it is on the same side
+    of all planes through the eye and one edge.
     """
     surface, depth = np.full(len(rays), -1, np.int64), np.full(len(rays), np.inf)
-    for i in range(len(rays)):
-        x, y = rays[i, 0], rays[i, 1]
-        for m in range(len(corners)):
-            if not (boxes[m, 0] <= x <= boxes[m, 2] and boxes[m, 1] <= y <= boxes[m, 3]):
-                continue
-            n, c = normals[m], corners[m]
-            slope = n[0] * x + n[1] * y + n[2]
-            if slope >= -1e-12:
-                continue
-            far = (n[0] * c[0, 0] + n[1] * c[0, 1] + n[2] * c[0, 2]) / slope
-            if far <= NEAR_M or far >= depth[i]:
-                continue
-            low, high = 0.0, 0.0
-            for k in range(c.shape[0]):
-                a, b = c[k], c[(k + 1) % c.shape[0]]
-                side = ((a[1] * b[2] - a[2] * b[1]) * x + (a[2] * b[0] - a[0] * b[2]) * y
-                        + a[0] * b[1] - a[1] * b[0])
-                low, high = min(low, side), max(high, side)
-            if low > -1e-12 or high < 1e-12:
-                surface[i], depth[i] = m, far
+    columns, rows = rays[: 5 * GRID : 5, 0], rays[:: 5 * GRID, 1]
+    for m in range(len(corners)):
+        n, c = normals[m], corners[m]
+        left, right = np.searchsorted(columns, boxes[m, 0]) - 1, np.searchsorted(columns, boxes[m, 2]) + 1
+        top, bottom = np.searchsorted(rows, boxes[m, 1]) - 1, np.searchsorted(rows, boxes[m, 3]) + 1
+        ahead = n[0] * c[0, 0] + n[1] * c[0, 1] + n[2] * c[0, 2]
+        for row in range(max(top, 0), min(bottom, GRID)):
+            for i in range(5 * (GRID * row + max(left, 0)), 5 * (GRID * row + min(right, GRID))):
+                x, y = rays[i, 0], rays[i, 1]
+                if not (boxes[m, 0] <= x <= boxes[m, 2] and boxes[m, 1] <= y <= boxes[m, 3]):
+                    continue
+                slope = n[0] * x + n[1] * y + n[2]
+                if slope >= -1e-12:
+                    continue
+                far = ahead / slope
+                if far <= NEAR_M or far >= depth[i]:
+                    continue
+                low, high = 0.0, 0.0
+                for k in range(c.shape[0]):
+                    a, b = c[k], c[(k + 1) % c.shape[0]]
+                    side = ((a[1] * b[2] - a[2] * b[1]) * x + (a[2] * b[0] - a[0] * b[2]) * y
+                            + a[0] * b[1] - a[1] * b[0])
+                    low, high = min(low, side), max(high, side)
+                if low > -1e-12 or high < 1e-12:
+                    surface[i], depth[i] = m, far
     return surface, depth
