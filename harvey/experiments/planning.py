@@ -43,10 +43,10 @@ class Clock:
 
     def begin(self) -> None:
         """The next decision begins now."""
-        self._began = time.process_time()
+        self._began = time.thread_time()
 
     def __call__(self, decision: Decision) -> None:
-        now = time.process_time()
+        now = time.thread_time()
         if decision.chosen is not None and decision.chosen.source.name in self.ms:
             self.steps_ms.append(1000.0 * (now - self._began))
             self.ms[decision.chosen.source.name] += self.steps_ms[-1]

@@ -23,7 +23,7 @@ from knowledge_sources.methods.regions import segment_regions
 from world_models.camera import NEAR_M, Camera
 from world_models.faces import area_vector
 from world_models.frame_source import Packet
-from world_models.frames import Pose2
+from world_models.frames import Pose, Pose2
 from world_models.portals import image_window, windows_of
 from world_models.regions import Finish, level
 from world_models.robot import RobotModel
@@ -45,6 +45,7 @@ DARK = 4.0
 ALIKE_LEVEL, ALIKE_TINT = 0.3, 0.1
 """Logarithms of brightness and colour that differ less than this agree: faces are lit by as much more or less."""
 LEAST_FACES, MOST_CHANCE = 3, 0.8
+KEPT_VIEWS = 64
 CORNERS = 8
 """Regions of more corners are not probed."""
 WHITE = Finish((1.0, 1.0, 1.0))
@@ -75,8 +76,18 @@ NOTHING = Probe(0, 0.0, 0.0)
 
 
 def expected_looks(robot: RobotModel, pose: Pose2) -> tuple[Look, ...]:
-    """The faces in view from a pose, those first of which most is seen."""
+    """The faces in view from a pose, those first of which most is seen; asked again soon, the answer is at hand."""
     camera, camera_from_world = robot.camera, robot.camera_from_world(pose)
+    key = camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes()
+    known: dict[object, tuple[Look, ...]] = robot.world.memo.setdefault("expected looks", {})
+    if key not in known:
+        if len(known) >= KEPT_VIEWS:
+            del known[next(iter(known))]
+        known[key] = _expected_looks(robot, camera, camera_from_world)
+    return known[key]
+
+
+def _expected_looks(robot: RobotModel, camera: Camera, camera_from_world: Pose) -> tuple[Look, ...]:
     rooms = sorted(windows_of(robot.world, image_window(camera), camera_from_world))
     packets = {(p.locale, p.neighbour or ""): p for room in rooms for p in robot.world.frames.packets(room)}
     if not packets:
@@ -88,7 +99,7 @@ def expected_looks(robot: RobotModel, pose: Pose2) -> tuple[Look, ...]:
     near = camera_from_world.apply(corners[facing].reshape(-1, 3)).reshape(-1, CORNERS, 3)
     boxes = _boxes(near)
     rays, (left, top, right, bottom) = _rays(camera)
-    in_view = np.flatnonzero((near[..., 2].max(axis=1) > NEAR_M) & (boxes[:, 0] <= right) & (boxes[:, 2] >= left)
+    in_view = np.flatnonzero(np.any(near[..., 2] > NEAR_M, axis=1) & (boxes[:, 0] <= right) & (boxes[:, 2] >= left)
                              & (boxes[:, 1] <= bottom) & (boxes[:, 3] >= top))
     facing = facing[in_view]
     turned = normals[facing] @ camera_from_world.rotation.T
@@ -205,9 +216,9 @@ def _largest(groups: NDArray[np.int64]) -> list[int]:
 
 def _look(colour: Floats, points: Floats) -> Look:
     """A face's look by a few of its points, from all over it."""
-    some = points[np.unique(np.linspace(0, len(points) - 1, POINTS).astype(np.int64))]
-    red, green, blue = (float(c) for c in colour)
-    return (red, green, blue), tuple((float(x), float(y), float(z)) for x, y, z in np.round(some, 3))
+    some = sorted({i * (len(points) - 1) // (POINTS - 1) for i in range(POINTS)})
+    red, green, blue = colour.tolist()
+    return (red, green, blue), tuple(map(tuple, points[some].round(3).tolist()))
 
 
 def _surfaces(memo: dict[str, Any], packet: Packet) -> tuple[Floats, Floats, Floats]:
@@ -229,9 +240,11 @@ def _surfaces(memo: dict[str, Any], packet: Packet) -> tuple[Floats, Floats, Flo
 
 def _boxes(corners: Floats) -> Floats:
     """(m, 4) the rectangle x / z, y / z (low, high) round polygons (m, k, 3); everything where one is partly behind."""
-    flat = corners[..., :2] / np.maximum(corners[..., 2:], NEAR_M)
-    box = np.concatenate([flat.min(axis=1), flat.max(axis=1)], axis=1)
-    box[np.any(corners[..., 2] <= NEAR_M, axis=1)] = (-np.inf, -np.inf, np.inf, np.inf)
+    across, down, deep = np.ascontiguousarray(corners.transpose(2, 1, 0))
+    depth = np.maximum(deep, NEAR_M)
+    x, y = across / depth, down / depth  # (k, m): numpy takes the least of many rows faster than of many short ones
+    box = np.column_stack([x.min(axis=0), y.min(axis=0), x.max(axis=0), y.max(axis=0)])
+    box[deep.min(axis=0) <= NEAR_M] = (-np.inf, -np.inf, np.inf, np.inf)
     return np.asarray(box)
 
 
@@ -244,8 +257,17 @@ def _first_hits(corners: Any, normals: Any, boxes: Any, rays: Any) -> Any:
     """
     surface, depth = np.full(len(rays), -1, np.int64), np.full(len(rays), np.inf)
     columns, rows = rays[: 5 * GRID : 5, 0], rays[:: 5 * GRID, 1]
+    edges = np.empty((corners.shape[1], 3))
     for m in range(len(corners)):
         n, c = normals[m], corners[m]
+        sides = 0
+        for k in range(len(c)):  # the last corner is repeated: what is no edge is left out
+            a, b = c[k], c[(k + 1) % len(c)]
+            if a[0] != b[0] or a[1] != b[1] or a[2] != b[2]:
+                edges[sides, 0] = a[1] * b[2] - a[2] * b[1]
+                edges[sides, 1] = a[2] * b[0] - a[0] * b[2]
+                edges[sides, 2] = a[0] * b[1] - a[1] * b[0]
+                sides += 1
         left, right = np.searchsorted(columns, boxes[m, 0]) - 1, np.searchsorted(columns, boxes[m, 2]) + 1
         top, bottom = np.searchsorted(rows, boxes[m, 1]) - 1, np.searchsorted(rows, boxes[m, 3]) + 1
         ahead = n[0] * c[0, 0] + n[1] * c[0, 1] + n[2] * c[0, 2]
@@ -261,10 +283,8 @@ def _first_hits(corners: Any, normals: Any, boxes: Any, rays: Any) -> Any:
                 if far <= NEAR_M or far >= depth[i]:
                     continue
                 low, high = 0.0, 0.0
-                for k in range(c.shape[0]):
-                    a, b = c[k], c[(k + 1) % c.shape[0]]
-                    side = ((a[1] * b[2] - a[2] * b[1]) * x + (a[2] * b[0] - a[0] * b[2]) * y
-                            + a[0] * b[1] - a[1] * b[0])
+                for k in range(sides):
+                    side = edges[k, 0] * x + edges[k, 1] * y + edges[k, 2]
                     low, high = min(low, side), max(high, side)
                 if low > -1e-12 or high < 1e-12:
                     surface[i], depth[i] = m, far
