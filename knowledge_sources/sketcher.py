@@ -101,10 +101,7 @@ class Sketcher(Expert):
         here = _place(belief.value)
         subgoals = self._between_locales(here, goal.value.destination, END_TOLERANCE_M)
         if subgoals is None:
-            there = goal.value.destination.locale
-            stairs = "; people can walk there, by stairs" if self._world.walk(here.locale, there) else ""
-            reason = f"no passage for wheels leads from {here.locale} to {there}{stairs}"
-            yield Post(Outcome("blocked", reason), (goal, belief))
+            yield Post(Outcome("blocked", self._why_not(here.locale, goal.value.destination.locale)), (goal, belief))
         else:
             yield Post(PlanSketch(goal.id, (), "", subgoals), (goal, belief))
 
@@ -123,6 +120,13 @@ class Sketcher(Expert):
             current = s.subgoals[s.at]
             if not current.primitive and not current.passage:
                 yield from self._refined(sketch, current, belief, go)
+
+    def _why_not(self, here: str, there: str) -> str:
+        """Why no sketch leads from one locale to another."""
+        if self._world.route(here, there) is not None:
+            return f"something stands before a passage on the way from {here} to {there}"
+        stairs = "; people can walk there, by stairs" if self._world.walk(here, there) else ""
+        return f"no passage for wheels leads from {here} to {there}{stairs}"
 
     def _is_off(self, belief: Hypothesis, subgoal: Subgoal) -> bool:
         here, there = belief.world_from_robot(self._world), subgoal.destination.in_world(self._world)
@@ -179,6 +183,8 @@ class Sketcher(Expert):
         subgoals: list[Subgoal] = []
         for step in route.steps:
             before, behind = (self._before(step.passage, locale) for locale in (step.origin, step.destination))
+            if before is None or behind is None:
+                return None
             subgoals.append(self._subgoal(here, before, self._way_tolerance_m(step.passage)))
             on_wheels = not isinstance(step.passage, Link)  # else it is a ride: there is nothing to drive
             subgoals.append(Subgoal(before, behind, on_wheels, step.passage.name, WAY_TOLERANCE_M))
@@ -193,7 +199,8 @@ class Sketcher(Expert):
         beside = passage.width_m / 2 - self._robot.radius_m
         return WAY_TOLERANCE_M if beside >= NARROW_M else max(beside, CLEARANCES_M[-1])
 
-    def _before(self, passage: Passage, locale: str) -> Place:
+    def _before(self, passage: Passage, locale: str) -> Place | None:
+        """Where to stand before a passage, or behind it; None where something bars it."""
         if isinstance(passage, Link):
             x, y, heading = passage.stop_of(locale)
             return Place.of_world(self._world, locale, float(x), float(y), float(heading))
@@ -201,6 +208,8 @@ class Sketcher(Expert):
         free = self._free(locale, CLEARANCES_M[-1])
         away = next((m for m in (THRESHOLD_M, *NEARER_M) if free.covers(Point(middle - m * outward))), THRESHOLD_M)
         x, y = middle - away * outward
+        if not is_clear(self._free(locale, -self._robot.radius_m), middle, (x, y)):
+            return None
         return Place.of_world(self._world, locale, float(x), float(y))
 
     def _subgoal(self, origin: Place, destination: Place, tolerance_m: float) -> Subgoal:
