@@ -44,6 +44,8 @@ DOUBT_M, DOUBT_RAD = 0.02, 0.01
 LEAST_LINES, LEAST_PART = 6, 0.5
 """So many lines, and this part of those near which there is an edge, must agree."""
 ROUNDS = 4
+MOST_LINES = 75.0
+"""Percent of the places along lines that must be sure to within the first search's reach."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +62,8 @@ def aligned(
 ) -> Aligned | None:
     """The pose that moves model lines onto the edges of a picture; None where too few of them are found.
 
+    It is None too where the belief is so loose that the nearest edge need not be a line's own.
+
     Args:
         image: (h, w) grey, without lens distortion.
         lines_world: (n, 2, 3) the visible pieces of model lines.
@@ -69,6 +73,8 @@ def aligned(
     pose, found = world_from_robot, None
     for across_px in ACROSS_PX:
         seen = _edges(robot, smooth, lines_world, pose, across_px)
+        if found is None and (seen is None or _doubt_px(seen, covariance) > across_px):
+            return None
         found = None if seen is None else _solved(seen, pose, world_from_robot, covariance)
         if found is None:
             return None
@@ -104,6 +110,12 @@ def _edges(robot: RobotModel, image: NDArray[np.uint8], lines: Floats, pose: Pos
     good &= p[:, 2] > 0.0
     slopes = np.einsum("ni,nij->nj", normal, jacobian)
     return _Edges(offset[good], slopes[good], line[good])
+
+
+def _doubt_px(edges: _Edges, covariance: Floats) -> float:
+    """How far the belief may put lines across themselves, as most of them have it: 3 deviations [px]."""
+    variances = np.einsum("ni,ij,nj->n", edges.slopes, covariance, edges.slopes)
+    return 3.0 * float(np.sqrt(np.percentile(variances, MOST_LINES))) if len(variances) else np.inf
 
 
 def _places(ends_px: Floats) -> tuple[NDArray[np.int64], Floats]:

@@ -44,28 +44,33 @@ def squared(glances: Sequence[Glance], camera: Camera, camera_from_robot: Pose) 
     """The glances with the turns between them corrected by the level lines that they show.
 
     Wheels err by a fortieth of a turn; but lines at right angles are seen to a tenth of a degree, and it is known from
-    the wheels which of the four directions is which. The last glance is where the robot is now.
+    the wheels which of the four directions is which. The last glance is where the robot is now. If it shows no level
+    lines, the others are set straight by the last one that does, and are known from now no better than that one is.
     """
     seen = [level_direction(g.segments_px, camera, camera_from_robot) for g in glances]
-    now = seen[-1]
-    if now is None:
+    told = [(g, d) for g, d in zip(glances, seen, strict=True) if d is not None]
+    if not told:
         return tuple(glances)
-    out = []
-    for glance, direction in zip(glances[:-1], seen[:-1], strict=True):
-        if direction is not None:
-            pose = glance.now_from_then
-            off = math.remainder(now - direction - pose.heading_rad, RIGHT)
-            if abs(off) < MOST_OFF_RAD:
-                turned = Pose2(pose.x_m, pose.y_m, wrap_angle(pose.heading_rad + off))
-                glance = replace(glance, now_from_then=turned, spread=_known_turn(glance.spread))
-        out.append(glance)
-    return (*out, glances[-1])
+    surest, direction = told[-1]
+    axis, spread = direction + surest.now_from_then.heading_rad, float(surest.spread[2, 2])
+    return tuple(g if d is None or g is surest else _straight(g, axis - d, spread)
+                 for g, d in zip(glances, seen, strict=True))
 
 
-def _known_turn(spread: Floats) -> Floats:
-    """The covariance (3, 3) once the turn is known from what is seen."""
+def _straight(glance: Glance, heading_rad: float, spread: float) -> Glance:
+    """A glance whose heading from now is known modulo a right angle, with the variance of that."""
+    pose = glance.now_from_then
+    off = math.remainder(heading_rad - pose.heading_rad, RIGHT)
+    if abs(off) >= MOST_OFF_RAD:
+        return glance
+    turned = Pose2(pose.x_m, pose.y_m, wrap_angle(pose.heading_rad + off))
+    return replace(glance, now_from_then=turned, spread=_known_turn(glance.spread, spread + SEEN_RAD**2))
+
+
+def _known_turn(spread: Floats, seen: float) -> Floats:
+    """The covariance (3, 3) once the turn is known from what is seen with the variance ``seen``."""
     out = np.zeros((3, 3))
-    out[:2, :2], out[2, 2] = spread[:2, :2], min(float(spread[2, 2]), SEEN_RAD**2)
+    out[:2, :2], out[2, 2] = spread[:2, :2], min(float(spread[2, 2]), seen)
     return out
 
 

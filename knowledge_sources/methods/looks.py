@@ -24,7 +24,7 @@ from world_models.camera import NEAR_M, Camera
 from world_models.faces import area_vector
 from world_models.frame_source import Packet
 from world_models.frames import Pose, Pose2
-from world_models.portals import image_window, windows_of
+from world_models.portals import Window, image_window, windows_of
 from world_models.regions import Finish, level
 from world_models.robot import RobotModel
 
@@ -88,7 +88,8 @@ def expected_looks(robot: RobotModel, pose: Pose2) -> tuple[Look, ...]:
 
 
 def _expected_looks(robot: RobotModel, camera: Camera, camera_from_world: Pose) -> tuple[Look, ...]:
-    rooms = sorted(windows_of(robot.world, image_window(camera), camera_from_world))
+    rays, (left, top, right, bottom), window = _rays(camera)
+    rooms = sorted(windows_of(robot.world, window, camera_from_world))
     packets = {(p.locale, p.neighbour or ""): p for room in rooms for p in robot.world.frames.packets(room)}
     if not packets:
         return ()
@@ -98,7 +99,6 @@ def _expected_looks(robot: RobotModel, camera: Camera, camera_from_world: Pose) 
     facing = np.flatnonzero(np.einsum("ij,ij->i", normals, centre - corners[:, 0]) > 1e-6)
     near = camera_from_world.apply(corners[facing].reshape(-1, 3)).reshape(-1, CORNERS, 3)
     boxes = _boxes(near)
-    rays, (left, top, right, bottom) = _rays(camera)
     in_view = np.flatnonzero(np.any(near[..., 2] > NEAR_M, axis=1) & (boxes[:, 0] <= right) & (boxes[:, 2] >= left)
                              & (boxes[:, 1] <= bottom) & (boxes[:, 3] >= top))
     facing = facing[in_view]
@@ -119,11 +119,13 @@ def _expected_looks(robot: RobotModel, camera: Camera, camera_from_world: Pose) 
 
 
 @lru_cache(maxsize=8)
-def _rays(camera: Camera) -> tuple[Floats, Floats]:
-    """Rays (n, 3), z = 1, through the samples of a picture, five together, and the rectangle round them (4,)."""
+def _rays(camera: Camera) -> tuple[Floats, Floats, Window]:
+    """Rays (n, 3), z = 1, through the samples of a picture, five together, the rectangle round them (4,), and the
+    picture's own.
+    """
     rays = camera.rays(_samples(camera.width, camera.height)).reshape(-1, 3)
     rays = np.ascontiguousarray(rays / rays[:, 2:])
-    return rays, np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)])
+    return rays, np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)]), image_window(camera)
 
 
 def small_colour(jpeg: bytes) -> NDArray[np.uint8]:

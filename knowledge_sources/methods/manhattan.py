@@ -21,16 +21,18 @@ LEVEL_EYE = 0.06
 """Nor does one at about the height of the eye, where all level lines look alike."""
 SMOOTHING = ((-2, 0.4), (-1, 0.8), (0, 1.0), (1, 0.8), (2, 0.4))
 RIGHT = 0.5 * math.pi
+FEWEST = 4
+"""Directions that fewer segments share tell nothing: in sight of a bare wall two or three of its marks may."""
 
 
 def level_direction(segments_px: Any, camera: Camera, camera_from_robot: Pose) -> float | None:
     """The direction, modulo a right angle, along which most level lines seen as segments (n, 2, 2) run [rad].
 
     In the robot's frame. A segment and the camera span a plane; a level line that lies in it runs across the plane's
-    normal. Lengths vote; None where no segment tells.
+    normal. Lengths vote; None where too few segments agree.
     """
     angle, weight = _votes(np.asarray(segments_px, float).reshape(-1, 2, 2), camera, camera_from_robot)
-    if not len(angle):
+    if len(angle) < FEWEST:
         return None
     counts = np.bincount(np.floor(angle / RIGHT * BINS).astype(np.int64) % BINS, weight, BINS)
     smooth = np.sum([w * np.roll(counts, k) for k, w in SMOOTHING], axis=0)
@@ -53,9 +55,10 @@ def _votes(segments: Floats, camera: Camera, camera_from_robot: Pose) -> tuple[F
     return np.mod(np.arctan2(n[:, 0], -n[:, 1]), RIGHT), np.minimum(length, 150.0)
 
 
-def _about(angle: Floats, weight: Floats, centre: float) -> float:
-    """The weighted mean of the directions within three degrees of one."""
+def _about(angle: Floats, weight: Floats, centre: float) -> float | None:
+    """The weighted mean of the directions within three degrees of one, if there are enough."""
     off = np.mod(angle - centre + 0.5 * RIGHT, RIGHT) - 0.5 * RIGHT
     near = np.abs(off) < math.radians(3.0)
-    total = float(np.sum(weight[near]))
-    return centre + (float(np.sum((off * weight)[near])) / total if total > 0.0 else 0.0)
+    if np.count_nonzero(near) < FEWEST:
+        return None
+    return centre + float(np.sum((off * weight)[near])) / float(np.sum(weight[near]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -22,7 +22,7 @@ from knowledge_sources.methods.rivals import (
     weights_of,
     widest_gap,
 )
-from knowledge_sources.methods.settling import settled
+from knowledge_sources.methods.settling import expected_lines, settled
 from knowledge_sources.methods.support import Support, support_of
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
@@ -89,26 +89,55 @@ class Finding:
 
 def finding(robot: RobotModel, glances: Sequence[Glance], rooms: Sequence[str]) -> Finding:
     """What is to be made of these glances, the last of which was taken from where the robot is now."""
-    kept = candidates(robot, glances, rooms)
-    return verdict(robot, kept, [g.now_from_then for g in glances])
-
-
-def candidates(robot: RobotModel, glances: Sequence[Glance], rooms: Sequence[str]) -> tuple[Candidate, ...]:
-    """Places in these rooms that bear out all glances, the likeliest first, with their weights."""
     straight = squared(glances, robot.camera, robot.mount.camera_from_robot)
+    return verdict(robot, candidates(robot, straight, rooms), [g.now_from_then for g in straight])
+
+
+def candidates(robot: RobotModel, straight: Sequence[Glance], rooms: Sequence[str]) -> tuple[Candidate, ...]:
+    """Places in these rooms that bear out all glances, the likeliest first, with their weights.
+
+    If one place stands alone, its twins are kept beside it: what would be seen there is looked for on the whole floor.
+    """
     found: list[tuple[str, Pose2, Floats]] = []
     for proposal in proposals(robot, straight, rooms, FINALISTS):
         pose, covariance = settled(robot, straight, proposal.world_from_robot)
         if all(are_apart(pose, other) for _, other, _ in found):
             found.append((proposal.room, pose, covariance))
-    all_found = [Candidate(_room_at(robot, room, pose), pose, covariance, support_of(robot, straight, pose))
-                 for room, pose, covariance in found]
-    seen, looked = view_of(robot), [g.now_from_then for g in straight]
+    look_alike = alike_in(robot, [g.now_from_then for g in straight])
+    kept = ranked([_candidate(robot, straight, *place) for place in found], look_alike)
+    if len(kept) != 1 or not kept[0].stands:
+        return kept
+    beside = twins(robot, straight, kept[0].world_from_robot, rooms)
+    return ranked([*kept, *(_candidate(robot, straight, *place) for place in beside)], look_alike)
+
+
+def twins(
+    robot: RobotModel, glances: Sequence[Glance], pose: Pose2, rooms: Sequence[str]
+) -> tuple[tuple[str, Pose2, Floats], ...]:
+    """Room, pose and covariance (3, 3) of the other places of these rooms that would look the same in all glances.
+
+    What was seen is asked no more, only the model: what is missed or hidden, and whatever else is seen, may put one of
+    two places that look alike far behind the other.
+    """
+    predicted = [replace(g, segments_px=expected_lines(robot, g.then(pose)).segments_px) for g in glances]
+    look_alike = alike_in(robot, [g.now_from_then for g in glances])
+    found = ((p.room, *settled(robot, predicted, p.world_from_robot))
+             for p in proposals(robot, predicted, rooms, FINALISTS))
+    return tuple(place for place in found if are_apart(place[1], pose) and look_alike(pose, place[1]))
+
+
+def alike_in(robot: RobotModel, looked: Sequence[Pose2]) -> Callable[[Pose2, Pose2], bool]:
+    """The question whether two poses would look the same in all looks, by the robot's model."""
+    seen = view_of(robot)
 
     def look_alike(one: Pose2, other: Pose2) -> bool:
         return not tell_apart([seen(one @ look) for look in looked], [seen(other @ look) for look in looked])
 
-    return ranked(all_found, look_alike)
+    return look_alike
+
+
+def _candidate(robot: RobotModel, glances: Sequence[Glance], room: str, pose: Pose2, covariance: Floats) -> Candidate:
+    return Candidate(_room_at(robot, room, pose), pose, covariance, support_of(robot, glances, pose))
 
 
 def ranked(found: Sequence[Candidate], look_alike: Callable[[Pose2, Pose2], bool]) -> tuple[Candidate, ...]:
@@ -118,7 +147,7 @@ def ranked(found: Sequence[Candidate], look_alike: Callable[[Pose2, Pose2], bool
     """
     order = sorted((c for c in found if c.evidence.likelihood >= IDEA), key=lambda c: -c.evidence.likelihood)
     ideas = [c for c in order if c.evidence.likelihood >= order[0].evidence.likelihood - CLEAR
-             or (c.stands and look_alike(order[0].world_from_robot, c.world_from_robot))][:KEPT]
+             or look_alike(order[0].world_from_robot, c.world_from_robot)][:KEPT]
     shares = weights_of([c.evidence.likelihood for c in ideas])
     return tuple(Candidate(c.room, c.world_from_robot, c.covariance, c.evidence, share)
                  for c, share in zip(ideas, shares, strict=True))

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 CELL_M = 0.75
-"""What is in sight is worked out in the middles of such squares."""
+"""What is in sight is worked out for one place of each of such squares."""
 STEP_M = 0.25
 """Places are so far apart."""
 SPACING_M = 0.25
@@ -40,13 +40,15 @@ class Vantage:
 
     Attributes:
         places: (n, 2) where the robot may stand [m, world]; cell: (n,) the square of each.
+        eyes: (c, 2) the place of each square, of its own, that is nearest to its middle [m, world].
         points: (p, 3) along model lines [m, world]; directions: (p, 3) unit, of each one's line.
-        first: (c + 1,) and seen: what is in sight from square i are the points seen[first[i] : first[i + 1]].
+        first: (c + 1,) and seen: what is in sight from eye i are the points seen[first[i] : first[i + 1]].
         axis_rad: the direction of most of its walls, modulo a right angle.
     """
 
     places: Floats
     cell: Ints
+    eyes: Floats
     points: Floats
     directions: Floats
     first: Ints
@@ -79,20 +81,27 @@ def sample_lines(lines_world: Floats, spacing_m: float = SPACING_M) -> tuple[Flo
 def _vantage(world: World, room: str, eye_m: float) -> Vantage:
     places = _places(world, room)
     squares, cell = np.unique(np.floor(places / CELL_M).astype(np.int64), axis=0, return_inverse=True)
-    eyes = np.column_stack([(squares + 0.5) * CELL_M, np.full(len(squares), eye_m)])
+    eyes = _eyes(places, cell.reshape(-1), squares)
     scene = world.scene_of((room,))
     points, directions, owner = sample_lines(scene.edges.lines_world)
     first, seen = [0], []
-    for eye in eyes:
+    for eye in np.column_stack([eyes, np.full(len(eyes), eye_m)]):
         showing = scene.edges.contrasts(eye)[owner] >= CONTRAST
         near = np.linalg.norm(points - eye, axis=1) < FAR_M
         asked = np.flatnonzero(showing & near)
         seen.append(asked[_in_sight(eye, points[asked], scene.planes_world, scene.polygons_world)])
         first.append(first[-1] + len(seen[-1]))
     return Vantage(
-        places, cell.reshape(-1).astype(np.int64), points, directions, np.array(first, np.int64),
+        places, cell.reshape(-1).astype(np.int64), eyes, points, directions, np.array(first, np.int64),
         np.concatenate([np.zeros(0, np.int64), *seen]), _axis(scene.edges.lines_world),
     )
+
+
+def _eyes(places: Floats, cell: Ints, squares: Ints) -> Floats:
+    """(c, 2) of the places of each square the one nearest to its middle: the middle itself may be beyond a wall."""
+    away = np.sum((places - (squares[cell] + 0.5) * CELL_M) ** 2, axis=1)
+    order = np.lexsort((away, cell))
+    return np.asarray(places[order[np.searchsorted(cell[order], np.arange(len(squares)))]])
 
 
 def _places(world: World, room: str) -> Floats:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from harvey.experiments.generated_floors import generated_floor
 from knowledge_sources.methods.glances import Glance, moved, squared
 from knowledge_sources.methods.manhattan import RIGHT, level_direction
-from knowledge_sources.methods.relocation import Verdict, finding
+from knowledge_sources.methods.relocation import Verdict, finding, twins
 from knowledge_sources.methods.rivals import (
     Place,
     Probe,
@@ -26,7 +26,7 @@ from knowledge_sources.methods.rivals import (
     widest_gap,
 )
 from knowledge_sources.methods.settling import expected_lines
-from knowledge_sources.methods.vantage import CELL_M, vantage_of
+from knowledge_sources.methods.vantage import vantage_of
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle
@@ -182,9 +182,11 @@ def test_level_lines_tell_the_heading_but_for_right_angles(seed: int) -> None:
     spots = vantage_of(CENTRE.world, "conference-room", 1.0).places
     x, y = spots[int(rng.integers(len(spots)))]
     pose = Pose2(x, y, float(rng.uniform(-math.pi, math.pi)))
-    lines = expected_lines(CENTRE, pose).segments_px
-    assume(len(lines) >= 12)
-    told = level_direction(lines, CAMERA, MOUNT.camera_from_robot)
+    lines = expected_lines(CENTRE, pose)
+    ends = lines.lines_world[..., 2]
+    level = (np.ptp(ends, axis=1) < 0.01) & (np.abs(ends[:, 0] - 1.0) > 0.3)  # at the eye's height none tells
+    assume(np.count_nonzero(level) >= 12)
+    told = level_direction(lines.segments_px, CAMERA, MOUNT.camera_from_robot)
     assert told is not None
     assert abs(math.remainder(told + pose.heading_rad, RIGHT)) < math.radians(1.0)
 
@@ -197,6 +199,28 @@ def test_turns_between_looks_are_corrected_by_what_is_seen() -> None:
     assert straight[0].now_from_then.heading_rad == pytest.approx(-turn, abs=math.radians(0.5))
 
 
+def test_marks_on_a_bare_wall_tell_no_heading() -> None:
+    rng, told = np.random.default_rng(4), 0
+    for _ in range(200):
+        middle, angle = rng.uniform(20, 490, (6, 2)), rng.uniform(0, math.pi, 6)
+        half = 25.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        marks = np.stack([middle - half, middle + half], axis=1)
+        told += level_direction(marks, CAMERA, MOUNT.camera_from_robot) is not None
+    assert told <= 2
+
+
+def test_looks_are_set_straight_by_one_another_where_the_last_shows_a_bare_wall() -> None:
+    rng, pose, turn = np.random.default_rng(3), Pose2(12.0, 5.0, 0.4), math.radians(95.0)
+    spread = np.diag([0.0, 0.0, 1e-4])
+    off = Glance(seen_from(CENTRE, pose, rng), Pose2(0.0, 0.0, -turn + math.radians(6.0)), spread)
+    good = Glance(seen_from(CENTRE, pose @ Pose2(0.0, 0.0, turn), rng), Pose2(0.0, 0.0, 0.0), spread)
+    bare = Glance(np.zeros((0, 2, 2)), HERE, np.zeros((3, 3)))
+    straight = squared([off, good, bare], CAMERA, MOUNT.camera_from_robot)
+    assert straight[0].now_from_then.heading_rad == pytest.approx(-turn, abs=math.radians(0.5))
+    assert 0.0 < straight[0].spread[2, 2] <= 1e-4
+    assert straight[1] is good and straight[2] is bare
+
+
 # -- what is in sight ------------------------------------------------------------------------------------------------
 
 
@@ -205,12 +229,11 @@ def test_what_is_in_sight_is_what_the_exact_computation_sees(room: str) -> None:
     vantage = vantage_of(CENTRE.world, room, 1.0)
     agree = []
     for square in range(0, len(vantage.first) - 1, 12):
-        place = vantage.places[np.flatnonzero(vantage.cell == square)[0]]
-        middle = (np.floor(place / CELL_M) + 0.5) * CELL_M
+        eye = vantage.eyes[square]
         in_sight = np.zeros(len(vantage.points), bool)
         in_sight[vantage.seen[vantage.first[square]: vantage.first[square + 1]]] = True
         for heading in (0.0, 2.0, 4.0):
-            camera_from_world = CENTRE.camera_from_world(Pose2(*middle, heading) @ Pose2(-0.1, 0.0, 0.0))
+            camera_from_world = CENTRE.camera_from_world(Pose2(*eye, heading) @ Pose2(-0.1, 0.0, 0.0))
             ahead = camera_from_world.apply(vantage.points)
             shown = np.flatnonzero(in_sight & (ahead[:, 2] > 0.3))
             px = CAMERA.project(ahead[shown])
@@ -244,6 +267,20 @@ def test_in_a_corridor_that_looks_the_same_from_both_ends_it_never_says_where_it
     assert len(found.candidates) >= 2
     turned = Pose2(*(low + high - pose.position), wrap_angle(pose.heading_rad + turns[-1] + math.pi))
     assert any(c.world_from_robot.distance_to(turned) < 0.1 for c in found.candidates)
+
+
+@settings(deadline=None, max_examples=6)
+@given(part=st.floats(0.12, 0.88), heading=angles, turn=angles)
+def test_the_twin_of_a_place_is_found_from_the_model_alone(part: float, heading: float, turn: float) -> None:
+    outline = SYMMETRIC.world.outline("corridor-0")
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    pose = Pose2(low[0] + part * (high[0] - low[0]), 0.5 * (low[1] + high[1]) + 0.3, heading)
+    nothing = np.zeros((0, 2, 2))  # whatever was seen, it is not asked
+    looks = [Glance(nothing, Pose2(0.0, 0.0, a), np.diag([1e-5, 1e-5, 1e-4])) for a in (turn, turn + 1.0, 0.0)]
+    turned = Pose2(*(low + high - pose.position), wrap_angle(heading + math.pi))
+    assume(pose.distance_to(turned) > 0.5)
+    found = [other for _, other, _ in twins(TWIN, looks, pose, list(SYMMETRIC.world.rooms))]
+    assert any(other.distance_to(turned) < 0.02 for other in found)
 
 
 @settings(deadline=None, max_examples=4)
