@@ -30,6 +30,8 @@ from world_models.robot import RobotModel
 from world_models.task import Certificate, Milestone
 from world_models.visibility import visible_lines
 
+WRONG_BEFORE = 0.05
+"""Where nothing is in doubt, a belief is taken to be wrong with this probability before the robot looks."""
 DARK = 6.0
 """A frame of less contrast (standard deviation of its grey values) shows nothing."""
 
@@ -90,10 +92,14 @@ class MilestoneJudge(Expert):
         told = evidence(robot, lines, segments.segments_px, pose, fix.value.covariance, before, spread, agreed, faces)
         p_false = CONVICTION.p_false(told)
         tolerance_px = FLOOR_PX + wheels_px(robot, lines, before, spread + fix.value.covariance)
-        if tolerance_px > PLAN_PX or open_discrepancy(view, Level.PLAN) is not None:
+        in_doubt = open_discrepancy(view, Level.PLAN) is not None
+        sure = CONVICTION.accepts(p_false)  # so much agrees only at the right place, whatever the wheels may have done
+        if sure or in_doubt or tolerance_px > PLAN_PX:
             tolerance_px = PLAN_PX
+        is_enough = CONVICTION.accepts(p_false, 0.5 if in_doubt else WRONG_BEFORE)
         shift_px = _median_shift(np.array(m.expected_px, float).reshape(-1, 2, 2), agreed.projected_px)
-        verdict, reason = _verdict(len(lines), segments.contrast, agreed, faces, p_false, shift_px, tolerance_px)
+        verdict, reason = _verdict(
+            len(lines), segments.contrast, agreed, faces, p_false, is_enough, shift_px, tolerance_px)
         certain = verdict != "verified" or belief is None
         other = None if certain else _as_likely(view, robot, before, pose, segments, agreed)
         if other is not None:
@@ -132,8 +138,8 @@ def _milestone_of(view: View, fix: PoseFix) -> Entry[Milestone] | None:
 
 
 def _verdict(
-    expected: int, contrast: float, agreed: Verification, faces: Probe, p_false: float, shift_px: float,
-    tolerance_px: float,
+    expected: int, contrast: float, agreed: Verification, faces: Probe, p_false: float, is_enough: bool,
+    shift_px: float, tolerance_px: float,
 ) -> tuple[str, str]:
     a = agreed.agreement
     if contrast < DARK:
@@ -145,10 +151,10 @@ def _verdict(
     if p_false >= CONVICTION.refute:
         return "refuted", f"{found}; at a wrong place {a.chance:.0%} are by chance"
     where = f"{found}, {shift_px:.1f} px from where expected"
+    if not is_enough or a.accounted < LEAST_ACCOUNTED:
+        return "not testable", f"{where}: not enough to tell the place by"
     if shift_px > tolerance_px:
         return "refuted", f"{where}: more than the {tolerance_px:.0f} px that the plan may be adjusted by"
-    if p_false > CONVICTION.accept or a.accounted < LEAST_ACCOUNTED:
-        return "not testable", f"{where}: not enough to tell the place by"
     return "verified", where
 
 

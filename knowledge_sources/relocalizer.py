@@ -78,6 +78,8 @@ class Relocalizer(Expert):
         glimpses = self._glimpses(view, segments, before)
         robot = self._robot.standing_in(belief.value.locale)
         result = finding(robot, [_glance(view, g) for g in glimpses], self._rooms(belief.value))
+        if result.verdict is Verdict.AMBIGUOUS or result.probe is None or len(glimpses) >= PROBES:
+            result = self._within_reach(result, belief.value.locale)
         for old in view.where(Hypothesis, lambda h: h.status == "candidate"):
             yield Retract(old, (segments,))
         told = Panorama(glimpses, _in_words(result))
@@ -90,6 +92,17 @@ class Relocalizer(Expert):
             yield Post(self._hypothesis(c, belief.value, "candidate", c.weight), (segments, seen, belief))
         if result.verdict is Verdict.PROBE and result.probe is not None and len(glimpses) < PROBES:
             yield Post(MotorCommand(result.probe.turn_rad, result.probe.move_m), (segments, lost, seen))
+
+    def _within_reach(self, result: Finding, locale: str) -> Finding:
+        """Of places that nothing more can tell apart the only one to which wheels lead from where the robot was.
+
+        Carried to another place of where it can drive to, it may look the same there: that stays ambiguous. But being
+        carried through a wall or up the stairs, to a place that looks just like one within reach, is not believed.
+        """
+        near = [c for c in result.candidates if self._robot.world.route(locale, c.room) is not None]
+        if result.verdict is Verdict.FOUND or len(near) != 1 or not near[0].stands:
+            return result
+        return Finding(Verdict.FOUND, (replace(near[0], weight=1.0),))
 
     def _glimpses(
         self, view: View, segments: Entry[Segments], before: Entry[Panorama] | None

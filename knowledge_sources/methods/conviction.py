@@ -70,6 +70,11 @@ class Conviction:
         weights = self.seeing if evidence.faces_tested > 0.0 else self.blind
         return float(weights.p_false(evidence.values[None])[0])
 
+    def accepts(self, p_false: float, wrong_before: float = 0.5) -> bool:
+        """Whether a pose is to be believed that was wrong with probability ``wrong_before`` as it seemed before."""
+        wrong, right = p_false * wrong_before, (1.0 - p_false) * (1.0 - wrong_before)
+        return wrong <= self.accept * (wrong + right)
+
     @staticmethod
     def of_table(table: dict[str, Any]) -> Conviction:
         """As ``conviction.toml`` has it."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.manhattan import level_direction
 from world_models.camera import Camera
-from world_models.frames import Pose, Pose2, wrap_angle
+from world_models.frames import Pose, Pose2
 
 Floats = NDArray[np.float64]
 RIGHT = 0.5 * math.pi
@@ -41,30 +41,41 @@ class Glance:
 
 
 def squared(glances: Sequence[Glance], camera: Camera, camera_from_robot: Pose) -> tuple[Glance, ...]:
-    """The glances with the turns between them corrected by the level lines that they show.
+    """The glances, in the order they were taken, with the turns between them corrected by the level lines they show.
 
     Wheels err by a fortieth of a turn; but lines at right angles are seen to a tenth of a degree, and it is known from
     the wheels which of the four directions is which. The last glance is where the robot is now. If it shows no level
     lines, the others are set straight by the last one that does, and are known from now no better than that one is.
     """
-    seen = [level_direction(g.segments_px, camera, camera_from_robot) for g in glances]
-    told = [(g, d) for g, d in zip(glances, seen, strict=True) if d is not None]
-    if not told:
+    told = _told(glances, camera, camera_from_robot)
+    if len(told) < 2:
         return tuple(glances)
-    surest, direction = told[-1]
-    axis, spread = direction + surest.now_from_then.heading_rad, float(surest.spread[2, 2])
-    return tuple(g if d is None or g is surest else _straight(g, axis - d, spread)
-                 for g, d in zip(glances, seen, strict=True))
+    surest = max(told)
+    axis, spread = told[surest], float(glances[surest].spread[2, 2]) + SEEN_RAD**2
+    out, off_later = [glances[-1]], 0.0
+    for k in range(len(glances) - 2, -1, -1):
+        glance, off = glances[k], math.remainder(axis - told[k], RIGHT) if k in told else math.inf
+        if abs(off) < MOST_OFF_RAD and k != surest:
+            glance = replace(glance, spread=_known_turn(glance.spread, spread))
+        else:
+            off = off_later
+        pose = _before(glance, glances[k + 1], out[-1].now_from_then, off_later - off)
+        out.append(replace(glance, now_from_then=pose))
+        off_later = off
+    return tuple(reversed(out))
 
 
-def _straight(glance: Glance, heading_rad: float, spread: float) -> Glance:
-    """A glance whose heading from now is known modulo a right angle, with the variance of that."""
-    pose = glance.now_from_then
-    off = math.remainder(heading_rad - pose.heading_rad, RIGHT)
-    if abs(off) >= MOST_OFF_RAD:
-        return glance
-    turned = Pose2(pose.x_m, pose.y_m, wrap_angle(pose.heading_rad + off))
-    return replace(glance, now_from_then=turned, spread=_known_turn(glance.spread, spread + SEEN_RAD**2))
+def _told(glances: Sequence[Glance], camera: Camera, camera_from_robot: Pose) -> dict[int, float]:
+    """By the number of each glance that shows level lines: their direction from now, modulo a right angle [rad]."""
+    seen = [level_direction(g.segments_px, camera, camera_from_robot) for g in glances]
+    return {k: d + g.now_from_then.heading_rad for k, (g, d) in enumerate(zip(glances, seen, strict=True))
+            if d is not None}
+
+
+def _before(glance: Glance, later: Glance, now_from_later: Pose2, more_rad: float) -> Pose2:
+    """Where a glance was taken if the robot turned by so much more before it went on to the later one."""
+    step = Pose2(0.0, 0.0, more_rad) @ glance.now_from_then.inverse() @ later.now_from_then
+    return now_from_later @ step.inverse()
 
 
 def _known_turn(spread: Floats, seen: float) -> Floats:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.glances import Glance, squared
 from knowledge_sources.methods.proposals import are_apart, proposals
+from knowledge_sources.methods.repetition import repetitions
 from knowledge_sources.methods.rivals import (
     Place,
     Probe,
@@ -22,12 +24,14 @@ from knowledge_sources.methods.rivals import (
     weights_of,
     widest_gap,
 )
-from knowledge_sources.methods.settling import expected_lines, settled
+from knowledge_sources.methods.settling import expected_lines, refined, settled
 from knowledge_sources.methods.support import Support, support_of
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
 Floats = NDArray[np.float64]
+Found = tuple[str, Pose2, Floats]
+"""The room in which a place was thought of, the pose, and its covariance (3, 3)."""
 
 FINALISTS = 14
 LEAST_GLANCES = 2
@@ -35,6 +39,9 @@ LEAST_GLANCES = 2
 LEAST_LINES = 12
 LEAST_PART, LEAST_EXPLAINED, WEAKEST = 0.6, 0.35, 0.35
 """What must be accounted for: of the expected lines, of what is seen, and of the lines of each single glance."""
+SURE, SURE_PART = 40.0, 0.75
+"""Where the model has little of what there is, as before full shelves, the lines that it has must tell so much more: by
+the logarithm of their likelihood, and by the part of them that is accounted for."""
 CLEAR = 8.0
 """A place is refuted by another that is likelier by this factor's logarithm, if the two would look different."""
 KEPT = 6
@@ -62,8 +69,9 @@ class Candidate:
     def stands(self) -> bool:
         """Whether enough is borne out, in every glance."""
         e = self.evidence
-        return (e.accounted >= LEAST_LINES and e.accounted >= LEAST_PART * e.seen
-                and e.explained >= LEAST_EXPLAINED and e.weakest >= WEAKEST)
+        is_sure = e.likelihood >= SURE and e.accounted >= SURE_PART * e.seen
+        return (e.accounted >= LEAST_LINES and e.accounted >= LEAST_PART * e.seen and e.weakest >= WEAKEST
+                and (e.explained >= LEAST_EXPLAINED or is_sure))
 
     @property
     def place(self) -> Place:
@@ -98,37 +106,34 @@ def candidates(robot: RobotModel, straight: Sequence[Glance], rooms: Sequence[st
 
     If one place stands alone, its twins are kept beside it: what would be seen there is looked for on the whole floor.
     """
-    found: list[tuple[str, Pose2, Floats]] = []
-    for proposal in proposals(robot, straight, rooms, FINALISTS):
-        pose, covariance = settled(robot, straight, proposal.world_from_robot)
-        if all(are_apart(pose, other) for _, other, _ in found):
-            found.append((proposal.room, pose, covariance))
     look_alike = alike_in(robot, [g.now_from_then for g in straight])
-    kept = ranked([_candidate(robot, straight, *place) for place in found], look_alike)
+    kept = ranked([_candidate(robot, straight, *place) for place in _found(robot, straight, rooms)], look_alike)
     if len(kept) != 1 or not kept[0].stands:
         return kept
     beside = twins(robot, straight, kept[0].world_from_robot, rooms)
     return ranked([*kept, *(_candidate(robot, straight, *place) for place in beside)], look_alike)
 
 
-def twins(
-    robot: RobotModel, glances: Sequence[Glance], pose: Pose2, rooms: Sequence[str]
-) -> tuple[tuple[str, Pose2, Floats], ...]:
+def twins(robot: RobotModel, glances: Sequence[Glance], pose: Pose2, rooms: Sequence[str]) -> tuple[Found, ...]:
     """Room, pose and covariance (3, 3) of the other places of these rooms that would look the same in all glances.
 
     What was seen is asked no more, only the model: what is missed or hidden, and whatever else is seen, may put one of
-    two places that look alike far behind the other.
+    two places that look alike far behind the other. Where few lines are in sight the grid of places may be too coarse
+    to propose either, so that the places at which the plan repeats itself are tried one by one.
     """
     predicted = [replace(g, segments_px=expected_lines(robot, g.then(pose)).segments_px) for g in glances]
     look_alike = alike_in(robot, [g.now_from_then for g in glances])
-    found = ((p.room, *settled(robot, predicted, p.world_from_robot))
-             for p in proposals(robot, predicted, rooms, FINALISTS))
-    return tuple(place for place in found if are_apart(place[1], pose) and look_alike(pose, place[1]))
+    found = [place for place in _found(robot, predicted, rooms)
+             if are_apart(place[1], pose) and look_alike(pose, place[1])]
+    for room, other in repetitions(robot.world, _room_at(robot, rooms[0], pose), pose, rooms):
+        if all(are_apart(other, known) for known in (pose, *(place[1] for place in found))) and look_alike(pose, other):
+            found.append((room, *settled(robot, predicted, other)))
+    return tuple(found)
 
 
 def alike_in(robot: RobotModel, looked: Sequence[Pose2]) -> Callable[[Pose2, Pose2], bool]:
     """The question whether two poses would look the same in all looks, by the robot's model."""
-    seen = view_of(robot)
+    seen = lru_cache(maxsize=64)(view_of(robot))
 
     def look_alike(one: Pose2, other: Pose2) -> bool:
         return not tell_apart([seen(one @ look) for look in looked], [seen(other @ look) for look in looked])
@@ -136,8 +141,19 @@ def alike_in(robot: RobotModel, looked: Sequence[Pose2]) -> Callable[[Pose2, Pos
     return look_alike
 
 
+def _found(robot: RobotModel, glances: Sequence[Glance], rooms: Sequence[str]) -> list[Found]:
+    """The places that fit best, settled, each once."""
+    found: list[Found] = []
+    for proposal in proposals(robot, glances, rooms, FINALISTS):
+        pose, covariance = settled(robot, glances, proposal.world_from_robot)
+        if all(are_apart(pose, other) for _, other, _ in found):
+            found.append((proposal.room, pose, covariance))
+    return found
+
+
 def _candidate(robot: RobotModel, glances: Sequence[Glance], room: str, pose: Pose2, covariance: Floats) -> Candidate:
-    return Candidate(_room_at(robot, room, pose), pose, covariance, support_of(robot, glances, pose))
+    evidence = support_of(robot, refined(robot, glances, pose, covariance), pose)
+    return Candidate(_room_at(robot, room, pose), pose, covariance, evidence)
 
 
 def ranked(found: Sequence[Candidate], look_alike: Callable[[Pose2, Pose2], bool]) -> tuple[Candidate, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from knowledge_sources.methods.glances import Glance
 from knowledge_sources.methods.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.pose import planar_from_lines
-from world_models.frames import Pose2
+from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 from world_models.visibility import VisibleLines, visible_lines
 
@@ -26,6 +27,10 @@ GATES_PX = (16.0, 4.0)
 """Round by round, how far a segment may be from its model line."""
 GATE_RAD = 0.12
 LEAST_PAIRS = 3
+MOST_KNOWN_RAD = math.radians(0.5)
+"""Turns that are known better than this are not asked about again."""
+TURN_RAD, TURNS_SIGMA = math.radians(1.5), 2.5
+"""Turns that are known less well are tried in such steps, as far as so many of their standard deviations."""
 
 
 def expected_lines(robot: RobotModel, world_from_robot: Pose2) -> VisibleLines:
@@ -37,22 +42,68 @@ def expected_lines(robot: RobotModel, world_from_robot: Pose2) -> VisibleLines:
 def settled(robot: RobotModel, glances: Sequence[Glance], pose: Pose2) -> tuple[Pose2, Floats]:
     """The pose now, with its covariance (3, 3), that the glances show together near a rough one.
 
-    The glance of which the model has most comes first: what another shows of things that the model lacks misleads
-    nobody any more when the pose is known from it.
+    The glance of which the model has most comes first, of those whose turn is known: what another shows of things that
+    the model lacks, or aside of where it is looked for, misleads nobody any more when the pose is known from it.
     """
     covariance = np.array(ROUGH)
     rich = [len(expected_lines(robot, glance.then(pose))) for glance in glances]
-    for _, glance in sorted(zip(rich, glances, strict=True), key=lambda pair: -pair[0]):
+    for _, glance in sorted(zip(rich, glances, strict=True), key=lambda pair: (_is_unsure(pair[1]), -pair[0])):
         pose, covariance = _with(robot, glance, pose, covariance)
     return pose, covariance
 
 
+def refined(robot: RobotModel, glances: Sequence[Glance], pose: Pose2, covariance: Floats) -> tuple[Glance, ...]:
+    """The glances with the motions between them as they must have been if the robot is at a pose (covariance (3, 3)).
+
+    Only of motions whose turn level lines have not told: a turn that is known but to a few degrees would else count
+    against the pose.
+    """
+    out = []
+    for glance in glances:
+        if _is_unsure(glance):
+            prior, _ = _prior(pose, covariance, glance)
+            then, _ = _fix(robot, glance, glance.then(pose), prior, _best_turn(robot, glance, pose))
+            glance = replace(glance, now_from_then=pose.inverse() @ then)
+        out.append(glance)
+    return tuple(out)
+
+
+def _is_unsure(glance: Glance) -> bool:
+    return bool(glance.spread[2, 2] > MOST_KNOWN_RAD**2)
+
+
+def _best_turn(robot: RobotModel, glance: Glance, pose: Pose2) -> Pose2:
+    """Of the headings a glance may have had, the one at which most of what it shows lies on lines; then the nearest."""
+    most = int(TURNS_SIGMA * math.sqrt(float(glance.spread[2, 2])) / TURN_RAD)
+    turns = sorted((k * TURN_RAD for k in range(-most, most + 1)), key=abs)
+    tried = [glance.then(pose) @ Pose2(0.0, 0.0, turn) for turn in turns]
+    pairs = [_pairs(expected_lines(robot, then).segments_px, glance.segments_px, GATES_PX[0], math.sin(GATE_RAD))
+             for then in tried]
+    return tried[int(np.argmax([len(p) for p in pairs]))]
+
+
 def _with(robot: RobotModel, glance: Glance, pose: Pose2, covariance: Floats) -> tuple[Pose2, Floats]:
-    """What is known after one more glance."""
-    then, lever = glance.then(pose), _lever(pose, glance.now_from_then)
-    prior = lever @ covariance @ lever.T + glance.spread
-    solved = then
-    spread = None
+    """What is known after one more glance: of what it corrects, the motion since then has its part, as it is unsure."""
+    then = glance.then(pose)
+    prior, lever = _prior(pose, covariance, glance)
+    solved, spread = _fix(robot, glance, then, prior, _best_turn(robot, glance, pose) if _is_unsure(glance) else then)
+    gain = np.linalg.solve(prior, lever @ covariance).T
+    off = gain @ (solved.x_m - then.x_m, solved.y_m - then.y_m, wrap_angle(solved.heading_rad - then.heading_rad))
+    now = Pose2(pose.x_m + float(off[0]), pose.y_m + float(off[1]), wrap_angle(pose.heading_rad + float(off[2])))
+    return now, np.asarray(covariance - gain @ (prior - spread) @ gain.T)
+
+
+def _prior(pose: Pose2, covariance: Floats, glance: Glance) -> tuple[Floats, Floats]:
+    """(3, 3) covariance of where a glance was taken, world, and the lever from the pose now to it."""
+    lever, turn = _lever(pose, glance.now_from_then), np.eye(3)
+    c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    turn[:2, :2] = ((c, -s), (s, c))
+    return lever @ covariance @ lever.T + turn @ glance.spread @ turn.T, lever
+
+
+def _fix(robot: RobotModel, glance: Glance, then: Pose2, prior: Floats, start: Pose2) -> tuple[Pose2, Floats]:
+    """Where a glance was taken, from about where it starts, with the covariance; as before where too little is seen."""
+    solved, spread = start, prior
     for gate_px in GATES_PX:
         lines = expected_lines(robot, solved)
         pairs = _pairs(lines.segments_px, glance.segments_px, gate_px, math.sin(GATE_RAD))
@@ -64,11 +115,7 @@ def _with(robot: RobotModel, glance: Glance, pose: Pose2, covariance: Floats) ->
             prior_covariance=prior, landmark_ids=lines.landmark[model].tolist(), sigma_px=SIGMA_ACROSS_PX,
         )
         solved, spread = fix.world_from_robot, np.asarray(fix.covariance)
-    if spread is None:
-        return pose, covariance
-    now = solved @ glance.now_from_then.inverse()
-    back = np.linalg.inv(_lever(now, glance.now_from_then))
-    return now, np.asarray(back @ spread @ back.T)
+    return (then if spread is prior else solved), spread
 
 
 def _lever(pose: Pose2, step: Pose2) -> Floats:

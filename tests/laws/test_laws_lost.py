@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -25,7 +25,7 @@ from knowledge_sources.methods.rivals import (
     weights_of,
     widest_gap,
 )
-from knowledge_sources.methods.settling import expected_lines
+from knowledge_sources.methods.settling import expected_lines, refined, settled
 from knowledge_sources.methods.vantage import vantage_of
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
@@ -218,7 +218,38 @@ def test_looks_are_set_straight_by_one_another_where_the_last_shows_a_bare_wall(
     straight = squared([off, good, bare], CAMERA, MOUNT.camera_from_robot)
     assert straight[0].now_from_then.heading_rad == pytest.approx(-turn, abs=math.radians(0.5))
     assert 0.0 < straight[0].spread[2, 2] <= 1e-4
-    assert straight[1] is good and straight[2] is bare
+    assert straight[1].now_from_then.heading_rad == pytest.approx(0.0) and straight[2] is bare
+
+
+@settings(deadline=None, max_examples=20)
+@given(error=st.floats(-0.15, 0.15), turn=angles, move=st.floats(0.0, 0.7))
+def test_a_turn_that_is_corrected_takes_the_way_after_it_along(error: float, turn: float, move: float) -> None:
+    rng, start = np.random.default_rng(3), Pose2(12.0, 5.0, 0.4)
+    true = Pose2(0.0, 0.0, turn) @ Pose2(move, 0.0, 0.0)
+    now = start @ true
+    lines = [seen_from(CENTRE, start, rng), seen_from(CENTRE, now, rng)]
+    assume(all(level_direction(seen, CAMERA, MOUNT.camera_from_robot) is not None for seen in lines))
+    claimed = Pose2(0.0, 0.0, turn + error) @ Pose2(move, 0.0, 0.0)
+    spread = np.diag([1e-3, 1e-3, 1e-2])
+    straight = squared([Glance(lines[0], claimed.inverse(), spread), Glance(lines[1], HERE, spread)], CAMERA,
+                       MOUNT.camera_from_robot)
+    assert straight[0].now_from_then.distance_to(true.inverse()) < 0.01
+
+
+@settings(deadline=None, max_examples=20)
+@given(error=st.floats(-0.06, 0.06), turn=angles, heading=angles)
+def test_a_turn_that_is_unsure_is_corrected_and_not_the_pose(error: float, turn: float, heading: float) -> None:
+    rng, before = np.random.default_rng(3), Pose2(12.0, 5.0, heading)
+    pose = before @ Pose2(0.0, 0.0, turn)
+    assume(all(len(expected_lines(CENTRE, there)) >= 20 for there in (before, pose)))
+    looks = [Glance(seen_from(CENTRE, before, rng), Pose2(0.0, 0.0, -turn + error), np.diag([1e-6, 1e-6, 0.05**2])),
+             Glance(seen_from(CENTRE, pose, rng), HERE, np.zeros((3, 3)))]
+    there, covariance = settled(CENTRE, looks, pose)
+    assert there.distance_to(pose) < 0.02
+    assert abs(wrap_angle(there.heading_rad - pose.heading_rad)) < math.radians(0.3)
+    assert np.linalg.eigvalsh(covariance)[0] > 0.0
+    told = refined(CENTRE, looks, there, covariance)[0].now_from_then.heading_rad
+    assert abs(wrap_angle(told + turn)) < math.radians(0.5)
 
 
 # -- what is in sight ------------------------------------------------------------------------------------------------
@@ -270,7 +301,8 @@ def test_in_a_corridor_that_looks_the_same_from_both_ends_it_never_says_where_it
 
 
 @settings(deadline=None, max_examples=6)
-@given(part=st.floats(0.12, 0.88), heading=angles, turn=angles)
+@example(part=0.05, heading=1.36, turn=math.pi)  # few lines are in sight
+@given(part=st.floats(0.05, 0.95), heading=angles, turn=angles)
 def test_the_twin_of_a_place_is_found_from_the_model_alone(part: float, heading: float, turn: float) -> None:
     outline = SYMMETRIC.world.outline("corridor-0")
     low, high = outline.min(axis=0), outline.max(axis=0)
