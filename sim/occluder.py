@@ -43,7 +43,8 @@ class Occluder:
     def before(self, radiance: NDArray[np.float32]) -> NDArray[np.float32]:
         """A picture (h, w, 3) of light in 0..1 with the occluder in it."""
         rows, columns = radiance.shape[:2]
-        top, left = round(self.top * rows), round(self.left * columns)
+        top, bottom = round(self.top * rows), round((self.top + self.height) * rows)
+        left, right = round(self.left * columns), round((self.left + self.width) * columns)
         seen = radiance.copy()
-        seen[top : round((self.top + self.height) * rows), left : round((self.left + self.width) * columns)] = self.shade
+        seen[top:bottom, left:right] = self.shade
         return seen

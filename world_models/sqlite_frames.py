@@ -105,6 +105,8 @@ class SqliteFrames:
             " l.survey_m, l.survey_rad from locale l"
             " left join locale p on p.id = l.parent where l.name = ?", name)
         if not rows:
+            if name in self._every_name:
+                raise WorldError(f"{self._path.name}: expected a sound world, got one whose index lacks {name!r}")
             return None
         kind, parent, frame, outline, height_m, floor_m, properties, source, survey_m, survey_rad = rows[0]
         matrix = unpacked_array(frame, (3, 4))

@@ -24,9 +24,10 @@ from world_models.body import MotionReport
 from world_models.robot import RobotModel
 
 NAMES = [expert.__module__.rpartition(".")[2] for expert in EXPERTS]
-NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "safekeeper", "helmsman", "passenger"}
-"""Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer where
-the robot moves while it looks, or ride in elevators."""
+NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "safekeeper", "helmsman",
+              "passenger"}
+"""Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
+the move, or ride in elevators."""
 
 
 @pytest.mark.parametrize("missing", NAMES)

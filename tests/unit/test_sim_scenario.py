@@ -65,7 +65,7 @@ to_heading_deg = 180.0
     (MINIMAL + "[servo]\naction = 1\n", r"s\.toml:4: servo\.action: expected true or false, got 1"),
     (MINIMAL + "[limits]\nmax_cycles = 2.5\n", r"s\.toml:4: limits\.max_cycles: expected a whole number, got 2\.5"),
     (MINIMAL + "[start]\nheading_deg = 1\nheading_rad = 1\n", r"s\.toml:5: .*heading_rad only once"),
-    (MINIMAL + '[[faults]]\nkind = "quake"\n', r"s\.toml:3: faults\.0: expected kind = bump, kidnap, lights_off, occluded or"),
+    (MINIMAL + '[[faults]]\nkind = "quake"\n', r"s\.toml:3: faults\.0: expected kind = bump, .*, occluded or"),
     (MINIMAL + "[actuator]\nspeed_m_per_s = 0\n", r"s\.toml:3: actuator: expected speeds > 0"),
     (MINIMAL + "[render]\nsamples = 5\n", r"s\.toml:3: render: expected 1, 4, 8, 16 samples"),
     ('world = "w"\ngoal = "(go home)"\n', r"s\.toml:2: goal: expected a goal like"),
