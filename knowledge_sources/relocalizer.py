@@ -20,9 +20,10 @@ from knowledge_sources.methods.relocation import Candidate, Finding, Verdict, fi
 from knowledge_sources.questions import active_goal, held, is_over, is_settled, open_discrepancy
 from world_models.body import Look, MotionReport, MotorCommand
 from world_models.frames import Pose2
+from world_models.locales import Link
 from world_models.location import Hypothesis, Place, covariance_tuple
 from world_models.percepts import Glimpse, Panorama, Segments
-from world_models.task import Goal
+from world_models.task import Goal, PlanSketch
 
 PROBES = 8
 """Looks, and then it says that it does not know."""
@@ -56,7 +57,9 @@ class Relocalizer(Expert):
 
     def rate(self, view: View, trigger: Change) -> float | None:
         lost = open_discrepancy(view, Level.GOAL)
-        return 0.7 if lost is not None and held(view) is not None and is_settled(view) and not is_over(view) else None
+        if lost is None or held(view) is None or not is_settled(view) or is_over(view) or self._has_just_ridden(view):
+            return None
+        return 0.7
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         lost, belief = open_discrepancy(view, Level.GOAL), held(view)
@@ -92,6 +95,12 @@ class Relocalizer(Expert):
             yield Post(self._hypothesis(c, belief.value, "candidate", c.weight), (segments, seen, belief))
         if result.verdict is Verdict.PROBE and result.probe is not None and len(glimpses) < PROBES:
             yield Post(MotorCommand(result.probe.turn_rad, result.probe.move_m), (segments, lost, seen))
+
+    def _has_just_ridden(self, view: View) -> bool:
+        """Whether no milestone has borne out an elevator ride yet: then it may be on any floor."""
+        at = (s.value.subgoals[s.value.at - 1].passage
+              for s in view.where(PlanSketch, lambda s: s.is_active and s.at > 0 and not s.verified))
+        return any(isinstance(self._robot.world.passage(name), Link) for name in at if name)
 
     def _within_reach(self, result: Finding, locale: str) -> Finding:
         """Of places that nothing more can tell apart the only one to which wheels lead from where the robot was.
