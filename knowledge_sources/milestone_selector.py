@@ -147,7 +147,7 @@ def _car_of(sketch: Entry[PlanSketch] | None, index: int) -> str:
 def _car(sketch: PlanSketch, index: int) -> str:
     """The elevator's car in which the subgoal before a milestone ends, after a ride: it looks alike on every floor."""
     before = sketch.subgoals[index - 1] if index > 0 else None
-    return before.destination.locale if before is not None and before.passage and not before.primitive else ""
+    return before.destination.locale if before is not None and before.is_ride else ""
 
 
 def _tried(view: View, sketch: Entry[PlanSketch]) -> tuple[float, ...]:

@@ -65,7 +65,7 @@ class Passenger(Expert):
         if any(open_discrepancy(view, level) is not None for level in (Level.PLAN, Level.GOAL)):
             return None
         s = sketch.value
-        if s.current is None or s.current.primitive or not s.current.passage:
+        if s.current is None or not s.current.is_ride:
             return None
         passage = self._robot.world.passage(s.current.passage)
         asked = view.latest(Ride, lambda r: r.sketch == sketch.id and r.index == s.at)

@@ -20,7 +20,6 @@ from knowledge_sources.methods.relocation import Candidate, Finding, Verdict, fi
 from knowledge_sources.questions import active_goal, held, is_over, is_settled, open_discrepancy
 from world_models.body import Look, MotionReport, MotorCommand
 from world_models.frames import Pose2
-from world_models.locales import Link
 from world_models.location import Hypothesis, Place, covariance_tuple
 from world_models.percepts import Glimpse, Panorama, Segments
 from world_models.task import Goal, PlanSketch
@@ -57,7 +56,7 @@ class Relocalizer(Expert):
 
     def rate(self, view: View, trigger: Change) -> float | None:
         lost = open_discrepancy(view, Level.GOAL)
-        if lost is None or held(view) is None or not is_settled(view) or is_over(view) or self._has_just_ridden(view):
+        if lost is None or held(view) is None or not is_settled(view) or is_over(view) or _has_just_ridden(view):
             return None
         return 0.7
 
@@ -95,12 +94,6 @@ class Relocalizer(Expert):
             yield Post(self._hypothesis(c, belief.value, "candidate", c.weight), (segments, seen, belief))
         if result.verdict is Verdict.PROBE and result.probe is not None and len(glimpses) < PROBES:
             yield Post(MotorCommand(result.probe.turn_rad, result.probe.move_m), (segments, lost, seen))
-
-    def _has_just_ridden(self, view: View) -> bool:
-        """Whether no milestone has borne out an elevator ride yet: then it may be on any floor."""
-        at = (s.value.subgoals[s.value.at - 1].passage
-              for s in view.where(PlanSketch, lambda s: s.is_active and s.at > 0 and not s.verified))
-        return any(isinstance(self._robot.world.passage(name), Link) for name in at if name)
 
     def _within_reach(self, result: Finding, locale: str) -> Finding:
         """Of places that nothing more can tell apart the only one to which wheels lead from where the robot was.
@@ -166,6 +159,12 @@ class Relocalizer(Expert):
             self._robot.world, candidate.room, candidate.world_from_robot, candidate.covariance, "relocalization",
             status=status, weight=weight, motion=belief.motion, evidence=str(candidate.evidence),
         )
+
+
+def _has_just_ridden(view: View) -> bool:
+    """Whether no milestone has borne out an elevator ride yet: then it may be on any floor."""
+    return view.latest(PlanSketch, lambda s: s.is_active and s.at > 0 and not s.verified
+                       and s.subgoals[s.at - 1].is_ride) is not None
 
 
 def _in_words(result: Finding) -> str:

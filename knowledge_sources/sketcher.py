@@ -118,7 +118,7 @@ class Sketcher(Expert):
             go = Revise(sketch, replace(s, verified=True, adjustments=0), (milestone, belief))
             yield go
             current = s.subgoals[s.at]
-            if not current.primitive and not current.passage:
+            if not current.primitive and not current.is_ride:
                 yield from self._refined(sketch, current, belief, go)
 
     def _why_not(self, here: str, there: str) -> str:

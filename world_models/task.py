@@ -57,6 +57,11 @@ class Subgoal:
     passage: str = ""
     tolerance_m: float = 0.1
 
+    @property
+    def is_ride(self) -> bool:
+        """Whether it is carried out by an elevator: it has a passage, and there is nothing to drive or to refine."""
+        return bool(self.passage) and not self.primitive
+
     def __str__(self) -> str:
         return f"(ptrans {self.origin} {self.destination})"
 

@@ -12,21 +12,19 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from harvey.again.reliving import interrupted_in
 from harvey.experiments.report import Cell, Report
 from harvey.experiments.short_missions import HALLWAY, OFFICE, fault
+from harvey.experiments.trials import campaign_folder, found_by_all
 from harvey.records import read_records
-from harvey.run_directory import RUNS
 
 CHILD = (sys.executable, "-m", "harvey.experiments.crash_child")
-WORKERS = 2
 MOST_S = 600.0
 """A child that takes longer than this hangs [s]."""
 CYCLE_S = 0.06
@@ -91,11 +89,10 @@ class Found:
 
 
 def run(quick: bool, seed: int) -> Report:
-    """Kill and resume; what is done is kept in ``runs/crash``, so that the experiment itself may be cut off."""
+    """Kill and resume; what is done is kept, so that the experiment itself may be cut off."""
     trials = list(_trials(QUICK if quick else FULL, seed))
-    folder = RUNS / "crash" / f"{'quick' if quick else 'full'}-{seed}"
-    folder.mkdir(parents=True, exist_ok=True)
-    found = _all_found(trials, folder)
+    folder = campaign_folder("crash", seed, quick=quick)
+    found = found_by_all(partial(_tried, folder=folder), trials, Found, folder)
     names = list(dict.fromkeys(trial.scenario for trial in trials))
     rows = [_row(name, [f for f in found if f.scenario == name]) for name in names]
     killed = sum(f.kills for f in found)
@@ -137,28 +134,6 @@ def _row(name: str, found: Sequence[Found]) -> tuple[Cell, ...]:
         sum(1 for f in found if not f.wrong), sum(1 for f in found if f.outcome == "reached"),
         1000.0 * max(f.error_m for f in found), float(np.sum([f.seconds for f in found])),
     )
-
-
-def _all_found(trials: Sequence[Trial], folder: Path) -> list[Found]:
-    """Those found before and those that are still to be done, in order."""
-    known = {f.number: f for f in _kept(folder / "found.jsonl")}
-    todo = [trial for trial in trials if trial.number not in known]
-    with (tqdm(total=len(trials), initial=len(trials) - len(todo), unit="trial", file=sys.stderr,
-               disable=not sys.stderr.isatty(), leave=False) as bar,
-          (folder / "found.jsonl").open("a", encoding="utf-8") as out, ThreadPoolExecutor(WORKERS) as pool):
-        for future in as_completed([pool.submit(_tried, trial, folder) for trial in todo]):
-            found = known[future.result().number] = future.result()
-            out.write(json.dumps(asdict(found)) + "\n")
-            out.flush()
-            bar.update()
-    return [known[trial.number] for trial in trials]
-
-
-def _kept(path: Path) -> Iterator[Found]:
-    """What an earlier process found; a line that was cut off is left out."""
-    if path.is_file():
-        for line in path.read_text(encoding="utf-8").split("\n")[:-1]:
-            yield Found(**json.loads(line))
 
 
 def _tried(trial: Trial, folder: Path) -> Found:

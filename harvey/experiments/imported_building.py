@@ -1,14 +1,12 @@
 """A house that others have drawn (IFC) is imported, checked and driven in: missions between its rooms.
 
 Missions are "Go from ROOM to ROOM", between rooms that a robot on wheels can stand in and get to without stairs. They
-run in two worker processes; what is done is kept, so that the experiment may be cut off and goes on where it was.
+run in worker processes; what is done is kept, so that the experiment may be cut off and goes on where it was.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -17,10 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harvey.campaign import Task, run_all
+from harvey.campaign import Task, run_task
 from harvey.experiments.buildings import DUPLEX, building_file, where_it_should_be
 from harvey.experiments.report import Cell, Report
-from harvey.progress import counted
+from harvey.experiments.trials import found_by_all
 from harvey.run_directory import RUNS
 from world_models.importers import import_building
 from world_models.outlines import distance_to_border
@@ -65,6 +63,8 @@ class Errand:
 
 def run(quick: bool, seed: int) -> Report:
     """Import, check, drive."""
+    from harvey.referee import MissionResult
+
     path, title = building_file(DUPLEX), "Missions between the rooms of an imported house"
     if find_spec("ifcopenshell") is None or not path.is_file():
         lacking = where_it_should_be(DUPLEX) if find_spec("ifcopenshell") else \
@@ -76,11 +76,10 @@ def run(quick: bool, seed: int) -> Report:
     (folder / "house.toml").write_text(text, encoding="utf-8")
     world = load_world(folder / "house.toml")
     errands = list(drawn(world, QUICK_MISSIONS if quick else MISSIONS, seed))
-    results = _driven(errands, folder, seed)
+    ends = found_by_all(run_task, [_task(errand, folder, seed) for errand in errands], MissionResult, folder, "mission")
     groups = _groups(world)
     rows = [_row(name, chosen) for name, rooms in groups.items()
-            if (chosen := [results[e.number] for e in errands if e.origin in rooms])]
-    ends = [results[errand.number] for errand in errands]
+            if (chosen := [end for errand, end in zip(errands, ends, strict=True) if errand.origin in rooms])]
     return Report(
         title, COLUMNS, (*rows, _row("all", ends)),
         notes=(
@@ -88,8 +87,8 @@ def run(quick: bool, seed: int) -> Report:
             f" down in: {sum(map(len, groups.values()))}; any two of one row can be reached from each other on wheels.",
             f"Rooms and headings are drawn with seed {seed}; mission N has seed {seed} + N. Errors are true distances.",
             f"Each is a scenario of its own: {folder}/mission-N.toml.",
-            *(_told(errand, results[errand.number], seed) for errand in errands if not _arrived(results[errand.number])
-              or results[errand.number].collisions),
+            *(_told(errand, end, seed) for errand, end in zip(errands, ends, strict=True)
+              if not _arrived(end) or end.collisions),
         ),
         claims=(
             ("the imported house is a world without faults", not world.check()),
@@ -129,34 +128,11 @@ def _room_m(world: World, room: str) -> float:
     return min(distance_to_border(middle, border) for border in (world.outline(room), *world.obstacles(room)))
 
 
-def _driven(errands: Sequence[Errand], folder: Path, seed: int) -> dict[int, MissionResult]:
-    """What was found before, and what is still to be done."""
-    known = dict(_kept(folder / "found.jsonl"))
-    todo = {_task(errand, folder, seed): errand for errand in errands if errand.number not in known}
-    with (folder / "found.jsonl").open("a", encoding="utf-8") as out:
-        for task, result in counted(run_all(list(todo)), len(todo), sys.stderr) if todo else ():
-            number = todo[task].number
-            known[number] = result
-            out.write(json.dumps({"number": number, "result": result.record()}) + "\n")
-            out.flush()
-    return known
-
-
 def _task(errand: Errand, folder: Path, seed: int) -> Task:
     path = folder / f"mission-{errand.number}.toml"
     path.write_text(SCENARIO.format(name=path.stem, seed=seed + errand.number, origin=errand.origin,
                                     destination=errand.destination, heading_deg=errand.heading_deg), encoding="utf-8")
     return Task(str(path), (), seed + errand.number)
-
-
-def _kept(path: Path) -> Iterator[tuple[int, MissionResult]]:
-    """What an earlier process found; a line that was cut off is left out."""
-    from harvey.referee import MissionResult
-
-    if path.is_file():
-        for line in path.read_text(encoding="utf-8").split("\n")[:-1]:
-            found = json.loads(line)
-            yield found["number"], MissionResult(**found["result"])
 
 
 def _arrived(result: MissionResult) -> bool:

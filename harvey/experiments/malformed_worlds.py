@@ -8,7 +8,6 @@ never ends.
 
 from __future__ import annotations
 
-import multiprocessing
 import re
 import signal
 import sys
@@ -17,9 +16,9 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
@@ -30,12 +29,12 @@ from tqdm import tqdm
 from harvey.experiments.malformed_buildings_text import GML, IFC
 from harvey.experiments.malformed_worlds_text import SMALL
 from harvey.experiments.report import Report
+from harvey.workers import by_workers
 from world_models.importers import BuildingError, import_building
 from world_models.store import compile_file, load_world, read_world
 from world_models.toml_source import Source, WorldError
 
 FILES, QUICK_FILES = 10_000, 400
-WORKERS = 2
 CHUNK, QUICK_CHUNK = 100, 20
 """Files that a worker takes at once."""
 IFC_EVERY = 50
@@ -84,14 +83,15 @@ class Found:
 
 
 def _found(files: int, chunk: int, seed: int) -> Iterator[Found]:
-    """All files in order, from two worker processes."""
+    """All files in order, from worker processes."""
     parts = [range(first, min(first + chunk, files)) for first in range(0, files, chunk)]
-    spawn = multiprocessing.get_context("spawn")
-    with (ProcessPoolExecutor(WORKERS, mp_context=spawn) as pool,
-          tqdm(total=files, unit="file", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar):
-        for found in pool.map(judged_all, parts, [seed] * len(parts)):
+    known: dict[int, list[Found]] = {}
+    with tqdm(total=files, unit="file", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+        for place, found in by_workers(partial(judged_all, seed=seed), parts):
+            known[place] = found
             bar.update(len(found))
-            yield from found
+    for place in range(len(parts)):
+        yield from known[place]
 
 
 def judged_all(numbers: Sequence[int], seed: int) -> list[Found]:

@@ -32,6 +32,9 @@ put_down_sigma_in = 0.5
 
 
 def fault(kind: str, in_locale: str, after_ft: float, **more: float) -> str:
-    """What is added to a scenario's text so that something happens there: ``fault("bump", "hallway", 7.0, ...)``."""
-    lines = [f'kind = "{kind}"', f'in_locale = "{in_locale}"', f"after_ft = {after_ft}"]
+    """What is added to a scenario's text so that something happens there, or anywhere for "":
+    ``fault("bump", "hallway", 7.0, ...)``.
+    """
+    where = [f'in_locale = "{in_locale}"'] if in_locale else []
+    lines = [f'kind = "{kind}"', *where, f"after_ft = {after_ft}"]
     return "\n".join(["", "[[faults]]", *lines, *(f"{name} = {value}" for name, value in more.items()), ""])

@@ -31,10 +31,10 @@ def flips(space: Any, terms: Any, chosen: Any) -> tuple[Any, Any]:
         line = model[p]
         if chosen[p]:
             out[p] = base - forms[p]
-            left = covered[line] - _alone(masks[p], counts[line])
+            left = covered[line] - _share(masks[p], counts[line], 1)
         else:
             out[p] = base + forms[p]
-            left = covered[line] + _new(masks[p], counts[line])
+            left = covered[line] + _share(masks[p], counts[line], 0)
         omission[p] = total + _omission(1.0 - left, line, terms) - now[line]
         rival = -1 if chosen[p] else holder[data[p]]
         if rival >= 0:
@@ -103,25 +103,16 @@ def _state(space: Any, terms: Any, chosen: Any) -> tuple[Any, Any, Any, Any, Any
 def _loss(pair: int, space: Any, terms: Any, counts: Any, covered: Any, now: Any) -> Any:
     """By how much the omission of a chosen pair's model line grows without it."""
     line = space[2][pair]
-    left = covered[line] - _alone(space[1][pair], counts[line])
+    left = covered[line] - _share(space[1][pair], counts[line], 1)
     return _omission(1.0 - left, line, terms) - now[line]
 
 
 @compiled
-def _new(mask: Any, counts: Any) -> float:
-    """Share of the cells that a data line would cover and none does."""
+def _share(mask: Any, counts: Any, count: int) -> float:
+    """Share of the cells that a data line covers, and that so many of the chosen ones do."""
     found = 0
     for c in range(len(mask)):
-        found += mask[c] and counts[c] == 0
-    return found / len(mask)
-
-
-@compiled
-def _alone(mask: Any, counts: Any) -> float:
-    """Share of the cells that a data line covers alone."""
-    found = 0
-    for c in range(len(mask)):
-        found += mask[c] and counts[c] == 1
+        found += mask[c] and counts[c] == count
     return found / len(mask)
 
 

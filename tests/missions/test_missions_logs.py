@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from harvey.experiments.short_missions import HALLWAY, fault
 from harvey.mission import run_mission
 from harvey.run_directory import RunDirectory
 from logs.journal_file import read_journal
@@ -15,35 +16,13 @@ from logs.reader import read_decisions, read_frames
 from sim.assembly import set_stage
 from sim.scenario import parse_scenario
 
-SCENARIO = """
-description = "Unplugged, pushed aside and carried off in the hallway."
-world = "research_center"
-details = ["research_center_details"]
-goal = "(ptrans (hallway (4,4,0)) (hallway (24,4,0)))"
-
-[start]
-heading_deg = 0.0
-put_down_sigma_in = 0.5
-
-[[faults]]
-kind = "bump"
-in_locale = "hallway"
-after_ft = 5.0
-left_m = 0.3
-turn_deg = 10.0
-
-[[faults]]
-kind = "kidnap"
-in_locale = "hallway"
-after_ft = 12.0
-forward_m = 0.8
-turn_deg = 15.0
-
-[[faults]]
-kind = "camera_unplugged"
-after_ft = 2.0
-duration_s = 4.0
-"""
+SCENARIO = (
+    HALLWAY
+    + fault("bump", "hallway", 5.0, left_m=0.3, turn_deg=10.0)
+    + fault("kidnap", "hallway", 12.0, forward_m=0.8, turn_deg=15.0)
+    + fault("camera_unplugged", "", 2.0, duration_s=4.0)
+)
+"""Unplugged, pushed aside and carried off in the hallway."""
 
 
 @pytest.fixture(scope="module")
