@@ -1,5 +1,6 @@
 """The law of spoilt building files: a clear error or a world that can be read and checked, never a traceback."""
 
+import multiprocessing
 import re
 import sys
 from importlib.util import find_spec
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from harvey.experiments.malformed_buildings_text import GML, IFC
 from world_models.importers import BuildingError, import_building
+from world_models.importers.ifc import Next, heard
 from world_models.store import read_world
 from world_models.toml_source import Source
 
@@ -74,3 +76,10 @@ def test_deep_xml_is_refused(tmp_path: Path) -> None:
 @pytest.mark.skipif(find_spec("ifcopenshell") is None, reason="needs ifcopenshell (the extra ifc)")
 def test_a_file_that_ends_the_library_is_an_error(tmp_path: Path) -> None:
     assert _judged(tmp_path / "a.ifc", IFC.replace("('IFC2X3')", "(3.5)")) == "error"
+
+
+def test_a_file_that_the_library_does_not_get_done_with_is_given_up() -> None:
+    answers, sender = multiprocessing.Pipe(duplex=False)
+    sender.send(Next("reading IfcSpace #109", 0.01))
+    told = heard(Path("a.ifc"), answers)
+    assert isinstance(told, str) and "a.ifc" in told and "IfcSpace #109 was given up" in told

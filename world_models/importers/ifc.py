@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from importlib.util import find_spec
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -32,8 +32,8 @@ from world_models.importers.things import bounding_steps
 
 READ_ERRORS = (RuntimeError, ValueError, TypeError, AttributeError, IndexError, KeyError, OverflowError)
 """What ifcopenshell and the geometry of a spoilt file raise."""
-LONGEST_S = 900.0
-"""A file that takes longer to read is given up."""
+OPEN_S, OPEN_S_PER_MB, ELEMENT_S = 10.0, 5.0, 20.0
+"""A file that takes longer to open, or an element of it to be read, is given up."""
 STEPS = 8
 """Boxes that stand for a flight of stairs."""
 
@@ -52,7 +52,7 @@ def read_ifc(path: Path) -> Plan:
     child.start()
     sender.close()
     try:
-        answer = answers.recv() if answers.poll(LONGEST_S) else f"{path.name}: not read in {LONGEST_S:.0f} s"
+        answer = heard(path, answers)
     except EOFError:
         answer = f"{path.name}: expected an IFC file, got one that ends ifcopenshell"
     finally:
@@ -64,25 +64,45 @@ def read_ifc(path: Path) -> Plan:
     raise BuildingError(answer)
 
 
+def heard(path: Path, answers: Connection) -> Plan | str:
+    """What the reading process says in the end; on the way it tells what it is about to do."""
+    limit_s, doing = ELEMENT_S, "starting to read"
+    while answers.poll(limit_s):
+        said: Next | Plan | str = answers.recv()
+        if not isinstance(said, Next):
+            return said
+        limit_s, doing = said.limit_s, said.doing
+    return (f"{path.name}: expected an IFC file, got one that ifcopenshell does not get done with: {doing} was given up"
+            f" after {limit_s:.0f} s")
+
+
+class Next(NamedTuple):
+    """What the reading process does next, and how long that may take."""
+
+    doing: str
+    limit_s: float
+
+
 def _answer(path: Path, sender: Connection) -> None:
-    """What the reading process does: sends a plan, or what is wrong with the file."""
+    """What the reading process does: sends what it is about, and in the end a plan, or what is wrong with the file."""
     try:
-        sender.send(_read(path))
+        sender.send(_read(path, sender.send))
     except BuildingError as error:
         sender.send(str(error))
 
 
-def _read(path: Path) -> Plan:
+def _read(path: Path, tell: Callable[[Next], None]) -> Plan:
     import ifcopenshell
     import ifcopenshell.geom
 
     try:
+        tell(Next("opening it", OPEN_S + OPEN_S_PER_MB * path.stat().st_size / 1e6))
         model = ifcopenshell.open(str(path))
     except (*READ_ERRORS, OSError, ifcopenshell.Error) as error:
         raise BuildingError(f"{path.name}: expected an IFC file, got: {_first_line(error)}") from None
     geometry: Any = ifcopenshell.geom
     settings = geometry.settings()
-    reader = _Reader(path, model, lambda element: geometry.create_shape(settings, element))
+    reader = _Reader(path, model, lambda element: geometry.create_shape(settings, element), tell)
     try:
         return reader.read()
     except READ_ERRORS as error:
@@ -113,6 +133,7 @@ class _Reader:
     path: Path
     model: Any
     shape: Callable[[Any], Any]
+    tell: Callable[[Next], None]
     plan: Plan = field(init=False)
     names: Names = field(init=False)
     by_id: dict[int, str] = field(default_factory=dict)
@@ -122,6 +143,7 @@ class _Reader:
 
     def read(self) -> Plan:
         title = slug(self.path.stem) or "building"
+        self.tell(Next("reading its storeys", ELEMENT_S))
         self.plan, self.names = Plan(title, self.path.name), Names(title)
         self._storeys()
         self._each("IfcSpace", self._space)
@@ -138,6 +160,7 @@ class _Reader:
     def _each(self, kind: str, read: Callable[[Any], None]) -> None:
         """Read every element of a kind; those that cannot be read are left out and named."""
         for element in self.model.by_type(kind):
+            self.tell(Next(f"reading {kind} #{element.id()}", ELEMENT_S))
             try:
                 read(element)
             except READ_ERRORS as error:
