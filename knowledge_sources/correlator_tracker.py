@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import lru_cache
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
@@ -20,9 +22,10 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
+from knowledge_sources.methods.correlation import Template, extract_template
 from knowledge_sources.methods.edge_alignment import aligned
 from knowledge_sources.methods.rectified import Rectified
-from knowledge_sources.methods.tracking import HALF_PX, Followed, Image, begin, correct, follow
+from knowledge_sources.methods.tracking import HALF_PX, TRACKS, Followed, Image, begin, correct, follow
 from knowledge_sources.questions import held, open_discrepancy
 from knowledge_sources.tolerances import PLAN_PX, action_px
 from world_models.actuator import Drift
@@ -32,8 +35,9 @@ from world_models.percepts import Anchor, Track, Tracks
 from world_models.robot import RobotModel
 from world_models.visibility import visible_lines
 
-FEW = 9
-"""With fewer landmarks than this, new ones are taken."""
+FEW, FEWEST, LEFT_PART = 9, 5, 0.5
+"""New landmarks are taken where fewer than FEWEST are left; or fewer than FEW, and than this part of those that there
+were when new ones were last taken."""
 FAR_M = 0.8
 """A template is given up when the robot is so far from where it was cut: it would look otherwise from here."""
 MISSES = 2
@@ -76,6 +80,7 @@ class CorrelatorTracker(Expert):
     def __init__(self, robot: RobotModel) -> None:
         super().__init__(robot)
         self._picture = Rectified(robot.lens, robot.camera)
+        self._template = lru_cache(maxsize=4 * TRACKS)(self._cut)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         if held(view) is None or view.latest(Frame) is None or open_discrepancy(view, Level.GOAL) is not None:
@@ -106,7 +111,8 @@ class CorrelatorTracker(Expert):
         near = self._near(anchors, now)
         kept = tuple(
             f.track for f in followed if f.expected and f.track.misses < MISSES and f.track.template_frame in near)
-        renewed = self._renewed(kept, anchors, frame, image, now)
+        taken = 0 if old is None else old.value.taken
+        renewed = self._renewed(kept, anchors, frame, image, now, taken)
         tracks = self._kept(old, renewed.tracks, because)
         yield tracks
         if corrected is not None or renewed.hypothesis is not now:
@@ -114,7 +120,7 @@ class CorrelatorTracker(Expert):
             yield correction
             yield from self._learnt(view, renewed.hypothesis, correction)
         if corrected is not None:
-            shift = float(np.median([math.dist(t.predicted_px, t.found_px) for t in seen if t.found_px is not None]))
+            shift = median(math.dist(t.predicted_px, t.found_px) for t in seen if t.found_px is not None)
             what = f"{len(seen)} landmarks are {shift:.1f} px from where they were expected"
             yield from self._told(view, what, shift, belief.value, seen, (correction,))
 
@@ -122,7 +128,7 @@ class CorrelatorTracker(Expert):
         self, view: View, frame: Entry[Frame], belief: Entry[Hypothesis], old: Entry[Tracks] | None
     ) -> Iterable[Effect]:
         """A milestone or a relocalization said anew where we are: landmarks are taken from there."""
-        fresh = self._renewed((), (), frame, self._picture(frame.value.jpeg), belief.value)
+        fresh = self._renewed((), (), frame, self._picture(frame.value.jpeg), belief.value, 0)
         tracks = self._kept(old, fresh.tracks, (frame, belief))
         yield tracks
         drift = view.latest(Drift)
@@ -144,11 +150,14 @@ class CorrelatorTracker(Expert):
     def _followed(self, view: View, tracks: Tracks | None, image: Image, belief: Hypothesis) -> list[Followed]:
         if tracks is None:
             return []
-        frames = sorted({t.template_frame for t in tracks.items})
-        pictures = {name: self._picture(view[name].value.jpeg) for name in frames}
         world = self._robot.world
-        return follow(self._robot.standing_in(belief.locale), tracks.items, pictures, image,
+        return follow(self._robot.standing_in(belief.locale), tracks.items,
+                      lambda track: self._template(view[track.template_frame].value.jpeg, track.template_px), image,
                       belief.world_from_robot(world), belief.covariance_world(world))
+
+    def _cut(self, jpeg: bytes, at_px: tuple[float, float]) -> Template:
+        """The template round a pixel of a picture; the last ones are remembered, as they serve for many frames."""
+        return extract_template(self._picture(jpeg), at_px, HALF_PX)
 
     def _corrected(self, belief: Hypothesis, seen: list[Track], anchors: tuple[Anchor, ...]) -> Corrected:
         """The belief after the landmarks were found."""
@@ -162,12 +171,12 @@ class CorrelatorTracker(Expert):
 
     def _renewed(
         self, kept: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame], image: Image,
-        belief: Hypothesis,
+        belief: Hypothesis, taken: int,
     ) -> Renewed:
         """New landmarks as old ones leave, cut where the model's edges say that they are."""
         world = self._robot.world
-        if len(kept) >= FEW:
-            return Renewed(self._anchored(kept, anchors, frame, belief), belief)
+        if len(kept) >= max(FEWEST, min(FEW, LEFT_PART * taken)):
+            return Renewed(self._anchored(kept, anchors, frame, belief, taken), belief)
         robot, pose = self._robot.standing_in(belief.locale), belief.world_from_robot(world)
         lines = visible_lines(
             world, robot.camera, robot.camera_from_world(pose), min_length_px=LENGTH_PX, min_contrast=CONTRAST,
@@ -178,7 +187,7 @@ class CorrelatorTracker(Expert):
             pose = found.world_from_robot
             belief = Hypothesis.of_world(world, belief.locale, pose, found.covariance, "tracks", motion=belief.motion)
         items = (*kept, *begin(robot, kept, frame.id, image, pose))
-        return Renewed(self._anchored(items, anchors, frame, belief), belief)
+        return Renewed(self._anchored(items, anchors, frame, belief, len(items)), belief)
 
     def _near(self, anchors: tuple[Anchor, ...], belief: Hypothesis) -> frozenset[str]:
         """The frames that were taken near enough to here for their templates to serve on."""
@@ -186,13 +195,14 @@ class CorrelatorTracker(Expert):
         return frozenset(a.frame for a in anchors if math.hypot(a.x_m - here.x_m, a.y_m - here.y_m) <= FAR_M)
 
     def _anchored(
-        self, items: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame], belief: Hypothesis
+        self, items: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame], belief: Hypothesis,
+        taken: int,
     ) -> Tracks:
         """The tracks, with what was believed where their templates were cut."""
         pose = belief.world_from_robot(self._robot.world)
         here = Anchor(frame.id, pose.x_m, pose.y_m, covariance_tuple(belief.covariance_world(self._robot.world)))
         used = {t.template_frame for t in items}
-        return Tracks(frame.id, HALF_PX, items, tuple(a for a in (*anchors, here) if a.frame in used))
+        return Tracks(frame.id, HALF_PX, items, tuple(a for a in (*anchors, here) if a.frame in used), taken)
 
     def _told(
         self, view: View, what: str, magnitude_px: float, belief: Hypothesis, tracks: list[Track],

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import numpy as np
-
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
 from knowledge_sources.expert import Expert
+from knowledge_sources.methods.images import mean_and_spread
 from knowledge_sources.methods.lines import find_lines
 from knowledge_sources.methods.rectified import Rectified
 from knowledge_sources.questions import open_milestone
@@ -44,6 +43,7 @@ class LineFinder(Expert):
         frame = trigger.entry
         image = self._picture(frame.value.jpeg)
         found = find_lines(image, min_length_px=LEAST_LENGTH_PX)
+        brightness, contrast = mean_and_spread(image)
         waiting = open_milestone(view) if frame.value.purpose == "milestone" else None
         yield Post(
             Segments(
@@ -51,8 +51,8 @@ class LineFinder(Expert):
                 "" if waiting is None else waiting.id,
                 frozen(found.segments_px),
                 frozen(found.sigma_offset_px),
-                float(np.std(image)),
-                float(np.mean(image)),
+                contrast,
+                brightness,
             ),
             (frame,) if waiting is None else (frame, waiting),
         )

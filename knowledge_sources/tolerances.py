@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,5 +31,5 @@ def action_px(robot: RobotModel, belief: Hypothesis, points_world: Floats) -> fl
     pose = belief.world_from_robot(robot.world)
     ahead_m = robot.standing_in(belief.locale).camera_from_world(pose).apply(points_world.reshape(-1, 3))[:, 2]
     near = ahead_m[ahead_m > NEAR_M]
-    spread = math.hypot(belief.sigma_rad, belief.sigma_m / float(np.median(near)) if len(near) else 0.0)
+    spread = math.hypot(belief.sigma_rad, belief.sigma_m / median(near.tolist()) if len(near) else 0.0)
     return min(FLOOR_PX + SIGMAS * robot.camera.fx * spread, PLAN_PX)

@@ -64,12 +64,14 @@ class Tracks:
         half_px: templates are squares of 2 half_px + 1.
         items: the tracks.
         anchors: one for each frame in which templates of these tracks were cut.
+        taken: how many there were when new ones were last taken.
     """
 
     frame: str
     half_px: int
     items: tuple[Track, ...]
     anchors: tuple[Anchor, ...] = ()
+    taken: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -68,7 +68,8 @@ class Correlation:
     @property
     def sigma_px(self) -> float:
         """Root of the covariance's mean diagonal [px]."""
-        return math.sqrt(float(np.trace(self.covariance_px)) / 2.0)
+        (uu, _), (_, vv) = self.covariance_px.tolist()
+        return math.sqrt((uu + vv) / 2.0)
 
     @property
     def distinctiveness(self) -> float:
@@ -103,7 +104,7 @@ def _cut_out(image: Any, centre_px: Any, half_px: int) -> tuple[NDArray[np.float
 
 def fits(shape: tuple[int, ...], centre_px: Any, half_px: float) -> bool:
     """Whether a patch of that half-width round a centre (u, v) lies inside an image of that shape (h, w)."""
-    u, v = (float(c) for c in np.asarray(centre_px, float))
+    u, v = map(float, centre_px)
     return bool(half_px <= u <= shape[1] - 1 - half_px and half_px <= v <= shape[0] - 1 - half_px)
 
 
@@ -197,7 +198,7 @@ def _window(
     shape: tuple[int, ...], predicted: NDArray[np.float64], search: float, half: int
 ) -> tuple[int, int, int, int] | None:
     """First and last column and row of the centres searched, all of whose patches lie in the image."""
-    if predicted.shape != (2,) or not np.all(np.isfinite(predicted)):
+    if predicted.shape != (2,) or not all(map(math.isfinite, predicted.tolist())):
         raise ValueError(f"expected a finite prediction (u, v), got {predicted}")
     u, v = predicted.tolist()
     u0, u1 = max(math.floor(u - search), half), min(math.ceil(u + search), shape[1] - 1 - half)

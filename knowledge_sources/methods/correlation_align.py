@@ -78,8 +78,8 @@ def _covariance(cut: Any, squares: float, noise: float, search: float) -> tuple[
 
 @compiled
 def _information(energy: float, blank: float, scatter: float) -> float:
-    """Gradient energy beyond that of noise; none where it is within noise's own relative scatter."""
-    certainty = min(max((energy / blank - 1.0) / (2.0 * scatter) - 1.0, 0.0), 1.0)
+    """Gradient energy beyond that of noise; none where it is within three times noise's own relative scatter."""
+    certainty = min(max(0.5 * ((energy / blank - 1.0) / scatter - 3.0), 0.0), 1.0)
     return (energy - blank) * certainty
 
 

@@ -52,6 +52,12 @@ def checked_grey(image: Any) -> NDArray[Any]:
     return array
 
 
+def mean_and_spread(image: NDArray[np.uint8]) -> tuple[float, float]:
+    """Mean and standard deviation of the grey levels of an image (h, w)."""
+    mean, spread = cv2.meanStdDev(image)
+    return float(mean[0, 0]), float(spread[0, 0])
+
+
 def noise_sigma(image: NDArray[np.float32]) -> float:
     """Standard deviation of the pixel noise [grey levels], at least that of rounding to whole grey levels.
 

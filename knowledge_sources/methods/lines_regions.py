@@ -61,7 +61,8 @@ def _edge_pixels(smooth: Any, least: float) -> tuple[Any, Any, Any, Any]:
     for y in range(1, height - 1):
         for x in range(1, width - 1):
             u, v = smooth[y, x + 1] - smooth[y, x - 1], smooth[y + 1, x] - smooth[y - 1, x]
-            size[y, x] = np.float32(0.5) * math.sqrt(u * u + v * v)
+            size[y, x] = np.float32(0.5) * np.sqrt(u * u + v * v)  # in single precision, many at once
+        for x in range(1, width - 1):
             count += size[y, x] >= least
     places, units, sizes = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
     index = np.full((height, width), -1, np.int32)

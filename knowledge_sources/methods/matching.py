@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching_fit import Fits, Similarity2, best_fits
+from knowledge_sources.methods.matching_fit import Fits, Fitting, Similarity2
 from knowledge_sources.methods.matching_hough import LineTable, Peak, hough_peaks, line_table
 from knowledge_sources.methods.matching_objective import Objective, Terms, likelihood_terms, paper_terms
 from knowledge_sources.methods.matching_pairs import (
@@ -184,8 +183,8 @@ def _pair_space(
     forms = np.swapaxes(rows * weights[:, None, None], 1, 2) @ rows
     shift, turn, scale = (np.array([w]) for w in terms.anchor_weights)
     anchor = start_anchor(placement[None], shift, turn, scale)[0]
-    fit = partial(best_fits, with_scale=with_scale, start=placement)
-    space = PairSpace(members, model, data, forms, masks, table.lines, anchor, fit)
+    fitting = Fitting.of_figure(with_scale, placement)
+    space = PairSpace(members, model, data, forms, masks, table.lines, anchor, fitting)
     distances = np.sqrt(np.mean((rows @ placement) ** 2, axis=1))
     return space, nearest(data, distances, distances <= 0.5 * gates[model])
 

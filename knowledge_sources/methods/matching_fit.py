@@ -1,18 +1,17 @@
-"""Closed-form best fit of a 2D model to the data lines paired with it (§6.1.2)."""
+"""Best fits of a model to the data lines paired with it: closed-form in the image (§6.1.2), or a step of a pose."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from knowledge_sources.methods.matching_kernels import RIGID, SCALED, STEP, fits
 
-NEWTON_STEPS = 4
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +39,31 @@ class Similarity2:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fits:
-    """Best fits of k states: ``errors`` (k,) E_fit at the optimum, ``placements`` (k, 5) (cos, sin, T_u, T_v, s)."""
+    """Best fits of k states: ``errors`` (k,) E_fit at the optimum, ``placements`` (k, 5) (cos, sin, T_u, T_v, s), or
+    the steps (k, d)."""
 
     errors: Array
     placements: Array
+
+
+class Fitting(NamedTuple):
+    """How states are fitted: RIGID, SCALED or STEP, and the turn [rad] that a rigid fit starts from."""
+
+    kind: int
+    turn_rad: float
+
+    @staticmethod
+    def of_figure(with_scale: bool, start: Array) -> Fitting:
+        """As :func:`best_fits`, from the turn of a placement (5,)."""
+        return Fitting(SCALED if with_scale else RIGID, math.atan2(start[1], start[0]))
+
+    def of(self, forms: Array) -> Fits:
+        """The best fits of k forms (k, d, d)."""
+        return Fits(*fits(np.ascontiguousarray(forms), self.kind, np.full(len(forms), self.turn_rad)))
+
+
+STEPS = Fitting(STEP, 0.0)
+"""As :func:`step_fits`."""
 
 
 def best_fits(forms: Array, with_scale: bool, start: Array) -> Fits:
@@ -57,68 +77,9 @@ def best_fits(forms: Array, with_scale: bool, start: Array) -> Fits:
     """
     turns = np.empty(len(forms))
     turns[:] = np.arctan2(start[..., 1], start[..., 0])
-    errors, placements = _fits(np.ascontiguousarray(forms), with_scale, turns)
-    return Fits(errors, placements)
+    return Fits(*fits(np.ascontiguousarray(forms), SCALED if with_scale else RIGID, turns))
 
 
-@njit(cache=True, error_model="numpy")
-def _fits(forms: Any, with_scale: bool, turns: Any) -> tuple[Any, Any]:
-    errors, placements = np.empty(len(forms)), np.empty((len(forms), 5))
-    back, q = np.empty((2, 3)), np.empty((3, 3))
-    for k in range(len(forms)):
-        _without_shift(forms[k], back, q)
-        scale = 1.0
-        if with_scale:
-            c, s, scale = _circle_with_scale(q)
-        else:
-            c, s = _circle(q, turns[k])
-        rest = (c, s, scale)
-        error = 0.0
-        for a in range(3):
-            for b in range(3):
-                error += rest[a] * q[a, b] * rest[b]
-        errors[k] = max(error, 0.0)
-        placements[k, 0], placements[k, 1], placements[k, 4] = c, s, scale
-        for t in range(2):
-            placements[k, 2 + t] = -(back[t, 0] * c + back[t, 1] * s + back[t, 2] * scale)
-    return errors, placements
-
-
-@njit(cache=True, error_model="numpy")
-def _without_shift(form: Any, back: Any, reduced: Any) -> None:
-    """Eliminate T: ``reduced`` (3, 3) in (cos, sin, s) and ``back`` (2, 3) with T = -back @ (cos, sin, s)."""
-    a, b, d = form[2, 2], form[2, 3], form[3, 3]
-    determinant = a * d - b * b
-    kept = (0, 1, 4)
-    for j in range(3):
-        u, v = form[2, kept[j]], form[3, kept[j]]
-        back[0, j], back[1, j] = (d * u - b * v) / determinant, (a * v - b * u) / determinant
-    for i in range(3):
-        for j in range(3):
-            across = form[2, kept[i]] * back[0, j] + form[3, kept[i]] * back[1, j]
-            reduced[i, j] = form[kept[i], kept[j]] - across
-
-
-@njit(cache=True, error_model="numpy")
-def _circle_with_scale(q: Any) -> tuple[float, float, float]:
-    """Eliminate s from (3, 3), then the smaller root of the second-order equation."""
-    pull = (q[0, 2] / q[2, 2], q[1, 2] / q[2, 2])
-    xx, xy, yy = q[0, 0] - q[0, 2] * pull[0], q[0, 1] - q[0, 2] * pull[1], q[1, 1] - q[1, 2] * pull[1]
-    turn = 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
-    c, s = math.cos(turn), math.sin(turn)
-    if c < 0.0:
-        c, s = -c, -s
-    return c, s, -(pull[0] * c + pull[1] * s)
-
-
-@njit(cache=True, error_model="numpy")
-def _circle(q: Any, turn: float) -> tuple[float, float]:
-    """Newton on the turn for x'Ax + 2 b'x, x = (cos, sin), with s = 1."""
-    a, b, d, e, f = q[0, 0], q[0, 1], q[1, 1], q[0, 2], q[1, 2]
-    for _ in range(NEWTON_STEPS):
-        c, s = math.cos(turn), math.sin(turn)
-        slope = (d - a) * s * c + b * (c * c - s * s) - e * s + f * c
-        bend = (d - a) * (c * c - s * s) - 4.0 * b * s * c - e * c - f * s
-        if bend > 1e-12:
-            turn -= min(max(slope / bend, -0.5), 0.5)
-    return math.cos(turn), math.sin(turn)
+def step_fits(forms: Array) -> Fits:
+    """Minimise k forms (k, d + 1, d + 1) over the first d of (step, 1); ``placements`` are the steps (k, d)."""
+    return STEPS.of(forms)

@@ -96,25 +96,23 @@ def _offset_votes(
     model: LineTable, data: LineTable, turns: Array, window_px: float, window_rad: float, step: float
 ) -> Array:
     """(t, m, bins): share of each model line found at each offset across it, at each turn."""
-    reach = int(np.ceil(1.5 * window_px / step))
-    bins = 2 * reach + 1
-    rows, columns = _near_pairs(model, data, window_px, window_rad)
-    votes = np.zeros((len(turns), len(model.ends), bins))
-    _vote(
-        votes, turns, rows, columns, undirected(data.angles[columns] - model.angles[rows]),
+    bins = 2 * int(np.ceil(1.5 * window_px / step)) + 1
+    rows, columns = pairs_within(model, data, np.full(len(model.ends), window_px), window_rad)
+    votes: Array = _votes(
+        turns, bins, rows, columns, undirected(data.angles[columns] - model.angles[rows]),
         model.normals, model.offsets, model.lengths, data.middles, data.lengths, step,
     )
-    votes[..., 1:-1] += 0.5 * (votes[..., :-2] + votes[..., 2:])
-    return np.minimum(votes, model.lengths[None, :, None])
+    return votes
 
 
 @njit(cache=True, error_model="numpy")
-def _vote(
-    votes: Any, turns: Any, rows: Any, columns: Any, angles: Any, normals: Any, offsets: Any, model_lengths: Any,
+def _votes(
+    turns: Any, bins: int, rows: Any, columns: Any, angles: Any, normals: Any, offsets: Any, model_lengths: Any,
     middles: Any, data_lengths: Any, step: float,
-) -> None:
-    """Each near pair votes, at each turn that makes it nearly parallel, for the offset that lays one on the other."""
-    bins, widest = votes.shape[2], 1.5 * TURN_STEP_RAD
+) -> Any:
+    """Each near pair votes, at each turn that makes it nearly parallel, for the offset that lays one on the other; half
+    as much for the offsets beside it."""
+    votes, widest = np.zeros((len(turns), len(normals), bins)), 1.5 * TURN_STEP_RAD
     for t in range(len(turns)):
         c, s = math.cos(turns[t]), math.sin(turns[t])
         for p in range(len(rows)):
@@ -127,20 +125,46 @@ def _vote(
             cell = int(np.rint(across / step)) + bins // 2
             if 0 <= cell < bins:
                 votes[t, i, cell] += min(data_lengths[k], model_lengths[i]) * (1.0 - miss / widest)
+        for i in range(len(normals)):
+            before = votes[t, i, 0]
+            for cell in range(1, bins - 1):
+                here = votes[t, i, cell]
+                votes[t, i, cell] = here + 0.5 * (before + votes[t, i, cell + 1])
+                before = here
+            for cell in range(bins):
+                votes[t, i, cell] = min(votes[t, i, cell], model_lengths[i])
+    return votes
 
 
-def _near_pairs(
-    model: LineTable, data: LineTable, window_px: float, window_rad: float
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Model and data indices within the windows; along the line they may miss each other by the window."""
-    apart = data.middles[None] - model.middles[:, None]
-    across = np.abs(np.sum(apart * model.normals[:, None], axis=-1))
-    along = np.abs(np.sum(apart * model.directions[:, None], axis=-1))
-    gap = along - 0.5 * (model.lengths[:, None] + data.lengths[None])
-    angle = np.abs(undirected(data.angles[None] - model.angles[:, None]))
-    lever = 0.5 * window_rad * model.lengths[:, None]
-    rows, columns = np.nonzero((across <= window_px + lever) & (gap <= window_px) & (angle <= window_rad))
-    return rows, columns
+def pairs_within(
+    model: LineTable, data: LineTable, window_px: Array, window_rad: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Model and data indices (p,) of every pair within the windows: (m,) pixels across the model line, its lever arm
+    for such a turn added, and along it, and an angle."""
+    found: NDArray[np.int64] = _pairs_within(
+        np.ascontiguousarray(window_px), window_rad, model.middles, model.normals, model.directions, model.lengths,
+        model.angles, data.middles, data.lengths, data.angles,
+    )
+    return found[0], found[1]
+
+
+@njit(cache=True, error_model="numpy")
+def _pairs_within(
+    window_px: Any, window_rad: float, middles: Any, normals: Any, directions: Any, lengths: Any, angles: Any,
+    data_middles: Any, data_lengths: Any, data_angles: Any,
+) -> Any:
+    found, count = np.empty((2, len(middles) * len(data_middles)), np.int64), 0
+    for i in range(len(middles)):
+        lever = 0.5 * window_rad * lengths[i]
+        for k in range(len(data_middles)):
+            u, v = data_middles[k, 0] - middles[i, 0], data_middles[k, 1] - middles[i, 1]
+            across = abs(u * normals[i, 0] + v * normals[i, 1])
+            gap = abs(u * directions[i, 0] + v * directions[i, 1]) - 0.5 * (lengths[i] + data_lengths[k])
+            angle = abs((data_angles[k] - angles[i] + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
+            if across <= window_px[i] + lever and gap <= window_px[i] and angle <= window_rad:
+                found[0, count], found[1, count] = i, k
+                count += 1
+    return found[:, :count]
 
 
 def _gathered(model: LineTable, votes: Array, turns: Array, window_px: float, step: float) -> Array:
@@ -155,15 +179,21 @@ def _gather(votes: Any, turns: Any, axis: Any, normals: Any, step: float) -> Any
     """At each turn and shift T the sum of what each model line has at its offset n . T."""
     bins, cells = votes.shape[2], len(axis)
     scores = np.zeros((len(turns), cells, cells))
+    across = np.empty(cells)
     for t in range(len(turns)):
         c, s = math.cos(turns[t]), math.sin(turns[t])
         for i in range(len(normals)):
+            if not votes[t, i].any():
+                continue
             # In the model's own frame the shift appears turned back.
             by_u = (c * normals[i, 0] - s * normals[i, 1]) / step
             by_v = (s * normals[i, 0] + c * normals[i, 1]) / step
+            for u in range(cells):
+                across[u] = by_u * axis[u] + (bins // 2 + 0.5)  # so that cutting off the fraction rounds
             for v in range(cells):
+                along = by_v * axis[v]
                 for u in range(cells):
-                    cell = int(np.rint(by_u * axis[u] + by_v * axis[v])) + bins // 2
+                    cell = int(across[u] + along)
                     scores[t, v, u] += votes[t, i, min(max(cell, 0), bins - 1)]
     return scores
 
@@ -171,27 +201,33 @@ def _gather(votes: Any, turns: Any, axis: Any, normals: Any, step: float) -> Any
 def _separate_peaks(scores: Array, turns: Array, window_px: float, step: float, count: int) -> list[Peak]:
     """Highest cells first, each clearing its neighbourhood (2 turns, 2 cells); ties go to the smaller motion."""
     axis = np.linspace(-window_px, window_px, CELLS)
-    free = np.ones(scores.shape, np.bool_)
-    peaks: list[Peak] = []
-    while len(peaks) < count:
-        t, v, u = _highest(scores, free, turns, axis)
-        if t < 0 or scores[t, v, u] <= 0.0:
-            break
-        peaks.append(Peak(float(turns[t]), (float(axis[u]), float(axis[v])), float(scores[t, v, u])))
-        free[max(t - 2, 0) : t + 3, max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3] = False
+    cells = [cell for cell in _highest(scores, turns, axis, count).tolist() if scores[tuple(cell)] > 0.0]
+    peaks = [Peak(float(turns[t]), (float(axis[u]), float(axis[v])), float(scores[t, v, u])) for t, v, u in cells]
     return peaks or [NO_MOTION]
 
 
 @njit(cache=True, error_model="numpy")
-def _highest(scores: Any, free: Any, turns: Any, axis: Any) -> tuple[int, int, int]:
-    """The highest free cell, a hair lower the larger its motion; -1 where none is free."""
-    best, found = -math.inf, (-1, -1, -1)
-    for t in range(len(turns)):
-        for v in range(len(axis)):
-            for u in range(len(axis)):
-                if free[t, v, u] and scores[t, v, u] > best:
-                    motion = abs(turns[t]) / 0.3 + math.hypot(axis[u], axis[v]) / 30.0
-                    score = scores[t, v, u] - 1e-6 * motion
-                    if score > best:
-                        best, found = score, (t, v, u)
+def _highest(scores: Any, turns: Any, axis: Any, count: int) -> Any:
+    """(n, 3) cells (turn, v, u), each the highest that those before it leave; a hair lower the larger its motion."""
+    free = np.ones(scores.shape, np.bool_)
+    tops, at = np.full(len(turns), -math.inf), np.zeros((len(turns), 3), np.int64)
+    found = np.empty((count, 3), np.int64)
+    first, last = 0, len(turns)
+    for n in range(count):
+        for t in range(first, last):  # of these turns the highest cell is not known, or taken
+            tops[t] = -math.inf
+            for v in range(len(axis)):
+                for u in range(len(axis)):
+                    if free[t, v, u] and scores[t, v, u] > tops[t]:
+                        motion = abs(turns[t]) / 0.3 + math.hypot(axis[u], axis[v]) / 30.0
+                        if scores[t, v, u] - 1e-6 * motion > tops[t]:
+                            tops[t] = scores[t, v, u] - 1e-6 * motion
+                            at[t, 0], at[t, 1], at[t, 2] = t, v, u
+        best = np.argmax(tops)
+        if tops[best] == -math.inf:
+            return found[:n]
+        found[n] = at[best]
+        t, v, u = found[n]
+        first, last = max(t - 2, 0), min(t + 3, len(turns))
+        free[first:last, max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3] = False
     return found

@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching_fit import Similarity2, best_fits
-from knowledge_sources.methods.matching_hough import LineTable, Peak, undirected
+from knowledge_sources.methods.matching_hough import LineTable, Peak, pairs_within, undirected
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -56,19 +56,12 @@ class PairTable:
 
 def pair_table(model: LineTable, data: LineTable, window_px: Array, window_rad: float) -> PairTable:
     """Every pair within the windows: (m,) pixels across and along, and an angle; the turn's lever arm is added."""
-    apart = data.middles[None] - model.middles[:, None]
-    across = np.abs(np.einsum("mka,ma->mk", apart, model.normals))
-    along = np.abs(np.einsum("mka,ma->mk", apart, model.directions))
-    angles = undirected(data.angles[None] - model.angles[:, None])
-    reach = window_px[:, None]
-    lever = 0.5 * window_rad * model.lengths[:, None]
-    gap = along - 0.5 * (model.lengths[:, None] + data.lengths)
-    i, k = np.nonzero((across <= reach + lever) & (gap <= reach) & (np.abs(angles) <= window_rad))
+    i, k = pairs_within(model, data, window_px, window_rad)
     starts = np.sum(model.directions * model.ends[:, 0], axis=1)
     return PairTable(
         model=i,
         data=k,
-        angles=angles[i, k],
+        angles=undirected(data.angles[k] - model.angles[i]),
         across=_rows(model.normals[i], model.offsets[i], data.ends[k]),
         along=_rows(model.directions[i], starts[i], data.ends[k]),
         lengths=model.lengths[i],

@@ -9,14 +9,12 @@ and the local search are those of :func:`match_lines`. How the pose may change i
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from knowledge_sources.methods.matching_fit import Fits
+from knowledge_sources.methods.matching_fit import STEPS
 from knowledge_sources.methods.matching_freedom import Array, Freedom
 from knowledge_sources.methods.matching_objective import Terms, likelihood_terms
 from knowledge_sources.methods.matching_posed_pairs import (
@@ -124,40 +122,10 @@ def _space(scene: PosedScene, pose: Pose, pairs: PosedPairs, tuning: Tuning) -> 
         masks=(cells >= pairs.along.min(axis=1)[:, None]) & (cells <= pairs.along.max(axis=1)[:, None]),
         lines=len(scene.model),
         anchor=0.5 * prior.T @ freedom.information @ prior,
-        fit=step_fits,
+        fitting=STEPS,
     )
     distances = np.sqrt(np.mean(pairs.distances**2, axis=1))
     return space, nearest(pairs.data, distances, distances <= 0.5 * tuning.pair_px)
-
-
-def step_fits(forms: Array) -> Fits:
-    """Minimise k forms (k, d + 1, d + 1) over the first d of (step, 1); ``placements`` are the steps (k, d)."""
-    return Fits(*_minimised(np.ascontiguousarray(forms)))
-
-
-@njit(cache=True, error_model="numpy")
-def _minimised(forms: Any) -> tuple[Any, Any]:
-    """By Cholesky's factors L: the error is what is left of the last pivot, the step solves L' step = -(last row)."""
-    unknowns = forms.shape[1] - 1
-    errors, steps = np.empty(len(forms)), np.empty((len(forms), unknowns))
-    factor = np.zeros((unknowns + 1, unknowns + 1))
-    for k in range(len(forms)):
-        for a in range(unknowns + 1):
-            for b in range(a + 1):
-                rest = forms[k, a, b]
-                for c in range(b):
-                    rest -= factor[a, c] * factor[b, c]
-                if b < a:
-                    factor[a, b] = rest / factor[b, b]
-                else:
-                    factor[a, b] = math.sqrt(rest) if a < unknowns else rest
-        errors[k] = max(factor[unknowns, unknowns], 0.0)
-        for a in range(unknowns - 1, -1, -1):
-            rest = -factor[unknowns, a]
-            for c in range(a + 1, unknowns):
-                rest -= factor[c, a] * steps[k, c]
-            steps[k, a] = rest / factor[a, a]
-    return errors, steps
 
 
 def _match(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -10,8 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching_fit import Fits
-from knowledge_sources.methods.matching_neighbours import flips, swaps
+from knowledge_sources.methods.matching_fit import Fits, Fitting
+from knowledge_sources.methods.matching_kernels import descend
 from knowledge_sources.methods.matching_objective import Terms
 
 Array = NDArray[np.float64]
@@ -34,7 +33,7 @@ class PairSpace:
         masks: (p, c) cells of the model line that the data line covers.
         lines: number of model lines.
         anchor: (d, d) pull to the placement the space was formed at.
-        fit: the best fits of k forms (k, d, d).
+        fitting: how a state is fitted.
     """
 
     members: Index
@@ -44,7 +43,7 @@ class PairSpace:
     masks: Mask
     lines: int
     anchor: Array
-    fit: Callable[[Array], Fits]
+    fitting: Fitting
 
     @property
     def arrays(self) -> tuple[Array | Mask | Index, ...]:
@@ -87,27 +86,11 @@ def local_search(
     """
     if strategy not in ("first", "steepest"):
         raise ValueError(f'expected strategy "first" or "steepest", got {strategy!r}')
-    chosen = start.copy()
-    error = evaluate(space, terms, chosen)
-    steps = [_step(space, chosen, error)] if keep_trace else []
-    last, moves = -1, 0
-    while moves < STEPS_A_PAIR * len(chosen):
-        errors = flip_errors(space, terms, chosen)
-        move = _pick(errors, error, strategy, last)
-        if move >= 0:
-            last, error = move, float(errors[move])
-            chosen = flipped(space, chosen, move)
-        else:
-            swap = _best_swap(space, terms, chosen, error) if replace else None
-            if swap is None:
-                break
-            out, move, error = swap
-            chosen = flipped(space, chosen, move)
-            chosen[out] = False
-        moves += 1
-        if keep_trace:
-            steps.append(_step(space, chosen, error))
-    return Found(chosen, error, moves, tuple(steps))
+    most = STEPS_A_PAIR * len(start)
+    chosen, moves, errors = descend(
+        space.arrays, terms.arrays, *space.fitting, start, strategy == "first", replace, most, GAIN)
+    steps = _states(space, start, moves.tolist(), errors.tolist()) if keep_trace else ()
+    return Found(chosen, float(errors[-1]), len(moves), steps)
 
 
 def evaluate(space: PairSpace, terms: Terms, chosen: Mask) -> float:
@@ -118,7 +101,7 @@ def evaluate(space: PairSpace, terms: Terms, chosen: Mask) -> float:
 
 def fit_of(space: PairSpace, chosen: Mask) -> Fits:
     """The best fit of one state."""
-    return space.fit((space.anchor + space.forms[chosen].sum(axis=0))[None])
+    return space.fitting.of((space.anchor + space.forms[chosen].sum(axis=0))[None])
 
 
 def coverage(space: PairSpace, chosen: Mask) -> Array:
@@ -137,34 +120,6 @@ def nearest(data: Index, distances: Array, near: Mask) -> Mask:
     return chosen
 
 
-def flipped(space: PairSpace, chosen: Mask, move: int) -> Mask:
-    """The state after adding or deleting pair ``move``; an added pair takes its data line from another."""
-    out = chosen.copy()
-    if not chosen[move]:
-        out[space.data == space.data[move]] = False
-    out[move] = not chosen[move]
-    return out
-
-
-def flip_errors(space: PairSpace, terms: Terms, chosen: Mask) -> Array:
-    """(p,) E_match of every neighbour, each one flip away."""
-    forms, omission = flips(space.arrays, terms.arrays, chosen)
-    return np.asarray(space.fit(forms).errors + omission)
-
-
-def _best_swap(
-    space: PairSpace, terms: Terms, chosen: Mask, error: float
-) -> tuple[int, int, float] | None:
-    """The best exchange (pair out, pair in, E_match) within a model line, if it lowers the match error."""
-    moves, forms, omission = swaps(space.arrays, terms.arrays, chosen)
-    if not len(moves):
-        return None
-    errors = space.fit(forms).errors + omission
-    best = int(np.argmin(errors))
-    out, into = moves[best].tolist()
-    return (out, into, float(errors[best])) if errors[best] < error - GAIN else None
-
-
 def _counts(space: PairSpace, chosen: Mask) -> Array:
     """(m, c) how many chosen data lines cover each cell."""
     counts: Array = _counted(space.masks, space.model, chosen, space.lines)
@@ -181,16 +136,21 @@ def _counted(masks: Any, model: Any, chosen: Any, lines: int) -> Any:
     return counts
 
 
-def _pick(errors: Array, error: float, strategy: Strategy, last: int) -> int:
-    """The move to take, or -1: the best, or the first that improves in turn after the last one taken."""
-    if strategy == "steepest":
-        best = int(np.argmin(errors)) if len(errors) else -1
-        return best if best >= 0 and errors[best] < error - GAIN else -1
-    better = np.flatnonzero(errors < error - GAIN)
-    if not len(better):
-        return -1
-    later = better[better > last]
-    return int(later[0] if len(later) else better[0])
+def _states(
+    space: PairSpace, start: Mask, moves: list[tuple[int, int]], errors: list[float]
+) -> tuple[TraceStep, ...]:
+    """The states on the way: each move flips a pair, or puts one in for another."""
+    chosen = start.copy()
+    steps = [_step(space, chosen, errors[0])]
+    for (move, out), error in zip(moves, errors[1:], strict=True):
+        is_in = chosen[move]
+        if not is_in:
+            chosen[space.data == space.data[move]] = False
+        chosen[move] = not is_in
+        if out >= 0:
+            chosen[out] = False
+        steps.append(_step(space, chosen, error))
+    return tuple(steps)
 
 
 def _step(space: PairSpace, chosen: Mask, error: float) -> TraceStep:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.correlation import (
     Correlation,
+    Template,
     corner_strengths,
     correlate,
-    extract_template,
     fits,
     rival,
 )
@@ -65,13 +65,13 @@ class Correction(NamedTuple):
 
 
 def follow(
-    robot: RobotModel, tracks: tuple[Track, ...], pictures: Mapping[str, Image], image: Image, pose: Pose2,
+    robot: RobotModel, tracks: tuple[Track, ...], template_of: Callable[[Track], Template], image: Image, pose: Pose2,
     covariance: Floats,
 ) -> list[Followed]:
     """Predict each landmark from the believed pose, and find it in the window that the belief leaves open.
 
     Args:
-        pictures: the frames in which the tracks' templates lie, by id.
+        template_of: the patch by which a track is known.
         pose, covariance: ``world_from_robot`` as believed, and (3, 3) over (x, y, heading), world.
     """
     if not tracks:
@@ -83,9 +83,8 @@ def follow(
         expected = z > NEAR_M and fits(image.shape, at, HALF_PX + 2) and SCALES[0] <= scale <= SCALES[1]
         found = None
         if expected:
-            template = extract_template(pictures[track.template_frame], track.template_px, HALF_PX)
             search = min(max(SIGMAS * sigma + 2.0, SEARCH_PX[0]), SEARCH_PX[1])
-            found = correlate(template, image, at, search, scale=scale)
+            found = correlate(template_of(track), image, at, search, scale=scale)
         out.append(Followed(_updated(track, at, found, expected), expected))
     return out
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.agreement import Agreement, agreement
+from knowledge_sources.methods.pose.planar import camera_states
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 
@@ -42,20 +43,24 @@ class Verification:
 
 def verify(robot: RobotModel, lines_world: Floats, segments_px: Floats, world_from_robot: Pose2) -> Verification:
     """Compare model lines (m, 2, 3), visible from there, with segments (k, 2, 2) found in the image."""
-    here, *displaced = _projected(robot, lines_world, [world_from_robot, *_wrong_poses(world_from_robot)])
-    found = agreement(here, segments_px, np.array(displaced))
-    lengths = np.linalg.norm(here[:, 1] - here[:, 0], axis=1) if len(here) else np.zeros(0)
-    return Verification(found, found.total(lengths), here)
+    state = np.array([world_from_robot.x_m, world_from_robot.y_m, world_from_robot.heading_rad])
+    here, displaced = np.split(_projected(robot, lines_world, np.concatenate([state[None], _wrong(state)])), [1])
+    found = agreement(here[0], segments_px, displaced)
+    lengths = np.linalg.norm(here[0, :, 1] - here[0, :, 0], axis=1)
+    return Verification(found, found.total(lengths), here[0])
 
 
-def _projected(robot: RobotModel, lines_world: Floats, poses: list[Pose2]) -> Floats:
-    """(p, m, 2, 2) the lines as seen from each pose, NaN where not in view [px]."""
-    lines_camera = np.array([robot.camera_from_world(pose).apply(lines_world) for pose in poses])
+def _projected(robot: RobotModel, lines_world: Floats, states: Floats) -> Floats:
+    """(p, m, 2, 2) the lines as seen from states (p, 3), world, NaN where not in view [px]."""
+    turns, shifts = camera_states(states, robot.mount.camera_from_robot)
+    lines_camera = lines_world.reshape(1, -1, 3) @ np.swapaxes(turns, 1, 2) + shifts[:, None]
     seen, _ = robot.camera.project_segments(lines_camera.reshape(-1, 2, 3), Pose.identity())
-    return seen.reshape(len(poses), len(lines_world), 2, 2)
+    return seen.reshape(len(states), -1, 2, 2)
 
 
-def _wrong_poses(pose: Pose2) -> list[Pose2]:
-    """Poses nearby at which the robot is not: what agrees there agrees by chance."""
-    shifts = [(s * x, s * y) for s in SHIFTS_M for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-    return [pose @ Pose2(x, y, turn) for x, y in shifts for turn in TURNS_RAD]
+def _wrong(state: Floats) -> Floats:
+    """(p, 3) states nearby at which the robot is not: what agrees there agrees by chance."""
+    c, s = np.cos(state[2]), np.sin(state[2])
+    away = np.array([(by * x, by * y) for by in SHIFTS_M for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))])
+    shifts = np.repeat(away @ np.array([[c, s], [-s, c]]), len(TURNS_RAD), axis=0)
+    return np.asarray(state + np.column_stack([shifts, np.tile(TURNS_RAD, len(away))]))

@@ -44,13 +44,13 @@ def middle(offset: Any = (0.0, 0.0)) -> NDArray[np.float64]:
 
 @few
 @given(seeds, fractions, shifts)
-def test_a_moved_patch_is_found_to_a_thirtieth_of_a_pixel(seed: int, fraction: Any, shift: Any) -> None:
+def test_a_moved_patch_is_found_to_a_twentieth_of_a_pixel(seed: int, fraction: Any, shift: Any) -> None:
     template = extract_template(pattern(seed), middle(fraction), 10)
     found = correlate(template, pattern(seed, shift), middle(fraction), 9.0)
     assert found is not None
     assert found.peak > 0.985
-    np.testing.assert_allclose(found.position_px, middle(fraction) + shift, atol=0.03)
-    np.testing.assert_allclose(found.moved_px, shift, atol=0.03)
+    np.testing.assert_allclose(found.position_px, middle(fraction) + shift, atol=0.05)
+    np.testing.assert_allclose(found.moved_px, shift, atol=0.05)
 
 
 @few

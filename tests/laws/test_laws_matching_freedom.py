@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from knowledge_sources.methods.matching_fit import step_fits
 from knowledge_sources.methods.matching_freedom import Freedom, in_space, on_floor
-from knowledge_sources.methods.matching_posed import step_fits
 from knowledge_sources.methods.matching_posed_pairs import pairs_at, posed_scene
 from knowledge_sources.methods.pose.image_error import image_jacobian
 from knowledge_sources.methods.pose.lines import line_set
