@@ -30,7 +30,7 @@ def frozen(array: Any, shape: tuple[int | None, ...] | None = None) -> NDArray[n
         ValueError: the shape is not the one expected (both are named).
     """
     out = np.array(array, dtype=np.float64)
-    if shape is not None and (
+    if shape is not None and out.shape != shape and (
         out.ndim != len(shape) or any(w is not None and w != g for w, g in zip(shape, out.shape, strict=True))
     ):
         raise ValueError(f"expected an array of shape {shape}, got {out.shape}")

@@ -114,7 +114,9 @@ def check_landmarks(landmark_ids: LandmarkIds, n: int) -> None:
 def checked_sigma(sigma_px: Any, n: int) -> Array:
     """A standard deviation a row, (n,), from one number or n."""
     if isinstance(sigma_px, float) and 0.0 < sigma_px < math.inf:
-        return np.full(n, sigma_px)
+        same = np.empty(n)
+        same.fill(sigma_px)
+        return same
     sigma = np.asarray(sigma_px, float)
     if sigma.shape not in ((), (n,)) or not np.all(np.isfinite(sigma)) or np.any(sigma <= 0):
         raise ValueError(f"expected sigma_px > 0, one number or {n}, got {sigma_px!r}")

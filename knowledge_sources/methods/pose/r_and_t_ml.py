@@ -126,7 +126,8 @@ def _explained(
     )
     if not fine:
         return None
-    rejected = (None,) * n if front.all() else tuple(None if f else BEHIND for f in front.tolist())
+    fronts = front.tolist()
+    rejected = (None,) * n if all(fronts) else tuple(None if f else BEHIND for f in fronts)
     return PoseEstimate(Pose(rotation, translation), covariance, front, distances, rejected, cost, steps)
 
 
