@@ -69,9 +69,15 @@ class Agenda:
         """The best rated, and of these the oldest, of the first group of levels that has any."""
         levels = self._levels
         for group in groups:
-            firsts = [first for level in group if levels[level].ratings and (first := levels[level].first())]
-            if firsts:
-                return firsts[0] if len(firsts) == 1 else min(firsts, key=_rank)
+            best = None
+            for level in group:
+                queues = levels[level]
+                if queues.ratings:
+                    first = queues.first()
+                    if first is not None and (best is None or _rank(first) < _rank(best)):
+                        best = first
+            if best is not None:
+                return best
         return None
 
     def __iter__(self) -> Iterator[Activation]:

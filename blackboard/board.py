@@ -90,7 +90,7 @@ class Blackboard:
     def _apply_one(self, effect: Effect, author: str, cycle: int, made: Mapping[int, Change]) -> Change:
         because = self._reasons(effect.because, made) if effect.because else ()
         if isinstance(effect, Retract):
-            return Retracted(self._remove(effect.entry.id), because)
+            return new_tuple(Retracted, (self._remove(effect.entry.id), because))
         value = effect.value
         kind = type(value)
         if isinstance(effect, Revise):
@@ -100,7 +100,7 @@ class Blackboard:
             id, revision = f"{kind.__name__}-{number}", 0
         entry = self._current[id] = new_tuple(Entry, (id, revision, value, author, cycle, because))
         (self._shelves.get(kind) or self._shelf(kind)).store(entry)
-        return Revised(entry) if revision else Posted(entry)
+        return new_tuple(Revised if revision else Posted, (entry, ()))
 
     def forget(self, id: str) -> None:
         """Let go of an entry that nobody can need any more. That is no change: nobody is told.

@@ -4,41 +4,52 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from blackboard.entry import Entry, Ref
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
-    """Something that happened to one entry; ``entry`` is the revision it left behind."""
-
+class _Happened(NamedTuple):
     entry: Entry[Any]
+    because: tuple[Ref, ...] = ()
+
+
+class Change(_Happened):
+    """Something that happened to one entry.
+
+    Attributes:
+        entry: the revision that it left behind.
+        because: what a retraction rests on; what an entry rests on stands in the entry.
+    """
+
+    __slots__ = ()
 
     @property
     def kind(self) -> str:
         return type(self).__name__
 
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and tuple.__eq__(self, other)
 
-@dataclass(frozen=True, slots=True)
+    __hash__ = _Happened.__hash__
+
+
 class Posted(Change):
     """A new entry."""
 
+    __slots__ = ()
 
-@dataclass(frozen=True, slots=True)
+
 class Revised(Change):
     """A new revision of an entry."""
 
+    __slots__ = ()
 
-@dataclass(frozen=True, slots=True)
+
 class Retracted(Change):
-    """An entry is no longer believed; ``entry`` is its last revision.
+    """An entry is no longer believed; ``entry`` is its last revision."""
 
-    Attributes:
-        because: what the retraction rests on; what the entry rested on stands in the entry.
-    """
-
-    because: tuple[Ref, ...] = ()
+    __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from blackboard.entry import Entry
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Post:
+class Post(NamedTuple):
     """Put a new entry on the board."""
 
     value: Any
     because: tuple[Any, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Revise:
+class Revise(NamedTuple):
     """Replace the value of an entry. ``entry`` is the revision that was seen: if it is stale, the act is refused."""
 
     entry: Entry[Any]
@@ -25,8 +22,7 @@ class Revise:
     because: tuple[Any, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Retract:
+class Retract(NamedTuple):
     """No longer believe an entry. ``entry`` is the revision that was seen."""
 
     entry: Entry[Any]

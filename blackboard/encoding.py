@@ -117,17 +117,19 @@ def _dataclass_encoder(kind: type[Any]) -> Encoder:
     if len(names) < 2:
         return lambda value: form % tuple([encoded(getattr(value, name)) for name in names])
     fields = attrgetter(*names)
-    shapes: dict[tuple[type[Any], ...], tuple[Encoder, ...]] = {}
+    shapes: dict[tuple[type[Any], ...], tuple[tuple[Encoder, ...], bool]] = {}
 
     def encode(value: Any) -> str:
         """The encoders of all fields are found by the types of all fields at once: no step in Python for each."""
         held = fields(value)
         kinds = tuple(map(type, held))
-        encoders = shapes.get(kinds)
-        if encoders is None:
-            encoders = shapes[kinds] = tuple([float.__repr__ if kind is float else ENCODERS[kind] for kind in kinds])
+        known = shapes.get(kinds)
+        if known is None:
+            found = tuple([float.__repr__ if kind is float else ENCODERS[kind] for kind in kinds])
+            known = shapes[kinds] = found, float in kinds
+        encoders, has_floats = known
         texts = tuple(map(call, encoders, held))
-        if not NOT_FINITE.isdisjoint(texts):
+        if has_floats and not NOT_FINITE.isdisjoint(texts):
             texts = tuple([f'"{text}"' if text in NOT_FINITE else text for text in texts])
         return form % texts
 

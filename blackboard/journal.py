@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from blackboard.activation import Activation, Obviated
-from blackboard.change import Change, Retracted
+from blackboard.change import Change
 from blackboard.encoding import ENCODERS, plain, quoted
 from blackboard.entry import Entry, Ref
 from blackboard.knowledge_source import KnowledgeSource
@@ -61,7 +61,7 @@ def entry_record(entry: Entry[Any]) -> dict[str, Any]:
 def change_record(change: Change) -> dict[str, Any]:
     """A change as JSON types; a retraction that rests on something says so under ``retracted_because``."""
     record = {"change": change.kind, **entry_record(change.entry)}
-    if isinstance(change, Retracted) and change.because:
+    if change.because:
         record["retracted_because"] = [str(ref) for ref in change.because]
     return record
 
@@ -148,9 +148,11 @@ class JournalLines:
 
     def _last_time(self, a: Activation) -> str:
         """An activation that has come to its end."""
-        if a.number not in self._texts:
-            self._bid(a)
-        return self._texts.pop(a.number)
+        text = self._texts.pop(a.number, None)
+        if text is None:
+            text = self._bid(a)
+            del self._texts[a.number]
+        return text
 
     def _ref(self, change: Change) -> str:
         """The revision's name, quoted; mostly the last one again: made, then seen, then the trigger of activations."""
@@ -164,7 +166,7 @@ class JournalLines:
         self._last, self._last_ref = change, quoted(f"{id}.{revision}")
         kind = type(value)
         reasons = ""
-        if isinstance(change, Retracted) and change.because:
+        if change.because:
             reasons = f',"retracted_because":[{_refs(change.because)}]'
         return (
             f'{{"change":"{type(change).__name__}","entry":{self._last_ref},"type":{quoted(kind.__name__)},'

@@ -5,6 +5,7 @@ Exit codes: 0 reached, or success; 1 not reached; 2 bad input; 130 interrupted; 
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
@@ -24,9 +25,14 @@ EPILOG = """examples:
 exit codes: 0 reached, or success; 1 not reached; 2 bad input.
 harvey COMMAND --help tells more and gives examples."""
 
+COLLECT_AFTER = 50_000, 20, 100
+"""Python's search for rings of references goes by how many objects there are more than before. A board's entries are
+many and are in no rings; so it is searched seldom, lest a robot stand still meanwhile."""
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
+    gc.set_threshold(*COLLECT_AFTER)
     try:
         args = _parsed(argv)
     except SystemExit as stop:

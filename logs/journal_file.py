@@ -25,7 +25,10 @@ HELD_LINES = 64
 
 def is_acted_on(decision: Decision) -> bool:
     """Whether a port will act on what a decision made."""
-    return any(isinstance(change.entry.value, ACTED_ON) for change in decision.made)
+    for change in decision.made:  # noqa: SIM110 - it is asked of every decision, and any() takes three times as long
+        if isinstance(change.entry.value, ACTED_ON):
+            return True
+    return False
 
 
 class JournalFile:
