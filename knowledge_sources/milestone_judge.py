@@ -18,6 +18,7 @@ from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
 from knowledge_sources.methods.conviction import CONVICTION
 from knowledge_sources.methods.evidence import evidence, wheels_px
+from knowledge_sources.methods.lookalikes import CONTRAST, LENGTH_PX, SIGHT_M, hardest_to_tell
 from knowledge_sources.methods.looks import Probe, probe, small_colour
 from knowledge_sources.methods.verification import LEAST_ACCOUNTED, Verification, verify
 from knowledge_sources.questions import held, open_discrepancy
@@ -38,10 +39,12 @@ DARK = 6.0
 
 MOST_LOOKS = 3
 """From so many directions a milestone is looked for before it counts against the belief that it cannot be told."""
-LENGTH_PX, CONTRAST, SIGHT_M = 12.0, 0.05, 15.0
-"""Lines that are longer, clearer and nearer than this are looked for where the robot may be otherwise."""
 AS_MUCH = 0.8
 """Another place of which this part of the agreement is seen is not ruled out."""
+
+UNMISTAKABLE, LEAST_MARGIN = 5e-4, 1.0
+"""Less likely to be wrong than this, a place is not compared with others; else at least so many lines must speak for it
+that places at which its room repeats itself do not have."""
 
 Floats = NDArray[np.float64]
 
@@ -100,10 +103,12 @@ class MilestoneJudge(Expert):
         shift_px = _median_shift(np.array(m.expected_px, float).reshape(-1, 2, 2), agreed.projected_px)
         verdict, reason = _verdict(
             len(lines), segments.contrast, agreed, faces, p_false, is_enough, shift_px, tolerance_px)
-        certain = verdict != "verified" or belief is None
-        other = None if certain else _as_likely(view, robot, before, pose, segments, agreed)
-        if other is not None:
-            verdict, reason = "not testable", f"{reason}; but as much agrees at {other.id}"
+        if verdict == "verified" and belief is not None:
+            other, room = _as_likely(view, robot, before, pose, segments, agreed), belief.value.locale
+            if other is not None:
+                verdict, reason = "not testable", f"{reason}; but as much agrees at {other.id}"
+            elif p_false > UNMISTAKABLE and _may_be_elsewhere(robot, segments.segments_px, room, pose):
+                verdict, reason = "not testable", f"{reason}; but it may be another door of {room}, or its other side"
         residuals = fix.value.residuals_px[fix.value.inliers]
         return Certificate(
             milestone=milestone.id,
@@ -170,6 +175,12 @@ def _as_likely(
         if verify(robot, lines, segments.segments_px, there).coverage >= AS_MUCH * agreed.coverage:
             return other
     return None
+
+
+def _may_be_elsewhere(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> bool:
+    """Whether what was seen may be seen, just as well, from where the room repeats itself."""
+    other = hardest_to_tell(robot, segments_px, room, pose)
+    return other is not None and other.margin < LEAST_MARGIN
 
 
 def _median_shift(before_px: Floats, after_px: Floats) -> float:

@@ -17,8 +17,9 @@ from world_models.frames import Pose, frozen
 NEAR_M = 0.05
 """Nothing nearer than this to the optical centre is projected [m]."""
 
-UNDONE_STEPS, LEAST_RADIAL = 60, 0.2
-"""Steps to where a ray came from, and the strongest barrel that is undone: beyond it no ray falls on a pixel."""
+UNDONE_STEPS, UNDONE_END, LEAST_RADIAL = 300, 1e-12, 0.2
+"""Steps to where a ray came from, at the most; how short the last one is; and the strongest barrel that is undone:
+beyond it no ray falls on a pixel."""
 
 _ZOOMS = tuple(1.0 + 0.01 * i for i in range(101))
 """Focal lengths that are tried for :attr:`Camera.pinhole`, relative to the camera's own."""
@@ -179,8 +180,11 @@ class Camera:
         for _ in range(UNDONE_STEPS):  # a fixed point, as OpenCV has it
             r2 = x * x + y * y
             radial = np.maximum(1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), LEAST_RADIAL)
+            before = x, y
             x, y = ((x0 - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial,
                     (y0 - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial)
+            if all(np.all(np.abs(now - then) <= UNDONE_END) for now, then in zip((x, y), before, strict=True)):
+                break
         return np.stack([x, y], axis=-1)
 
 
