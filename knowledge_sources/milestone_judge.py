@@ -26,7 +26,7 @@ from knowledge_sources.tolerances import FLOOR_PX, PLAN_PX
 from world_models.body import Frame
 from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis
-from world_models.percepts import LineMatch, PoseFix, Segments
+from world_models.percepts import LineMatch, PoseFix, Segments, Tracks
 from world_models.robot import RobotModel
 from world_models.task import Certificate, Milestone
 from world_models.visibility import visible_lines
@@ -42,9 +42,11 @@ MOST_LOOKS = 3
 AS_MUCH = 0.8
 """Another place of which this part of the agreement is seen is not ruled out."""
 
-UNMISTAKABLE, LEAST_MARGIN = 5e-4, 1.0
+UNMISTAKABLE, LEAST_MARGIN = 8e-4, 1.0
 """Less likely to be wrong than this, a place is not compared with others; else at least so many lines must speak for it
 that places at which its room repeats itself do not have."""
+FOLLOWED = 4
+"""A robot that has found so many landmarks where it expected them, up to here, is at no other door."""
 
 Floats = NDArray[np.float64]
 
@@ -107,7 +109,8 @@ class MilestoneJudge(Expert):
             other, room = _as_likely(view, robot, before, pose, segments, agreed), belief.value.locale
             if other is not None:
                 verdict, reason = "not testable", f"{reason}; but as much agrees at {other.id}"
-            elif p_false > UNMISTAKABLE and _may_be_elsewhere(robot, segments.segments_px, room, pose):
+            elif (p_false > UNMISTAKABLE and (in_doubt or not _has_followed(view))
+                  and _may_be_elsewhere(robot, segments.segments_px, room, pose)):
                 verdict, reason = "not testable", f"{reason}; but it may be another door of {room}, or its other side"
         residuals = fix.value.residuals_px[fix.value.inliers]
         return Certificate(
@@ -175,6 +178,12 @@ def _as_likely(
         if verify(robot, lines, segments.segments_px, there).coverage >= AS_MUCH * agreed.coverage:
             return other
     return None
+
+
+def _has_followed(view: View) -> bool:
+    """Whether landmarks have been followed until the last move."""
+    tracks = view.latest(Tracks)
+    return tracks is not None and sum(track.found_px is not None for track in tracks.value.items) >= FOLLOWED
 
 
 def _may_be_elsewhere(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> bool:

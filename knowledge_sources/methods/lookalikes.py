@@ -36,8 +36,10 @@ class Lookalike(NamedTuple):
 
 def hardest_to_tell(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> Lookalike | None:
     """Of the places at which a room repeats itself, the one that segments (k, 2, 2) speak least against; None: none."""
-    own = view(robot, pose)
-    places = [other for _, other in repetitions(robot.world, room, pose, (room,))]
+    own, outline = view(robot, pose), robot.world.outline(room)
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    places = [other for _, other in repetitions(robot.world, room, pose, (room,))
+              if np.all((low <= other.position) & (other.position <= high))]
     margins = [margin(own, view(robot, other), segments_px) for other in places]
     if not margins:
         return None
