@@ -21,11 +21,13 @@ def test_a_driver_in_another_process_finds_a_base_there(kind: str) -> None:
         said = process.stdout.readline()
         match = re.fullmatch(rf"an emulated {kind} base is at (\S+); Ctrl-C ends it\n", said)
         assert match is not None, said
-        base = open_base(f"{kind}:{match[1]}")
         try:
-            report = base.move(0.2)
-        finally:
-            base.close()
+            base = open_base(f"{kind}:{match[1]}")
+            try:
+                report = base.move(0.2)
+            finally:
+                base.close()
+        finally:  # whatever went wrong: the process does not end by itself
             process.send_signal(signal.SIGINT)
         traffic, farewell = process.communicate(timeout=60)
     assert report.move_m == pytest.approx(0.2, abs=0.03)
