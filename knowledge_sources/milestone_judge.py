@@ -16,9 +16,9 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
+from knowledge_sources.methods import lookalikes
 from knowledge_sources.methods.conviction import CONVICTION
 from knowledge_sources.methods.evidence import evidence, wheels_px
-from knowledge_sources.methods.lookalikes import CONTRAST, LENGTH_PX, SIGHT_M, hardest_to_tell
 from knowledge_sources.methods.looks import Probe, probe, small_colour
 from knowledge_sources.methods.verification import LEAST_ACCOUNTED, Verification, verify
 from knowledge_sources.questions import held, open_discrepancy
@@ -29,7 +29,6 @@ from world_models.location import Hypothesis
 from world_models.percepts import LineMatch, PoseFix, Segments, Tracks
 from world_models.robot import RobotModel
 from world_models.task import Certificate, Milestone
-from world_models.visibility import visible_lines
 
 WRONG_BEFORE = 0.05
 """Where nothing is in doubt, a belief is taken to be wrong with this probability before the robot looks."""
@@ -46,7 +45,8 @@ UNMISTAKABLE, LEAST_MARGIN = 8e-4, 1.0
 """Less likely to be wrong than this, a place is not compared with others; else at least so many lines must speak for it
 that places at which its room repeats itself do not have."""
 FOLLOWED = 4
-"""A robot that has found so many landmarks where it expected them, up to here, is at no other door."""
+"""A robot that holds so many landmarks in sight is at no other door: when they are not where they should be, all are
+given up."""
 
 Floats = NDArray[np.float64]
 
@@ -173,22 +173,21 @@ def _as_likely(
     correction = before.inverse() @ pose
     for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
         there = other.value.world_from_robot(robot.world) @ correction
-        lines = visible_lines(robot.world, robot.camera, robot.camera_from_world(there), min_length_px=LENGTH_PX,
-                              min_contrast=CONTRAST, max_distance_m=SIGHT_M).lines_world
+        lines = lookalikes.view(robot, there).lines_world
         if verify(robot, lines, segments.segments_px, there).coverage >= AS_MUCH * agreed.coverage:
             return other
     return None
 
 
 def _has_followed(view: View) -> bool:
-    """Whether landmarks have been followed until the last move."""
+    """Whether landmarks were in sight in the last frame that was tracked, followed or taken anew there."""
     tracks = view.latest(Tracks)
     return tracks is not None and sum(track.found_px is not None for track in tracks.value.items) >= FOLLOWED
 
 
 def _may_be_elsewhere(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> bool:
     """Whether what was seen may be seen, just as well, from where the room repeats itself."""
-    other = hardest_to_tell(robot, segments_px, room, pose)
+    other = lookalikes.hardest_to_tell(robot, segments_px, room, pose)
     return other is not None and other.margin < LEAST_MARGIN
 
 

@@ -25,7 +25,7 @@ HELD_LINES = 64
 
 def is_acted_on(decision: Decision) -> bool:
     """Whether a port will act on what a decision made."""
-    for change in decision.made:  # noqa: SIM110 - it is asked of every decision, and any() takes three times as long
+    for change in decision.made:  # noqa: SIM110 - asked of every decision; any() takes about twice as long
         if isinstance(change.entry.value, ACTED_ON):
             return True
     return False

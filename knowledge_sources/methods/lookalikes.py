@@ -16,7 +16,7 @@ from knowledge_sources.methods.repetition import repetitions
 from knowledge_sources.methods.rivals import ALIKE_PX, ALIKE_RAD
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
-from world_models.visibility import visible_lines
+from world_models.visibility import VisibleLines, visible_lines
 
 Floats = NDArray[np.float64]
 
@@ -36,21 +36,21 @@ class Lookalike(NamedTuple):
 
 def hardest_to_tell(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> Lookalike | None:
     """Of the places at which a room repeats itself, the one that segments (k, 2, 2) speak least against; None: none."""
-    own, outline = view(robot, pose), robot.world.outline(room)
+    own, outline = view(robot, pose).segments_px, robot.world.outline(room)
     low, high = outline.min(axis=0), outline.max(axis=0)
     places = [other for _, other in repetitions(robot.world, room, pose, (room,))
               if np.all((low <= other.position) & (other.position <= high))]
-    margins = [margin(own, view(robot, other), segments_px) for other in places]
+    margins = [margin(own, view(robot, other).segments_px, segments_px) for other in places]
     if not margins:
         return None
     least = int(np.argmin(margins))
     return Lookalike(places[least], margins[least])
 
 
-def view(robot: RobotModel, pose: Pose2) -> Floats:
-    """The lines (n, 2, 2) [px] that should be seen from a pose."""
+def view(robot: RobotModel, pose: Pose2) -> VisibleLines:
+    """The lines that should be seen from a pose."""
     return visible_lines(robot.world, robot.camera, robot.camera_from_world(pose), min_length_px=LENGTH_PX,
-                         min_contrast=CONTRAST, max_distance_m=SIGHT_M).segments_px
+                         min_contrast=CONTRAST, max_distance_m=SIGHT_M)
 
 
 def margin(one: Floats, other: Floats, segments_px: Floats) -> float:

@@ -46,18 +46,25 @@ def descend(
             break
         if out < 0:
             last = move
-        is_in = chosen[move]
-        for p in range(len(data)):  # an added pair takes its data line from the pair that has it
-            if not is_in and data[p] == data[move]:
-                chosen[p] = False
-        chosen[move] = not is_in
-        if out >= 0:
-            chosen[out] = False
+        carry_out(data, chosen, move, out)
         moves[count, 0], moves[count, 1] = move, out
         count += 1
         errors[count] = error
         state = _state(space, terms, chosen)
     return chosen, moves[:count], errors[: count + 1]
+
+
+@compiled
+def carry_out(data: Any, chosen: Any, move: int, out: int) -> None:
+    """Change a state (p,): flip pair ``move``, or put it in for ``out``; what is put in takes its data line from the pair
+    that has it."""
+    is_in = chosen[move]
+    for p in range(len(data)):
+        if not is_in and data[p] == data[move]:
+            chosen[p] = False
+    chosen[move] = not is_in
+    if out >= 0:
+        chosen[out] = False
 
 
 @compiled

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching_fit import Fits, Fitting
-from knowledge_sources.methods.matching_kernels import descend
+from knowledge_sources.methods.matching_kernels import carry_out, descend
 from knowledge_sources.methods.matching_objective import Terms
 
 Array = NDArray[np.float64]
@@ -143,12 +143,7 @@ def _states(
     chosen = start.copy()
     steps = [_step(space, chosen, errors[0])]
     for (move, out), error in zip(moves, errors[1:], strict=True):
-        is_in = chosen[move]
-        if not is_in:
-            chosen[space.data == space.data[move]] = False
-        chosen[move] = not is_in
-        if out >= 0:
-            chosen[out] = False
+        carry_out(space.data, chosen, move, out)
         steps.append(_step(space, chosen, error))
     return tuple(steps)
 

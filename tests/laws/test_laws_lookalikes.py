@@ -72,8 +72,8 @@ def test_what_only_one_view_shows_speaks_for_it_where_it_is_seen_and_against_it_
 def test_from_the_middle_of_the_hallway_the_other_way_round_is_told() -> None:
     """What should be seen in one direction is not what should be seen from where the hallway repeats itself."""
     here = Pose2(*WORLD.world_from_locale("hallway").apply([6.0, 1.2, 0.0])[:2], 0.0)
-    seen = view(ROBOT, here)
+    seen = view(ROBOT, here).segments_px
     found = hardest_to_tell(ROBOT, seen, "hallway", here)
     assert found is not None and found.margin > 1.0
-    from_there = hardest_to_tell(ROBOT, view(ROBOT, found.world_from_robot), "hallway", here)
+    from_there = hardest_to_tell(ROBOT, view(ROBOT, found.world_from_robot).segments_px, "hallway", here)
     assert from_there is not None and from_there.margin < 0.0
