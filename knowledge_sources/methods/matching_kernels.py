@@ -56,8 +56,10 @@ def descend(
 
 @compiled
 def carry_out(data: Any, chosen: Any, move: int, out: int) -> None:
-    """Change a state (p,): flip pair ``move``, or put it in for ``out``; what is put in takes its data line from the pair
-    that has it."""
+    """Change a state (p,): flip pair ``move``, or put it in for ``out``.
+
+    What is put in takes its data line from the pair that has it.
+    """
     is_in = chosen[move]
     for p in range(len(data)):
         if not is_in and data[p] == data[move]:
