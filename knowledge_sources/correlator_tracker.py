@@ -38,8 +38,9 @@ from world_models.visibility import visible_lines
 FEW, FEWEST, LEFT_PART = 9, 5, 0.5
 """New landmarks are taken where fewer than FEWEST are left; or fewer than FEW, and than this part of those that there
 were when new ones were last taken."""
-FAR_M = 0.8
-"""A template is given up when the robot is so far from where it was cut: it would look otherwise from here."""
+FAR_M = 1.3
+"""A template is given up when the robot is so far from where it was cut: it would look otherwise from here. Two of the
+paper's increments (two feet each, Table 1) are less."""
 MISSES = 2
 """A landmark that is not found so often in a row is given up."""
 LEAST = 4
