@@ -26,7 +26,7 @@ from knowledge_sources.methods.correlation import Template, extract_template
 from knowledge_sources.methods.edge_alignment import aligned
 from knowledge_sources.methods.rectified import Rectified
 from knowledge_sources.methods.tracking import HALF_PX, TRACKS, Followed, Image, begin, correct, follow
-from knowledge_sources.questions import held, open_discrepancy
+from knowledge_sources.questions import held, open_discrepancy, standing_in
 from knowledge_sources.tolerances import PLAN_PX, action_px
 from world_models.actuator import Drift
 from world_models.body import Frame
@@ -113,7 +113,7 @@ class CorrelatorTracker(Expert):
         kept = tuple(
             f.track for f in followed if f.expected and f.track.misses < MISSES and f.track.template_frame in near)
         taken = 0 if old is None else old.value.taken
-        renewed = self._renewed(kept, anchors, frame, image, now, taken)
+        renewed = self._renewed(view, kept, anchors, frame, image, now, taken)
         tracks = self._kept(old, renewed.tracks, because)
         yield tracks
         if corrected is not None or renewed.hypothesis is not now:
@@ -129,7 +129,7 @@ class CorrelatorTracker(Expert):
         self, view: View, frame: Entry[Frame], belief: Entry[Hypothesis], old: Entry[Tracks] | None
     ) -> Iterable[Effect]:
         """A milestone or a relocalization said anew where we are: landmarks are taken from there."""
-        fresh = self._renewed((), (), frame, self._picture(frame.value.jpeg), belief.value, 0)
+        fresh = self._renewed(view, (), (), frame, self._picture(frame.value.jpeg), belief.value, 0)
         tracks = self._kept(old, fresh.tracks, (frame, belief))
         yield tracks
         drift = view.latest(Drift)
@@ -152,7 +152,7 @@ class CorrelatorTracker(Expert):
         if tracks is None:
             return []
         world = self._robot.world
-        return follow(self._robot.standing_in(belief.locale), tracks.items,
+        return follow(standing_in(view, self._robot, belief.locale), tracks.items,
                       lambda track: self._template(view[track.template_frame].value.jpeg, track.template_px), image,
                       belief.world_from_robot(world), belief.covariance_world(world))
 
@@ -171,14 +171,14 @@ class CorrelatorTracker(Expert):
         return Corrected(hypothesis, agreeing)
 
     def _renewed(
-        self, kept: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame], image: Image,
+        self, view: View, kept: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame], image: Image,
         belief: Hypothesis, taken: int,
     ) -> Renewed:
         """New landmarks as old ones leave, cut where the model's edges say that they are."""
         world = self._robot.world
         if len(kept) >= max(FEWEST, min(FEW, LEFT_PART * taken)):
             return Renewed(self._anchored(kept, anchors, frame, belief, taken), belief)
-        robot, pose = self._robot.standing_in(belief.locale), belief.world_from_robot(world)
+        robot, pose = standing_in(view, self._robot, belief.locale), belief.world_from_robot(world)
         lines = visible_lines(
             world, robot.camera, robot.camera_from_world(pose), min_length_px=LENGTH_PX, min_contrast=CONTRAST,
             max_distance_m=15.0,

@@ -21,7 +21,7 @@ from knowledge_sources.methods.conviction import CONVICTION
 from knowledge_sources.methods.evidence import evidence, wheels_px
 from knowledge_sources.methods.looks import Probe, probe, small_colour
 from knowledge_sources.methods.verification import LEAST_ACCOUNTED, Verification, verify
-from knowledge_sources.questions import held, open_discrepancy
+from knowledge_sources.questions import held, open_discrepancy, standing_in
 from knowledge_sources.tolerances import FLOOR_PX, PLAN_PX
 from world_models.body import Frame
 from world_models.frames import Pose2, wrap_angle
@@ -87,7 +87,7 @@ class MilestoneJudge(Expert):
         match: LineMatch = view[fix.value.match].value
         segments: Segments = view[match.segments].value
         m, pose, belief = milestone.value, fix.value.world_from_robot, held(view)
-        robot = self._robot if belief is None else self._robot.standing_in(belief.value.locale)
+        robot = self._robot if belief is None else standing_in(view, self._robot, belief.value.locale)
         before = pose if belief is None else belief.value.world_from_robot(robot.world)
         spread = fix.value.covariance if belief is None else belief.value.covariance_world(robot.world)
         lines = np.array(m.expected, float).reshape(-1, 2, 3)

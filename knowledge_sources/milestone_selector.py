@@ -20,10 +20,19 @@ from knowledge_sources.expert import Expert
 from knowledge_sources.methods.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.looks import expected_looks
 from knowledge_sources.methods.views import ViewQuality, view_quality
-from knowledge_sources.questions import deepest_sketch, held, is_over, is_settled, open_discrepancy, open_milestone
+from knowledge_sources.questions import (
+    deepest_sketch,
+    held,
+    is_over,
+    is_settled,
+    open_discrepancy,
+    open_milestone,
+    standing_in,
+)
 from world_models.body import Look
 from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis
+from world_models.obstruction import Obstruction
 from world_models.robot import RobotModel
 from world_models.task import Milestone, PlanSketch
 from world_models.visibility import VisibleLines, visible_lines
@@ -74,10 +83,10 @@ class MilestoneSelector(Expert):
         elif waiting is None:
             what = f"check of the belief, because {task.value.what}"
             check = Milestone("", -1, what, self._heading(belief.value))
-            yield from self._looked_for(None, check, task, belief)
+            yield from self._looked_for(view, None, check, task, belief)
         else:
             here = replace(waiting.value, look_heading_rad=self._heading(belief.value))
-            yield from self._looked_for(waiting, here, task, belief, _car_of(view.get(here.sketch), here.index))
+            yield from self._looked_for(view, waiting, here, task, belief, _car_of(view.get(here.sketch), here.index))
 
     def _task(self, view: View) -> Entry[Any] | None:
         """What asks for a look now: a doubt, a milestone that is faced, or a sketch whose milestone is due."""
@@ -97,23 +106,24 @@ class MilestoneSelector(Expert):
     def _proposed(self, view: View, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         """The milestone before the sketch's next subgoal, seen from the first direction that is good enough."""
         pose = belief.value.world_from_robot(self._robot.world)
-        robot = self._robot.standing_in(belief.value.locale)
+        robot = standing_in(view, self._robot, belief.value.locale)
         s, tried = sketch.value, _tried(view, sketch)
         heading = self._direction(robot, s, pose, tried)
         milestone = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}", heading, tried=tried)
         if self._faces(belief.value, milestone):
-            yield from self._looked_for(None, milestone, sketch, belief, _car_of(sketch, s.at))
+            yield from self._looked_for(view, None, milestone, sketch, belief, _car_of(sketch, s.at))
         else:
             yield Post(milestone, (sketch, belief))
 
     def _looked_for(
-        self, old: Entry[Milestone] | None, milestone: Milestone, task: Entry[Any], belief: Entry[Hypothesis],
-        car: str = "",
+        self, view: View, old: Entry[Milestone] | None, milestone: Milestone, task: Entry[Any],
+        belief: Entry[Hypothesis], car: str = "",
     ) -> Iterable[Effect]:
         """Predict the landmarks from the believed pose, but those in a car, and ask for the picture."""
-        pose = belief.value.world_from_robot(self._robot.world)
-        expected = expectation(self._robot.standing_in(belief.value.locale), pose, milestone, car)
-        wish = Post(expected, (task, belief)) if old is None else Revise(old, expected, (task, belief))
+        pose, hidden = belief.value.world_from_robot(self._robot.world), view.latest(Obstruction)
+        expected = expectation(standing_in(view, self._robot, belief.value.locale), pose, milestone, car)
+        because = (task, belief) if hidden is None else (task, belief, hidden)
+        wish = Post(expected, because) if old is None else Revise(old, expected, because)
         yield wish
         yield Post(Look("milestone"), (wish,))
 

@@ -9,6 +9,8 @@ from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
 from world_models.body import BodyFault, Course, MotionReport, MotorCommand
 from world_models.location import Hypothesis
+from world_models.obstruction import Obstruction
+from world_models.robot import RobotModel
 from world_models.task import Goal, Leg, Milestone, Outcome, PlanSketch
 
 HELD: Index[Hypothesis] = Index(Hypothesis, lambda h: h.is_held or None)
@@ -21,6 +23,12 @@ OPEN_FAULT: Index[BodyFault] = Index(BodyFault, lambda f: f.is_open or None)
 def held(view: View) -> Entry[Hypothesis] | None:
     """Where the robot believes it is."""
     return view.newest(HELD, True)
+
+
+def standing_in(view: View, robot: RobotModel, locale: str) -> RobotModel:
+    """The robot on the floor of a locale, behind whatever is known to stand before its camera."""
+    obstruction = view.latest(Obstruction)
+    return robot.behind(None if obstruction is None else obstruction.value).standing_in(locale)
 
 
 def active_goal(view: View) -> Entry[Goal] | None:

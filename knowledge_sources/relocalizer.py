@@ -17,11 +17,14 @@ from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
 from knowledge_sources.methods.glances import Glance, moved
 from knowledge_sources.methods.relocation import Candidate, Finding, Verdict, finding
+from knowledge_sources.methods.standing_still import is_opaque, obstruction_in
 from knowledge_sources.questions import active_goal, held, is_over, is_settled, open_discrepancy
 from world_models.body import Look, MotionReport, MotorCommand
 from world_models.frames import Pose2
 from world_models.location import Hypothesis, Place, covariance_tuple
+from world_models.obstruction import Obstruction
 from world_models.percepts import Glimpse, Panorama, Segments
+from world_models.robot import RobotModel
 from world_models.task import Goal, PlanSketch
 
 PROBES = 8
@@ -42,7 +45,8 @@ class Relocalizer(Expert):
     A probe is a turn or a short safe move, and a look: the one by which the places are expected to part best. When it
     knows, a new top-level goal follows from the place where it is to the old destination, and so new sketches (§2).
     When the building cannot tell the places apart it stays lost, and the places stay on the board: never does it choose
-    between places that look alike.
+    between places that look alike. What stands still in its looks while it turns is before the camera, and it looks
+    past it.
     """
 
     level = Level.GOAL
@@ -52,7 +56,7 @@ class Relocalizer(Expert):
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "odometry"),
         Watch(Segments, (Posted,), lambda s: s.milestone == ""),
     )
-    writes = (Look, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama)
+    writes = (Look, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama, Obstruction)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         lost = open_discrepancy(view, Level.GOAL)
@@ -78,14 +82,23 @@ class Relocalizer(Expert):
     ) -> Iterable[Effect]:
         before = _panorama_since(view, lost)
         glimpses = self._glimpses(view, segments, before)
-        robot = self._robot.standing_in(belief.value.locale)
-        result = finding(robot, [_glance(view, g) for g in glimpses], self._rooms(belief.value))
+        looks, hidden = [_glance(view, g) for g in glimpses], view.latest(Obstruction)
+        obstruction = _obstruction(self._robot, looks, hidden)
+        if obstruction is not None:
+            looks = [replace(g, segments_px=obstruction.without_its_own(g.segments_px)) for g in looks]
+        because: tuple[object, ...] = (segments, lost)
+        if (change := _told(hidden, obstruction, because)) is not None:
+            yield change
+        if obstruction is not None:
+            because = (segments, lost, hidden if change is None else change)
+        robot = self._robot.behind(obstruction).standing_in(belief.value.locale)
+        result = finding(robot, looks, self._rooms(belief.value))
         if result.verdict is Verdict.AMBIGUOUS or result.probe is None or len(glimpses) >= PROBES:
             result = self._within_reach(result, belief.value.locale)
         for old in view.where(Hypothesis, lambda h: h.status == "candidate"):
             yield Retract(old, (segments,))
         told = Panorama(glimpses, _in_words(result))
-        seen = Post(told, (segments, lost)) if before is None else Revise(before, told, (segments, lost, before))
+        seen = Post(told, because) if before is None else Revise(before, told, (*because, before))
         yield seen
         if result.verdict is Verdict.FOUND:
             yield from self._found(view, (segments, seen), lost, belief, result.candidates[0])
@@ -165,6 +178,23 @@ def _has_just_ridden(view: View) -> bool:
     """Whether no milestone has borne out an elevator ride yet: then it may be on any floor."""
     return view.latest(PlanSketch, lambda s: s.is_active and s.at > 0 and not s.verified
                        and s.subgoals[s.at - 1].is_ride) is not None
+
+
+def _obstruction(robot: RobotModel, looks: list[Glance], known: Entry[Obstruction] | None) -> Obstruction | None:
+    """What stands before the camera, by these looks; else what was found before, unless it is not opaque now."""
+    found = obstruction_in(looks, robot.camera)
+    if found is None and known is not None and is_opaque(known.value, [g.segments_px for g in looks]):
+        return known.value
+    return found
+
+
+def _told(known: Entry[Obstruction] | None, now: Obstruction | None, because: tuple[object, ...]) -> Effect | None:
+    """What changes of what is known to stand before the camera."""
+    if now is None:
+        return None if known is None else Retract(known, because)
+    if known is None:
+        return Post(now, because)
+    return None if known.value == now else Revise(known, now, because)
 
 
 def _in_words(result: Finding) -> str:

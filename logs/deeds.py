@@ -12,6 +12,7 @@ from logs import words
 from world_models.actuator import Drift
 from world_models.body import BodyFault, Course, Frame, Look, MotionReport, MotorCommand, Recovery, Ride, RideReport
 from world_models.location import Hypothesis
+from world_models.obstruction import Obstruction
 from world_models.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
 from world_models.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch, Resumed
 
@@ -144,6 +145,7 @@ TELLERS: Mapping[type[Any], Callable[[Any, bool], str]] = {
     Frame: lambda f, _: f"picture {f.number}",
     Panorama: _panorama,
     Drift: lambda _d, _r: "",
+    Obstruction: lambda o, _: "something is before the camera and hides a part of every picture",
     Outcome: lambda o, _: f"{o.kind}: {o.reason}",
     Resumed: lambda r, _: f"goes on after cycle {r.after_cycle}, where the run was cut off",
     Quiescence: lambda _q, _r: "nothing is left to do",

@@ -18,6 +18,7 @@ IMAGE = f"{CAMERA}/image"
 EXPECTED, SEGMENTS, MATCHED = f"{IMAGE}/expected", f"{IMAGE}/segments", f"{IMAGE}/matched"
 REJECTED, LANDMARK_NAMES = f"{IMAGE}/rejected", f"{IMAGE}/names"
 WINDOWS, DRIFTS = f"{IMAGE}/windows", f"{IMAGE}/drifts"
+OBSTRUCTION = f"{IMAGE}/obstruction"
 WAITING = f"{CAMERA}/waiting"
 
 SKETCH = "sketch"

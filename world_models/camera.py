@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.frames import Pose, frozen
+from world_models.obstruction import Obstruction
 
 NEAR_M = 0.05
 """Nothing nearer than this to the optical centre is projected [m]."""
@@ -34,6 +35,7 @@ class Camera:
         cx, cy: principal point [px].
         width, height: image size [px].
         distortion: ``None`` or (k1, k2, p1, p2[, k3]), OpenCV's order.
+        obstruction: what stands before it, if anything does, in the picture once distortion is undone.
     """
 
     fx: float
@@ -43,6 +45,7 @@ class Camera:
     width: int
     height: int
     distortion: Any = None
+    obstruction: Obstruction | None = None
 
     def __post_init__(self) -> None:
         if not (self.fx > 0 and self.fy > 0 and self.width > 0 and self.height > 0):

@@ -8,6 +8,7 @@ from functools import cached_property
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
+from world_models.obstruction import Obstruction
 from world_models.world import World
 
 _THE_CAMERA = Camera(1.0, 1.0, 0.0, 0.0, 1, 1)
@@ -35,6 +36,7 @@ class RobotModel:
     radius_m: float = 0.35
     lens: Camera = _THE_CAMERA
     continuous: bool = False
+
     def __post_init__(self) -> None:
         if self.lens is _THE_CAMERA:
             object.__setattr__(self, "lens", self.camera)
@@ -51,6 +53,21 @@ class RobotModel:
             object.__setattr__(raised, "camera", self.camera)  # the same camera, by which views are remembered
             self._raised[height_m] = raised
         return self._raised[height_m]
+
+    def behind(self, obstruction: Obstruction | None) -> RobotModel:
+        """The robot, who knows that something stands before its camera: it expects to see nothing there."""
+        if obstruction == self.camera.obstruction:
+            return self
+        if obstruction not in self._behind:
+            behind = replace(self)
+            object.__setattr__(behind, "camera", replace(self.camera, obstruction=obstruction))
+            self._behind[obstruction] = behind
+        return self._behind[obstruction]
+
+    @cached_property
+    def _behind(self) -> dict[Obstruction | None, RobotModel]:
+        """The same robot behind what has stood before its camera."""
+        return {}
 
     @cached_property
     def _raised(self) -> dict[float, RobotModel]:

@@ -151,7 +151,9 @@ def _visible_lines(
     found = VisibleLines(segments, camera_from_world.inverse().apply(lines), scene.line_landmark[index],
                          scene.line_index[index], contrast[index])
     found = found[lengths_px(segments) >= min_length_px]
-    return found[_distinct(found, min_separation_px)] if min_separation_px > 0 else found
+    if min_separation_px > 0:
+        found = found[_distinct(found, min_separation_px)]
+    return found if camera.obstruction is None else found[camera.obstruction.shows(found.segments_px)]
 
 
 def visible_points(
@@ -181,6 +183,8 @@ def visible_points(
     pixels = camera.project(points)
     keep = camera.inside(pixels, margin_px)
     keep[keep] &= ~hidden_points(points[keep], view.shadows())
+    if camera.obstruction is not None:
+        keep[keep] &= ~camera.obstruction.covers(pixels[keep])
     index = index[keep]
     return VisiblePoints(pixels[keep], scene.corners_world[index], scene.corner_landmark[index],
                          scene.corner_index[index], contrast[index])

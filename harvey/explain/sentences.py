@@ -260,6 +260,11 @@ def _drift(v: Value) -> str:
             f" (+-{math.degrees(v['sigma_per_m']):.2f}), by what was seen until {metres(v['gone_m'])} ago")
 
 
+def _obstruction(v: Value) -> str:
+    corners = ", ".join(f"({u:.0f}, {w:.0f})" for u, w in v["outline_px"])
+    return f"something is before the camera: the part of the picture within {corners} px stands still while it turns"
+
+
 def _ride(v: Value) -> str:
     return f"Harvey stands in the elevator and asks for a ride from {v['origin']} to {v['destination']}"
 
@@ -280,4 +285,5 @@ MAKERS: Mapping[str, Callable[[Value], str]] = {
     "MotorCommand": _motion, "MotionReport": _motion_report, "Look": _look, "Frame": _frame,
     "Discrepancy": _discrepancy, "Quiescence": _quiescence, "Resumed": _resumed, "BodyFault": _body_fault,
     "Recovery": _recovery, "Drift": _drift, "Course": _course, "Ride": _ride, "RideReport": _ride_report,
+    "Obstruction": _obstruction,
 }

@@ -279,7 +279,7 @@ LABELS: Mapping[str, str] = {
     "Command": "command", "Tracks": "seen", "Frame": "picture", "MotionReport": "wheels", "MotorCommand": "motion",
     "Course": "motion",
     "Look": "look", "Segments": "seen", "Panorama": "thought", "BodyFault": "fault", "Recovery": "recovery",
-    "Ride": "ride", "RideReport": "ride",
+    "Ride": "ride", "RideReport": "ride", "Obstruction": "hidden",
 }
 FOLDED = frozenset({"PoseFix", "LineMatch", "Segments", "Certificate"})
 """Told by the sentences of what rests on them."""
@@ -287,10 +287,10 @@ SEVERAL = frozenset({"Discrepancy", "Goal", "PlanSketch", "BodyFault"})
 """Of these a story may tell more than one."""
 FOLLOW: Mapping[str, tuple[str, ...]] = {
     "MotorCommand": ("Leg", "Milestone", "Segments", "Panorama", "Discrepancy", "Hypothesis"),
-    "Panorama": ("Panorama",),
+    "Panorama": ("Obstruction", "Panorama"),
     "Course": ("Leg", "Discrepancy", "Hypothesis"),
     "Leg": ("Hypothesis",),
-    "Milestone": ("Certificate", "Discrepancy", "Hypothesis"),
+    "Milestone": ("Obstruction", "Certificate", "Discrepancy", "Hypothesis"),
     "Certificate": ("Milestone",),
     "PoseFix": ("LineMatch",),
     "LineMatch": ("Segments", "Milestone"),

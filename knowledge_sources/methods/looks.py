@@ -104,6 +104,8 @@ def _expected_looks(robot: RobotModel, camera: Camera, camera_from_world: Pose) 
     facing = facing[in_view]
     turned = normals[facing] @ camera_from_world.rotation.T
     surface, depth = _first_hits(near[in_view], turned, boxes[in_view], rays)
+    if camera.obstruction is not None:
+        surface[camera.obstruction.covers(_samples(camera.width, camera.height)).ravel()] = -1
     hit = np.unique(surface[surface >= 0])
     if not len(hit):
         return ()

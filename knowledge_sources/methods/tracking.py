@@ -77,10 +77,14 @@ def follow(
     if not tracks:
         return []
     depth, predicted, spread = _predicted(robot, np.array([t.point_world for t in tracks]), pose, covariance)
+    before = robot.camera.obstruction
+    hidden = np.zeros(len(tracks), bool) if before is None else before.covers(predicted, HALF_PX)
     out = []
-    for track, z, at, sigma in zip(tracks, depth.tolist(), predicted, spread.tolist(), strict=True):
+    for track, z, at, sigma, is_hidden in zip(
+            tracks, depth.tolist(), predicted, spread.tolist(), hidden.tolist(), strict=True):
         scale = track.template_depth_m / max(z, NEAR_M)
-        expected = z > NEAR_M and fits(image.shape, at, HALF_PX + 2) and SCALES[0] <= scale <= SCALES[1]
+        in_view = z > NEAR_M and not is_hidden and fits(image.shape, at, HALF_PX + 2)
+        expected = in_view and SCALES[0] <= scale <= SCALES[1]
         found = None
         if expected:
             search = min(max(SIGMAS * sigma + 2.0, SEARCH_PX[0]), SEARCH_PX[1])

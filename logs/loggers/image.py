@@ -1,4 +1,5 @@
-"""What is drawn over the camera's picture: lines expected, found and matched, and the templates that are followed."""
+"""What is drawn over the camera's picture: lines expected, found and matched, the templates that are followed, and what
+is known to stand before the camera."""
 
 from __future__ import annotations
 
@@ -10,8 +11,8 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from logs.mirror import Mirror, Moment
-from logs.palette import DONE, EXPECTED, FOUND, MATCHED, PLANNED, REJECTED, Colour
-from logs.paths import DRIFTS, LANDMARK_NAMES, WAITING, WINDOWS
+from logs.palette import DONE, EXPECTED, FOUND, MATCHED, NOT_TESTABLE, PLANNED, REJECTED, Colour
+from logs.paths import DRIFTS, LANDMARK_NAMES, OBSTRUCTION, WAITING, WINDOWS
 from logs.paths import EXPECTED as EXPECTED_PATH
 from logs.paths import MATCHED as MATCHED_PATH
 from logs.paths import REJECTED as REJECTED_PATH
@@ -21,6 +22,7 @@ from logs.words import nearby
 from world_models.body import Frame
 from world_models.camera import Camera, clip_segments
 from world_models.frames import frozen
+from world_models.obstruction import Obstruction
 from world_models.percepts import LineMatch, PoseFix, Segments, Track, Tracks
 from world_models.task import Milestone
 
@@ -28,7 +30,7 @@ DRIFT_SCALE = 5.0
 """Drifts of a few pixels would not show: their arrows are drawn longer, and the view's legend says so."""
 
 STYLES = ((EXPECTED_PATH, EXPECTED, 1.5), (SEGMENTS_PATH, FOUND, 1.0), (MATCHED_PATH, MATCHED, 2.0),
-          (REJECTED_PATH, REJECTED, 2.0))
+          (REJECTED_PATH, REJECTED, 2.0), (OBSTRUCTION, NOT_TESTABLE, 2.0))
 """Lines of each kind: where, colour and half width on the screen."""
 
 MOST_NAMES = 6
@@ -68,6 +70,8 @@ class Image:
             if self._waits:
                 self._wait(tape, NO_POINTS, ())
             self._wipe(tape, moment.mirror)
+        if moment.touched(Obstruction):
+            self._obstruction(tape, moment.mirror)
         for milestone in moment.changed(Milestone)[-1:]:
             self._expected(tape, milestone.value)
         for segments in moment.changed(Segments)[-1:]:
@@ -97,6 +101,13 @@ class Image:
                 tape.log(path, rr.Arrows2D, origins=NO_POINTS, vectors=NO_POINTS)
             else:
                 tape.log(path, rr.LineStrips2D, strips=NO_LINES)
+
+    def _obstruction(self, tape: Tape, mirror: Mirror) -> None:
+        """It moves with the camera: its outline stays from picture to picture."""
+        known = mirror.latest(Obstruction)
+        corners = np.zeros((0, 2)) if known is None else np.array(known.value.outline_px, float)
+        sides, inside = self._clipped(np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
+        tape.log(OBSTRUCTION, rr.LineStrips2D, strips=sides[inside].astype(np.float32))
 
     def _lines(self, tape: Tape, path: str, segments_px: Any) -> None:
         lines, inside = self._clipped(np.asarray(segments_px))

@@ -1,0 +1,39 @@
+"""A fifth of the view is hidden for good: the robot finds out what hides it, and arrives."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from blackboard.journal import Decision
+from harvey.experiments.short_missions import HALLWAY, fault
+from harvey.mission import run_mission
+from sim.assembly import set_stage
+from sim.scenario import parse_scenario
+from world_models.obstruction import Obstruction
+from world_models.task import Milestone
+
+HIDDEN = fault("occluded", "hallway", 3.0, part=0.2, duration_s=1000.0)
+
+
+def test_it_finds_what_is_before_its_camera_and_looks_past_it() -> None:
+    known: list[Obstruction] = []
+    behind: list[np.ndarray] = []
+
+    def watch(decision: Decision) -> None:
+        for change in decision.made:
+            value = change.entry.value
+            if isinstance(value, Obstruction):
+                known.append(value)
+            if isinstance(value, Milestone) and value.expected_px and known:
+                behind.append(known[-1].hidden_part(value.expected_px))
+
+    stage = set_stage(parse_scenario(HALLWAY + HIDDEN, "behind-something"))
+    result = run_mission(stage, 1, sinks=[watch])
+    assert result.outcome == "reached" and result.final_error_m < 0.0254
+    assert result.collisions == 0 and result.milestones["false_accepts"] == 0
+
+    grid = np.stack(np.meshgrid(np.arange(512.0), np.arange(512.0)), axis=-1)
+    said = known[-1].covers(grid)
+    true = stage.scenario.faults[0]
+    assert abs(np.mean(said) - true.part) < 0.02  # type: ignore[union-attr]
+    assert behind and all(np.all(part <= 0.3) for part in behind)
