@@ -57,6 +57,10 @@ class BodyPort:
         self._body = body
         self._unanswered: dict[str, Entry[Any]] = {}
 
+    def remember(self, request: Entry[Any]) -> None:
+        """A request that another process was asked, and did not answer: a recovery will ask for it here."""
+        self._unanswered[request.id] = request
+
     def answer(self, change: Change) -> Iterable[Effect]:
         """A motion report for a command, a frame for a look, the answer to an older request for a recovery."""
         entry = change.entry

@@ -122,7 +122,7 @@ def _go_on(run: RunDirectory, mission: Mission, stage: Stage) -> Outcome:
     if last is None:
         return mission.begin()
     for change in last.made:
-        if not _is_command(change):
+        if not is_command(change):
             mission.scheduler.tell(mission.kept.answer(change), mission.kept.name)
     return mission.go_on(last)
 
@@ -130,7 +130,7 @@ def _go_on(run: RunDirectory, mission: Mission, stage: Stage) -> Outcome:
 def _tell_of_the_crash(mission: Mission, stage: Stage, last: Decision) -> None:
     """The commands that nobody reported on are answered by what the wheels claim."""
     scheduler, reliving = mission.scheduler, Reliving(mission.port, mission.seed, stage.scenario.actuator)
-    broken_off = [change.entry for change in last.made if _is_command(change)]
+    broken_off = [change.entry for change in last.made if is_command(change)]
     refs = tuple(str(entry.ref) for entry in broken_off)
     scheduler.tell([Post(Resumed(scheduler.cycle, refs), tuple(broken_off))], RESUME)
     for entry in broken_off:
@@ -139,7 +139,8 @@ def _tell_of_the_crash(mission: Mission, stage: Stage, last: Decision) -> None:
             scheduler.tell([effect], mission.port.name)
 
 
-def _is_command(change: Change) -> bool:
+def is_command(change: Change) -> bool:
+    """Whether a change asks the wheels to turn."""
     if isinstance(change.entry.value, Course):
         return not isinstance(change, Retracted)
     return isinstance(change, Posted) and isinstance(change.entry.value, MotorCommand)

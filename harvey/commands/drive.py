@@ -53,16 +53,22 @@ def _run(args: Namespace) -> int:
         return time.monotonic() - began
 
     with DryRun(mission, out, clock) as dry:
-        for check in dry.run():
-            _tell(check)
-        if not dry.ok:
-            failed = sum(1 for check in dry.checks if not check.ok)
-            print(f"\n{failed} of {len(dry.checks)} failed: nothing was moved", file=sys.stderr)
+        if not checked(dry):
             return 2
         if args.dry_run:
             print("\neverything is ready; nothing was moved")
             return 0
         return _drive(mission, dry, clock, new_run(out), args.live)
+
+
+def checked(dry: DryRun) -> bool:
+    """Make all checks, and tell what came of each; whether nothing failed."""
+    for check in dry.run():
+        _tell(check)
+    if not dry.ok:
+        failed = sum(1 for check in dry.checks if not check.ok)
+        print(f"\n{failed} of {len(dry.checks)} failed: nothing was moved", file=sys.stderr)
+    return dry.ok
 
 
 def _mission(args: Namespace) -> HardwareMission:
@@ -91,18 +97,28 @@ def _drive(mission: HardwareMission, dry: DryRun, clock: Callable[[], float], ou
 
     if dry.robot is None or dry.base is None or dry.camera is None:
         raise BadInput("expected a world, a base and a camera, and one of them is lacking")
-    print("\nspace, enter, q, escape or Ctrl-C stops the robot at once", file=sys.stderr, flush=True)
-    result = drive(mission, dry.robot, dry.base, dry.camera, clock, out=out, sinks=[_follow], live=live)
-    m = result["milestones"]
-    print(f"{result['outcome']}: {result['reason']}\n"
-          f"  milestones    {m['verified']} verified, {m['refuted']} refuted, {m['not_testable']} not testable\n"
-          f"  way           {result['path_length_m']:.1f} m, as the wheels claim, in {result['sim_time_s']:.0f} s\n"
-          f"  recording     {out / 'recording.rrd'}\n\n"
-          f"open it with    harvey view {out}\nask it with     harvey why {out}")
+    tell_how_to_stop()
+    result = drive(mission, dry.robot, dry.base, dry.camera, clock, out=out, sinks=[follow], live=live)
+    print(summary(result, out))
     return 0 if result["outcome"] == "reached" else 1
 
 
-def _follow(decision: Decision) -> None:
+def tell_how_to_stop() -> None:
+    """On the terminal, before the first move."""
+    print("\nspace, enter, q, escape or Ctrl-C stops the robot at once", file=sys.stderr, flush=True)
+
+
+def summary(result: Mapping[str, Any], out: Path) -> str:
+    """How a mission on hardware went, and what to do with its run."""
+    m = result["milestones"]
+    return (f"{result['outcome']}: {result['reason']}\n"
+            f"  milestones    {m['verified']} verified, {m['refuted']} refuted, {m['not_testable']} not testable\n"
+            f"  way           {result['path_length_m']:.1f} m, as the wheels claim, in {result['sim_time_s']:.0f} s\n"
+            f"  recording     {out / 'recording.rrd'}\n\n"
+            f"open it with    harvey view {out}\nask it with     harvey why {out}")
+
+
+def follow(decision: Decision) -> None:
     """A line for every milestone, and for whatever is wrong with the body."""
     from world_models.body import BodyFault
     from world_models.task import Milestone

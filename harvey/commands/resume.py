@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import time
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from harvey.commands.command import Command
+from harvey.errors import BadInput
 from harvey.run_directory import RunDirectory, open_run
+from harvey.run_head import HARDWARE, RunHead
 from harvey.units import count
 
 if TYPE_CHECKING:
@@ -16,6 +21,9 @@ if TYPE_CHECKING:
 
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN", help="a run directory")
+    for name, example in (("base", "denning:/dev/ttyUSB1"), ("camera", "1")):
+        parser.add_argument(f"--{name}", metavar=name.upper(),
+                            help=f"on hardware: where the {name} is now, as {example}, if not where it was")
     parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
 
 
@@ -28,10 +36,41 @@ def _run(args: Namespace) -> int:
     if remains.outcome is not None and run.read_result().get("outcome") == remains.outcome.kind:
         print(f"{run.path} was not cut off: it ended with {remains.outcome.kind}, {remains.outcome.reason}")
         return 0 if remains.outcome.kind == "reached" else 1
+    head = RunHead.read(run.path)
+    moved = {key: value for key, value in (("base.port", args.base), ("camera.source", args.camera)) if value}
+    if head.kind == HARDWARE:
+        return _on_hardware(run, head, remains, moved, args.live)
+    if moved:
+        raise BadInput(f"--base and --camera: expected a run on hardware, and {run.path} is one of the simulator")
     _tell(run, remains)
     result = resume(run, remains, live=args.live)
     print(one(result, run.path))
     return 0 if result.outcome == "reached" else 1
+
+
+def _on_hardware(
+    run: RunDirectory, head: RunHead, remains: Remains, moved: Mapping[str, str], live: bool
+) -> int:
+    """Everything is checked as before a first move; then the mission goes on."""
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
+    from harvey.commands.drive import checked, follow, summary, tell_how_to_stop
+    from harvey.hardware.dry_run import DryRun
+    from harvey.hardware.mission import mission_again
+    from harvey.hardware.resume import resume, stood_at
+
+    mission, began_s = mission_again(head, moved), time.monotonic() - stood_at(run)[0]
+
+    def clock() -> float:
+        return time.monotonic() - began_s
+
+    with DryRun(mission, run.path, clock) as dry:
+        if not checked(dry) or dry.base is None or dry.camera is None:
+            return 2
+        _tell(run, remains)
+        tell_how_to_stop()
+        result = resume(mission, run, remains, dry.base, dry.camera, clock, sinks=[follow], live=live)
+    print(summary(result, run.path))
+    return 0 if result["outcome"] == "reached" else 1
 
 
 def _tell(run: RunDirectory, remains: Remains) -> None:
@@ -46,10 +85,12 @@ COMMAND = Command(
     (
         ("harvey resume runs/lab-to-allens-office-3", "after a crash, kill -9, a power cut or a full disk"),
         ("harvey why runs/lab-to-allens-office-3 resumed-1", "what it was told then"),
+        ("harvey resume runs/mission-drive --base create2:/dev/ttyUSB1", "on hardware, the base on another port now"),
     ),
     _arguments, _run,
     "Its decisions are told again from what was observed, the simulated robot lives through them, and it goes on\n"
     "from the last one. A motor command of which nobody heard how far it was carried out is not carried out again:\n"
-    "the robot was stopped in it, and the wheels are asked. Exit code 0: the goal was reached; 1: it was not; 2: the\n"
+    "the robot was stopped in it, and the wheels are asked. On hardware everything is checked as harvey drive does,\n"
+    "and a milestone has to hold before the robot moves on. Exit code 0: the goal was reached; 1: it was not; 2: the\n"
     "input cannot be used.",
 )

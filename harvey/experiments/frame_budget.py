@@ -20,7 +20,7 @@ from world_models.body import Frame
 from world_models.robot import RobotModel
 
 SCENARIOS, QUICK_SCENARIOS = ("forty-foot-hallway", "lab-to-allens-office"), ("forty-foot-hallway",)
-DRIVES = 4
+DRIVES = 6
 """Each mission is driven so often, which gives the same acts in the same order; of each the best time counts: what else
 the machine does is none of its fault. The first drive compiles what is compiled."""
 TRACK, ANEW = "correlator_tracker", "correlator_tracker, anew"

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from harvey.errors import BadInput
+from harvey.run_head import RunHead
 from sim.scenario import ROOT, Arrival, Servo, Start
 from sim.settings import known_keys, merged, near, parsed, read_settings
 from world_models.actuator import ActuatorModel
@@ -140,6 +141,17 @@ def load_mission(path: Path | None, settings: Mapping[str, Any]) -> HardwareMiss
             data = _replaced(data, key, value)
         folder = Path() if path is None else path.parent
         return _mission(Source(source.name, data, source.lines).root, "drive" if path is None else path.stem, folder)
+    except WorldError as error:
+        raise BadInput(str(error)) from None
+
+
+def mission_again(head: RunHead, settings: Mapping[str, Any]) -> HardwareMission:
+    """The mission of a run that was begun on hardware, with some settings replaced; see :func:`load_mission`."""
+    try:
+        data = dict(head.scenario)
+        for key, value in settings.items():
+            data = _replaced(data, key, value)
+        return _mission(Source("run.json", data, {}).root, head.name, Path(head.folder))
     except WorldError as error:
         raise BadInput(str(error)) from None
 

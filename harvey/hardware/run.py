@@ -11,13 +11,13 @@ from typing import Any
 from blackboard.effect import Post
 from blackboard.journal import Decision, Sink
 from blackboard.scheduler import Scheduler
-from harvey.diary import Diary
-from harvey.hardware.body import HardwareBody, Watching
+from harvey.diary import Diary, Extent
+from harvey.hardware.body import Eye, HardwareBody, Watching
 from harvey.hardware.heart import Heart
 from harvey.hardware.mission import HardwareMission
 from harvey.hardware.stop_key import stop_key
 from harvey.loop import until_outcome
-from harvey.minds import mind_of
+from harvey.minds import Mind, mind_of
 from harvey.ports import BodyPort
 from harvey.referee import Counts
 from harvey.run_directory import RunDirectory
@@ -48,34 +48,62 @@ class Odometer(Counts):
             self.frames += isinstance(value, Frame)
 
 
+class HardwareRun:
+    """Mind, body of metal and diary put together; where a run goes on that was cut off, so much of it is ``whole``.
+
+    Attributes:
+        port: the body's; kept: the same, whose pictures go into the diary.
+        diary, scheduler: the files, and the mind at work.
+    """
+
+    def __init__(
+        self, run: RunDirectory, head: RunHead, mind: Mind, body: HardwareBody, *, sinks: Sequence[Sink] = (),
+        live: bool = False, whole: Extent | None = None,
+    ) -> None:
+        self.head, self.port = head, BodyPort(body)
+        self.diary = Diary(run, head, mind.robot, live=live, whole=whole)
+        self.kept = self.diary.kept(self.port)
+        self.scheduler: Scheduler = mind.scheduler(ports=(self.kept,), sinks=(*self.diary.sinks, *sinks))
+
+    def begin(self) -> None:
+        """Tell it what the user asked for."""
+        self.scheduler.tell([Post(self.head.task())], "user")
+
+
+Begin = Callable[[HardwareRun], Decision | None]
+"""Brings a run to where it goes on from, and returns the last decision there was."""
+
+
 def drive(
-    mission: HardwareMission,
-    robot: RobotModel,
-    base: Base,
-    camera: VideoCamera,
-    clock: Callable[[], float],
-    *,
-    out: Path,
-    sinks: Sequence[Sink] = (),
-    live: bool = False,
+    mission: HardwareMission, robot: RobotModel, base: Base, camera: VideoCamera, clock: Callable[[], float], *,
+    out: Path, sinks: Sequence[Sink] = (), live: bool = False,
 ) -> dict[str, Any]:
     """Drive to the outcome; however it ends, the base is told to stop, and what was recorded is kept.
 
     Returns what ``result.json`` holds: as for a run in the simulator, with null for what only the truth could tell.
     """
-    began, run = time.perf_counter(), RunDirectory(out)
     head = RunHead.of(HARDWARE, mission.name, 0, mission.world, robot, mission.servo, mission.command,
                       scenario=mission.data, folder=str(mission.folder.resolve()))
-    body, counts = HardwareBody(base, Watching(camera, clock, mission.camera.rate_hz), clock=clock), Odometer()
+    eye = Watching(camera, clock, mission.camera.rate_hz)
+    return driven(mission, head, base, eye, clock, RunDirectory(out), HardwareRun.begin, sinks=sinks, live=live)
+
+
+def driven(
+    mission: HardwareMission, head: RunHead, base: Base, eye: Eye, clock: Callable[[], float], run: RunDirectory,
+    begin: Begin, *, sinks: Sequence[Sink] = (), live: bool = False, whole: Extent | None = None,
+) -> dict[str, Any]:
+    """Drive to the outcome from wherever ``begin`` brings the run; see :func:`drive`."""
+    began = time.perf_counter()
+    body, counts = HardwareBody(base, eye, clock=clock), Odometer()
     try:
         with stop_key(body.stop_for_good), Heart(base) as heart, mind_of(head) as mind:
-            diary = Diary(run, head, mind.robot, live=live)
+            robot = HardwareRun(run, head, mind, body, sinks=(counts, *sinks), live=live, whole=whole)
+            diary, scheduler = robot.diary, robot.scheduler
             try:
                 run.write_result({"scenario": mission.name, "seed": 0, "outcome": "unfinished"})
-                port = diary.kept(BodyPort(body))
-                scheduler = mind.scheduler(ports=(port,), sinks=(*diary.sinks, counts, *sinks))
-                scheduler.tell([Post(head.task())], "user")
-                outcome = until_outcome(scheduler, over=lambda s: _over(mission, s, clock()), before=heart.tick)
+                last = begin(robot)
+                outcome = until_outcome(
+                    scheduler, over=lambda s: _over(mission, s, clock()), before=heart.tick, last=last)
             finally:
                 body.stop()
                 diary.close()

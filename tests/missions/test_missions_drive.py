@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -114,6 +116,30 @@ def test_whoever_wants_it_to_stop_is_heeded_at_once(tmp_path: Path) -> None:
     result = result_of(tmp_path)
     assert (result["outcome"], result["reason"]) == ("stopped", "stopped by SIGTERM")
     assert main(["why", str(tmp_path / "run")]) == 0
+
+
+def test_a_mission_whose_process_was_killed_in_mid_move_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with emulated(tmp_path) as robot:
+        process = subprocess.Popen([sys.executable, "-m", "harvey.cli", "drive", *robot.options],
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL)
+        kill = _when(lambda: robot.body.truth.path_m > 0.75 and robot.base.moving, process.kill)
+        process.wait()
+        kill.join()
+        time.sleep(3.0)
+        assert not robot.base.moving  # its watchdog
+        gone_m, run = robot.body.truth.path_m, str(tmp_path / "run")
+        assert result_of(tmp_path)["outcome"] == "unfinished"
+        assert main(["resume", run]) == 0
+        there = robot.body.truth
+    assert gone_m < 1.5 and abs(there.world_from_robot.x_m - GOAL_M) < INCH_M and there.collisions == 0
+    told = capsys.readouterr().err
+    assert "told again, then it goes on" in told and "base: link lost: over" in told
+    assert result_of(tmp_path)["outcome"] == "reached"
+    assert main(["replay", run]) == 0
+    assert main(["why", run, "resumed-1"]) == 0
+    assert main(["resume", run]) == 0 and "was not cut off" in capsys.readouterr().out
 
 
 def _when(holds: Callable[[], bool], then: Callable[[], None]) -> threading.Thread:
