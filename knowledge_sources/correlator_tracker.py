@@ -38,9 +38,10 @@ from world_models.visibility import visible_lines
 FEW, FEWEST, LEFT_PART = 9, 5, 0.5
 """New landmarks are taken where fewer than FEWEST are left; or fewer than FEW, and than this part of those that there
 were when new ones were last taken."""
-FAR_M = 1.3
+FAR_M, FAR_ON_THE_MOVE_M = 1.3, 0.8
 """A template is given up when the robot is so far from where it was cut: it would look otherwise from here. Two of the
-paper's increments (two feet each, Table 1) are less."""
+paper's increments (two feet each, Table 1) are less. With thirty pictures a second new ones cost little, and one that
+has begun to look otherwise draws many pictures aside in a row."""
 MISSES = 2
 """A landmark that is not found so often in a row is given up."""
 LEAST = 4
@@ -193,7 +194,8 @@ class CorrelatorTracker(Expert):
     def _near(self, anchors: tuple[Anchor, ...], belief: Hypothesis) -> frozenset[str]:
         """The frames that were taken near enough to here for their templates to serve on."""
         here = belief.world_from_robot(self._robot.world)
-        return frozenset(a.frame for a in anchors if math.hypot(a.x_m - here.x_m, a.y_m - here.y_m) <= FAR_M)
+        far_m = FAR_ON_THE_MOVE_M if self._robot.continuous else FAR_M
+        return frozenset(a.frame for a in anchors if math.hypot(a.x_m - here.x_m, a.y_m - here.y_m) <= far_m)
 
     def _anchored(
         self, items: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame], belief: Hypothesis,

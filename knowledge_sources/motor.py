@@ -31,11 +31,14 @@ from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis
 from world_models.task import Leg, Milestone, PlanSketch
 
-LOOKAHEAD_M = 1.5
-"""Steers at the point of the line so far ahead, so that it comes back to the line and not only to its end."""
+LOOKAHEAD_M = 1.2
+"""Steers at the point of the line so far ahead, two increments, so that it comes back to the line and not only to its
+end."""
 FACING_RAD = math.radians(3.0)
 """Turned to within this, it sets off."""
 AIM_RAD = math.radians(0.5)
+BESIDE_M = 0.15
+"""So near to where a subgoal begins it comes back to the line that was planned; from further off it takes another."""
 CREEP_M = 0.25
 """Nearer than this it steers straight at the end."""
 
@@ -96,7 +99,9 @@ class Motor(Expert):
         if sketch is None or sketch.value.current is None:
             return
         subgoal, world = sketch.value.current, self._robot.world
-        start, end = belief.value.world_from_robot(world), subgoal.destination.in_world(world)
+        here, end = belief.value.world_from_robot(world), subgoal.destination.in_world(world)
+        planned = subgoal.origin.in_world(world)
+        start = planned if planned.distance_to(here) <= BESIDE_M else here
         heading = None if subgoal.destination.heading_rad is None else end.heading_rad
         leg = Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m, subgoal.tolerance_m, heading)
         yield Post(leg, (sketch, belief))

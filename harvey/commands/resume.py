@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 from harvey.commands.command import Command
 from harvey.errors import BadInput
 from harvey.run_directory import RunDirectory, open_run
-from harvey.run_head import HARDWARE, RunHead
 from harvey.units import count
 
 if TYPE_CHECKING:
     from harvey.again.resume import Remains
+    from harvey.run_head import RunHead
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -30,6 +30,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     run = open_run(args.run, "run.json")
     from harvey.again.resume import remains_of, resume
+    from harvey.run_head import HARDWARE, RunHead
     from harvey.summary import one
 
     remains = remains_of(run)
