@@ -21,33 +21,32 @@ from knowledge_sources.methods.conviction import CONVICTION
 from knowledge_sources.methods.evidence import evidence, wheels_px
 from knowledge_sources.methods.looks import Probe, probe, small_colour
 from knowledge_sources.methods.verification import LEAST_ACCOUNTED, Verification, verify
-from knowledge_sources.questions import held, open_discrepancy, standing_in
+from knowledge_sources.questions import has_followed, held, open_discrepancy, standing_in
 from knowledge_sources.tolerances import FLOOR_PX, PLAN_PX
 from world_models.body import Frame
 from world_models.frames import Pose2, wrap_angle
 from world_models.location import Hypothesis
-from world_models.percepts import LineMatch, PoseFix, Segments, Tracks
+from world_models.percepts import LineMatch, PoseFix, Segments
 from world_models.robot import RobotModel
 from world_models.task import Certificate, Milestone
 
-WRONG_BEFORE = 0.05
-"""Where nothing is in doubt, a belief is taken to be wrong with this probability before the robot looks."""
+WRONG_BEFORE, WRONG_UNFOLLOWED = 0.05, 0.12
+"""Where nothing is in doubt, a belief is taken to be wrong with this probability before the robot looks: if landmarks
+were followed up to here, and if none were."""
 DARK = 6.0
 """A frame of less contrast (standard deviation of its grey values) shows nothing."""
 
 
 MOST_LOOKS = 3
 """From so many directions a milestone is looked for before it counts against the belief that it cannot be told."""
-AS_MUCH = 0.8
-"""Another place of which this part of the agreement is seen is not ruled out."""
+AS_MUCH, AS_LIKELY = 0.8, 0.5
+"""Another place of which this part of the agreement is seen is not ruled out; and where one is not, both are as likely.
+"""
 
-UNMISTAKABLE, LEAST_MARGIN = 8e-4, 1.0
-"""Less likely to be wrong than this, a place is not compared with others; else at least so many lines must speak for it
-that places at which its room repeats itself do not have."""
-FOLLOWED = 4
-"""A robot that holds so many landmarks in sight is at no other door: when they are not where they should be, all are
-given up."""
-
+UNMISTAKABLE, CLEAR, LEAST_MARGIN = 2e-4, 2e-3, 1.0
+"""Less likely to be wrong than the first, a place is not compared with others; than the second, only with those at
+which its room repeats itself; else with wherever in its room the picture fits. At least so many lines must speak for it
+that the others do not have."""
 Floats = NDArray[np.float64]
 
 
@@ -97,11 +96,11 @@ class MilestoneJudge(Expert):
         told = evidence(robot, lines, segments.segments_px, pose, fix.value.covariance, before, spread, agreed, faces)
         p_false = CONVICTION.p_false(told)
         tolerance_px = FLOOR_PX + wheels_px(robot, lines, before, spread + fix.value.covariance)
-        in_doubt = open_discrepancy(view, Level.PLAN) is not None
+        in_doubt, followed = open_discrepancy(view, Level.PLAN) is not None, has_followed(view)
         sure = CONVICTION.accepts(p_false)  # so much agrees only at the right place, whatever the wheels may have done
         if sure or in_doubt or tolerance_px > PLAN_PX:
             tolerance_px = PLAN_PX
-        is_enough = CONVICTION.accepts(p_false, 0.5 if in_doubt else WRONG_BEFORE)
+        is_enough = CONVICTION.accepts(p_false, 0.5 if in_doubt else WRONG_BEFORE if followed else WRONG_UNFOLLOWED)
         shift_px = _median_shift(np.array(m.expected_px, float).reshape(-1, 2, 2), agreed.projected_px)
         verdict, reason = _verdict(
             len(lines), segments.contrast, agreed, faces, p_false, is_enough, shift_px, tolerance_px)
@@ -109,9 +108,11 @@ class MilestoneJudge(Expert):
             other, room = _as_likely(view, robot, before, pose, segments, agreed), belief.value.locale
             if other is not None:
                 verdict, reason = "not testable", f"{reason}; but as much agrees at {other.id}"
-            elif (p_false > UNMISTAKABLE and (in_doubt or not _has_followed(view))
-                  and _may_be_elsewhere(robot, segments.segments_px, room, pose)):
+                p_false = max(p_false, AS_LIKELY)
+            elif (p_false > UNMISTAKABLE and (in_doubt or not followed)
+                  and _may_be_elsewhere(robot, segments.segments_px, room, pose, p_false)):
                 verdict, reason = "not testable", f"{reason}; but it may be another door of {room}, or its other side"
+                p_false = max(p_false, AS_LIKELY)
         residuals = fix.value.residuals_px[fix.value.inliers]
         return Certificate(
             milestone=milestone.id,
@@ -179,15 +180,9 @@ def _as_likely(
     return None
 
 
-def _has_followed(view: View) -> bool:
-    """Whether landmarks were in sight in the last frame that was tracked, followed or taken anew there."""
-    tracks = view.latest(Tracks)
-    return tracks is not None and sum(track.found_px is not None for track in tracks.value.items) >= FOLLOWED
-
-
-def _may_be_elsewhere(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> bool:
-    """Whether what was seen may be seen, just as well, from where the room repeats itself."""
-    other = lookalikes.hardest_to_tell(robot, segments_px, room, pose)
+def _may_be_elsewhere(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, p_false: float) -> bool:
+    """Whether what was seen may be seen, just as well, from elsewhere in the room."""
+    other = lookalikes.hardest_to_tell(robot, segments_px, room, pose, search=p_false > CLEAR)
     return other is not None and other.margin < LEAST_MARGIN
 
 

@@ -18,10 +18,12 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
 from knowledge_sources.methods.lines import SIGMA_ACROSS_PX
+from knowledge_sources.methods.lookalikes import anticipate
 from knowledge_sources.methods.looks import expected_looks
 from knowledge_sources.methods.views import ViewQuality, view_quality
 from knowledge_sources.questions import (
     deepest_sketch,
+    has_followed,
     held,
     is_over,
     is_settled,
@@ -121,7 +123,10 @@ class MilestoneSelector(Expert):
     ) -> Iterable[Effect]:
         """Predict the landmarks from the believed pose, but those in a car, and ask for the picture."""
         pose, hidden = belief.value.world_from_robot(self._robot.world), view.latest(Obstruction)
-        expected = expectation(standing_in(view, self._robot, belief.value.locale), pose, milestone, car)
+        robot = standing_in(view, self._robot, belief.value.locale)
+        expected = expectation(robot, pose, milestone, car)
+        if not has_followed(view) or open_discrepancy(view, Level.PLAN) is not None:
+            anticipate(robot, belief.value.locale, pose)  # the judge will ask whether it is another door
         because = (task, belief) if hidden is None else (task, belief, hidden)
         wish = Post(expected, because) if old is None else Revise(old, expected, because)
         yield wish

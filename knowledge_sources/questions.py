@@ -10,6 +10,7 @@ from blackboard.servoing import OPEN, Discrepancy
 from world_models.body import BodyFault, Course, MotionReport, MotorCommand
 from world_models.location import Hypothesis
 from world_models.obstruction import Obstruction
+from world_models.percepts import Tracks
 from world_models.robot import RobotModel
 from world_models.task import Goal, Leg, Milestone, Outcome, PlanSketch
 
@@ -18,6 +19,11 @@ ACTIVE_GOAL: Index[Goal] = Index(Goal, lambda g: g.is_active or None)
 OPEN_MILESTONE: Index[Milestone] = Index(Milestone, lambda m: m.is_open or None)
 ACTIVE_SKETCH: Index[PlanSketch] = Index(PlanSketch, lambda s: s.goal if s.is_active else None)
 OPEN_FAULT: Index[BodyFault] = Index(BodyFault, lambda f: f.is_open or None)
+
+
+FOLLOWED = 4
+"""A robot that holds so many landmarks in sight is at no other door: when they are not where they should be, all are
+given up."""
 
 
 def held(view: View) -> Entry[Hypothesis] | None:
@@ -29,6 +35,12 @@ def standing_in(view: View, robot: RobotModel, locale: str) -> RobotModel:
     """The robot on the floor of a locale, behind whatever is known to stand before its camera."""
     obstruction = view.latest(Obstruction)
     return robot.behind(None if obstruction is None else obstruction.value).standing_in(locale)
+
+
+def has_followed(view: View) -> bool:
+    """Whether enough landmarks were in sight in the last frame that was tracked, followed or taken anew there."""
+    tracks = view.latest(Tracks)
+    return tracks is not None and sum(track.found_px is not None for track in tracks.value.items) >= FOLLOWED
 
 
 def active_goal(view: View) -> Entry[Goal] | None:

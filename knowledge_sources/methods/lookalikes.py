@@ -1,19 +1,28 @@
-"""Could it be the next door? A place, against those at which its room repeats itself.
+"""Could it be the next door? A place, against others of its room: those at which the plan repeats itself, and those at
+which the picture fits as well.
 
 Lines that a view shares with the view at the next door speak for both. What tells them apart is what only one of them
 shows: the picture has it, or has it not.
+
+Which lines can be seen is worked out on a grid of poses and remembered, and only their projection is of the very pose:
+so it can be thought of beforehand, while the robot has yet to look.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.agreement import coverage
+from knowledge_sources.methods.glances import Glance
+from knowledge_sources.methods.proposals import are_apart, proposals
 from knowledge_sources.methods.repetition import repetitions
 from knowledge_sources.methods.rivals import ALIKE_PX, ALIKE_RAD
+from knowledge_sources.methods.settling import settled
+from world_models.camera import Camera
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 from world_models.visibility import VisibleLines, visible_lines
@@ -25,6 +34,11 @@ LENGTH_PX, CONTRAST, SIGHT_M = 12.0, 0.05, 15.0
 LINE_PX, LONG_PX = 30.0, 100.0
 """So much length counts as one line; what is longer than LONG_PX tells no more."""
 TOLERANCE_PX, TOLERANCE_RAD = 2.5, 0.06
+GRID_M, GRID_RAD = 0.1, math.radians(2.0)
+"""From poses so near to each other the same lines are seen, but for a few."""
+KEPT_VIEWS = 64
+MOST_FITTING = 14
+"""So many of the places at which the picture fits best are looked at."""
 
 
 class Lookalike(NamedTuple):
@@ -34,17 +48,57 @@ class Lookalike(NamedTuple):
     margin: float
 
 
-def hardest_to_tell(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> Lookalike | None:
-    """Of the places at which a room repeats itself, the one that segments (k, 2, 2) speak least against; None: none."""
-    own, outline = view(robot, pose).segments_px, robot.world.outline(room)
-    low, high = outline.min(axis=0), outline.max(axis=0)
-    places = [other for _, other in repetitions(robot.world, room, pose, (room,))
-              if np.all((low <= other.position) & (other.position <= high))]
-    margins = [margin(own, view(robot, other).segments_px, segments_px) for other in places]
-    if not margins:
+def hardest_to_tell(
+    robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, *, search: bool = False
+) -> Lookalike | None:
+    """Of other places of a room, the one that segments (k, 2, 2) speak least against; None: there is none.
+
+    They are those at which the room repeats itself and, with ``search``, wherever else in it the segments fit: what
+    repeats itself may be notices and doors for show, which no plan tells of. A search takes half a second.
+    """
+    others = [*places(robot, room, pose), *(fitting(robot, segments_px, room, pose) if search else ())]
+    if not others:
         return None
+    own = _looked_for(view_near(robot, pose), segments_px)
+    margins = [_margin(own, _looked_for(view_near(robot, other), segments_px)) for other in others]
     least = int(np.argmin(margins))
-    return Lookalike(places[least], margins[least])
+    return Lookalike(others[least], margins[least])
+
+
+def places(robot: RobotModel, room: str, pose: Pose2) -> list[Pose2]:
+    """The other places within a room at which it repeats itself."""
+    outline = robot.world.outline(room)
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    return [other for _, other in repetitions(robot.world, room, pose, (room,))
+            if np.all((low <= other.position) & (other.position <= high))]
+
+
+def fitting(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> list[Pose2]:
+    """The places of a room, apart from a pose, at which segments (k, 2, 2) fit best."""
+    look = (Glance(segments_px, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))),)
+    found = (settled(robot, look, p.world_from_robot)[0] for p in proposals(robot, look, (room,), MOST_FITTING))
+    return [place for place in found if are_apart(place, pose)]
+
+
+def anticipate(robot: RobotModel, room: str, pose: Pose2) -> None:
+    """Think of what would be seen there, and at the places that may look alike: the answers are at hand then."""
+    for place in (pose, *places(robot, room, pose)):
+        view_near(robot, place)
+
+
+def view_near(robot: RobotModel, pose: Pose2) -> Floats:
+    """(n, 2, 2) where the lines lie that should be seen from a pose, as they can be from the next pose of a grid."""
+    turned = round(pose.heading_rad / GRID_RAD) % round(math.tau / GRID_RAD)
+    nearest = (round(pose.x_m / GRID_M), round(pose.y_m / GRID_M), turned)
+    key = id(robot.camera), robot.mount.height_m, nearest
+    known: dict[object, tuple[Camera, Floats]] = robot.world.memo.setdefault("views of a grid", {})
+    if key not in known:
+        if len(known) >= KEPT_VIEWS:
+            del known[next(iter(known))]
+        of_grid = Pose2(nearest[0] * GRID_M, nearest[1] * GRID_M, nearest[2] * GRID_RAD)
+        known[key] = robot.camera, view(robot, of_grid).lines_world
+    seen, inside = robot.camera.project_segments(known[key][1], robot.camera_from_world(pose))
+    return np.asarray(seen[inside])
 
 
 def view(robot: RobotModel, pose: Pose2) -> VisibleLines:
@@ -59,13 +113,30 @@ def margin(one: Floats, other: Floats, segments_px: Floats) -> float:
     Only lines count that the other view lacks; of each, what is accounted for beyond a half speaks for its view, what
     is missing beyond a half against it.
     """
-    return _told(one, other, segments_px) - _told(other, one, segments_px)
+    return _margin(_looked_for(one, segments_px), _looked_for(other, segments_px))
 
 
-def _told(view_px: Floats, other_px: Floats, segments_px: Floats) -> float:
-    if not len(view_px):
-        return 0.0
-    lines = np.minimum(np.linalg.norm(view_px[:, 1] - view_px[:, 0], axis=1), LONG_PX) / LINE_PX
-    lacking = 1.0 - np.nan_to_num(coverage(view_px, other_px, ALIKE_PX, ALIKE_RAD)) if len(other_px) else 1.0
-    found = np.nan_to_num(coverage(view_px, segments_px, TOLERANCE_PX, TOLERANCE_RAD)) if len(segments_px) else 0.0
-    return float(np.sum(lines * lacking * (found - 0.5)))
+class _View(NamedTuple):
+    """Lines (n, 2, 2) that a place shows, and what each of them says (n,) if no other place shows it."""
+
+    lines_px: Floats
+    says: Floats
+
+
+def _looked_for(lines_px: Floats, segments_px: Floats) -> _View:
+    lines = np.minimum(np.linalg.norm(lines_px[:, 1] - lines_px[:, 0], axis=1), LONG_PX) / LINE_PX
+    return _View(lines_px, lines * (_covered(lines_px, segments_px, TOLERANCE_PX, TOLERANCE_RAD) - 0.5))
+
+
+def _margin(one: _View, other: _View) -> float:
+    return _told(one, other) - _told(other, one)
+
+
+def _told(view: _View, other: _View) -> float:
+    return float(np.sum(view.says * (1.0 - _covered(view.lines_px, other.lines_px, ALIKE_PX, ALIKE_RAD))))
+
+
+def _covered(lines_px: Floats, by_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
+    if not len(lines_px) or not len(by_px):
+        return np.zeros(len(lines_px))
+    return np.nan_to_num(coverage(lines_px, by_px, tolerance_px, tolerance_rad))

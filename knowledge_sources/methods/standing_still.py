@@ -51,7 +51,7 @@ def obstruction_in(glances: Sequence[Glance], camera: Camera) -> Obstruction | N
 
 def is_opaque(obstruction: Obstruction, seen: Sequence[Floats]) -> bool:
     """Whether of the segments (n, 2, 2) of several looks hardly any lie within its outline."""
-    inside = sum(float(np.sum(_lengths(s) * obstruction.hidden_part(s, -INSIDE_PX))) for s in seen)
+    inside = math.fsum(float(np.sum(_lengths(s) * obstruction.hidden_part(s, -INSIDE_PX))) for s in seen)
     return inside <= MOST_INSIDE * len(seen) * _round(np.array(obstruction.outline_px))
 
 

@@ -10,7 +10,16 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.lookalikes import hardest_to_tell, margin, view
+from knowledge_sources.methods.agreement import coverage
+from knowledge_sources.methods.lookalikes import (
+    GRID_M,
+    GRID_RAD,
+    anticipate,
+    hardest_to_tell,
+    margin,
+    view,
+    view_near,
+)
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
@@ -77,3 +86,27 @@ def test_from_the_middle_of_the_hallway_the_other_way_round_is_told() -> None:
     assert found is not None and found.margin > 1.0
     from_there = hardest_to_tell(ROBOT, view(ROBOT, found.world_from_robot).segments_px, "hallway", here)
     assert from_there is not None and from_there.margin < 0.0
+
+
+@few
+@given(st.integers(0, 2**32 - 1))
+def test_what_can_be_seen_from_near_is_projected_to_where_it_is_seen_from_the_pose(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, y = WORLD.world_from_locale("hallway").apply([rng.uniform(3.0, 18.0), 1.2, 0.0])[:2]
+    pose = Pose2(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
+    of_grid = Pose2(*(round(v / by) * by for v, by in zip(
+        (pose.x_m, pose.y_m, pose.heading_rad), (GRID_M, GRID_M, GRID_RAD), strict=True)))
+    assert view_near(ROBOT, of_grid) == pytest.approx(view(ROBOT, of_grid).segments_px, abs=1e-6)
+    near, exact = view_near(ROBOT, pose), view(ROBOT, pose).segments_px
+    length = np.linalg.norm(exact[:, 1] - exact[:, 0], axis=1)
+    covered = np.nan_to_num(coverage(exact, near, 0.5, 0.06))
+    assert np.sum(length * covered) >= 0.7 * np.sum(length)
+
+
+def test_to_have_thought_of_it_beforehand_changes_no_answer() -> None:
+    here = Pose2(*WORLD.world_from_locale("hallway").apply([7.31, 1.17, 0.0])[:2], 0.013)
+    seen = view(ROBOT, here).segments_px
+    world = load_world(WORLDS / "research_center.toml", details=[])
+    asked = RobotModel(world, ROBOT.camera, ROBOT.mount, ROBOT.actuator)
+    anticipate(asked, "hallway", here @ Pose2(0.02, -0.01, 0.004))
+    assert hardest_to_tell(asked, seen, "hallway", here) == hardest_to_tell(ROBOT, seen, "hallway", here)
