@@ -17,6 +17,7 @@ from blackboard.journal import Decision, Sink
 from harvey.again.reliving import RESUME
 from harvey.again.replay import checked, pictures_of, replayed
 from harvey.again.resume import Remains, is_command
+from harvey.errors import BadInput
 from harvey.hardware.body import Eye, Watching
 from harvey.hardware.mission import HardwareMission
 from harvey.hardware.run import HardwareRun, driven
@@ -35,10 +36,12 @@ def stood_at(run: RunDirectory) -> tuple[float, int]:
     for record in read_records(run.journal) if run.journal.is_file() else ():
         for seen in record.observed:
             value = seen.value if isinstance(seen.value, dict) else {}
-            for key in ("sim_time_s", "when_s"):
-                last_s = max(last_s, float(value.get(key, 0.0)))
-            if seen.type == Frame.__name__:
-                pictures = max(pictures, int(value["number"]) + 1)
+            try:
+                last_s = max(last_s, *(float(value.get(key, 0.0)) for key in ("sim_time_s", "when_s")))
+                pictures = max(pictures, int(value["number"]) + 1) if seen.type == Frame.__name__ else pictures
+            except (KeyError, TypeError, ValueError):
+                raise BadInput(f"{run.journal}: {seen.ref}: expected when it was observed, and a picture's number, got "
+                               f"{seen.value!r}") from None
     return last_s, pictures
 
 
