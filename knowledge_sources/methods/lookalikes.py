@@ -11,6 +11,7 @@ so it can be thought of beforehand, while the robot has yet to look.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from knowledge_sources.methods.repetition import repetitions
 from knowledge_sources.methods.rivals import ALIKE_PX, ALIKE_RAD
 from knowledge_sources.methods.settling import settled
 from world_models.camera import Camera
-from world_models.frames import Pose2
+from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility import VisibleLines, visible_lines
 
@@ -59,8 +60,8 @@ def hardest_to_tell(
     others = [*places(robot, room, pose), *(fitting(robot, segments_px, room, pose) if search else ())]
     if not others:
         return None
-    own = _looked_for(view_near(robot, pose), segments_px)
-    margins = [_margin(own, _looked_for(view_near(robot, other), segments_px)) for other in others]
+    own, *there = (_looked_for(lines_px, segments_px) for lines_px in views_near(robot, (pose, *others)))
+    margins = [_margin(own, other) for other in there]
     least = int(np.argmin(margins))
     return Lookalike(others[least], margins[least])
 
@@ -82,12 +83,20 @@ def fitting(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> l
 
 def anticipate(robot: RobotModel, room: str, pose: Pose2) -> None:
     """Think of what would be seen there, and at the places that may look alike: the answers are at hand then."""
-    for place in (pose, *places(robot, room, pose)):
-        view_near(robot, place)
+    views_near(robot, (pose, *places(robot, room, pose)))
 
 
-def view_near(robot: RobotModel, pose: Pose2) -> Floats:
-    """(n, 2, 2) where the lines lie that should be seen from a pose, as they can be from the next pose of a grid."""
+def views_near(robot: RobotModel, poses: Sequence[Pose2]) -> list[Floats]:
+    """(n, 2, 2) for each pose: where the lines lie that should be seen from it, as they can be from the next of a grid.
+    """
+    lines = [robot.camera_from_world(pose).apply(_seen_near(robot, pose)) for pose in poses]
+    seen, inside = robot.camera.project_segments(np.concatenate(lines).reshape(-1, 2, 3), Pose.identity())
+    ends = np.cumsum([len(some) for some in lines])[:-1]
+    return [some[here] for some, here in zip(np.split(seen, ends), np.split(inside, ends), strict=True)]
+
+
+def _seen_near(robot: RobotModel, pose: Pose2) -> Floats:
+    """(n, 2, 3) the lines [m, world] that can be seen from the pose of a grid that is next to one."""
     turned = round(pose.heading_rad / GRID_RAD) % round(math.tau / GRID_RAD)
     nearest = (round(pose.x_m / GRID_M), round(pose.y_m / GRID_M), turned)
     key = id(robot.camera), robot.mount.height_m, nearest
@@ -97,8 +106,7 @@ def view_near(robot: RobotModel, pose: Pose2) -> Floats:
             del known[next(iter(known))]
         of_grid = Pose2(nearest[0] * GRID_M, nearest[1] * GRID_M, nearest[2] * GRID_RAD)
         known[key] = robot.camera, view(robot, of_grid).lines_world
-    seen, inside = robot.camera.project_segments(known[key][1], robot.camera_from_world(pose))
-    return np.asarray(seen[inside])
+    return known[key][1]
 
 
 def view(robot: RobotModel, pose: Pose2) -> VisibleLines:

@@ -18,7 +18,7 @@ from knowledge_sources.methods.lookalikes import (
     hardest_to_tell,
     margin,
     view,
-    view_near,
+    views_near,
 )
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
@@ -96,8 +96,8 @@ def test_what_can_be_seen_from_near_is_projected_to_where_it_is_seen_from_the_po
     pose = Pose2(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
     of_grid = Pose2(*(round(v / by) * by for v, by in zip(
         (pose.x_m, pose.y_m, pose.heading_rad), (GRID_M, GRID_M, GRID_RAD), strict=True)))
-    assert view_near(ROBOT, of_grid) == pytest.approx(view(ROBOT, of_grid).segments_px, abs=1e-6)
-    near, exact = view_near(ROBOT, pose), view(ROBOT, pose).segments_px
+    assert views_near(ROBOT, [of_grid])[0] == pytest.approx(view(ROBOT, of_grid).segments_px, abs=1e-6)
+    (near,), exact = views_near(ROBOT, [pose]), view(ROBOT, pose).segments_px
     length = np.linalg.norm(exact[:, 1] - exact[:, 0], axis=1)
     covered = np.nan_to_num(coverage(exact, near, 0.5, 0.06))
     assert np.sum(length * covered) >= 0.7 * np.sum(length)
