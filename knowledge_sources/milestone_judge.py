@@ -107,13 +107,14 @@ class MilestoneJudge(Expert):
             len(lines), segments.contrast, agreed, faces, p_false, is_enough, shift_px, tolerance_px)
         if verdict == "verified" and belief is not None:
             other, room = _as_likely(view, robot, before, pose, segments, agreed), belief.value.locale
+            elsewhere = ""
             if other is not None:
-                verdict, reason = "not testable", f"{reason}; but as much agrees at {other.id}"
-                p_false = max(p_false, AS_LIKELY)
+                elsewhere = f"as much agrees at {other.id}"
             elif (p_false > UNMISTAKABLE and (in_doubt or not followed)
                   and _may_be_elsewhere(robot, segments.segments_px, room, pose, p_false)):
-                verdict, reason = "not testable", f"{reason}; but it may be another door of {room}, or its other side"
-                p_false = max(p_false, AS_LIKELY)
+                elsewhere = f"it may be another door of {room}, or its other side"
+            if elsewhere:
+                verdict, reason, p_false = "not testable", f"{reason}; but {elsewhere}", max(p_false, AS_LIKELY)
         residuals = fix.value.residuals_px[fix.value.inliers]
         return Certificate(
             milestone=milestone.id,

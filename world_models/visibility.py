@@ -118,15 +118,12 @@ def visible_lines(
     for the sketch above.
     """
     wanted = None if locales is None else tuple(sorted(locales))
-    key = (id(camera), camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes(), wanted,
+    key = (camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes(), wanted,
            min_length_px, min_contrast, min_separation_px, max_distance_m)
-    known: dict[object, tuple[Camera, VisibleLines]] = world.memo.setdefault("visible lines", {})
-    if key not in known:
-        if len(known) >= KEPT_VIEWS:
-            del known[next(iter(known))]
-        known[key] = camera, _visible_lines(world, camera, camera_from_world, locales, min_length_px, min_contrast,
-                                            min_separation_px, max_distance_m)
-    return known[key][1]
+    return world.remembered(
+        "visible lines", KEPT_VIEWS, key,
+        lambda: _visible_lines(world, camera, camera_from_world, locales, min_length_px, min_contrast,
+                               min_separation_px, max_distance_m))
 
 
 def _visible_lines(

@@ -7,9 +7,9 @@ they are asked for, so that a robot in a room touches the room. The attributes t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import networkx as nx
 import numpy as np
@@ -26,6 +26,8 @@ from world_models.scene import Scene, build_scene, joined_scene
 from world_models.things import Fault, Thing
 
 __all__ = ["Fault", "Thing", "World"]
+
+T = TypeVar("T")
 
 NEAR_FLOOR_M = 0.5
 """A camera so far above a room's ceiling, or below its floor, may still be in its doorway."""
@@ -50,6 +52,15 @@ class World:
         self._landmarks: dict[int, Landmark] = {}
         self._scenes: dict[tuple[str, ...], Scene] = {}
         self.memo: dict[str, Any] = {}
+
+    def remembered(self, what: str, most: int, key: Hashable, make: Callable[[], T]) -> T:
+        """What was made for a key, made now unless it is among the last ``most`` of its kind."""
+        known: dict[Hashable, T] = self.memo.setdefault(what, {})
+        if key not in known:
+            if len(known) >= most:
+                del known[next(iter(known))]
+            known[key] = make()
+        return known[key]
 
     @property
     def root(self) -> str:

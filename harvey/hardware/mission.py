@@ -136,9 +136,7 @@ def load_mission(path: Path | None, settings: Mapping[str, Any]) -> HardwareMiss
     """
     try:
         source = Source("the options", {}, {}) if path is None else Source.read(path)
-        data = dict(source.data)
-        for key, value in settings.items():
-            data = _replaced(data, key, value)
+        data = _with(source.data, settings)
         folder = Path() if path is None else path.parent
         return _mission(Source(source.name, data, source.lines).root, "drive" if path is None else path.stem, folder)
     except WorldError as error:
@@ -148,10 +146,7 @@ def load_mission(path: Path | None, settings: Mapping[str, Any]) -> HardwareMiss
 def mission_again(head: RunHead, settings: Mapping[str, Any]) -> HardwareMission:
     """The mission of a run that was begun on hardware, with some settings replaced; see :func:`load_mission`."""
     try:
-        data = dict(head.scenario)
-        for key, value in settings.items():
-            data = _replaced(data, key, value)
-        return _mission(Source("run.json", data, {}).root, head.name, Path(head.folder))
+        return _mission(Source("run.json", _with(head.scenario, settings), {}).root, head.name, Path(head.folder))
     except WorldError as error:
         raise BadInput(str(error)) from None
 
@@ -159,6 +154,13 @@ def mission_again(head: RunHead, settings: Mapping[str, Any]) -> HardwareMission
 def keys() -> tuple[str, ...]:
     """Every key that may be set."""
     return ("world", "goal", *(f"{name}.{key}" for name, kind in SECTIONS.items() for key in known_keys(kind)))
+
+
+def _with(tables: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    data = dict(tables)
+    for key, value in settings.items():
+        data = _replaced(data, key, value)
+    return data
 
 
 def _replaced(data: dict[str, Any], key: str, value: Any) -> dict[str, Any]:

@@ -23,7 +23,6 @@ from knowledge_sources.methods.proposals import are_apart, proposals
 from knowledge_sources.methods.repetition import repetitions
 from knowledge_sources.methods.rivals import ALIKE_PX, ALIKE_RAD
 from knowledge_sources.methods.settling import settled
-from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility import VisibleLines, visible_lines
@@ -60,8 +59,8 @@ def hardest_to_tell(
     others = [*places(robot, room, pose), *(fitting(robot, segments_px, room, pose) if search else ())]
     if not others:
         return None
-    own, *there = (_looked_for(lines_px, segments_px) for lines_px in views_near(robot, (pose, *others)))
-    margins = [_margin(own, other) for other in there]
+    own, *there = (looked_for(lines_px, segments_px) for lines_px in views_near(robot, (pose, *others)))
+    margins = [margin(own, other) for other in there]
     least = int(np.argmin(margins))
     return Lookalike(others[least], margins[least])
 
@@ -99,14 +98,9 @@ def _seen_near(robot: RobotModel, pose: Pose2) -> Floats:
     """(n, 2, 3) the lines [m, world] that can be seen from the pose of a grid that is next to one."""
     turned = round(pose.heading_rad / GRID_RAD) % round(math.tau / GRID_RAD)
     nearest = (round(pose.x_m / GRID_M), round(pose.y_m / GRID_M), turned)
-    key = id(robot.camera), robot.mount.height_m, nearest
-    known: dict[object, tuple[Camera, Floats]] = robot.world.memo.setdefault("views of a grid", {})
-    if key not in known:
-        if len(known) >= KEPT_VIEWS:
-            del known[next(iter(known))]
-        of_grid = Pose2(nearest[0] * GRID_M, nearest[1] * GRID_M, nearest[2] * GRID_RAD)
-        known[key] = robot.camera, view(robot, of_grid).lines_world
-    return known[key][1]
+    of_grid = Pose2(nearest[0] * GRID_M, nearest[1] * GRID_M, nearest[2] * GRID_RAD)
+    return robot.world.remembered("views of a grid", KEPT_VIEWS, (robot.camera, robot.mount.height_m, nearest),
+                                  lambda: view(robot, of_grid).lines_world)
 
 
 def view(robot: RobotModel, pose: Pose2) -> VisibleLines:
@@ -115,32 +109,29 @@ def view(robot: RobotModel, pose: Pose2) -> VisibleLines:
                          min_contrast=CONTRAST, max_distance_m=SIGHT_M)
 
 
-def margin(one: Floats, other: Floats, segments_px: Floats) -> float:
-    """By how many lines segments (k, 2, 2) speak rather for one view (n, 2, 2) than for another (m, 2, 2).
-
-    Only lines count that the other view lacks; of each, what is accounted for beyond a half speaks for its view, what
-    is missing beyond a half against it.
-    """
-    return _margin(_looked_for(one, segments_px), _looked_for(other, segments_px))
-
-
-class _View(NamedTuple):
+class LookedFor(NamedTuple):
     """Lines (n, 2, 2) that a place shows, and what each of them says (n,) if no other place shows it."""
 
     lines_px: Floats
     says: Floats
 
 
-def _looked_for(lines_px: Floats, segments_px: Floats) -> _View:
+def looked_for(lines_px: Floats, segments_px: Floats) -> LookedFor:
+    """A view (n, 2, 2) held against segments (k, 2, 2): of each line, what is accounted for beyond a half speaks for
+    its view, what is missing beyond a half against it.
+    """
     lines = np.minimum(np.linalg.norm(lines_px[:, 1] - lines_px[:, 0], axis=1), LONG_PX) / LINE_PX
-    return _View(lines_px, lines * (_covered(lines_px, segments_px, TOLERANCE_PX, TOLERANCE_RAD) - 0.5))
+    return LookedFor(lines_px, lines * (_covered(lines_px, segments_px, TOLERANCE_PX, TOLERANCE_RAD) - 0.5))
 
 
-def _margin(one: _View, other: _View) -> float:
+def margin(one: LookedFor, other: LookedFor) -> float:
+    """By how many lines the same segments speak rather for one view than for another: only lines count that the other
+    view lacks.
+    """
     return _told(one, other) - _told(other, one)
 
 
-def _told(view: _View, other: _View) -> float:
+def _told(view: LookedFor, other: LookedFor) -> float:
     return float(np.sum(view.says * (1.0 - _covered(view.lines_px, other.lines_px, ALIKE_PX, ALIKE_RAD))))
 
 

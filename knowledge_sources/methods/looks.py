@@ -79,12 +79,8 @@ def expected_looks(robot: RobotModel, pose: Pose2) -> tuple[Look, ...]:
     """The faces in view from a pose, those first of which most is seen; asked again soon, the answer is at hand."""
     camera, camera_from_world = robot.camera, robot.camera_from_world(pose)
     key = camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes()
-    known: dict[object, tuple[Look, ...]] = robot.world.memo.setdefault("expected looks", {})
-    if key not in known:
-        if len(known) >= KEPT_VIEWS:
-            del known[next(iter(known))]
-        known[key] = _expected_looks(robot, camera, camera_from_world)
-    return known[key]
+    return robot.world.remembered(
+        "expected looks", KEPT_VIEWS, key, lambda: _expected_looks(robot, camera, camera_from_world))
 
 
 def _expected_looks(robot: RobotModel, camera: Camera, camera_from_world: Pose) -> tuple[Look, ...]:

@@ -10,13 +10,14 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
+from knowledge_sources.methods import lookalikes
 from knowledge_sources.methods.agreement import coverage
 from knowledge_sources.methods.lookalikes import (
     GRID_M,
     GRID_RAD,
     anticipate,
     hardest_to_tell,
-    margin,
+    looked_for,
     view,
     views_near,
 )
@@ -32,6 +33,11 @@ WORLD = load_world(WORLDS / "research_center.toml", details=[])
 ROBOT = RobotModel(WORLD, Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1), ActuatorModel())
 NONE = np.zeros((0, 2, 2))
 few = settings(max_examples=40, deadline=None)
+
+
+def margin(one: Floats, other: Floats, seen: Floats) -> float:
+    """Of two views, by what was seen."""
+    return lookalikes.margin(looked_for(one, seen), looked_for(other, seen))
 
 
 @st.composite

@@ -8,6 +8,7 @@ from blackboard.journal import Decision
 from harvey.experiments.short_missions import HALLWAY, fault
 from harvey.mission import run_mission
 from sim.assembly import set_stage
+from sim.faults import Occlusion
 from sim.scenario import parse_scenario
 from world_models.obstruction import Obstruction
 from world_models.task import Milestone
@@ -35,5 +36,5 @@ def test_it_finds_what_is_before_its_camera_and_looks_past_it() -> None:
     grid = np.stack(np.meshgrid(np.arange(512.0), np.arange(512.0)), axis=-1)
     said = known[-1].covers(grid)
     true = stage.scenario.faults[0]
-    assert abs(np.mean(said) - true.part) < 0.02  # type: ignore[union-attr]
+    assert isinstance(true, Occlusion) and abs(np.mean(said) - true.part) < 0.02
     assert behind and all(np.all(part <= 0.3) for part in behind)
