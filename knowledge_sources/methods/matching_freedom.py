@@ -20,8 +20,12 @@ from world_models.frames import Pose, Pose2, frozen, wrap_angle
 Array = NDArray[np.float64]
 Widths = tuple[float, ...]
 
-GRID = (-2.0, -1.0, 0.0, 1.0, 2.0)
-"""Starts along each axis of a floor's prior, in its deviations."""
+GRID_SIGMAS = 2.0
+"""So many deviations to either side of a floor's prior there are starts."""
+GRID_PX = 20.0
+"""And about so far apart in the picture, that the loss may draw what lies between two of them to one."""
+GRID_SIDE = 3
+"""And so many to a side of an axis, at the most."""
 STARTS = 128
 """Starts spread over a prior in space, beside the prior itself."""
 
@@ -43,10 +47,9 @@ class Freedom(ABC):
     first_widths: ClassVar[Widths]
     later_widths: ClassVar[tuple[Widths, ...]]
 
-    @property
     @abstractmethod
-    def starts(self) -> Array:
-        """(s, d) where to start from, in deviations."""
+    def starts(self, reach_px: Array) -> Array:
+        """(s, d) where to start from, in deviations, given how far one along each axis moves the picture (d,) [px]."""
 
     @abstractmethod
     def basis(self, pose: Pose) -> Array:
@@ -68,8 +71,7 @@ class InSpace(Freedom):
     first_widths = (16.0, 12.0, 8.0, 6.0)
     later_widths = ((6.0,), (4.0,), (3.0,), (2.0,))
 
-    @property
-    def starts(self) -> Array:
+    def starts(self, reach_px: Array) -> Array:
         return _spread()
 
     def basis(self, pose: Pose) -> Array:
@@ -95,9 +97,8 @@ class OnFloor(Freedom):
     first_widths = (16.0, 12.0, 8.0)
     later_widths = ((6.0, 4.0, 3.0, 2.0),)
 
-    @property
-    def starts(self) -> Array:
-        return _grid()
+    def starts(self, reach_px: Array) -> Array:
+        return _grid(tuple(min(round(GRID_SIGMAS * reach / GRID_PX + 0.25), GRID_SIDE) for reach in reach_px.tolist()))
 
     def robot(self, pose: Pose) -> Pose2:
         """``world_from_robot`` of a camera pose."""
@@ -142,10 +143,11 @@ def on_floor(mount: Pose, prior: Pose2, covariance: Any) -> OnFloor:
     return OnFloor(seen, np.linalg.inv(spread), np.linalg.cholesky(spread), mount, turning)
 
 
-@lru_cache(maxsize=1)
-def _grid() -> Array:
-    """(125, 3) every combination of :data:`GRID`."""
-    return frozen(np.stack(np.meshgrid(GRID, GRID, GRID, indexing="ij"), axis=-1).reshape(-1, 3))
+@lru_cache(maxsize=(GRID_SIDE + 1) ** 3)
+def _grid(sides: tuple[int, ...]) -> Array:
+    """(s, 3) every combination of so many steps to either side of each axis."""
+    axes = [GRID_SIGMAS * np.arange(-side, side + 1) / max(side, 1) for side in sides]
+    return frozen(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes)))
 
 
 @lru_cache(maxsize=1)

@@ -21,7 +21,7 @@ BESIDE_PX = 20.0
 """A data line that lies further than this past a model line's end supports nothing."""
 FARTHEST = 25.0
 """Pairs whose mean square distance is more than so many squared widths do not pull at all."""
-FINALISTS = 12
+FINALISTS = 8
 SEARCHED = 4
 
 
@@ -30,7 +30,8 @@ def settled_poses(scene: PosedScene, wide: PosedPairs) -> list[Pose]:
     freedom = scene.freedom
     if not len(wide.model):
         return [freedom.prior]
-    starts = freedom.starts @ freedom.root.T
+    reach_px = np.median(np.sqrt(np.mean((wide.slopes @ freedom.root) ** 2, axis=1)), axis=0)
+    starts = freedom.starts(reach_px) @ freedom.root.T
     steps, support = _settled(wide, starts, freedom.information, np.zeros(starts.shape[1]), freedom.first_widths)
     poses = [freedom.moved(freedom.prior, steps[i]) for i in _distinct(steps, support, FINALISTS, scene)]
     exact = [_settled_exactly(scene, wide, pose, freedom.later_widths) for pose in poses]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching_fit import step_fits
-from knowledge_sources.methods.matching_freedom import Freedom, in_space, on_floor
+from knowledge_sources.methods.matching_freedom import GRID_PX, GRID_SIDE, GRID_SIGMAS, Freedom, in_space, on_floor
 from knowledge_sources.methods.matching_posed_pairs import pairs_at, posed_scene
 from knowledge_sources.methods.pose.image_error import image_jacobian
 from knowledge_sources.methods.pose.lines import line_set
@@ -72,6 +72,20 @@ def test_a_robot_on_the_floor_stays_on_it(seed: int) -> None:
     seen = floor.moved(floor.prior, step).inverse() @ MOUNT
     expected = Pose2(robot.x_m + step[0], robot.y_m + step[1], robot.heading_rad + step[2]).lifted()
     assert apart(seen, expected) < 1e-9
+
+
+@some
+@given(seeds, st.tuples(*[st.floats(0.0, 200.0)] * 3))
+def test_starts_on_a_floor_leave_no_gap_in_the_picture(seed: int, reach_px: tuple[float, float, float]) -> None:
+    starts = freedoms(np.random.default_rng(seed))[0].starts(np.array(reach_px))
+    assert len(np.unique(starts, axis=0)) == len(starts) <= (2 * GRID_SIDE + 1) ** 3
+    assert 0.0 in np.abs(starts).sum(axis=1)
+    for axis, reach in zip(starts.T, reach_px, strict=True):
+        places_px = np.unique(axis) * reach
+        np.testing.assert_allclose(places_px, -places_px[::-1])
+        assert GRID_SIGMAS * reach - places_px[-1] <= 0.25 * GRID_PX
+        if len(places_px) <= 2 * GRID_SIDE:
+            assert np.all(np.diff(places_px) <= 1.25 * GRID_PX + 1e-9)
 
 
 @some

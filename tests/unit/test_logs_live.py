@@ -18,7 +18,7 @@ from logs.reader import read_decisions, read_frames
 from logs.sink import Recorder
 from rehearsal import CAMERA, MOUNT, house, play
 
-PATIENCE_S = 30.0
+PATIENCE_S = 300.0
 
 
 def free_port() -> int:
