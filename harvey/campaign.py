@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,7 +69,8 @@ def seeds_of(text: str) -> tuple[int, ...]:
         match = re.fullmatch(r"(\d{1,9})(?:\.\.(\d{1,9}))?", part.strip(), re.ASCII)
         first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
         if last < first or last - first >= MOST_SEEDS:
-            raise BadInput(f"--seed: expected a number, a range as 0..19 or a list as 1,4,9, got {text!r}")
+            raise BadInput("--seed: expected a number from 0 to 999999999, a range as 0..19 or a list as 1,4,9,"
+                           f" of {MOST_SEEDS} at most, got {text!r}")
         seeds += range(first, last + 1)
     return tuple(dict.fromkeys(seeds))
 
@@ -94,8 +96,17 @@ def run_task(
     shown = (tally, follow(tally)) if follow else ()
     if task.go_on and task.out is not None and (task.out / "run.json").exists():
         return _kept_or_resumed(RunDirectory(task.out), task, stage, (*shown, *sinks), live)
-    out = None if task.out is None else new_run(task.out)
+    out = None if task.out is None else room_for(task.out, stage.scenario.name, task.seed)
     return run_mission(stage, task.seed, out=out, sinks=(*shown, *sinks), live=live, body=task.body)
+
+
+def room_for(out: Path, name: str, seed: int) -> Path:
+    """An empty directory for a run; says so where a run of something else had to be moved aside. Raises BadInput."""
+    path, aside = new_run(out, name, seed)
+    if aside is not None:
+        print(f"--out {out}: the run that was there is of another scenario or seed; it is kept in {aside}",
+              file=sys.stderr)
+    return path
 
 
 def _kept_or_resumed(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence[Sink], live: bool) -> MissionResult:

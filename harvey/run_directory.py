@@ -12,6 +12,7 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,16 @@ RUNS = Path("runs")
 """Where runs are kept unless ``--out`` says otherwise."""
 
 FILES = ("run.json", "journal.jsonl", "camera.mjpeg", "recording.rrd", "result.json")
+
+RESULT: Mapping[str, tuple[Any, str]] = {
+    "scenario": (str, "a text"),
+    "outcome": (str, "a text"),
+    "seed": (int, "a number"),
+    "milestones": (dict, "an object"),
+    **dict.fromkeys(("decisions", "collisions", "replans", "relocalizations"), (int | None, "a number")),
+    **dict.fromkeys(("final_error_m", "sim_time_s", "path_length_m"), (int | float | None, "a number")),
+}
+"""Keys of ``result.json`` that others read, with the JSON types that they have; null is what nobody knows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +68,9 @@ class RunDirectory:
             raise BadInput(f"{self.result}: expected JSON, got: {error}") from None
         if not isinstance(data, dict):
             raise BadInput(f"{self.result}: expected a JSON object, got {type(data).__name__}")
+        for key, (kind, named) in RESULT.items():
+            if key in data and not isinstance(data[key], kind):
+                raise BadInput(f"{self.result}: {key}: expected {named}, got {json.dumps(data[key])}")
         return data
 
     def write_result(self, record: Mapping[str, Any]) -> None:
@@ -74,23 +88,54 @@ def vacant(path: Path) -> Path:
     """A place where a run may be written: nothing, or an older run. Raises BadInput where there is anything else."""
     try:
         here = next(p for p in (path, *path.parents) if p.exists())
-        others = sorted(p.name for p in here.iterdir() if p.name not in FILES)
+        names = {p.name for p in here.iterdir()}
     except OSError as error:
         raise BadInput(f"--out {path}: expected a directory, got: {error.strerror}") from None
+    others = sorted(names.difference(FILES))
     if others and here == path:
         raise BadInput(f"--out {path}: expected a new directory or an older run's, got one with {others[0]!r}")
+    if "journal.jsonl" in names and here != path:
+        raise BadInput(f"--out {path}: expected a directory outside of runs, got one in the run {here}")
     return path
 
 
-def new_run(path: Path) -> Path:
-    """Make room for a run: an older run there goes. Raises BadInput where that cannot be."""
+def new_run(path: Path, name: str, seed: int) -> tuple[Path, Path | None]:
+    """Make room for a run of a scenario and seed.
+
+    An older run of the same goes; one of another scenario or seed is moved aside, since nobody asked to do that again.
+
+    Returns:
+        where the run may be written, and where the older one is now, if it is kept.
+
+    Raises:
+        BadInput: that cannot be.
+    """
     try:
         vacant(path).mkdir(parents=True, exist_ok=True)
-        for name in FILES:
-            (path / name).unlink(missing_ok=True)
+        aside = None if _is_of(path, name, seed) else _free_beside(path)
+        if aside is not None:
+            path.rename(aside)
+            path.mkdir()
+        for file in FILES:
+            (path / file).unlink(missing_ok=True)
     except OSError as error:
         raise BadInput(f"--out {path}: expected a directory to write to, got: {error.strerror}") from None
-    return path
+    return path, aside
+
+
+def _is_of(path: Path, name: str, seed: int) -> bool:
+    """Whether what is there may go: an older run of this scenario and seed, or nothing that tells of a run."""
+    try:
+        head = json.loads((path / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return not (path / "journal.jsonl").exists()
+    return isinstance(head, dict) and (head.get("name"), head.get("seed")) == (name, seed)
+
+
+def _free_beside(path: Path) -> Path:
+    """The first name beside a directory that nothing has: ``runs/try-older-1``."""
+    there = path if path.name not in ("", "..") else path.resolve()
+    return next(p for n in count(1) if not (p := there.with_name(f"{there.name}-older-{n}")).exists())
 
 
 def open_run(text: str, needed: str = "journal.jsonl") -> RunDirectory:
@@ -99,16 +144,23 @@ def open_run(text: str, needed: str = "journal.jsonl") -> RunDirectory:
     Raises:
         BadInput: there is none (near ones are listed), or it lacks the needed file.
     """
-    path = next((p for p in (Path(text), RUNS / text) if p.exists()), None)
-    if path is None:
-        raise BadInput(f"expected a run directory{_near(text)}, got {text!r}, which does not exist")
-    run = RunDirectory(path if path.is_dir() else path.parent)
+    run = RunDirectory(named_directory(text))
     inner = sorted(str(p.parent) for p in run.path.glob("*/journal.jsonl"))
     if inner and not run.journal.exists():
         raise BadInput(f"expected one run, got {text!r}, which holds {len(inner)} of them, as {inner[0]}")
     if not (run.path / needed).is_file():
         raise BadInput(f"expected a run directory with a {needed}, got {text!r}, which has none")
     return run
+
+
+def named_directory(text: str) -> Path:
+    """The directory that a user names, as it is or under ``runs/``, or by a run's file in it. Raises BadInput."""
+    path = next((p for p in (Path(text), RUNS / text) if p.exists()), None)
+    if path is None:
+        raise BadInput(f"expected a run directory{_near(text)}, got {text!r}, which does not exist")
+    if not path.is_dir() and path.name not in FILES:
+        raise BadInput(f"expected a run directory or a file of one ({', '.join(FILES)}), got {text!r}")
+    return path if path.is_dir() else path.parent
 
 
 def _near(text: str) -> str:

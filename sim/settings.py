@@ -71,10 +71,15 @@ def _value(item: Node, hint: Any, factor: float) -> Any:
     return item.number(-1e9, 1e9) * factor
 
 
+FEW = 12
+"""So many keys are named where none is similar."""
+
+
 def near(key: str, known: Iterable[str]) -> str:
-    """What to say was expected instead of an unknown key: the most similar ones, or all."""
+    """What to say was expected instead of an unknown key: the most similar ones, or all, or how many there are."""
     names = list(known)
-    return "one of " + ", ".join(difflib.get_close_matches(key, names, n=4, cutoff=0.5) or names)
+    alike = difflib.get_close_matches(key, names, n=4, cutoff=0.5) or names[:FEW]
+    return "one of " + ", ".join(alike) + (f" ... ({len(names)} in all)" if len(names) > len(alike) == FEW else "")
 
 
 def parsed(text: str) -> Any:

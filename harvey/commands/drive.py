@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_directory import RUNS, new_run, vacant
+from harvey.run_directory import RUNS, vacant
 
 if TYPE_CHECKING:
     from blackboard.journal import Decision
@@ -43,6 +43,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 def _run(args: Namespace) -> int:
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
+    from harvey.campaign import room_for
     from harvey.hardware.dry_run import DryRun
 
     mission = _mission(args)
@@ -58,7 +59,7 @@ def _run(args: Namespace) -> int:
         if args.dry_run:
             print("\neverything is ready; nothing was moved")
             return 0
-        return _drive(mission, dry, clock, new_run(out), args.live)
+        return _drive(mission, dry, clock, room_for(out, mission.name, 0), args.live)
 
 
 def checked(dry: DryRun) -> bool:

@@ -31,5 +31,7 @@ COMMAND = Command(
         ("harvey experiment levels --json", "for further use"),
     ),
     _arguments, _run,
-    "Exit code 0 where the experiment's claims hold, 1 where they do not.",
+    "Exit code 0 where the experiment's claims hold, 1 where they do not. With --json one object is printed: title,\n"
+    "rows (the cells by their columns; beside them paper, peer and ours: a figure, several by name, or null), notes\n"
+    "and claims.",
 )

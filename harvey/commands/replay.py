@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harvey.campaign import settings_of
+from harvey.campaign import room_for, settings_of
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_directory import RunDirectory, new_run, open_run
+from harvey.run_directory import RunDirectory, open_run
 from harvey.units import count
 
 if TYPE_CHECKING:
@@ -45,13 +45,23 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
     from harvey.again.counterfactual import what_if
     from harvey.again.counterfactual_words import told
 
-    out = RunDirectory(new_run(Path(args.out))) if args.out else None
+    out = _kept_in(Path(args.out), run) if args.out else None
     answer = what_if(run, args.without, settings, out=out, go_on=not args.record_only)
     print("\n".join(told(answer, run, [*(f"without {name}" for name in args.without),
                                        *(f"with {key} = {value}" for key, value in settings)])))
     if out is not None:
         print(f"\nit is kept in {out.path}; compare with    harvey diff {run.path} {out.path}")
     return 0
+
+
+def _kept_in(path: Path, run: RunDirectory) -> RunDirectory:
+    """Where what would have been is kept. Raises BadInput where that is the run itself."""
+    from harvey.run_head import RunHead
+
+    if path.resolve() == run.path.resolve():
+        raise BadInput(f"--out {path}: expected another directory than the run's own")
+    head = RunHead.read(run.path)
+    return RunDirectory(room_for(path, head.name, head.seed))
 
 
 def _again(run: RunDirectory) -> int:

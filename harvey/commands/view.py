@@ -12,7 +12,7 @@ from pathlib import Path
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_directory import RUNS, RunDirectory, open_run
+from harvey.run_directory import RunDirectory, named_directory, open_run
 
 OVERVIEW = "overview.rrd"
 
@@ -25,7 +25,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    if len(args.runs) == 1 and not _is_campaign(_directory(args.runs[0])):
+    if len(args.runs) == 1 and not _is_campaign(named_directory(args.runs[0])):
         if args.save:
             raise BadInput("--save: expected several runs, or a directory of them, got one run")
         return _open(_whole(open_run(args.runs[0], "recording.rrd")))
@@ -47,15 +47,9 @@ def _whole(run: RunDirectory) -> Path:
     return run.recording
 
 
-def _directory(text: str) -> Path:
-    """What a user names, as it is or under ``runs/``; the directory of a file."""
-    path = next((p for p in (Path(text), RUNS / text) if p.exists()), Path(text))
-    return path if path.is_dir() else path.parent
-
-
 def _runs(text: str) -> list[RunDirectory]:
     """One run, or all runs of a directory in the order of their numbers. Raises BadInput where there is none."""
-    here = _directory(text)
+    here = named_directory(text)
     if not _is_campaign(here):
         return [open_run(text)]
     return [RunDirectory(path) for path in sorted((p.parent for p in here.glob("*/journal.jsonl")), key=_natural)]
@@ -84,7 +78,7 @@ def _write(runs: list[RunDirectory], overview: Path) -> None:
     files = [RunFiles(run.path.name if unique else str(run.path), run.recording, run.read_result()) for run in runs]
     print(f"reading {len(files)} recordings", file=sys.stderr, flush=True)
     for line in write_overview(files, overview, overview.parent.name or "runs"):
-        print(f"left out: {line}", file=sys.stderr)
+        print(f"only its result is shown: {line}", file=sys.stderr)
 
 
 def _open(recording: Path) -> int:

@@ -33,14 +33,15 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    asked = [name for name in ("entry", "milestone", "not_") if getattr(args, name)] + ["--check"] * args.check
+    asked = [name for name in ("entry", "milestone", "not_") if getattr(args, name) is not None]
+    asked += ["--check"] * args.check
     if len(asked) + (args.at is not None and not args.not_) > 1:
         raise BadInput("expected one of ENTRY, --at, --milestone, --not and --check; --not also goes with --at")
     run = open_run(args.run)
     history = JournalHistory(run.journal)
     if args.check:
         return _checked(history, args.json)
-    if args.not_:
+    if args.not_ is not None:
         _print_not(run, history, args)
         return 0
     refs = _refs(history, args)
@@ -53,7 +54,7 @@ def _run(args: Namespace) -> int:
 
 def _refs(history: History, args: Namespace) -> list[str]:
     """What is to be explained."""
-    if args.milestone:
+    if args.milestone is not None:
         return []
     if args.at is None:
         return [history.named(args.entry) if args.entry else history.outcome()]
@@ -61,7 +62,7 @@ def _refs(history: History, args: Namespace) -> list[str]:
 
 
 def _stories(history: History, args: Namespace, refs: Iterable[str]) -> Iterator[Story]:
-    if args.milestone:
+    if args.milestone is not None:
         from harvey.explain.milestone import milestone_story, milestones
 
         yield from (milestone_story(history, id) for id in milestones(history, args.milestone))

@@ -13,6 +13,11 @@ WIDTH = 120
 Cell = str | int | float | None
 """None is shown as a dash: nobody has measured it."""
 
+SIDES: Mapping[str, tuple[str, ...]] = {
+    "paper": ("paper", "literature"), "peer": ("peer", "py_trees", "clips", "networkx"), "ours": (),
+}
+"""Whose figures a column holds, by a word in its name; ours where there is none of these."""
+
 
 @dataclass(frozen=True, slots=True)
 class Report:
@@ -50,13 +55,33 @@ class Report:
         return "\n".join([self.title, "", shown, *([""] if words else []), *words])
 
     def record(self) -> Mapping[str, Any]:
-        """As JSON types."""
+        """As JSON types: a row has its cells by the names of their columns, and ``paper``, ``peer`` and ``ours``.
+
+        Each of these three is a figure, or the figures of several columns by their names, or null.
+        """
         return {
             "title": self.title,
-            "rows": [dict(zip(self.columns, row, strict=True)) for row in self.rows],
+            "rows": [self._row(dict(zip(self.columns, row, strict=True))) for row in self.rows],
             "notes": list(self.notes),
             "claims": [{"claim": claim, "holds": held} for claim, held in self.claims],
         }
+
+
+    def _row(self, cells: Mapping[str, Cell]) -> Mapping[str, Any]:
+        what, *measured = self.columns
+        sides: dict[str, dict[str, Cell]] = {side: {} for side in SIDES}
+        for column in measured:
+            sides[_side_of(column)][column] = cells[column]
+        return {"what": cells[what], **{side: _alone(figures) for side, figures in sides.items()}, **cells}
+
+
+def _side_of(column: str) -> str:
+    name = column.lower()
+    return next((side for side, words in SIDES.items() if any(word in name for word in words)), "ours")
+
+
+def _alone(figures: Mapping[str, Cell]) -> Cell | Mapping[str, Cell]:
+    return dict(figures) if len(figures) > 1 else next(iter(figures.values()), None)
 
 
 def _shown(cell: Cell) -> str:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from harvey.cli import main
 from harvey.commands import COMMANDS
+from harvey.run_directory import new_run
 from sim.scenario import SCENARIOS
 from world_models.task import Outcome
 
@@ -163,6 +164,60 @@ def test_a_run_does_not_overwrite_other_things(tmp_path: Path, capsys: pytest.Ca
         assert code == 2
         assert "thesis.tex" in err
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
+
+
+def headed(folder: Path, name: str, seed: int) -> str:
+    """A run directory that says of what scenario and seed it is."""
+    (Path(journalled(folder, json.dumps(DECISION))) / "run.json").write_text(json.dumps({"name": name, "seed": seed}))
+    return str(folder)
+
+
+def test_a_run_of_something_else_is_moved_aside_and_one_of_the_same_goes(tmp_path: Path) -> None:
+    headed(tmp_path / "kept", "bump", 3)
+    assert new_run(tmp_path / "kept", "bump", 4) == (tmp_path / "kept", tmp_path / "kept-older-1")
+    headed(tmp_path / "kept", "hallway-kidnap", 4)
+    assert new_run(tmp_path / "kept", "bump", 4) == (tmp_path / "kept", tmp_path / "kept-older-2")
+    headed(tmp_path / "kept", "bump", 4)
+    assert new_run(tmp_path / "kept", "bump", 4) == (tmp_path / "kept", None)
+    assert not any((tmp_path / "kept").iterdir())
+    for number, name in ((1, "bump"), (2, "hallway-kidnap")):
+        assert json.loads((tmp_path / f"kept-older-{number}" / "run.json").read_text())["name"] == name
+        assert (tmp_path / f"kept-older-{number}" / "journal.jsonl").exists()
+
+
+def test_no_run_is_put_into_another(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = headed(tmp_path / "one", "bump", 0)
+    code, err = said(capsys, ["run", "bump", "--seed", "0..1", "--out", run])
+    assert code == 2 and f"got one in the run {run}" in err
+
+
+def test_what_would_have_been_does_not_replace_what_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = headed(tmp_path / "one", "bump", 0)
+    code, err = said(capsys, ["replay", run, "--set", "servo.plan=off", "--out", f"{run}/../one"])
+    assert code == 2 and "another directory" in err
+    assert (tmp_path / "one" / "journal.jsonl").exists()
+
+
+@pytest.mark.parametrize("command", ["view", "why", "replay", "resume"])
+def test_what_is_no_run_is_not_taken_for_its_neighbours(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    headed(tmp_path / "one", "bump", 0)
+    code, err = said(capsys, [command, str(tmp_path / "oen")])
+    assert code == 2 and "does not exist" in err
+    (tmp_path / "notes.txt").write_text("of my own")
+    code, err = said(capsys, [command, str(tmp_path / "notes.txt")])
+    assert code == 2 and "expected a run directory or a file of one" in err
+
+
+@pytest.mark.parametrize(("key", "value"), [("milestones", 3), ("outcome", 7), ("final_error_m", "far")])
+def test_a_result_of_other_types_is_named(
+    key: str, value: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = [headed(tmp_path / name, "bump", 0) for name in ("one", "two")]
+    (tmp_path / "one" / "result.json").write_text(json.dumps({key: value}))
+    code, err = said(capsys, ["view", *runs, "--save", str(tmp_path / "both.rrd")])
+    assert code == 2 and f"{tmp_path / 'one' / 'result.json'}: {key}: expected" in err
 
 
 def test_a_recording_is_not_opened_where_there_is_no_screen(

@@ -99,9 +99,18 @@ def test_a_report_holds_when_all_its_claims_do() -> None:
     report = Report("t", ("what", "paper", "ours"), (("x", None, 0.123456),), claims=(("a", True), ("b", False)))
     assert not report.holds
     assert "0.1235" in report.text() and "FAILS: b" in report.text()
-    assert report.record()["rows"] == [{"what": "x", "paper": None, "ours": 0.123456}]
+    assert report.record()["rows"] == [{"what": "x", "paper": None, "peer": None, "ours": 0.123456}]
     with pytest.raises(ValueError, match="expected 3 cells"):
         Report("t", ("what", "paper", "ours"), (("x", 1.0),))
+
+
+def test_a_record_says_whose_each_figure_is() -> None:
+    columns = ("way", "paper: E", "paper: pairs", "peer (PoseLib)", "ours", "ours, median")
+    row, = Report("t", columns, (("one", 1.0, 2, 3.0, 4.0, 5.0),)).record()["rows"]
+    assert (row["what"], row["paper"], row["peer"]) == ("one", {"paper: E": 1.0, "paper: pairs": 2}, 3.0)
+    assert row["ours"] == 4.0 and row["ours, median"] == 5.0
+    row, = Report("t", ("way", "fast", "slow"), (("one", 1.0, 2.0),)).record()["rows"]
+    assert row["paper"] is row["peer"] is None and row["ours"] == {"fast": 1.0, "slow": 2.0}
 
 
 def test_an_unknown_experiment_is_answered_with_near_ones() -> None:
