@@ -130,10 +130,12 @@ def test_where_a_wall_ends_the_rest_is_open_and_no_railing_is(tmp_path: Path) ->
     for name, x in (("a", 0.0), ("b", 3.0), ("c", 6.0)):
         house.space(name, box(x, 0.0, x + 3.0, 6.0))
     house.wall(2.95, 0.0, 3.05, 3.5)
+    house.space("stairwell", box(9.0, 0.0, 12.0, 6.0))
     house.element("IfcRailing", box(5.97, 0.0, 6.03, 6.0), 0.0, 0.9)
+    house.element("IfcRailing", box(8.97, 0.0, 9.03, 6.0), 0.0, 4.0)
     world, _ = imported(house, tmp_path)
-    assert doors(world) == {("a", "b")}
-    assert 2.0 < world.doorways[0].width_m < 2.5
+    assert doors(world) == {("a", "b"), ("c", "stairwell")}, "the railing of stairs leads up them"
+    assert 2.0 < min(doorway.width_m for doorway in world.doorways) < 2.5
 
 
 def test_openings_without_doors_and_virtual_boundaries_are_ways_through(tmp_path: Path) -> None:
@@ -254,6 +256,21 @@ def test_stairs_join_storeys(tmp_path: Path, how: str) -> None:
     house.contain(below, steps)
     world, told = imported(house, tmp_path)
     assert [link.between for link in world.links] == [("hall", "landing")] and "1 of 1 stairs" in told
+
+
+def test_a_lift_joins_the_shafts_over_each_other(tmp_path: Path) -> None:
+    house = House()
+    for number in range(3):
+        house.storey(f"Level {number}", 3.0 * number)
+        house.space(f"hall {number}", box(0.0, 0.0, 5.0, 3.0))
+        house.space(f"shaft {number}", box(5.2, 0.0, 7.2, 2.0))
+        house.door(5.0, 0.5, 5.2, 1.5)
+    house.element("IfcTransportElement", box(5.4, 0.2, 7.0, 1.8), 0.0, 2.2, storey=house.storeys[0],
+                  PredefinedType="ELEVATOR")
+    world, told = imported(house, tmp_path)
+    assert [(link.kind, link.between) for link in world.links] == [
+        ("elevator", ("shaft-0", "shaft-1")), ("elevator", ("shaft-1", "shaft-2"))]
+    assert world.route("hall-0", "hall-2") is not None and "1 lifts: 2 rides" in told
 
 
 def test_stairs_over_three_storeys_pass_the_one_between() -> None:

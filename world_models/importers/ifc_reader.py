@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,6 +31,8 @@ STEP_M = 0.05
 BESIDE_M = 1.2
 BARRIERS = ("IfcWall", "IfcCurtainWall", "IfcPlate", "IfcRailing")
 """What may stand between spaces that touch."""
+CLIMBING_M = 1.5
+"""A railing that is higher goes up with stairs."""
 FURNITURE = ("IfcFurnishingElement", "IfcColumn", "IfcSanitaryTerminal")
 MANY = 3
 """Elements that are left out for one reason are told together if they are more."""
@@ -77,6 +80,7 @@ class Reader:
     bounds: dict[int, list[str]] = field(default_factory=dict)
     floors: dict[str, shapely.Polygon] = field(default_factory=dict)
     holes: list[tuple[str, shapely.Polygon]] = field(default_factory=list)
+    lifts: set[frozenset[str]] = field(default_factory=set)
     flights: int = 0
     flights_told: int = 0
     pieces: int = 0
@@ -98,6 +102,7 @@ class Reader:
         self._each("IfcWindow", self._window)
         self._each("IfcStair", self._stairs)
         self._each("IfcStairFlight", self._stairs)
+        self._each("IfcTransportElement", self._lift)
         for kind in FURNITURE:
             self._each(kind, self._furnishing)
         self._told()
@@ -288,15 +293,17 @@ class Reader:
         for element in (element for kind in BARRIERS for element in self._all(kind)):
             self.tell(Next(f"reading {element.is_a()} #{element.id()}", ELEMENT_S))
             body = self._body_of(element)
-            if body is not None and self._stands_on(body, spaces):
+            if body is not None and self._stands_on(element, body, spaces):
                 shadows.append(body.shadow)
         self.plan.barriers[storey] = [shadow for shadow in shadows if not shadow.is_empty]
         self.plan.without_wall |= neighbours_without_wall(spaces, names, self.plan.barriers[storey])
 
     @staticmethod
-    def _stands_on(body: Body, spaces: list[Space]) -> bool:
-        """Whether something would stop one who walks on the floor of these spaces."""
+    def _stands_on(element: Any, body: Body, spaces: list[Space]) -> bool:
+        """Whether something would stop one who walks on the floor of these spaces; a railing of stairs leads up."""
         low, high = float(body.world[:, 2].min()), float(body.world[:, 2].max())
+        if element.is_a("IfcRailing") and high - low > CLIMBING_M:
+            return False
         return any(low < space.floor_m + 1.0 and high > space.floor_m + 0.3 for space in spaces)
 
     # -- doors, passages and windows ---------------------------------------------------------------------------------
@@ -378,6 +385,22 @@ class Reader:
         self.plan.furnishings.append(flight(name, ways[0][0].name, points))
         self.flights += 1
 
+    def _lift(self, element: Any) -> None:
+        """A lift joins the spaces of all storeys that are over each other where it is."""
+        kind = getattr(element, "PredefinedType", None) or getattr(element, "OperationType", None) or "ELEVATOR"
+        if kind != "ELEVATOR":
+            raise ValueError(f"it is no lift ({kind})")
+        world = self._body(element).world
+        middle = (world.min(axis=0) + world.max(axis=0))[:2] / 2
+        shaft = [s for s in sorted(self.plan.spaces, key=lambda s: s.floor_m) if self._away(s.name, middle) == 0.0]
+        if len({space.storey for space in shaft}) < 2:
+            raise ValueError("there are no spaces of two storeys where it is")
+        for below, above in pairwise(shaft):
+            if below.storey != above.storey and frozenset((below.name, above.name)) not in self.lifts:
+                self.lifts.add(frozenset((below.name, above.name)))
+                self.plan.ways.append(Way(self.names.new(f"lift {element.id()}", "lift"), "elevator",
+                                          (below.name, above.name)))
+
     def _furnishing(self, element: Any) -> None:
         name = name_of(element) or element.is_a().removeprefix("Ifc")
         room, body = self._room_of(element), None
@@ -416,6 +439,8 @@ class Reader:
                             f"{count('IfcSpace')} spaces, {doors} of {count('IfcDoor')} doors, {passages}"
                             f"{len(plan.windows)} of {count('IfcWindow')} windows, {self.flights} of "
                             f"{self.flights_told} stairs, {self.pieces} of {count(*FURNITURE)} pieces of furniture")
+        if lifts := count("IfcTransportElement"):
+            account.used.append(f"{lifts} lifts: {len(self.lifts)} rides from a storey to the next")
         account.used.append(f"its unit of length: {self.unit_m:g} m")
         account.used.append("which spaces a door joins: from space boundaries, and from what lies on both its sides")
         account.guessed.append("all doors between spaces stand open; furniture is its bounding box; colours are ours")

@@ -126,7 +126,8 @@ def _cut(layout: Layout, storey: str) -> None:
     for gap in (gap for gap in plan.gaps if gap.storey == storey):
         cut = _door(layout, gap, _near(gap, outlines))
         if cut is not None and overlap(cut, layout.cuts, layout.rooms):
-            account.left_out.append(f"door {gap.name}: another door is in its place")
+            if gap.has_leaf:
+                account.left_out.append(f"door {gap.name}: another door is in its place")
         elif cut is not None:
             layout.cuts.append(cut)
     for a, b in all_pairs(outlines):
@@ -152,7 +153,7 @@ def _door(layout: Layout, gap: Gap, outlines: Mapping[str, Floats]) -> Cut | Non
             account.guessed.append(f"door {gap.name}: moved or narrowed by {100 * change:.0f} cm to fit its wall")
         return _under(cut, low)
     if not gap.has_leaf:
-        account.left_out.append(f"passage {gap.name}: not between two spaces of one storey")
+        account.left_out.append(f"{gap.name}: an opening, but not between two spaces of one storey")
         return None
     out = door_outside(gap, {room: outlines[room] for room in known} or outlines)
     if out is None:
