@@ -160,6 +160,13 @@ def test_walls_of_old_houses(tmp_path: Path) -> None:
     assert doors(imported(house, tmp_path)[0]) == {("a", "b"), ("b", "c")}
 
 
+def test_a_step_between_rooms_is_told(tmp_path: Path) -> None:
+    house = row(House(), 0.2)
+    house.file.by_type("IfcSpace")[1].ObjectPlacement = house.place((0.0, 0.0, 0.4), above=house.storeys[0])
+    house.door(3.0, 1.0, 3.2, 1.9)
+    assert "from a to b the floor goes up by 0.40 m in the file; drawn level" in imported(house, tmp_path)[1]
+
+
 def test_a_door_in_a_curved_wall(tmp_path: Path) -> None:
     house = House()
     house.storey("Ground", 0.0)

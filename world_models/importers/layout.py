@@ -36,6 +36,7 @@ FAR_M = 2.0
 THICK_M = 0.89
 """Of the walls of old houses, as a world may have them: rooms that a door joins, where none are nearer."""
 IN_DOORWAY_M = 0.05
+STEP_M = 0.05
 
 
 @dataclass
@@ -73,6 +74,7 @@ def lay_out(plan: Plan) -> Layout:
         _cut(layout, storey.name)
         _glaze(layout, storey.name)
     _clear_doorways(layout)
+    _tell_steps(layout)
     if not layout.rooms:
         raise BuildingError(f"{plan.source}: expected spaces with a floor, got none that can be used")
     plan.ways = [way for way in plan.ways if all(room in layout.rooms for room in way.between)]
@@ -218,6 +220,16 @@ def _clear_doorways(layout: Layout) -> None:
                 if lowest_m(thing) < cut.height_m and shapely.Polygon(footprint(thing)).intersection(floor).area > 1e-4:
                     layout.furnishings[room].remove(thing)
                     layout.plan.account.left_out.append(f"{thing.name}: it stands in the doorway {cut.name}")
+
+
+def _tell_steps(layout: Layout) -> None:
+    """A storey is level here: what a file has as a step, or a ramp, between two of its rooms is said."""
+    for cut in (cut for cut in layout.cuts if cut.is_open):
+        floors = [layout.plan.space(room).floor_m for room in cut.between]
+        if abs(floors[0] - floors[1]) > STEP_M:
+            layout.plan.account.guessed.append(f"{cut.name}: from {cut.between[0]} to {cut.between[1]} the floor goes "
+                                               f"{'down' if floors[1] < floors[0] else 'up'} by "
+                                               f"{abs(floors[0] - floors[1]):.2f} m in the file; drawn level")
 
 
 def _spread(layout: Layout) -> None:
