@@ -22,8 +22,8 @@ from world_models.shells import Opening, Shell, Wall, along_wall, walls_of
 from world_models.things import ROBOT_TOP_M, Fault, Thing
 from world_models.world import World
 
-THICKEST_WALL_M = 0.6
-"""Walls of two rooms that are further apart than this are not the two sides of one wall."""
+THICKEST_WALL_M = 0.9
+"""Walls of two rooms that are further apart than this are not the two sides of one wall, not even in an old house."""
 
 ROOF_M = 0.3
 """How far a locale without walls of its own reaches beyond the locales in it."""
@@ -111,6 +111,7 @@ class _Site:
         return [(near.locale, near.name, opening), far]
 
     def _far_hole(self, door: DoorSpec, near: Wall, ends_world: NDArray[np.float64]) -> tuple[str, str, Opening]:
+        found: tuple[float, Wall, Opening] | None = None
         for wall in self.walls[door.between[1]].values():
             ends = wall.world_from_wall.inverse().apply(ends_world)
             faces_back = float(wall.inward_world @ near.inward_world) < -0.999
@@ -118,7 +119,10 @@ class _Site:
             if faces_back and behind and ends[1, 0] >= 0 and ends[0, 0] <= wall.length_m:
                 neighbour = door.between[0] if door.is_open else None
                 opening = Opening(door.name, float(ends[1, 0]), float(ends[0, 0]), door.height_m, neighbour)
-                return wall.locale, wall.name, opening
+                if found is None or -ends[0, 1] < found[0] - 1e-9:
+                    found = -float(ends[0, 1]), wall, opening
+        if found is not None:
+            return found[1].locale, found[1].name, found[2]
         raise _Unbuildable(f"expected a wall of {door.between[1]} behind the {door.wall} wall of {door.between[0]}, "
                            "got none there: the doorway leads nowhere")
 

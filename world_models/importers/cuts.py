@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+import shapely
 
-from world_models.importers.outlines import Floats, Stretch, facing, side_of
+from world_models.importers.outlines import THICKEST_M, Floats, Stretch, facing, side_of
 from world_models.importers.plan import Gap, Window
 
 MARGIN_M = 0.02
@@ -48,12 +49,12 @@ class Pane:
 
 
 def door_between(
-    gap: Gap, outlines: Mapping[str, Floats], pairs: Iterable[tuple[str, str]]
+    gap: Gap, outlines: Mapping[str, Floats], pairs: Iterable[tuple[str, str]], thickest_m: float = THICKEST_M
 ) -> tuple[Cut, float] | None:
     """The best place for a door between any of these pairs of rooms, and by how much it was moved or narrowed [m]."""
     best: tuple[float, Cut, float] | None = None
     for a, b in pairs:
-        for stretch in facing(a, outlines[a], b, outlines[b]):
+        for stretch in facing(a, outlines[a], b, outlines[b], most_m=thickest_m):
             start, along, _ = side_of(outlines[a], stretch.side)
             arm = gap.centre - start
             off = float(arm @ np.array([-along[1], along[0]])) + stretch.gap_m / 2
@@ -95,11 +96,15 @@ def door_outside(gap: Gap, outlines: Mapping[str, Floats]) -> Cut | None:
 
 
 def wide_opening(name: str, a: str, b: str, outlines: Mapping[str, Floats], height_m: float,
-                 taken: Iterable[Cut], thickest_m: float, solid: Iterable[Floats] = ()) -> Cut | None:
-    """The widest opening that thin walls between two rooms allow, away from doors and from footprints (4, 2)."""
+                 taken: Iterable[Cut], thickest_m: float, solid: Iterable[Floats] = (),
+                 barriers: Iterable[shapely.Geometry] = ()) -> Cut | None:
+    """The widest opening that thin walls between two rooms allow, away from doors and from footprints (4, 2).
+
+    ``barriers`` close only what they stand in.
+    """
     stretches = [s for s in facing(a, outlines[a], b, outlines[b]) if s.gap_m < thickest_m]
-    solid = list(solid)
-    free = [f for s in stretches for f in _free(s, outlines[a], taken, solid)]
+    solid, barriers = list(solid), list(barriers)
+    free = [f for s in stretches for f in _free(s, outlines[a], taken, solid, barriers)]
     if not free or (longest := max(free, key=lambda f: f[2] - f[1]))[2] - longest[1] < WIDE_M + 2 * CASING_M:
         return None
     side, low, high = longest
@@ -107,8 +112,8 @@ def wide_opening(name: str, a: str, b: str, outlines: Mapping[str, Floats], heig
 
 
 def _free(stretch: Stretch, outline: Floats, taken: Iterable[Cut], solid: Iterable[Floats],
-          ) -> list[tuple[int, float, float]]:
-    """(side, low, high) of what doors in the same side, and footprints before and behind it, leave of a stretch."""
+          barriers: Iterable[shapely.Geometry]) -> list[tuple[int, float, float]]:
+    """(side, low, high) of what doors in the same side, footprints before and behind it and barriers leave of it."""
     start, along, _ = side_of(outline, stretch.side)
     inward = np.array([-along[1], along[0]])
     marks = [(c.along_m - c.width_m / 2, c.along_m + c.width_m / 2) for c in taken
@@ -117,6 +122,14 @@ def _free(stretch: Stretch, outline: Floats, taken: Iterable[Cut], solid: Iterab
         s, off = arms @ along, arms @ inward
         if off.min() < ROOM_M and off.max() > -ROOM_M - stretch.gap_m:
             marks.append((float(s.min()) - CASING_M, float(s.max()) + CASING_M))
+    quad = [start + s * along + off * inward for s, off in
+            ((stretch.low_m, MARGIN_M), (stretch.high_m, MARGIN_M), (stretch.high_m, -stretch.gap_m - MARGIN_M),
+             (stretch.low_m, -stretch.gap_m - MARGIN_M))]
+    for barrier in barriers:
+        inside = barrier.intersection(shapely.Polygon(quad))
+        for part in (part for part in shapely.get_parts(inside) if not part.is_empty):
+            s = (shapely.get_coordinates(part) - start) @ along
+            marks.append((float(s.min()) - MARGIN_M, float(s.max()) + MARGIN_M))
     pieces, at = [], stretch.low_m
     for low, high in sorted(marks):
         pieces.append((stretch.side, at, min(low, stretch.high_m)))
@@ -133,6 +146,16 @@ def overlap(cut: Cut, others: Iterable[Cut], outlines: Mapping[str, Floats]) -> 
 def _feet(cut: Cut, outlines: Mapping[str, Floats]) -> Floats:
     start, along, _ = side_of(outlines[cut.between[0]], cut.side)
     return np.array([start + (cut.along_m + sign * cut.width_m / 2) * along for sign in (-1, 1)])
+
+
+def doorway(cut: Cut, outlines: Mapping[str, Floats], margin_m: float) -> Floats:
+    """(4, 2) the floor of an opening between two rooms, and so much of the rooms before and behind it."""
+    feet = _feet(cut, outlines)
+    along = (feet[1] - feet[0]) / np.linalg.norm(feet[1] - feet[0])
+    inward = np.array([-along[1], along[0]])
+    deep_m = shapely.Polygon(outlines[cut.between[-1]]).distance(shapely.Point(feet.mean(axis=0)))
+    near, far = margin_m * inward, -(deep_m + margin_m) * inward
+    return np.array([feet[0] + near, feet[0] + far, feet[1] + far, feet[1] + near])
 
 
 def _near(one: Floats, other: Floats) -> bool:

@@ -9,17 +9,19 @@ import networkx as nx
 import numpy as np
 import shapely
 
+from world_models.importers.curves import straight_at
 from world_models.importers.cuts import (
     Cut,
     Pane,
     all_pairs,
     door_between,
     door_outside,
+    doorway,
     overlap,
     panes,
     wide_opening,
 )
-from world_models.importers.outlines import THIN_WALL_M, Floats, apart, facing
+from world_models.importers.outlines import THICKEST_M, THIN_WALL_M, Floats, apart, facing
 from world_models.importers.plan import BuildingError, Furnishing, Gap, Plan, Space, Window
 from world_models.importers.things import HIGH_M, footprint, in_the_way, lowest_m, put_inside
 
@@ -30,6 +32,11 @@ HEADER_M = 0.2
 LARGEST_M = 2000.0
 ROBOT_M = 0.36
 """Radius of a robot that should find a place in a room."""
+FAR_M = 2.0
+THICK_M = 0.89
+"""Of the walls of old houses, as a world may have them: rooms that a door joins, where none are nearer."""
+IN_DOORWAY_M = 0.05
+STEP_M = 0.05
 
 
 @dataclass
@@ -61,10 +68,13 @@ def lay_out(plan: Plan) -> Layout:
     layout = Layout(plan)
     for storey in plan.storeys:
         _raise_walls(layout, storey.name)
+        _straighten(layout, storey.name)
     _furnish(layout)
     for storey in plan.storeys:
         _cut(layout, storey.name)
         _glaze(layout, storey.name)
+    _clear_doorways(layout)
+    _tell_steps(layout)
     if not layout.rooms:
         raise BuildingError(f"{plan.source}: expected spaces with a floor, got none that can be used")
     plan.ways = [way for way in plan.ways if all(room in layout.rooms for room in way.between)]
@@ -87,14 +97,39 @@ def _raise_walls(layout: Layout, storey: str) -> None:
                                f"{100 * THIN_WALL_M:.0f} cm was put there ({', '.join(changed)})")
 
 
+def _outlines(layout: Layout, storey: str) -> dict[str, Floats]:
+    return {space.name: layout.rooms[space.name] for space in layout.plan.on(storey) if space.name in layout.rooms}
+
+
+def _near(gap: Gap, outlines: Mapping[str, Floats]) -> dict[str, Floats]:
+    """The rooms whose bounds are next to a door: in a large building not every pair of rooms is looked at."""
+    return {name: outline for name, outline in outlines.items()
+            if (outline.min(axis=0) < gap.centre + FAR_M).all() and (outline.max(axis=0) > gap.centre - FAR_M).all()}
+
+
+def _straighten(layout: Layout, storey: str) -> None:
+    """Curved walls get a straight side for each of their doors."""
+    outlines = _outlines(layout, storey)
+    for gap in (gap for gap in layout.plan.gaps if gap.storey == storey and gap.along is not None):
+        near = _near(gap, outlines)
+        if gap.along is None or door_between(gap, near, all_pairs(near), THICK_M):
+            continue
+        for name in near:
+            changed = straight_at(near[name], gap.centre, gap.along, gap.width_m)
+            if changed is not None:
+                layout.rooms[name] = outlines[name] = changed
+                layout.plan.account.guessed.append(f"space {name}: its curved wall is straight at {gap.name}")
+
+
 def _cut(layout: Layout, storey: str) -> None:
     """Doors first, then wide openings where there is no wall."""
     plan, account = layout.plan, layout.plan.account
-    outlines = {space.name: layout.rooms[space.name] for space in plan.on(storey) if space.name in layout.rooms}
+    outlines = _outlines(layout, storey)
     for gap in (gap for gap in plan.gaps if gap.storey == storey):
-        cut = _door(layout, gap, outlines)
+        cut = _door(layout, gap, _near(gap, outlines))
         if cut is not None and overlap(cut, layout.cuts, layout.rooms):
-            account.left_out.append(f"door {gap.name}: another door is in its place")
+            if gap.has_leaf:
+                account.left_out.append(f"door {gap.name}: another door is in its place")
         elif cut is not None:
             layout.cuts.append(cut)
     for a, b in all_pairs(outlines):
@@ -105,17 +140,23 @@ def _cut(layout: Layout, storey: str) -> None:
 def _door(layout: Layout, gap: Gap, outlines: Mapping[str, Floats]) -> Cut | None:
     account = layout.plan.account
     known = tuple(room for room in gap.rooms if room in outlines)
-    found = door_between(gap, outlines, [(known[0], known[1])]) if len(known) == 2 else None
-    if found is None:
-        found = door_between(gap, outlines, all_pairs(outlines))
-        if found is not None and known and not set(known) <= set(found[0].between):
-            found = None
+    found = None
+    for thickest_m in (THICKEST_M, THICK_M):
+        if found is None and len(known) == 2:
+            found = door_between(gap, outlines, [(known[0], known[1])], thickest_m)
+        if found is None:
+            found = door_between(gap, outlines, all_pairs(outlines), thickest_m)
+            if found is not None and known and not set(known) <= set(found[0].between):
+                found = None
     if found is not None:
         cut, change = found
         low = min(layout.plan.space(room).height_m for room in cut.between)
         if change > 0.01:
             account.guessed.append(f"door {gap.name}: moved or narrowed by {100 * change:.0f} cm to fit its wall")
         return _under(cut, low)
+    if not gap.has_leaf:
+        account.left_out.append(f"{gap.name}: an opening, but not between two spaces of one storey")
+        return None
     out = door_outside(gap, {room: outlines[room] for room in known} or outlines)
     if out is None:
         joined = f" of {' and '.join(known)}" if known else ""
@@ -137,7 +178,8 @@ def _open_up(layout: Layout, a: str, b: str, outlines: Mapping[str, Floats]) -> 
     own = [cut for cut in layout.cuts if {a, b} & set(cut.between)]
     height = min(plan.space(room).height_m for room in (a, b)) - HEADER_M
     solid = [footprint(thing) for room in (a, b) for thing in layout.furnishings.get(room, ()) if in_the_way(thing)]
-    cut = wide_opening(f"{a}-to-{b}", a, b, outlines, height, own, 2.5 * THIN_WALL_M, solid)
+    barriers = plan.barriers.get(plan.space(a).storey, ())
+    cut = wide_opening(f"{a}-to-{b}", a, b, outlines, height, own, 2.5 * THIN_WALL_M, solid, barriers)
     if cut is None or overlap(cut, layout.cuts, layout.rooms):
         account.left_out.append(f"{a} and {b} meet without a wall, but not along a line with room for an opening")
         return
@@ -148,7 +190,7 @@ def _open_up(layout: Layout, a: str, b: str, outlines: Mapping[str, Floats]) -> 
 
 def _glaze(layout: Layout, storey: str) -> None:
     plan, account = layout.plan, layout.plan.account
-    outlines = {space.name: layout.rooms[space.name] for space in plan.on(storey) if space.name in layout.rooms}
+    outlines = _outlines(layout, storey)
     for window in (w for w in plan.windows if w.storey == storey):
         found = [(pane, window) for pane in panes(window, outlines)]
         layout.panes += found
@@ -167,6 +209,27 @@ def _furnish(layout: Layout) -> None:
             account.left_out.append(f"{thing.name}: does not fit into {thing.room}")
         else:
             layout.furnishings.setdefault(thing.room, []).append(placed)
+
+
+def _clear_doorways(layout: Layout) -> None:
+    """What would stand in an open doorway is left out: a file may have a mat, or a door's own handle, as furniture."""
+    for cut in (cut for cut in layout.cuts if cut.is_open):
+        floor = shapely.Polygon(doorway(cut, layout.rooms, IN_DOORWAY_M))
+        for room in cut.between:
+            for thing in list(layout.furnishings.get(room, ())):
+                if lowest_m(thing) < cut.height_m and shapely.Polygon(footprint(thing)).intersection(floor).area > 1e-4:
+                    layout.furnishings[room].remove(thing)
+                    layout.plan.account.left_out.append(f"{thing.name}: it stands in the doorway {cut.name}")
+
+
+def _tell_steps(layout: Layout) -> None:
+    """A storey is level here: what a file has as a step, or a ramp, between two of its rooms is said."""
+    for cut in (cut for cut in layout.cuts if cut.is_open):
+        floors = [layout.plan.space(room).floor_m for room in cut.between]
+        if abs(floors[0] - floors[1]) > STEP_M:
+            layout.plan.account.guessed.append(f"{cut.name}: from {cut.between[0]} to {cut.between[1]} the floor goes "
+                                               f"{'down' if floors[1] < floors[0] else 'up'} by "
+                                               f"{abs(floors[0] - floors[1]):.2f} m in the file; drawn level")
 
 
 def _spread(layout: Layout) -> None:
@@ -225,9 +288,14 @@ def _fill(layout: Layout) -> None:
                                             f"{', '.join(n for n in layout.rooms if n in layout.full)}")
 
 
-def neighbours_without_wall(spaces: Sequence[Space], which: set[str]) -> set[frozenset[str]]:
-    """Pairs of these spaces of one storey that touch along a line, of which both are among ``which``."""
-    outlines = {space.name: space.outline for space in spaces if space.name in which}
-    kept, _ = apart(outlines)
-    return {frozenset((a, b)) for a, b in all_pairs(kept)
-            if any(s.gap_m < 2.5 * THIN_WALL_M for s in facing(a, kept[a], b, kept[b]))}
+def neighbours_without_wall(spaces: Sequence[Space], which: set[str],
+                            barriers: Sequence[shapely.Geometry] = ()) -> set[frozenset[str]]:
+    """Pairs of these spaces of one storey that touch along a line, of which both are among ``which``.
+
+    Where there are barriers, only those between which they leave room for a wide opening.
+    """
+    kept, _ = apart({space.name: space.outline for space in spaces if space.name in which})
+    thickest_m = 2.5 * THIN_WALL_M
+    pairs = [(a, b) for a, b in all_pairs(kept) if any(s.gap_m < thickest_m for s in facing(a, kept[a], b, kept[b]))]
+    return {frozenset((a, b)) for a, b in pairs
+            if not barriers or wide_opening("", a, b, kept, 1.0, (), thickest_m, (), barriers) is not None}

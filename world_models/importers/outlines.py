@@ -18,6 +18,11 @@ THIN_WALL_M = 0.05
 """Of the wall that is put between two spaces which have none."""
 THICKEST_M = 0.55
 SHORTEST_SIDE_M = 0.03
+CORNERS, COARSE_M = 24, 0.03
+"""An outline of more corners than this is curved: it is drawn with sides that are off it by up to so much."""
+SMALLEST_HOLE_M2 = 0.05
+COVERED = 0.6
+"""A space of which others, no larger, cover more than this part is no room: an area to pay for, or twice told."""
 STRAIGHT = math.radians(8.0)
 
 
@@ -38,17 +43,38 @@ def cleaned(points: Floats) -> Floats | None:
     if len(points) < 3 or not np.isfinite(points).all() or np.abs(points).max() > 5000.0:
         return None
     polygon = shapely.Polygon(points)
-    return _outline(polygon if polygon.is_valid else shapely.make_valid(polygon))
+    return outline_of(polygon if polygon.is_valid else shapely.make_valid(polygon))
 
 
-def _outline(shape: shapely.Geometry) -> Floats | None:
+def outline_of(shape: shapely.Geometry) -> Floats | None:
+    """(k, 2) the outline of the largest polygon of a shape, as :func:`cleaned` makes it."""
     polygons = [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon" and p.area > 0.05]
     if not polygons:
         return None
-    ring = shapely.Polygon(max(polygons, key=lambda p: p.area).exterior).simplify(0.002)
-    outline = np.round(shapely.get_coordinates(shapely.orient_polygons(ring).exterior)[:-1], 4)
-    outline = _without_short_sides(outline)
+    best = without_holes(max(polygons, key=lambda p: p.area))
+    for tolerance_m in (0.002, COARSE_M):
+        ring = shapely.Polygon(best.exterior).simplify(tolerance_m)
+        outline = np.round(shapely.get_coordinates(shapely.orient_polygons(ring).exterior)[:-1], 4)
+        outline = _without_short_sides(outline)
+        if len(outline) <= CORNERS:
+            break
     return outline if len(outline) >= 3 and is_simple(outline) else None
+
+
+def without_holes(polygon: shapely.Polygon) -> shapely.Polygon:
+    """The polygon with a thin wall from each of its holes to its border: a room round a core is drawn as one that ends.
+
+    An outline has no holes, and to fill them would put the room over those that lie in them.
+    """
+    while holes := [ring for ring in polygon.interiors if shapely.Polygon(ring).area > SMALLEST_HOLE_M2]:
+        across = shapely.shortest_line(holes[0], polygon.exterior)
+        slit = across.buffer(THIN_WALL_M / 2, cap_style="square") if across.length else across.buffer(THIN_WALL_M)
+        parts = [p for p in shapely.get_parts(polygon.difference(slit)) if p.geom_type == "Polygon"]
+        best = max(parts, key=lambda p: p.area, default=shapely.Polygon())
+        if len(best.interiors) >= len(polygon.interiors):
+            return shapely.Polygon(polygon.exterior, [r for r in polygon.interiors if r is not holes[0]])
+        polygon = best
+    return polygon
 
 
 def _without_short_sides(outline: Floats) -> Floats:
@@ -74,23 +100,39 @@ def _bends(outline: Floats) -> Floats:
 
 
 def apart(outlines: Mapping[str, Floats]) -> tuple[dict[str, Floats], list[str]]:
-    """The outlines of a storey with a thin wall between all that touch or overlap; and the names of those changed."""
-    shapes = {name: shapely.Polygon(outline) for name, outline in outlines.items()}
+    """The outlines of a storey with a thin wall between all that touch or overlap; and the names of those changed.
+
+    What others cover is not among them.
+    """
+    shapes = _uncovered({name: shapely.Polygon(outline) for name, outline in outlines.items()})
     kept: dict[str, Floats] = {}
     changed = []
     for name, shape in shapes.items():
         near = [other for key, other in shapes.items() if key != name and shape.distance(other) < THIN_WALL_M - 2e-3]
         rest = shape
         for other in near:
-            smaller = other.area < shape.area or shape.intersection(other).area < 0.05
+            shared = shape.intersection(other).area
+            if other.area > shape.area and shared > 0.5 * shape.area:
+                continue  # it lies in the other, which makes room for it
+            smaller = other.area < shape.area or shared < 0.05
             rest = rest.difference(other.buffer(THIN_WALL_M / 2, join_style="mitre")) if smaller else rest.difference(
                 other.buffer(-0.3, join_style="mitre"))
-        outline = _outline(rest) if near else outlines[name]
+        outline = outline_of(rest) if near else outlines[name]
         if near:
             changed.append(name)
         if outline is not None:
             kept[name] = outline
     return kept, changed
+
+
+def _uncovered(shapes: Mapping[str, shapely.Polygon]) -> dict[str, shapely.Polygon]:
+    """Those of which no others that are smaller, or as large and told before, cover most."""
+    kept: dict[str, shapely.Polygon] = {}
+    for name, shape in sorted(shapes.items(), key=lambda pair: round(pair[1].area, 1)):
+        over = [other.intersection(shape) for other in kept.values() if other.intersects(shape)]
+        if not over or shapely.union_all(over).area < COVERED * shape.area:
+            kept[name] = shape
+    return {name: shape for name, shape in shapes.items() if name in kept}
 
 
 def squared(outline: Floats) -> Floats:
@@ -120,11 +162,12 @@ def _runs(level: NDArray[np.bool_]) -> list[list[int]]:
     return runs
 
 
-def facing(a: str, outline_a: Floats, b: str, outline_b: Floats, least_m: float = 1e-3) -> list[Stretch]:
-    """The stretches of the sides of one room that have the other behind them, through one wall of ``least_m`` on."""
+def facing(a: str, outline_a: Floats, b: str, outline_b: Floats, least_m: float = 1e-3,
+           most_m: float = THICKEST_M) -> list[Stretch]:
+    """The stretches of the sides of one room that have the other behind them, through one wall of so much."""
     found: list[Stretch] = []
-    if (outline_a.min(axis=0) > outline_b.max(axis=0) + THICKEST_M).any() or (
-            outline_b.min(axis=0) > outline_a.max(axis=0) + THICKEST_M).any():
+    if (outline_a.min(axis=0) > outline_b.max(axis=0) + most_m).any() or (
+            outline_b.min(axis=0) > outline_a.max(axis=0) + most_m).any():
         return found
     starts, ends = outline_b, np.roll(outline_b, -1, axis=0)
     for side, (p, q) in enumerate(zip(outline_a, np.roll(outline_a, -1, axis=0), strict=True)):
@@ -134,7 +177,7 @@ def facing(a: str, outline_a: Floats, b: str, outline_b: Floats, least_m: float 
         for start, end in zip(starts, ends, strict=True):
             there = (end - start) / np.linalg.norm(end - start)
             behind = [-float((x - p) @ inward) for x in (start, end)]
-            if float(there @ along) > -0.9993 or min(behind) < least_m or max(behind) > THICKEST_M:
+            if float(there @ along) > -0.9993 or min(behind) < least_m or max(behind) > most_m:
                 continue
             s = sorted(float((x - p) @ along) for x in (start, end))
             low, high = max(0.0, s[0]), min(length, s[1])

@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, field
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -50,6 +51,8 @@ class Gap:
         centre: (2,) on the plan [m].
         width_m, height_m: of the opening.
         rooms: the spaces that the file says it joins; empty where it says nothing.
+        along: (2,) direction along its wall on the plan, where that is known.
+        has_leaf: whether it is a door; else it is a passage, and nothing where it does not lead from space to space.
     """
 
     name: str
@@ -58,6 +61,8 @@ class Gap:
     width_m: float
     height_m: float
     rooms: tuple[str, ...] = ()
+    along: Floats | None = None
+    has_leaf: bool = True
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -110,7 +115,10 @@ class Account:
 
 @dataclass
 class Plan:
-    """Everything that was found; storeys from the lowest up."""
+    """Everything that was found; storeys from the lowest up.
+
+    ``barriers`` are the shadows of walls and railings by storey: no wide opening is cut where one stands.
+    """
 
     name: str
     source: str
@@ -118,6 +126,7 @@ class Plan:
     spaces: list[Space] = field(default_factory=list)
     gaps: list[Gap] = field(default_factory=list)
     without_wall: set[frozenset[str]] = field(default_factory=set)
+    barriers: dict[str, list[shapely.Geometry]] = field(default_factory=dict)
     windows: list[Window] = field(default_factory=list)
     furnishings: list[Furnishing] = field(default_factory=list)
     ways: list[Way] = field(default_factory=list)
