@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from world_models.importers.ifc_reader import READ_ERRORS, Next, Reader, first_line
+from world_models.importers.ifc_file import READ_ERRORS, IfcFile, Next, first_line
+from world_models.importers.ifc_reader import plan_of
 from world_models.importers.ifc_shapes import Body
 from world_models.importers.plan import BuildingError, Plan
 
@@ -79,13 +80,13 @@ def _read(path: Path, tell: Callable[[Next], None]) -> Plan:
         model = ifcopenshell.open(str(path)) if plain else ifcopenshell.file.from_string(_plain(path))
     except (*READ_ERRORS, OSError, ifcopenshell.Error) as error:
         raise BuildingError(f"{path.name}: expected an IFC file, got: {first_line(error)}") from None
-    reader = Reader(path.stem, path.name, model, _shapes(), _height, tell)
+    file = IfcFile(path.stem, path.name, model, _shapes(), _height, tell)
     try:
         if not _has_unit(model):
             _take_metres(model)
-            reader.plan.account.guessed.append("the file says nothing of its unit of length: taken for metres")
-        reader.unit_m = _unit_m(model)
-        return reader.read()
+            file.plan.account.guessed.append("the file says nothing of its unit of length: taken for metres")
+        file.unit_m = _unit_m(model)
+        return plan_of(file)
     except READ_ERRORS as error:
         if isinstance(error, BuildingError):
             raise
