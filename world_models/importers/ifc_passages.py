@@ -58,12 +58,14 @@ class Passages:
                 "no space boundaries in the file: doors joined to the spaces next to them")
 
     def _meetings(self, storey: str) -> None:
-        """Which spaces meet without a wall: as the boundaries say, or else where nothing stands between them."""
+        """Which spaces meet without a wall: where nothing stands between them, and the boundaries do not say otherwise.
+
+        A boundary that is told to be virtual may be one of several of its space: walls may stand beside it.
+        """
         spaces = self._plan.on(storey)
         names = self._virtual or {space.name for space in spaces}
         pairs = neighbours_without_wall(spaces, names)
-        if self._virtual or not pairs:
-            self._plan.without_wall |= pairs
+        if not pairs:
             return
         shadows = []
         for element in self._file.all(*BARRIERS):
