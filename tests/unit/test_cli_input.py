@@ -134,6 +134,27 @@ def test_a_corrupt_line_of_a_journal_is_named(
         assert told in err
 
 
+@pytest.mark.parametrize(("cycles", "told"), [
+    ((1, 2, 2, 3), "journal.jsonl:3: expected cycle 3, got 2 (a line is there twice"),
+    ((1, 3, 4), "journal.jsonl:2: expected cycle 2, got 3 (a line is missing"),
+    ((2, 3), "journal.jsonl:1: expected cycle 1, got 2 (a line is missing"),
+])
+@pytest.mark.parametrize("spaces", [False, True])
+def test_a_line_that_is_missing_or_there_twice_is_named(
+    cycles: tuple[int, ...], told: str, spaces: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """However the lines are written; every cycle has its line."""
+    written = (", ", ": ") if spaces else (",", ":")
+    run = journalled(tmp_path / "run", *(json.dumps({**DECISION, "cycle": n}, separators=written) for n in cycles))
+    (tmp_path / "run" / "run.json").write_text("{}")
+    before = (tmp_path / "run" / "journal.jsonl").read_bytes()
+    for argv in (["why", run], ["diff", run, run], ["replay", run], ["resume", run], ["repair", run]):
+        code, err = said(capsys, argv)
+        assert code == 2
+        assert told in err, argv
+    assert (tmp_path / "run" / "journal.jsonl").read_bytes() == before
+
+
 def test_a_line_that_was_cut_off_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole = journalled(tmp_path / "whole", json.dumps(DECISION))
     cut = journalled(tmp_path / "cut", json.dumps(DECISION))
