@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from blackboard.encoding import plain
-from harvey.again.observations import decoded
+from harvey.again.observations import MisfitError, decoded, fields_of
 from harvey.errors import BadInput
 from sim.scenario import ROOT, Servo
 from world_models.actuator import ActuatorModel
@@ -21,6 +21,10 @@ from world_models.store import fingerprint, load_world
 from world_models.task import Command
 
 SIMULATOR, HARDWARE = "simulator", "hardware"
+PARTS: Mapping[str, type[Any]] = {"camera": Camera, "mount": CameraMount, "actuator": ActuatorModel}
+"""What a robot knows of itself that has parts of its own."""
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,27 +104,47 @@ class RunHead:
         path = ROOT / self.world
         if _sha256_or_none(path) != self.world_sha256:
             raise BadInput(f"{path}: expected the world file as it was when the run was made, got another or none")
-        kinds = {"camera": Camera, "mount": CameraMount, "actuator": ActuatorModel}
-        try:
-            made = {name: kinds[name](**value) if name in kinds else value for name, value in self.robot.items()}
-            return RobotModel(load_world(path), **made)
-        except (TypeError, ValueError) as error:
-            raise BadInput(f"run.json: robot: {error}") from None
+        world = load_world(path)
+        return _made("robot", lambda: RobotModel(world, **self._known()))
 
     def task(self) -> Command:
         """What the user asked for. Raises BadInput."""
-        try:
-            command: Command = decoded(self.command, Command)
-        except (TypeError, ValueError) as error:
-            raise BadInput(f"run.json: command: {error}") from None
-        return command
+        return _made("command", lambda: _whole(self.command, Command))
 
     def servo_settings(self) -> Servo:
         """Which levels are on. Raises BadInput."""
-        try:
-            return Servo(**self.servo)
-        except TypeError as error:
-            raise BadInput(f"run.json: servo: {error}") from None
+        return _made("servo", lambda: _whole(self.servo, Servo))
+
+    def _known(self) -> dict[str, Any]:
+        """What the robot knows of itself; a run of an older version may lack what has a default. Raises ValueError."""
+        parts = {name: self.robot[name] for name in PARTS if name in self.robot}
+        rest = {name: value for name, value in self.robot.items() if name not in parts}
+        made = fields_of(rest, RobotModel)
+        for name, value in parts.items():
+            try:
+                made[name] = _whole(value, PARTS[name])
+            except (TypeError, ValueError) as error:
+                raise MisfitError.within(name, error) from None
+        return made
+
+
+def _made(what: str, make: Callable[[], T]) -> T:
+    """What a part of ``run.json`` stands for. Raises BadInput where a value in it cannot be used, and names it."""
+    try:
+        return make()
+    except (TypeError, ValueError) as error:
+        raise BadInput(f"run.json: {MisfitError.within(what, error)}") from None
+
+
+def _whole(value: Any, kind: type[T]) -> T:
+    """A dataclass from JSON types. Raises TypeError, ValueError."""
+    if not isinstance(value, dict):
+        raise ValueError(f"expected an object, got {value!r}")
+    lacking = [f.name for f in fields(kind)  # type: ignore[arg-type]
+               if f.name not in value and f.default is MISSING and f.default_factory is MISSING]
+    if lacking:
+        raise ValueError(f"expected {', '.join(lacking)} as well, got {', '.join(value) or 'nothing'}")
+    return kind(**fields_of(value, kind))
 
 
 def _portable(path: Path) -> str:

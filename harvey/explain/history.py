@@ -104,7 +104,7 @@ class History(ABC):
         """
         if not self.newest:
             self.verify()
-            raise BadInput("expected a run with at least one entry in its journal, got none")
+            raise BadInput(f"{self.source}: expected at least one entry, got none")
         outcomes = [id for id in self.newest if id.startswith("Outcome-")]
         return self.newest[outcomes[-1]] if outcomes else self.refs[-1]
 

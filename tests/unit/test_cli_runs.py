@@ -72,6 +72,7 @@ def test_why_without_an_entry_tells_the_outcome(run: Path, capsys: pytest.Captur
     assert main(["why", str(run)]) == 0
     out = capsys.readouterr().out
     assert "The mission ended: failed" in out
+    assert "s into the run.\n" in out
     assert "The user asked for it: (ptrans" in out
 
 
