@@ -16,6 +16,7 @@ from blackboard.encoding import NOT_FINITE
 from blackboard.entry import Entry, Ref
 from harvey.errors import BadInput
 from harvey.records import EntryRecord
+from logs.camera_file import Pictures
 from world_models.body import BodyFault, Frame, MotionReport, Recovery, RideReport
 from world_models.task import Command, Outcome, Resumed
 
@@ -90,7 +91,9 @@ def _picture(record: EntryRecord, value: Mapping[str, Any], frames: Mapping[int,
         raise BadInput(f"{record.ref}: expected picture {number} among those that were kept, which are {len(frames)}")
     jpeg = frames[number]
     if not isinstance(seen, dict) or hashlib.sha256(jpeg).hexdigest() != seen.get("sha256"):
-        raise BadInput(f"{record.ref}: expected the picture that the journal saw, got another one for number {number}")
+        where = f"{frames.where(number)}: " if isinstance(frames, Pictures) else ""
+        raise BadInput(f"{where}{record.ref}: expected the picture that the journal saw, got another one for number "
+                       f"{number}")
     return jpeg
 
 
