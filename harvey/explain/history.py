@@ -108,6 +108,12 @@ class History(ABC):
         outcomes = [id for id in self.newest if id.startswith("Outcome-")]
         return self.newest[outcomes[-1]] if outcomes else self.refs[-1]
 
+    @property
+    def cut_off(self) -> int | None:
+        """The last cycle of a run of which nothing says how it ended; None where it ended, or never began."""
+        ended = any(id.startswith("Outcome-") for id in self.newest)
+        return None if ended or not self.cycles else self.cycles[-1]
+
     def named(self, text: str) -> str:
         """The ref that a user means: ``MotorCommand-12.3``, or ``MotorCommand-12`` for its last revision.
 
