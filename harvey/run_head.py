@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
 from blackboard.encoding import plain
 from harvey.again.observations import MisfitError, decoded, fields_of
+from harvey.deciding_code import deciding_code
 from harvey.errors import BadInput
 from sim.scenario import ROOT, Servo
 from world_models.actuator import ActuatorModel
@@ -44,7 +45,8 @@ class RunHead:
         scenario: simulator: the scenario's tables as read, with ``--set`` applied; hardware: what the driver needs.
         folder: simulator: where the scenario's file was.
         body: simulator: how the body is reached, as :func:`harvey.hardware.serial_body.reached` knows it.
-        harvey: version.
+        harvey: version; code: what :func:`harvey.deciding_code.deciding_code` says of the program that decides, ""
+            in a run that is older than that.
     """
 
     kind: str
@@ -61,6 +63,7 @@ class RunHead:
     folder: str = ""
     body: str = "simulated"
     harvey: str = field(default_factory=lambda: version("harvey"))
+    code: str = field(default_factory=deciding_code)
 
     @staticmethod
     def of(
@@ -90,14 +93,27 @@ class RunHead:
         except (ValueError, RecursionError) as error:
             raise BadInput(f"{path}: expected JSON, got: {error}") from None
         try:
-            head: RunHead = decoded(data, RunHead)
+            head: RunHead = decoded({"code": "", **data} if isinstance(data, dict) else data, RunHead)
         except (ValueError, TypeError) as error:
             raise BadInput(f"{path}: {error}") from None
         return head
 
     def is_like(self, other: RunHead) -> bool:
-        """Whether both are written alike: then their runs began alike."""
-        return json.dumps(asdict(self)) == json.dumps(asdict(other))
+        """Whether both are written alike, whatever code decides: then their runs began alike."""
+        return json.dumps(asdict(replace(self, code=""))) == json.dumps(asdict(replace(other, code="")))
+
+    def here(self) -> RunHead:
+        """The same, for a run that this program decides."""
+        return replace(self, harvey=version("harvey"), code=deciding_code())
+
+    def decided_elsewhere(self) -> str:
+        """What to say of a run that was decided by another program than this; "" where none is known of."""
+        here = self.here()
+        if self.harvey != here.harvey:
+            return f"was decided by version {self.harvey} of harvey, and this is {here.harvey}"
+        if self.code and self.code != here.code:
+            return f"was decided by other code than this ({self.code} by its run.json, and here {here.code})"
+        return ""
 
     def model(self) -> RobotModel:
         """What the robot knows. Raises BadInput where the world file has changed since, or a value cannot be used."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,6 +18,10 @@ from world_models.task import Outcome
 
 DECISION = {"cycle": 1, "focus": "action", "observed": [], "seen": [], "activated": [], "obviated": [], "chosen": None,
             "runner_up": None, "pending": 0, "made": [], "refused": ""}
+
+HEAD = {"kind": "simulator", "name": "bump", "seed": 0, "world": "", "world_sha256": "", "robot": {}, "servo": {},
+        "command": {}, "without": [], "constants": [], "scenario": {}, "folder": "", "body": "simulated",
+        "harvey": version("harvey")}
 
 
 SMALL_WORLD = """name = "cottage"
@@ -41,6 +46,7 @@ kitchen-door = { between = ["kitchen", "hall"], wall = "east", along = 4, open =
 def journalled(folder: Path, *lines: str | bytes) -> str:
     """A run directory with this journal."""
     folder.mkdir(exist_ok=True)
+    (folder / "run.json").write_text(json.dumps(HEAD))
     (folder / "journal.jsonl").write_bytes(b"".join(
         (line.encode() if isinstance(line, str) else line) + b"\n" for line in lines))
     return str(folder)
@@ -146,7 +152,6 @@ def test_a_line_that_is_missing_or_there_twice_is_named(
     """However the lines are written; every cycle has its line."""
     written = (", ", ": ") if spaces else (",", ":")
     run = journalled(tmp_path / "run", *(json.dumps({**DECISION, "cycle": n}, separators=written) for n in cycles))
-    (tmp_path / "run" / "run.json").write_text("{}")
     before = (tmp_path / "run" / "journal.jsonl").read_bytes()
     for argv in (["why", run], ["diff", run, run], ["replay", run], ["resume", run], ["repair", run]):
         code, err = said(capsys, argv)
