@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from harvey.run_head import RunHead
 
 MOST_SETTINGS = 8
-DEEPEST = 40
 IGNORED = frozenset({"harvey", "code", "folder", "world_sha256"})
 
 
@@ -84,16 +83,36 @@ def _motions(d: DecisionRecord) -> tuple[EntryRecord, ...]:
 
 
 def grounds(ours: History, theirs: History, ref: str) -> Iterator[tuple[EntryRecord, EntryRecord]]:
-    """From an entry that differs down to the oldest of its reasons that differs, and on from there."""
-    for _ in range(DEEPEST):
-        a, b = ours.entry(ref), theirs.entry(ref)
-        if a is None or b is None:
-            return
-        yield a, b
-        below = [name for name in a.because if name in b.because and not same(ours.entry(name), theirs.entry(name))]
+    """From an entry that differs to the oldest difference that it rests on, by the shortest way.
+
+    What is nearest is not what it came from: a belief that differs since the first picture rests on the last one too.
+    """
+    above: dict[str, str] = {ref: ""}
+    met, roots = [ref], list[str]()
+    for name in met:  # which grows meanwhile
+        below = _differing(ours, theirs, name)
         if not below:
-            return
-        ref = min(below, key=lambda name: (_cycle(ours, name), name))
+            roots.append(name)
+        for under in below:
+            if under not in above:
+                above[under] = name
+                met.append(under)
+    oldest = min(roots, key=lambda name: (_cycle(ours, name), name), default=ref)
+    way = [oldest]
+    while above[way[-1]]:
+        way.append(above[way[-1]])
+    for name in reversed(way):
+        a, b = ours.entry(name), theirs.entry(name)
+        if a is not None and b is not None:
+            yield a, b
+
+
+def _differing(ours: History, theirs: History, ref: str) -> list[str]:
+    """The reasons of an entry that both runs have and that are not the same in both."""
+    a, b = ours.entry(ref), theirs.entry(ref)
+    shared = [name for name in a.because if name in b.because] if a is not None and b is not None else []
+    pairs = ((name, ours.entry(name), theirs.entry(name)) for name in dict.fromkeys(shared))
+    return [name for name, one, other in pairs if one is not None and other is not None and not same(one, other)]
 
 
 def _cycle(history: History, ref: str) -> int:
