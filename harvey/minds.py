@@ -68,7 +68,7 @@ def mind_of(head: RunHead, sources: Sources = knowledge_sources) -> Iterator[Min
         BadInput: something to be taken or set is not there; near names are listed.
     """
     names = [name for name in head.without if SEGMENT.fullmatch(name) is None]
-    segments = [(int(m[1]), int(m[2])) for name in head.without if (m := SEGMENT.fullmatch(name))]
+    segments = segments_named(head.without)
     model = head.model()
     known = [source.name for source in sources(model)]
     robot = replace(model, world=_lacking(model.world, [name for name in names if name not in known], known))
@@ -78,6 +78,11 @@ def mind_of(head: RunHead, sources: Sources = knowledge_sources) -> Iterator[Min
         experts = tuple(_Blinkered(robot, segments) if isinstance(s, LineFinder) else s for s in experts)
     with set_for_a_while([(key, value) for key, value in head.constants if not key.startswith(SERVO)]):
         yield Mind(robot, experts, _servoing(head, levels))
+
+
+def segments_named(names: Iterable[str]) -> tuple[tuple[int, int], ...]:
+    """(frame, segment) of the names that are of that kind."""
+    return tuple((int(m[1]), int(m[2])) for name in names if (m := SEGMENT.fullmatch(name)))
 
 
 def _servoing(head: RunHead, levels: dict[str, str]) -> Servoing:

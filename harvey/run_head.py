@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from blackboard.encoding import plain
-from harvey.again.observations import decoded
+from harvey.again.observations import MisfitError, decoded, fields_of
+from harvey.deciding_code import deciding_code
 from harvey.errors import BadInput
 from sim.scenario import ROOT, Servo
 from world_models.actuator import ActuatorModel
@@ -21,6 +22,10 @@ from world_models.store import fingerprint, load_world
 from world_models.task import Command
 
 SIMULATOR, HARDWARE = "simulator", "hardware"
+PARTS: Mapping[str, type[Any]] = {"camera": Camera, "mount": CameraMount, "actuator": ActuatorModel}
+"""What a robot knows of itself that has parts of its own."""
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +45,8 @@ class RunHead:
         scenario: simulator: the scenario's tables as read, with ``--set`` applied; hardware: what the driver needs.
         folder: simulator: where the scenario's file was.
         body: simulator: how the body is reached, as :func:`harvey.hardware.serial_body.reached` knows it.
-        harvey: version.
+        harvey: version; code: what :func:`harvey.deciding_code.deciding_code` says of the program that decides, ""
+            in a run that is older than that.
     """
 
     kind: str
@@ -57,6 +63,7 @@ class RunHead:
     folder: str = ""
     body: str = "simulated"
     harvey: str = field(default_factory=lambda: version("harvey"))
+    code: str = field(default_factory=deciding_code)
 
     @staticmethod
     def of(
@@ -86,41 +93,74 @@ class RunHead:
         except (ValueError, RecursionError) as error:
             raise BadInput(f"{path}: expected JSON, got: {error}") from None
         try:
-            head: RunHead = decoded(data, RunHead)
+            head: RunHead = decoded({"code": "", **data} if isinstance(data, dict) else data, RunHead)
         except (ValueError, TypeError) as error:
             raise BadInput(f"{path}: {error}") from None
         return head
 
     def is_like(self, other: RunHead) -> bool:
-        """Whether both are written alike: then their runs began alike."""
-        return json.dumps(asdict(self)) == json.dumps(asdict(other))
+        """Whether both are written alike, whatever code decides: then their runs began alike."""
+        return json.dumps(asdict(replace(self, code=""))) == json.dumps(asdict(replace(other, code="")))
+
+    def here(self) -> RunHead:
+        """The same, for a run that this program decides."""
+        return replace(self, harvey=version("harvey"), code=deciding_code())
+
+    def decided_elsewhere(self) -> str:
+        """What to say of a run that was decided by another program than this; "" where none is known of."""
+        here = self.here()
+        if self.harvey != here.harvey:
+            return f"was decided by version {self.harvey} of harvey, and this is {here.harvey}"
+        if self.code and self.code != here.code:
+            return f"was decided by other code than this ({self.code} by its run.json, and here {here.code})"
+        return ""
 
     def model(self) -> RobotModel:
         """What the robot knows. Raises BadInput where the world file has changed since, or a value cannot be used."""
         path = ROOT / self.world
         if _sha256_or_none(path) != self.world_sha256:
             raise BadInput(f"{path}: expected the world file as it was when the run was made, got another or none")
-        kinds = {"camera": Camera, "mount": CameraMount, "actuator": ActuatorModel}
-        try:
-            made = {name: kinds[name](**value) if name in kinds else value for name, value in self.robot.items()}
-            return RobotModel(load_world(path), **made)
-        except (TypeError, ValueError) as error:
-            raise BadInput(f"run.json: robot: {error}") from None
+        world = load_world(path)
+        return _made("robot", lambda: RobotModel(world, **self._known()))
 
     def task(self) -> Command:
         """What the user asked for. Raises BadInput."""
-        try:
-            command: Command = decoded(self.command, Command)
-        except (TypeError, ValueError) as error:
-            raise BadInput(f"run.json: command: {error}") from None
-        return command
+        return _made("command", lambda: _whole(self.command, Command))
 
     def servo_settings(self) -> Servo:
         """Which levels are on. Raises BadInput."""
-        try:
-            return Servo(**self.servo)
-        except TypeError as error:
-            raise BadInput(f"run.json: servo: {error}") from None
+        return _made("servo", lambda: _whole(self.servo, Servo))
+
+    def _known(self) -> dict[str, Any]:
+        """What the robot knows of itself; a run of an older version may lack what has a default. Raises ValueError."""
+        parts = {name: self.robot[name] for name in PARTS if name in self.robot}
+        rest = {name: value for name, value in self.robot.items() if name not in parts}
+        made = fields_of(rest, RobotModel)
+        for name, value in parts.items():
+            try:
+                made[name] = _whole(value, PARTS[name])
+            except (TypeError, ValueError) as error:
+                raise MisfitError.within(name, error) from None
+        return made
+
+
+def _made(what: str, make: Callable[[], T]) -> T:
+    """What a part of ``run.json`` stands for. Raises BadInput where a value in it cannot be used, and names it."""
+    try:
+        return make()
+    except (TypeError, ValueError) as error:
+        raise BadInput(f"run.json: {MisfitError.within(what, error)}") from None
+
+
+def _whole(value: Any, kind: type[T]) -> T:
+    """A dataclass from JSON types. Raises TypeError, ValueError."""
+    if not isinstance(value, dict):
+        raise ValueError(f"expected an object, got {value!r}")
+    lacking = [f.name for f in fields(kind)  # type: ignore[arg-type]
+               if f.name not in value and f.default is MISSING and f.default_factory is MISSING]
+    if lacking:
+        raise ValueError(f"expected {', '.join(lacking)} as well, got {', '.join(value) or 'nothing'}")
+    return kind(**fields_of(value, kind))
 
 
 def _portable(path: Path) -> str:

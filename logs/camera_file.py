@@ -31,23 +31,32 @@ class CameraFile:
 
 
 class Pictures(Mapping[int, bytes]):
-    """The pictures of a run by number; each is read from the file when it is asked for."""
+    """The pictures of a run by number; each is read from the file when it is asked for.
+
+    Attributes:
+        path: of the file.
+        end: length that the file has to have [bytes].
+    """
 
     def __init__(self, path: Path, sizes: Iterable[tuple[int, int]]) -> None:
         """``sizes``: (number, length in bytes) of each picture in the order of the file."""
-        self._path = path
+        self.path = path
         self._places: dict[int, tuple[int, int]] = {}
         end = 0
         for number, size in sizes:
             self._places[number] = end, size
             end += size
         self.end = end
-        """Length that the file has to have [bytes]."""
+
+    def where(self, number: int) -> str:
+        """In which file a picture is, and where in it. Raises KeyError."""
+        start, size = self._places[number]
+        return f"{self.path}, bytes {start} to {start + size}"
 
     def __getitem__(self, number: int) -> bytes:
         """The picture's bytes, fewer where the file is too short. Raises KeyError, OSError."""
         start, size = self._places[number]
-        with self._path.open("rb") as file:
+        with self.path.open("rb") as file:
             file.seek(start)
             return file.read(size)
 

@@ -109,9 +109,10 @@ def read_journal(path: Path) -> Iterator[dict[str, Any]]:
     """The decisions of a journal, one by one.
 
     A last line without its end, as a crash leaves it, is not a decision: it comes as ``{"truncated": <line number>}``.
+    Every cycle has its line, also where a run was cut off and went on: line 42 is cycle 42.
 
     Raises:
-        JournalError: a line is not a decision.
+        JournalError: a line is not a decision, or not the one that follows on the line before.
         OSError: the file cannot be read.
     """
     with path.open("rb") as file:
@@ -119,7 +120,16 @@ def read_journal(path: Path) -> Iterator[dict[str, Any]]:
             if not line.endswith(b"\n"):
                 yield {"truncated": number}
                 return
-            yield _decision(line, f"{path}:{number}")
+            record = _decision(line, f"{path}:{number}")
+            if record["cycle"] != number:
+                raise JournalError(out_of_step(f"{path}:{number}", number, record["cycle"]))
+            yield record
+
+
+def out_of_step(where: str, expected: int, came: int) -> str:
+    """What to say of a line whose cycle is not the one that has to stand there."""
+    why = "a line is missing before it" if came > expected else "a line is there twice, or was moved"
+    return f"{where}: expected cycle {expected}, got {came} ({why})"
 
 
 def _decision(line: bytes, where: str) -> dict[str, Any]:

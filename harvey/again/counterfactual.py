@@ -16,10 +16,12 @@ from blackboard.effect import Post
 from blackboard.encoding import plain
 from blackboard.journal import Decision, decision_line, decision_record
 from blackboard.scheduler import Scheduler
+from harvey.again.hidden_segments import check_segments
 from harvey.again.observations import effect_of
 from harvey.again.reliving import RESUME, Reliving
 from harvey.again.replay import Live, pictures_of
 from harvey.again.resume import stage_of
+from harvey.campaign import room_for
 from harvey.diary import Diary
 from harvey.loop import Over, endless, until_outcome
 from harvey.minds import mind_of
@@ -78,16 +80,19 @@ def what_if(
     Args:
         without: experts, landmarks, faces, or ``frame 88 segment 12``, to be taken away.
         constants: (key, value) of servo levels and constants to be set.
-        out: where what would have been is kept, as a run.
+        out: where what would have been is kept, as a run; an older one there goes once it is clear what is asked.
         go_on: in the simulator: go on where the record no longer answers.
 
     Raises:
         BadInput: the run cannot be used, or what is to be taken or set is not there.
     """
-    head = RunHead.read(run.path)
-    head = replace(head, without=(*head.without, *without), constants=(*head.constants, *constants))
+    then = RunHead.read(run.path)
+    head = replace(then.here(), without=(*then.without, *without), constants=(*then.constants, *constants))
     player = _Player(run)
+    check_segments(player.records, without, then.without)
     with mind_of(head) as mind:
+        if out is not None:
+            room_for(out.path, head.name, head.seed)
         diary = Diary(out, head, mind.robot)
         if head.kind != SIMULATOR:
             scheduler = mind.scheduler(sinks=(*diary.sinks, player.heard))
@@ -131,8 +136,8 @@ class _Player:
 
     def __init__(self, run: RunDirectory) -> None:
         self.pictures = pictures_of(run)
-        self._records = list(read_records(run.journal))
-        self._steps = _steps(self._records)
+        self.records = list(read_records(run.journal))
+        self._steps = _steps(self.records)
         self._agreed, self._differs = 0, False
         self._first: tuple[DecisionRecord | None, DecisionRecord] | None = None
         self._answered = 0
@@ -144,7 +149,7 @@ class _Player:
         """Sink: compares with the record until the first difference."""
         self.last, self.open = decision, tuple(change for change in decision.made if is_asked(change))
         if self._first is None:
-            recorded = self._records[self._agreed] if self._agreed < len(self._records) else None
+            recorded = self.records[self._agreed] if self._agreed < len(self.records) else None
             if recorded is not None and recorded.line == decision_line(decision):
                 self._agreed += 1
             else:
@@ -169,8 +174,8 @@ class _Player:
     def answer(self, outcome: Outcome, result: MissionResult | None) -> Answer:
         """What was found."""
         then, now = self._first or (None, None)
-        if self._first is None and self._agreed < len(self._records):
-            then = self._records[self._agreed]
+        if self._first is None and self._agreed < len(self.records):
+            then = self.records[self._agreed]
         return Answer(self._agreed, then, now, self._answered, self.parting, outcome, result)
 
     def _tell(self, scheduler: Scheduler, diary: Diary, live: Live) -> None:

@@ -78,11 +78,22 @@ def pictures_of(run: RunDirectory) -> Mapping[int, bytes]:
     """The pictures of a run: from its camera file or, where it has none, from its recording.
 
     Raises:
-        BadInput: the journal cannot be read.
+        BadInput: the journal cannot be read, or the camera file is shorter than what it tells of.
         RecordingError: there is no camera file, and the recording cannot be read.
     """
     sizes = list(_sizes(read_records(run.journal)))
-    return Pictures(run.camera, sizes) if run.camera.is_file() or not sizes else read_frames(run.recording)
+    if sizes and not run.camera.is_file():
+        return read_frames(run.recording)
+    pictures, there = Pictures(run.camera, sizes), camera_bytes(run)
+    if there < pictures.end:
+        raise BadInput(
+            f"{run.camera}: expected {pictures.end} bytes of pictures that the journal tells of, got {there}")
+    return pictures
+
+
+def camera_bytes(run: RunDirectory) -> int:
+    """Length of the camera file; 0 where there is none."""
+    return run.camera.stat().st_size if run.camera.is_file() else 0
 
 
 def _sizes(decisions: Iterable[DecisionRecord]) -> Iterator[tuple[int, int]]:

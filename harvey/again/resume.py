@@ -16,7 +16,7 @@ from blackboard.change import Change, Posted, Retracted
 from blackboard.effect import Post
 from blackboard.journal import Decision, Sink
 from harvey.again.reliving import RESUME, Reliving
-from harvey.again.replay import checked, pictures_of, replayed
+from harvey.again.replay import camera_bytes, checked, pictures_of, replayed
 from harvey.diary import Diary, Extent
 from harvey.errors import BadInput
 from harvey.minds import mind_of
@@ -51,20 +51,33 @@ class Remains:
 
 def remains_of(run: RunDirectory) -> Remains:
     """Look at a run without touching it. Raises BadInput where it cannot be used at all."""
+    there = camera_bytes(run)
+    decisions, outcome = _decided(run) if run.journal.is_file() else (0, None)
+    if decisions == 0:
+        _begins_anew(run, there)
     if not run.journal.is_file():
         return Remains(Extent(), 0, None, ())
-    decisions, outcome = _decided(run)
     whole, pictures = _whole_lines(run.journal), pictures_of(run)
     end = pictures.end if isinstance(pictures, Pictures) else 0
-    there = run.camera.stat().st_size if run.camera.is_file() else 0
-    if there < end:
-        raise BadInput(f"{run.camera}: expected {end} bytes of pictures that the journal tells of, got {there}")
     dropped = []
     if run.journal.stat().st_size > whole:
         dropped.append(f"decision {decisions + 1}, which was cut off while it was written")
     if there > end:
         dropped.append(f"{there - end} bytes of a picture that no decision had seen")
     return Remains(Extent(whole, end), decisions, outcome, tuple(dropped))
+
+
+def _begins_anew(run: RunDirectory, pictures: int) -> None:
+    """Raises BadInput where a run of which no decision is there was more than begun: its journal was lost since.
+
+    A picture is asked for by a decision that is on the disk by then; so where nothing was lost, there is none.
+    """
+    lost = [f"{run.camera.name} has {pictures} bytes of pictures"] * (pictures > 0)
+    if told := run.read_result().get("decisions"):
+        lost.append(f"{run.result.name} tells of {told} decisions")
+    if lost:
+        raise BadInput(f"{run.journal}: expected the decisions of the run, got none, although {' and '.join(lost)}; "
+                       "nothing was touched")
 
 
 def resume(

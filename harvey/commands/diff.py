@@ -19,12 +19,18 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
+    from harvey.run_head import RunHead
+
     first, second = open_run(args.first), open_run(args.second)
+    heads = RunHead.read(first.path), RunHead.read(second.path)
+    ours, theirs = JournalHistory(first.journal), JournalHistory(second.journal)
     print(f"first:  {_title(first)}\nsecond: {_title(second)}")
-    set_differently = tuple(settings(first, second))
+    for name, head in zip(("first", "second"), heads, strict=True):
+        if elsewhere := head.decided_elsewhere():
+            print(f"note: the {name} run {elsewhere}")
+    set_differently = tuple(settings(*heads))
     if set_differently:
         print(f"set differently: {'; '.join(set_differently)}")
-    ours, theirs = JournalHistory(first.journal), JournalHistory(second.journal)
     alike = ours.lines_alike(theirs)
     more, one, other = first_difference(*(islice(h.decisions(), alike, None) for h in (ours, theirs)))
     agreed = alike + more

@@ -8,14 +8,15 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harvey.campaign import room_for, settings_of
+from harvey.campaign import settings_of
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_directory import RunDirectory, open_run
+from harvey.run_directory import RunDirectory, open_run, vacant
 from harvey.units import count
 
 if TYPE_CHECKING:
     from harvey.again.replay import Told
+    from harvey.run_head import RunHead
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -44,24 +45,20 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
     """Decide it again with a changed mind."""
     from harvey.again.counterfactual import what_if
     from harvey.again.counterfactual_words import told
+    from harvey.run_head import RunHead
 
-    out = _kept_in(Path(args.out), run) if args.out else None
+    out = RunDirectory(vacant(Path(args.out))) if args.out else None
+    if out is not None and out.path.resolve() == run.path.resolve():
+        raise BadInput(f"--out {args.out}: expected another directory than that of the run, got the same")
+    elsewhere = RunHead.read(run.path).decided_elsewhere()
     answer = what_if(run, args.without, settings, out=out, go_on=not args.record_only)
     print("\n".join(told(answer, run, [*(f"without {name}" for name in args.without),
                                        *(f"with {key} = {value}" for key, value in settings)])))
+    if elsewhere:
+        print(f"\nnote: the run {elsewhere}, so what differs may come of that as well: harvey replay {run.path} tells")
     if out is not None:
         print(f"\nit is kept in {out.path}; compare with    harvey diff {run.path} {out.path}")
     return 0
-
-
-def _kept_in(path: Path, run: RunDirectory) -> RunDirectory:
-    """Where what would have been is kept. Raises BadInput where that is the run itself."""
-    from harvey.run_head import RunHead
-
-    if path.resolve() == run.path.resolve():
-        raise BadInput(f"--out {path}: expected another directory than the run's own")
-    head = RunHead.read(run.path)
-    return RunDirectory(room_for(path, head.name, head.seed))
 
 
 def _again(run: RunDirectory) -> int:
@@ -70,18 +67,31 @@ def _again(run: RunDirectory) -> int:
     from harvey.minds import mind_of
     from harvey.run_head import RunHead
 
-    pictures, agreed = pictures_of(run), 0
-    with mind_of(RunHead.read(run.path)) as mind:
+    pictures, agreed, head = pictures_of(run), 0, RunHead.read(run.path)
+    elsewhere = head.decided_elsewhere()
+    with mind_of(head) as mind:
         for told in shown(replayed(run, pictures, mind.scheduler())):
             if not told.same:
-                print(_difference(agreed, told))
+                print(f"{_difference(agreed, told)}\n\n{_perhaps(head, elsewhere)}")
                 return 1
             agreed += 1
     if not agreed:
         raise BadInput(f"{run.journal}: expected at least one decision, got none")
     frames = count(len(pictures), "frame")
     print(f"{count(agreed, 'decision')} decided again from {frames}: all the same, byte for byte")
+    if elsewhere:
+        print(f"note: the run {elsewhere}")
     return 0
+
+
+def _perhaps(head: RunHead, elsewhere: str) -> str:
+    """What a difference may come from, as far as the run tells who decided it."""
+    if elsewhere:
+        return f"The run {elsewhere}: that may be why. It takes the program that made the run to decide it as it was."
+    if not head.code:
+        return ("The program may have changed since the run was made, whose run.json does not say by which code it was "
+                "decided.")
+    return "The run was decided by the same code as this, so its files were changed since, or the libraries are others."
 
 
 def _difference(agreed: int, told: Told) -> str:

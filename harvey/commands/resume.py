@@ -43,7 +43,7 @@ def _run(args: Namespace) -> int:
         return _on_hardware(run, head, remains, moved, args.live)
     if moved:
         raise BadInput(f"--base and --camera: expected a run on hardware, and {run.path} is one of the simulator")
-    _tell(run, remains)
+    _tell(run, remains, head)
     result = resume(run, remains, live=args.live)
     print(one(result, run.path))
     return 0 if result.outcome == "reached" else 1
@@ -67,14 +67,16 @@ def _on_hardware(
     with DryRun(mission, run.path, clock) as dry:
         if not checked(dry) or dry.base is None or dry.camera is None:
             return 2
-        _tell(run, remains)
+        _tell(run, remains, head)
         tell_how_to_stop()
         result = resume(mission, run, remains, dry.base, dry.camera, clock, sinks=[follow], live=live)
     print(summary(result, run.path))
     return 0 if result["outcome"] == "reached" else 1
 
 
-def _tell(run: RunDirectory, remains: Remains) -> None:
+def _tell(run: RunDirectory, remains: Remains, head: RunHead) -> None:
+    if elsewhere := head.decided_elsewhere():
+        print(f"note: the run {elsewhere}; it goes on only if it is decided again as it was", file=sys.stderr)
     for what in remains.dropped:
         print(f"dropped: {what}", file=sys.stderr)
     told = count(remains.decisions, "decision")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -45,11 +46,20 @@ def _run(args: Namespace) -> int:
         _print_not(run, history, args)
         return 0
     refs = _refs(history, args)
+    if not asked and args.at is None and history.cut_off is not None:
+        print(_cut_off(run, history.cut_off), file=sys.stderr if args.json else sys.stdout)
     if args.json:
         print(json.dumps([_record(one) for one in _stories(history, args, refs)], indent=2))
     else:
         print("\n".join(_paragraphs(history, args, refs)))
     return 0
+
+
+def _cut_off(run: RunDirectory, cycle: int) -> str:
+    """What to say first of a run that has no outcome."""
+    go_on = f"harvey resume {run.path} goes on with it"
+    return (f"The run was cut off in cycle {cycle}, before it had an outcome: {go_on}.\n"
+            "The last thing that its journal tells of:\n")
 
 
 def _refs(history: History, args: Namespace) -> list[str]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 from harvey.explain.diff import differing_leaves, short
 from harvey.explain.history import History
@@ -17,9 +17,11 @@ from harvey.run_directory import RunDirectory
 from harvey.tables import table
 from harvey.units import count, metres
 
+if TYPE_CHECKING:
+    from harvey.run_head import RunHead
+
 MOST_SETTINGS = 8
-DEEPEST = 40
-IGNORED = frozenset({"harvey", "folder", "world_sha256"})
+IGNORED = frozenset({"harvey", "code", "folder", "world_sha256"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,16 +83,36 @@ def _motions(d: DecisionRecord) -> tuple[EntryRecord, ...]:
 
 
 def grounds(ours: History, theirs: History, ref: str) -> Iterator[tuple[EntryRecord, EntryRecord]]:
-    """From an entry that differs down to the oldest of its reasons that differs, and on from there."""
-    for _ in range(DEEPEST):
-        a, b = ours.entry(ref), theirs.entry(ref)
-        if a is None or b is None:
-            return
-        yield a, b
-        below = [name for name in a.because if name in b.because and not same(ours.entry(name), theirs.entry(name))]
+    """From an entry that differs to the oldest difference that it rests on, by the shortest way.
+
+    What is nearest is not what it came from: a belief that differs since the first picture rests on the last one too.
+    """
+    above: dict[str, str] = {ref: ""}
+    met, roots = [ref], list[str]()
+    for name in met:  # which grows meanwhile
+        below = _differing(ours, theirs, name)
         if not below:
-            return
-        ref = min(below, key=lambda name: (_cycle(ours, name), name))
+            roots.append(name)
+        for under in below:
+            if under not in above:
+                above[under] = name
+                met.append(under)
+    oldest = min(roots, key=lambda name: (_cycle(ours, name), name), default=ref)
+    way = [oldest]
+    while above[way[-1]]:
+        way.append(above[way[-1]])
+    for name in reversed(way):
+        a, b = ours.entry(name), theirs.entry(name)
+        if a is not None and b is not None:
+            yield a, b
+
+
+def _differing(ours: History, theirs: History, ref: str) -> list[str]:
+    """The reasons of an entry that both runs have and that are not the same in both."""
+    a, b = ours.entry(ref), theirs.entry(ref)
+    shared = [name for name in a.because if name in b.because] if a is not None and b is not None else []
+    pairs = ((name, ours.entry(name), theirs.entry(name)) for name in dict.fromkeys(shared))
+    return [name for name, one, other in pairs if one is not None and other is not None and not same(one, other)]
 
 
 def _cycle(history: History, ref: str) -> int:
@@ -98,24 +120,19 @@ def _cycle(history: History, ref: str) -> int:
     return 0 if record is None else record.cycle
 
 
-def settings(first: RunDirectory, second: RunDirectory) -> Iterator[str]:
-    """What was set differently, as far as the run directories tell."""
-    ours, theirs = _head(first), _head(second)
+def settings(first: RunHead, second: RunHead) -> Iterator[str]:
+    """What was set differently, and by which code it was decided where both say so and differ."""
+    if first.harvey != second.harvey:
+        yield f"decided by harvey {first.harvey} against {second.harvey}"
+    elif first.code and second.code and first.code != second.code:
+        yield f"decided by different code: {first.code} against {second.code}"
+    ours, theirs = (json.loads(json.dumps(asdict(head))) for head in (first, second))
     keys = [key for key in {**ours, **theirs} if key not in IGNORED]
     told = [f"{path}: {short(a)} against {short(b)}" for key in keys
             for path, a, b in differing_leaves({key: ours.get(key)}, {key: theirs.get(key)})]
     yield from told[:MOST_SETTINGS]
     if len(told) > MOST_SETTINGS:
         yield f"and {len(told) - MOST_SETTINGS} more"
-
-
-def _head(run: RunDirectory) -> Mapping[str, Any]:
-    """``run.json``, or what the result says of where it came from."""
-    try:
-        data = json.loads((run.path / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        data = {key: value for key, value in run.read_result().items() if key in ("scenario", "seed", "origin")}
-    return data if isinstance(data, dict) else {}
 
 
 def because(ours: History, theirs: History, agreed: int, settings: tuple[str, ...]) -> Iterator[str]:

@@ -104,9 +104,15 @@ class History(ABC):
         """
         if not self.newest:
             self.verify()
-            raise BadInput("expected a run with at least one entry in its journal, got none")
+            raise BadInput(f"{self.source}: expected at least one entry, got none")
         outcomes = [id for id in self.newest if id.startswith("Outcome-")]
         return self.newest[outcomes[-1]] if outcomes else self.refs[-1]
+
+    @property
+    def cut_off(self) -> int | None:
+        """The last cycle of a run of which nothing says how it ended; None where it ended, or never began."""
+        ended = any(id.startswith("Outcome-") for id in self.newest)
+        return None if ended or not self.cycles else self.cycles[-1]
 
     def named(self, text: str) -> str:
         """The ref that a user means: ``MotorCommand-12.3``, or ``MotorCommand-12`` for its last revision.

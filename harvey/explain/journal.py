@@ -16,6 +16,7 @@ from pathlib import Path
 from harvey.errors import BadInput
 from harvey.explain.history import History
 from harvey.records import DecisionRecord, EntryRecord, decision_of
+from logs.journal_file import out_of_step
 
 PLAIN = re.compile(rb'\{"cycle":(\d+),"')
 """How a line begins as the scheduler writes it; a line that begins otherwise is read in full."""
@@ -90,13 +91,19 @@ class JournalHistory(History):
         return min(len(self._ends), len(other._ends))
 
     def _sweep(self) -> None:
-        """Note where each cycle and each entry stands. What stands in an unusual line is read from it."""
+        """Note where each cycle and each entry stands. What stands in an unusual line is read from it.
+
+        Raises BadInput where a line is not the cycle that follows on the line before.
+        """
         start, unusual = 0, list[int]()
         for line, end in enumerate(self._ends):
             plain = PLAIN.match(self._data, start)
             if plain is None or self._data[end - 1] != CLOSES:
                 unusual.append(line)
-            self._line_of[int(plain[1]) if plain else self._decision(line).cycle] = line
+            cycle = int(plain[1]) if plain else self._decision(line).cycle
+            if cycle != line + 1:
+                raise BadInput(out_of_step(f"{self._path}:{line + 1}", line + 1, cycle))
+            self._line_of[cycle] = line
             start = end + 1
         if unusual:
             self._sweep_slowly()

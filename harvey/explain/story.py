@@ -100,7 +100,7 @@ def decided(history: History, record: EntryRecord) -> str:
     """By whom, when and against what."""
     when = f"cycle {record.cycle}" + _time(history, record)
     if record.observed:
-        return f"It came from outside, from {record.author}, and was taken up in {when}."
+        return f"It came from outside, from {record.author}, and was taken up in {when.rstrip(',')}."
     decision = history.decision(record.cycle)
     text = f"Decided in {when} by the {words(record.author)}"
     if decision.chosen is None:

@@ -118,8 +118,28 @@ def test_a_run_that_had_hardly_begun_begins(
     whole: RunDirectory, short_stage: Stage, tmp_path: Path, tail: int
 ) -> None:
     run = cut(whole, tmp_path / "run", 0, tail=tail)
+    run.camera.write_bytes(b"")
     assert gone_on(run, short_stage).outcome == "reached"
     assert run.journal.read_bytes() == whole.journal.read_bytes()
+
+
+@pytest.mark.parametrize("tail", [None, 0, 200])
+@pytest.mark.parametrize("lacking", ["result.json", "camera.mjpeg"])
+def test_a_run_whose_journal_was_lost_is_left_alone(
+    whole: RunDirectory, tmp_path: Path, capsys: pytest.CaptureFixture[str], tail: int | None, lacking: str
+) -> None:
+    """Pictures, or a result, of decisions that are not there: the run had more than begun."""
+    run = cut(whole, tmp_path / "run", 0, tail=tail or 0)
+    shutil.copy(whole.result, run.result)
+    (run.path / lacking).unlink()
+    if tail is None:
+        run.journal.unlink()
+    before = {path.name: path.read_bytes() for path in run.path.iterdir()}
+    assert main(["resume", str(run.path)]) == 2
+    err = capsys.readouterr().err
+    assert "journal.jsonl: expected the decisions of the run, got none, although" in err
+    assert ("result.json tells of" if lacking == "camera.mjpeg" else "bytes of pictures") in err
+    assert {path.name: path.read_bytes() for path in run.path.iterdir()} == before
 
 
 def test_a_finished_run_says_so(whole: RunDirectory, capsys: pytest.CaptureFixture[str]) -> None:

@@ -184,6 +184,7 @@ def test_two_seeds_part_at_an_observation_and_each_later_difference_goes_back_to
     assert f"The first motion that differs is {where.motion}" in out
     chain = list(grounds(history, theirs, where.motion))
     assert chain[-1][0].observed
+    assert chain[-1][0].ref == where.observation
     assert "seed: 0 against 1" in out
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,6 +19,10 @@ from world_models.task import Outcome
 
 DECISION = {"cycle": 1, "focus": "action", "observed": [], "seen": [], "activated": [], "obviated": [], "chosen": None,
             "runner_up": None, "pending": 0, "made": [], "refused": ""}
+
+HEAD = {"kind": "simulator", "name": "bump", "seed": 0, "world": "", "world_sha256": "", "robot": {}, "servo": {},
+        "command": {}, "without": [], "constants": [], "scenario": {}, "folder": "", "body": "simulated",
+        "harvey": version("harvey")}
 
 
 SMALL_WORLD = """name = "cottage"
@@ -42,6 +47,7 @@ kitchen-door = { between = ["kitchen", "hall"], wall = "east", along = 4, open =
 def journalled(folder: Path, *lines: str | bytes) -> str:
     """A run directory with this journal."""
     folder.mkdir(exist_ok=True)
+    (folder / "run.json").write_text(json.dumps(HEAD))
     (folder / "journal.jsonl").write_bytes(b"".join(
         (line.encode() if isinstance(line, str) else line) + b"\n" for line in lines))
     return str(folder)
@@ -135,6 +141,26 @@ def test_a_corrupt_line_of_a_journal_is_named(
         assert told in err
 
 
+@pytest.mark.parametrize(("cycles", "told"), [
+    ((1, 2, 2, 3), "journal.jsonl:3: expected cycle 3, got 2 (a line is there twice"),
+    ((1, 3, 4), "journal.jsonl:2: expected cycle 2, got 3 (a line is missing"),
+    ((2, 3), "journal.jsonl:1: expected cycle 1, got 2 (a line is missing"),
+])
+@pytest.mark.parametrize("spaces", [False, True])
+def test_a_line_that_is_missing_or_there_twice_is_named(
+    cycles: tuple[int, ...], told: str, spaces: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """However the lines are written; every cycle has its line."""
+    written = (", ", ": ") if spaces else (",", ":")
+    run = journalled(tmp_path / "run", *(json.dumps({**DECISION, "cycle": n}, separators=written) for n in cycles))
+    before = (tmp_path / "run" / "journal.jsonl").read_bytes()
+    for argv in (["why", run], ["diff", run, run], ["replay", run], ["resume", run], ["repair", run]):
+        code, err = said(capsys, argv)
+        assert code == 2
+        assert told in err, argv
+    assert (tmp_path / "run" / "journal.jsonl").read_bytes() == before
+
+
 def test_a_line_that_was_cut_off_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole = journalled(tmp_path / "whole", json.dumps(DECISION))
     cut = journalled(tmp_path / "cut", json.dumps(DECISION))
@@ -147,7 +173,7 @@ def test_a_line_that_was_cut_off_is_left_out(tmp_path: Path, capsys: pytest.Capt
 def test_an_empty_journal_is_no_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, err = said(capsys, ["why", journalled(tmp_path / "run")])
     assert code == 2
-    assert "at least one entry" in err
+    assert "journal.jsonl: expected at least one entry, got none" in err
 
 
 def test_a_directory_of_runs_is_told_apart_from_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,6 +16,7 @@ import pytest
 
 from harvey.campaign import Task, run_all, seeds_of, settings_of
 from harvey.cli import main
+from harvey.deciding_code import deciding_code
 from harvey.errors import BadInput, Terminated
 from harvey.explain.sentences import MAKERS
 from harvey.records import read_records
@@ -72,6 +73,7 @@ def test_why_without_an_entry_tells_the_outcome(run: Path, capsys: pytest.Captur
     assert main(["why", str(run)]) == 0
     out = capsys.readouterr().out
     assert "The mission ended: failed" in out
+    assert "s into the run.\n" in out
     assert "The user asked for it: (ptrans" in out
 
 
@@ -121,6 +123,7 @@ def test_replay_finds_a_journal_that_was_tampered_with(
     out = capsys.readouterr().out
     assert "agree for 1 decision." in out
     assert "rated 0.7" in out and "rated 0.8" in out
+    assert "decided by the same code as this" in out
 
 
 def test_replay_refuses_pictures_that_the_journal_did_not_see(
@@ -130,7 +133,103 @@ def test_replay_refuses_pictures_that_the_journal_did_not_see(
     seen = journal.partition('"sha256":"')[2][:64]
     forged = copied(run, tmp_path / "forged", journal=journal.replace(seen, "0" * 64))
     assert main(["replay", str(forged)]) == 2
-    assert "another one for number 0" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert "camera.mjpeg, bytes 0 to" in err
+    assert "another one for number 0" in err
+
+
+@pytest.mark.parametrize("left", [0, 5000])
+def test_replay_names_a_camera_file_that_is_too_short(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], left: int
+) -> None:
+    short = copied(run, tmp_path / "short", journal=(run / "journal.jsonl").read_text())
+    pictures = (short / "camera.mjpeg").read_bytes()
+    (short / "camera.mjpeg").write_bytes(pictures[:left])
+    told = f"camera.mjpeg: expected {len(pictures)} bytes of pictures that the journal tells of, got {left}"
+    for more in ([], ["--without", "plan_adjuster", "--record-only"]):
+        assert main(["replay", str(short), *more]) == 2
+        assert told in capsys.readouterr().err
+
+
+def test_a_run_that_was_cut_off_says_so_first(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = (run / "journal.jsonl").read_text().splitlines(keepends=True)
+    cut = str(copied(run, tmp_path / "cut", journal="".join(lines[:20]) + lines[20][:9]))
+    assert main(["why", cut]) == 0
+    assert capsys.readouterr().out.startswith(
+        f"The run was cut off in cycle 20, before it had an outcome: harvey resume {cut} goes on with it.\n")
+    assert main(["why", cut, "--json"]) == 0
+    told = capsys.readouterr()
+    assert "cut off in cycle 20" in told.err
+    assert json.loads(told.out)[0]["entry"]
+    for asked in ([str(run)], [cut, "Frame-1"], [cut, "--at", "3"]):
+        assert main(["why", *asked]) == 0
+        assert "cut off" not in "".join(capsys.readouterr())
+
+
+def headed(run: Path, to: Path, **head: str) -> Path:
+    """The run with something else at its head."""
+    again = copied(run, to, journal=(run / "journal.jsonl").read_text())
+    (again / "run.json").write_text(json.dumps(json.loads((run / "run.json").read_text()) | head))
+    return again
+
+
+@pytest.mark.parametrize(("head", "words"), [
+    ({"harvey": "0.0.1"}, "was decided by version 0.0.1 of harvey, and this is"),
+    ({"code": "0123456789abcdef"}, "was decided by other code than this (0123456789abcdef by its run.json, and here"),
+])
+def test_a_run_of_another_program_is_called_that(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], head: dict[str, str], words: str
+) -> None:
+    """A note where nothing differs; where something does, that may be why."""
+    other = headed(run, tmp_path / "other", **head)
+    assert main(["replay", str(other)]) == 0
+    assert words in capsys.readouterr().out
+    assert main(["diff", str(run), str(other)]) == 0
+    out = capsys.readouterr().out
+    assert f"note: the second run {words}" in out
+    assert "first run was" not in out
+    assert "decided by" in out.partition("set differently: ")[2]
+    text = (other / "journal.jsonl").read_text()
+    (other / "journal.jsonl").write_text(text.replace('"rating":0.8', '"rating":0.7', 1))
+    assert main(["replay", str(other)]) == 1
+    assert f"The run {words}" in capsys.readouterr().out
+    assert main(["resume", str(other)]) == 1  # it has an outcome
+    lines = text.splitlines(keepends=True)
+    (other / "journal.jsonl").write_text("".join(lines[:20]).replace('"rating":0.8', '"rating":0.7', 1))
+    assert main(["resume", str(other)]) == 2
+    err = capsys.readouterr().err
+    assert f"note: the run {words}" in err
+    assert "is not decided again as it was" in err
+
+
+def test_a_run_that_is_older_than_the_name_of_its_code_is_read(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    older = headed(run, tmp_path / "older")
+    data = json.loads((older / "run.json").read_text())
+    assert data.pop("code") == deciding_code()
+    (older / "run.json").write_text(json.dumps(data))
+    assert main(["replay", str(older)]) == 0
+    assert "note" not in capsys.readouterr().out
+    assert main(["diff", str(run), str(older)]) == 0
+    assert "decided by" not in capsys.readouterr().out
+    text = (older / "journal.jsonl").read_text()
+    (older / "journal.jsonl").write_text(text.replace('"rating":0.8', '"rating":0.7', 1))
+    assert main(["replay", str(older)]) == 1
+    assert "The program may have changed since the run was made" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("head", [None, "{", "[]", '{"kind": "simulator"}'])
+def test_diff_names_a_head_that_cannot_be_read(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], head: str | None
+) -> None:
+    spoilt = copied(run, tmp_path / "spoilt", journal=(run / "journal.jsonl").read_text())
+    (spoilt / "run.json").unlink()
+    if head is not None:
+        (spoilt / "run.json").write_text(head)
+    for pair in ((run, spoilt), (spoilt, run)):
+        assert main(["diff", *map(str, pair)]) == 2
+        assert f"{spoilt / 'run.json'}: expected" in capsys.readouterr().err
 
 
 def test_diff_names_the_first_decision_that_differs(

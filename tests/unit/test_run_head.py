@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,8 +65,48 @@ def test_a_malformed_head_is_named(tmp_path: Path, text: str, word: str) -> None
 @pytest.mark.parametrize(("key", "value"), [("seed", "three"), ("servo", []), ("without", [3]), ("kind", None)])
 def test_a_value_of_the_wrong_kind_is_named(robot: RobotModel, tmp_path: Path, key: str, value: object) -> None:
     (tmp_path / "run.json").write_text(json.dumps({**dataclasses.asdict(head_of(robot)), key: value}))
-    with pytest.raises(BadInput, match=r"run\.json: expected"):
+    with pytest.raises(BadInput, match=rf"run\.json: {key}.*: expected"):
         RunHead.read(tmp_path)
+
+
+@pytest.mark.parametrize(("part", "spoilt", "told"), [
+    ("robot", {"camera": {"fx": "wide"}}, "robot.camera.fx: expected a number, got 'wide'"),
+    ("robot", {"camera": {"fx": True}}, "robot.camera.fx: expected a number, got True"),
+    ("robot", {"camera": {"width": 3.5}}, "robot.camera.width: expected a whole number, got 3.5"),
+    ("robot", {"camera": {"fx": -1.0}}, "robot.camera: expected positive focal lengths"),
+    ("robot", {"camera": {"distortion": "barrel"}}, "robot.camera: "),
+    ("robot", {"camera": {"focus": 1.0}}, "robot.camera: expected fx, fy, .*, got 'focus'"),
+    ("robot", {"mount": {"height_m": None}}, "robot.mount.height_m: expected a number, got None"),
+    ("robot", {"radius_m": "broad"}, "robot.radius_m: expected a number, got 'broad'"),
+    ("robot", {"colour": "red"}, "robot: expected .*, got 'colour'"),
+    ("servo", {"plan": "perhaps"}, "servo.plan: expected true or false, got 'perhaps'"),
+    ("command", {"text": 3}, "command.text: expected a text, got 3"),
+])
+def test_what_cannot_be_used_is_named_by_where_it_stands(
+    robot: RobotModel, tmp_path: Path, part: str, spoilt: dict[str, object], told: str
+) -> None:
+    data = dataclasses.asdict(head_of(robot))
+    (tmp_path / "run.json").write_text(json.dumps({**data, part: merged(data[part], spoilt)}))
+    head = RunHead.read(tmp_path)
+    with pytest.raises(BadInput, match=rf"run\.json: {told}"):
+        {"robot": head.model, "servo": head.servo_settings, "command": head.task}[part]()
+
+
+def merged(whole: dict[str, Any], spoilt: Any) -> dict[str, Any]:
+    return whole | {key: merged(whole[key], value) if isinstance(value, dict) else value
+                    for key, value in spoilt.items()}
+
+
+def test_a_head_that_lacks_what_is_lacking_by_default_is_read(robot: RobotModel, tmp_path: Path) -> None:
+    """As an older version wrote it; what has no default is asked for by name."""
+    data = dataclasses.asdict(head_of(robot))
+    del data["robot"]["camera"]["obstruction"], data["robot"]["continuous"], data["robot"]["actuator"]["turn_sigma"]
+    (tmp_path / "run.json").write_text(json.dumps(data))
+    assert RunHead.read(tmp_path).model().actuator == robot.actuator
+    del data["robot"]["camera"]["cx"]
+    (tmp_path / "run.json").write_text(json.dumps(data))
+    with pytest.raises(BadInput, match=r"run\.json: robot\.camera: expected cx as well"):
+        RunHead.read(tmp_path).model()
 
 
 def test_without_a_head_it_is_no_run(tmp_path: Path) -> None:

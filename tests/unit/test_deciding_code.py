@@ -1,0 +1,45 @@
+"""The name of the program that decides: another whenever what decides is another, and only then."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from harvey.deciding_code import DIGITS, PACKAGES, WIRING, code_in, deciding_code
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    """The same files elsewhere."""
+    for name in PACKAGES:
+        shutil.copytree(ROOT / name, tmp_path / name)
+    (tmp_path / WIRING).parent.mkdir()
+    shutil.copy(ROOT / WIRING, tmp_path / WIRING)
+    return tmp_path
+
+
+def test_the_same_files_are_the_same_program_wherever_they_are(program: Path) -> None:
+    (program / "harvey" / "cli.py").write_text("what tells, and decides nothing")
+    (program / "blackboard" / "notes.txt").write_text("no code")
+    entry = program / "blackboard" / "entry.py"
+    entry.write_bytes(entry.read_bytes().replace(b"\n", b"\r\n"))
+    assert code_in(program) == deciding_code() == code_in(ROOT)
+    assert len(deciding_code()) == DIGITS
+
+
+@pytest.mark.parametrize(
+    "name", ["knowledge_sources/motor.py", "blackboard/agenda.py", "world_models/robot.py", WIRING])
+def test_a_changed_file_is_another_program(program: Path, name: str) -> None:
+    (program / name).write_text((program / name).read_text(encoding="utf-8") + "# otherwise\n", encoding="utf-8")
+    assert code_in(program) != deciding_code()
+
+
+def test_a_file_that_was_renamed_or_is_new_makes_another_program(program: Path) -> None:
+    (program / "knowledge_sources" / "motor.py").rename(program / "knowledge_sources" / "engine.py")
+    renamed = code_in(program)
+    (program / "knowledge_sources" / "gearbox.py").write_text("")
+    assert len({renamed, code_in(program), deciding_code()}) == 3
