@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from world_models.bounds import Bounds, check_bounds
 from world_models.faces import Face
 from world_models.regions import Region
 
@@ -24,6 +25,9 @@ class Moved:
     thing: str
     x_m: float = 0.0
     y_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_bounds(self, {"x_m": Bounds(-1000.0, 1000.0), "y_m": Bounds(-1000.0, 1000.0)})
 
 
 def with_moved(faces: Sequence[Face], moved: Sequence[Moved]) -> tuple[Face, ...]:

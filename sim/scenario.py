@@ -16,7 +16,8 @@ from sim.moved import Moved
 from sim.optics import check_lens
 from sim.rasterizer import sample_offsets
 from sim.sensor import SensorParameters
-from sim.settings import known_keys, merged, near, parsed, read_settings
+from sim.settings import MOST, known_keys, merged, near, parsed, read_settings
+from world_models.bounds import Bounds, check_bounds
 from world_models.camera import Camera, CameraMount
 from world_models.phrases import check_command
 from world_models.store_schema import SUFFIXES
@@ -24,6 +25,7 @@ from world_models.toml_source import Node, Source, WorldError
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "sim" / "scenarios"
+TURN = Bounds(-2.0 * math.pi, 2.0 * math.pi)
 
 
 class ScenarioError(ValueError):
@@ -38,12 +40,20 @@ class Start:
     put_down_sigma_m: float = 0.0
     put_down_sigma_rad: float = 0.0
 
+    def __post_init__(self) -> None:
+        check_bounds(self, {"heading_rad": TURN, "put_down_sigma_m": Bounds(0.0, 2.0),
+                            "put_down_sigma_rad": Bounds(0.0, math.pi)})
+
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
     """The heading wanted at the goal, in the last locale's frame; NaN for any."""
 
     heading_rad: float = math.nan
+
+    def __post_init__(self) -> None:
+        if self.matters:
+            check_bounds(self, {"heading_rad": TURN})
 
     @property
     def matters(self) -> bool:
@@ -67,6 +77,8 @@ class CameraSettings:
         if not (0.05 <= self.field_of_view_rad <= 2.6 and small >= 16 and large <= 4096):
             raise ValueError("expected a field of view of 3 to 149 degrees and 16 to 4096 px, got "
                              f"{math.degrees(self.field_of_view_rad):g} degrees, {self.width_px} x {self.height_px} px")
+        check_bounds(self, {"mount_height_m": Bounds(0.0, 5.0, above=True), "mount_forward_m": Bounds(-2.0, 2.0),
+                            "mount_tilt_rad": Bounds(-math.pi / 2.0, math.pi / 2.0)})
         if self.distortion:
             check_lens(self.camera)
 
@@ -116,8 +128,9 @@ class Limits:
     max_collisions: int = 3
 
     def __post_init__(self) -> None:
-        if min(self.max_time_s, self.max_cycles, self.max_path_m) <= 0 or self.max_collisions < 0:
-            raise ValueError(f"expected limits above 0, got {self}")
+        some = Bounds(0.0, MOST, above=True)
+        check_bounds(self, {"max_time_s": some, "max_cycles": some, "max_path_m": some,
+                            "max_collisions": Bounds(0, MOST)})
 
 
 SECTIONS: Mapping[str, type[Any]] = {
@@ -235,7 +248,7 @@ def _with_setting(scenario: Scenario, key: str, value: Any) -> Scenario:
     try:
         return _scenario(Source("--set", merged(data, path, value), {}), scenario.name, scenario.folder)
     except WorldError as error:
-        raise ScenarioError(f"--set {key}: {str(error).partition(': ')[2]}") from None
+        raise ScenarioError(f"--set {key}: {str(error).partition(': ')[2].removeprefix(f'{key}: ')}") from None
 
 
 def _scenario(source: Source, name: str, folder: Path) -> Scenario:
