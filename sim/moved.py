@@ -37,12 +37,13 @@ def with_moved(faces: Sequence[Face], moved: Sequence[Moved]) -> tuple[Face, ...
         ValueError: there is no such thing.
     """
     for thing in moved:
-        if not any(_is_of(face, thing) for face in faces):
+        if not any(is_of(face, thing) for face in faces):
             raise ValueError(f"expected a thing of the building, as locale/name, got {thing.thing!r}")
-    return tuple(_put(face, [thing for thing in moved if _is_of(face, thing)]) for face in faces)
+    return tuple(_put(face, [thing for thing in moved if is_of(face, thing)]) for face in faces)
 
 
-def _is_of(face: Face, moved: Moved) -> bool:
+def is_of(face: Face, moved: Moved) -> bool:
+    """Whether a face is one of the thing's."""
     return face.name == moved.thing or face.name.startswith(f"{moved.thing}/")
 
 

@@ -21,7 +21,7 @@ from world_models.bounds import Bounds, check_bounds
 from world_models.camera import Camera, CameraMount
 from world_models.phrases import check_command
 from world_models.store_schema import SUFFIXES
-from world_models.toml_source import Node, Source, WorldError
+from world_models.toml_source import Key, Node, Source, WorldError
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "sim" / "scenarios"
@@ -159,6 +159,7 @@ class Scenario:
         moved: what stands elsewhere in the building than in the robot's model.
         rides: who presses the buttons of elevators.
         folder, data: where the file is, and its tables as read, for :func:`with_settings`.
+        source: the file, to point at; settings: the keys that were set otherwise than there.
     """
 
     name: str
@@ -180,6 +181,14 @@ class Scenario:
     rides: tuple[Helper, ...] = ()
     folder: Path = SCENARIOS
     data: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    source: Source = field(default=Source("scenario", {}, {}), repr=False)
+    settings: tuple[str, ...] = ()
+
+    def refused(self, key: Key, why: str) -> ScenarioError:
+        """What to raise where one of its values does not go with the building."""
+        path = ".".join(str(part) for part in key)
+        where = f"--set {path}" if path in self.settings else f"{self.source.where(key)}: {path}"
+        return ScenarioError(f"{where}: {why}")
 
 
 def list_scenarios() -> tuple[str, ...]:
@@ -246,7 +255,8 @@ def _with_setting(scenario: Scenario, key: str, value: Any) -> Scenario:
         kept = {k: v for k, v in data.get(path[0], {}).items() if same[k][0] != same[path[1]][0]}
         data = {**data, path[0]: kept}
     try:
-        return _scenario(Source("--set", merged(data, path, value), {}), scenario.name, scenario.folder)
+        changed = _scenario(Source("--set", merged(data, path, value), {}), scenario.name, scenario.folder)
+        return replace(changed, source=scenario.source, settings=(*scenario.settings, key))
     except WorldError as error:
         raise ScenarioError(f"--set {key}: {str(error).partition(': ')[2].removeprefix(f'{key}: ')}") from None
 
@@ -266,6 +276,7 @@ def _scenario(source: Source, name: str, folder: Path) -> Scenario:
         rides=tuple(read_settings(item, Helper) for item in node["rides"].items()) if "rides" in node else (),
         folder=folder,
         data=source.data,
+        source=source,
         **sections,
     )
 
