@@ -35,6 +35,7 @@ def one(r: MissionResult, out: Path | None) -> str:
         f"  plans         {count(r.sketches, 'sketch', 'sketches')}, {count(r.replans, 'replan')},"
         f" {count(r.relocalizations, 'relocalization')}",
         f"  collisions    {r.collisions}",
+        *(f"  amiss         {text}" for text in r.amiss),
         f"  way           {r.path_length_m:.1f} m in {r.sim_time_s:.0f} s of the robot's time",
         f"  took          {r.wall_time_s:.1f} s for {count(r.decisions, 'cycle')} and {count(r.frames, 'frame')}",
     ]
@@ -46,7 +47,8 @@ def one(r: MissionResult, out: Path | None) -> str:
 
 def several(results: Sequence[MissionResult]) -> str:
     """A table, one row a seed, with a summary row."""
-    return table(COLUMNS, [*(_cells(r) for r in results), _total(results)], last_is_summary=True)
+    rows = table(COLUMNS, [*(_cells(r) for r in results), _total(results)], last_is_summary=True)
+    return "\n".join([rows, *(f"seed {r.seed}: {text}" for r in results for text in r.amiss)])
 
 
 def prospects(ahead: Sequence[Prospect]) -> str:
