@@ -59,8 +59,10 @@ def test_a_kidnap_ends_in_a_free_place_of_the_same_locale() -> None:
 
 
 def test_what_did_not_happen_as_it_was_asked_for_is_told() -> None:
-    robot = body(Displacement("bump", forward_m=3.0), Displacement("bump", left_m=0.1),
-                 Displacement("kidnap", turn_rad=1.0), LightsOff(Moment(after_s=1e6)), Ailment("stall", Moment("attic")))
+    robot = body(
+        Displacement("bump", forward_m=3.0), Displacement("bump", left_m=0.1), Displacement("kidnap", turn_rad=1.0),
+        LightsOff(Moment(after_s=1e6)), Ailment("stall", Moment("attic")),
+    )
     robot.move(0.3)
     blocked, *late = robot.amiss
     assert blocked.startswith("bump: 0.") and blocked.endswith(" m of 3.00 m, for want of room")

@@ -91,6 +91,8 @@ def test_a_malformed_scenario_is_pointed_at(text: str, message: str) -> None:
     ("[sensor]\njpeg_quality = 0", "from 1 to 100"),
     ("[camera]\nmount_height_m = -1", "above 0, up to 5"),
     ("[camera]\nmount_height_ft = 0", "above 0, up to 16.4042"),
+    ("[camera]\nfield_of_view_deg = 180", "from 2.86479 to 148.969"),
+    ("[camera]\nwidth_px = 4097", "from 16 to 4096"),
     ("[camera]\nmount_tilt_deg = 91", "from -90 to 90"),
     ("[limits]\nmax_time_s = -3", "above 0, up to 1e+09"),
     ("[limits]\nmax_cycles = 0", "above 0, up to 1e+09"),
@@ -144,6 +146,7 @@ def test_settings_are_typed_and_leave_the_original_alone() -> None:
     ("limits.max_time_s", "-3", "max_time_s: expected a number above 0, up to 1e.09, got -3"),
     ("start.put_down_sigma_in", "-1", "put_down_sigma_in: expected a number from 0 to 78.7402, got -1"),
     ("start.heading_deg", "1979-05-27", "expected a number from .*, got 1979-05-27"),
+    ("camera.distortion", "[0.1, -1e9, 0, 0]", "expected distortion coefficients of at most 10000 in size"),
     ("goal", "home", "expected a goal like"),
     ("start", "3", "expected one of"),
 ])
