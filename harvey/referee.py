@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,6 +33,7 @@ class MissionResult:
         replans: sketches adjusted or drawn anew; relocalizations: how often it found itself again.
         sketches: how many plan sketches were drawn.
         max_cross_track_m: how far the robot truly strayed from the line of the leg it was driving.
+        amiss: which of the scenario's faults did not happen, or not as they were asked for, in words.
     """
 
     scenario: str
@@ -52,6 +54,7 @@ class MissionResult:
     sketches: int
     collisions: int
     max_cross_track_m: float
+    amiss: Sequence[str] = ()
 
     def record(self) -> dict[str, Any]:
         """As JSON types."""
@@ -142,6 +145,7 @@ class Referee(Counts):
             sketches=self.sketches,
             collisions=score.collisions,
             max_cross_track_m=self.max_cross_track_m,
+            amiss=self._body.amiss,
         )
 
     def _heading_error(self, wanted_rad: float | None, belief: Hypothesis | None) -> float:

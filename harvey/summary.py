@@ -13,6 +13,7 @@ from harvey.units import INCH_M, count, degrees
 if TYPE_CHECKING:
     from harvey.referee import MissionResult
     from harvey.rehearsal import Prospect
+    from world_models.task import Outcome
 
 COLUMNS = ("seed", "outcome", "error mm", "inches", "milestones", "refuted", "wrong", "sketches", "replans",
            "relocated", "collisions", "path m", "robot s", "cycles", "wall s")
@@ -34,6 +35,7 @@ def one(r: MissionResult, out: Path | None) -> str:
         f"  plans         {count(r.sketches, 'sketch', 'sketches')}, {count(r.replans, 'replan')},"
         f" {count(r.relocalizations, 'relocalization')}",
         f"  collisions    {r.collisions}",
+        *(f"  amiss         {text}" for text in r.amiss),
         f"  way           {r.path_length_m:.1f} m in {r.sim_time_s:.0f} s of the robot's time",
         f"  took          {r.wall_time_s:.1f} s for {count(r.decisions, 'cycle')} and {count(r.frames, 'frame')}",
     ]
@@ -45,7 +47,8 @@ def one(r: MissionResult, out: Path | None) -> str:
 
 def several(results: Sequence[MissionResult]) -> str:
     """A table, one row a seed, with a summary row."""
-    return table(COLUMNS, [*(_cells(r) for r in results), _total(results)], last_is_summary=True)
+    rows = table(COLUMNS, [*(_cells(r) for r in results), _total(results)], last_is_summary=True)
+    return "\n".join([rows, *(f"seed {r.seed}: {text}" for r in results for text in r.amiss)])
 
 
 def prospects(ahead: Sequence[Prospect]) -> str:
@@ -53,6 +56,21 @@ def prospects(ahead: Sequence[Prospect]) -> str:
     columns = ("milestone", "in", "x m", "y m", "looking", "landmarks", "lines", "place mm", "heading deg",
                "p wrong", "verdict")
     return table(columns, [_prospect(p) for p in ahead])
+
+
+def foreseen(ahead: Sequence[Prospect], outcome: Outcome) -> tuple[str, bool]:
+    """How a mission ends in thought, and whether nothing speaks against driving it.
+
+    In thought every milestone is taken for verified, so that the goal is reached says little where one could not be.
+    """
+    doubtful = [(verdict, sum(1 for p in ahead if p.verdict == verdict)) for verdict in ("not testable", "ambiguous")]
+    doubts = [f"{count(number, 'milestone')} {verdict}" for verdict, number in doubtful if number]
+    weak = sum(1 for p in ahead if p.verdict == "weak")
+    if outcome.kind == "reached" and doubts:
+        return f"may not reach its goal: of {len(ahead)} on the way, {' and '.join(doubts)}", False
+    if outcome.kind == "reached":
+        return f"ends: reached, {outcome.reason}" + (f"; {count(weak, 'milestone')} weak" if weak else ""), True
+    return f"ends: {outcome.kind}, {outcome.reason}" + (f"; {' and '.join(doubts)}" if doubts else ""), False
 
 
 def _prospect(p: Prospect) -> tuple[str, ...]:

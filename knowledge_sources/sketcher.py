@@ -18,6 +18,7 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.expert import Expert
 from knowledge_sources.methods.routes import free_space, is_clear, shortest_route
+from knowledge_sources.methods.standing_room import thing_distance_m, wall_distance_m
 from knowledge_sources.questions import held
 from world_models.frames import wrap_angle
 from world_models.locales import Link, Passage
@@ -99,6 +100,10 @@ class Sketcher(Expert):
         if belief is None:
             return
         here = _place(belief.value)
+        unfit = self._why_not_at(goal.value.destination)
+        if unfit:
+            yield Post(Outcome("blocked", f"the goal {goal.value.destination} {unfit}"), (goal, belief))
+            return
         subgoals = self._between_locales(here, goal.value.destination, END_TOLERANCE_M)
         if subgoals is None:
             yield Post(Outcome("blocked", self._why_not(here.locale, goal.value.destination.locale)), (goal, belief))
@@ -120,6 +125,22 @@ class Sketcher(Expert):
             current = s.subgoals[s.at]
             if not current.primitive and not current.is_ride:
                 yield from self._refined(sketch, current, belief, go)
+
+    def _why_not_at(self, there: Place) -> str:
+        """Why the robot cannot stand at a place, as far as it knows; "" where it can."""
+        world, name = self._world, there.locale
+        if not world.locale(name).contains((there.x_m, there.y_m)):
+            return f"is not within {name}"
+        point = there.in_world(world).position
+        openings = [np.concatenate(doorway.thresholds_world) for doorway in world.doorways_of(name)]
+        near = [(wall_distance_m(world.outline(name), openings, point), "a wall")]
+        near += [(thing_distance_m(t.footprint_world, point), t.name) for t in world.things_of(name) if t.in_the_way]
+        distance_m, what = min(near)
+        radius_m, margin_m = self._robot.radius_m, CLEARANCES_M[-1]
+        if distance_m >= radius_m + margin_m:
+            return ""
+        return (f"is {distance_m:.2f} m from {what}: the robot cannot stand there, with a radius of {radius_m:.2f} m"
+                f" and the {margin_m:.2f} m that it keeps round itself")
 
     def _why_not(self, here: str, there: str) -> str:
         """Why no sketch leads from one locale to another."""

@@ -8,15 +8,36 @@ curvature c, with c (5.8 m)^2 / 2 between 2 and 12 in, is 0.003 to 0.018 per met
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from world_models.bounds import Bounds, check_bounds
 from world_models.frames import Pose2
 
 STEP_M = 0.02
 """Motion is integrated in steps of at most this."""
+
+BOUNDS: Mapping[str, Bounds] = {
+    "turn_scale_sigma": Bounds(0.0, 1.0),
+    "turn_sigma_rad": Bounds(0.0, math.pi / 2.0),
+    "skitter_sigma_m": Bounds(0.0, 1.0),
+    "curvature_low_per_m": Bounds(0.0, 10.0),
+    "curvature_high_per_m": Bounds(0.0, 10.0),
+    "curvature_sigma_per_m": Bounds(0.0, 10.0),
+    "shortfall_low": Bounds(0.0, 0.99),
+    "shortfall_high": Bounds(0.0, 0.99),
+    "distance_sigma": Bounds(0.0, 1.0),
+    "encoder_step_m": Bounds(0.0, 1.0),
+    "encoder_step_rad": Bounds(0.0, math.pi),
+    "speed_m_per_s": Bounds(0.001, 10.0),
+    "turn_speed_rad_per_s": Bounds(0.001, 100.0),
+    "acceleration_m_per_s2": Bounds(0.001, 100.0),
+    "increment_m": Bounds(0.001, 100.0),
+    "command_s": Bounds(0.0, 3600.0),
+}
+"""Far beyond any wheels, but such that a run with them comes to an end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,19 +77,12 @@ class ActuatorParameters:
     command_s: float = 0.1
 
     def __post_init__(self) -> None:
-        for name in self.__dataclass_fields__:
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"expected {name} >= 0, got {getattr(self, name)}")
+        check_bounds(self, BOUNDS)
         ordered = self.curvature_low_per_m <= self.curvature_high_per_m and self.shortfall_low <= self.shortfall_high
-        if not (ordered and self.shortfall_high < 1):
-            raise ValueError("expected low <= high bounds of curvature and shortfall, and a shortfall below 1, got "
+        if not ordered:
+            raise ValueError("expected low <= high bounds of curvature and shortfall, got "
                              f"{self.curvature_low_per_m}..{self.curvature_high_per_m} and "
                              f"{self.shortfall_low}..{self.shortfall_high}")
-        if not (self.acceleration_m_per_s2 > 0 and self.increment_m > 0):
-            raise ValueError("expected an acceleration and an increment > 0, got "
-                             f"{self.acceleration_m_per_s2} m/s^2, {self.increment_m} m")
-        if not (self.speed_m_per_s > 0 and self.turn_speed_rad_per_s > 0):
-            raise ValueError(f"expected speeds > 0, got {self.speed_m_per_s} m/s, {self.turn_speed_rad_per_s} rad/s")
 
 
 @dataclass(frozen=True, slots=True)

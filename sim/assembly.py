@@ -10,13 +10,12 @@ import numpy as np
 
 from sim.body import SimulatedBody
 from sim.building import Building
-from sim.collision import ROBOT_RADIUS_M, Obstacles
+from sim.collision import Obstacles
 from sim.elevator import Elevators
-from sim.faults import Displacement, Fault, placed
-from sim.moved import with_moved
+from sim.faults import placed
+from sim.fitting import check_names, check_room, faces_of, named_in
 from sim.renderer import Renderer
-from sim.scenario import Scenario, ScenarioError
-from sim.settings import near
+from sim.scenario import Scenario
 from sim.truth import Score, Truth, score
 from world_models.faces import Face
 from world_models.frames import Pose2
@@ -72,44 +71,39 @@ def set_stage(scenario: Scenario) -> Stage:
     """Load the scenario's world and building.
 
     Raises:
-        ScenarioError: the world or details cannot be read, or lack a locale that the scenario names, or the robot
-            would begin in a wall.
+        ScenarioError: the world or details cannot be read, or what the scenario names, moves or puts somewhere does not
+            go with the building.
     """
-    try:
-        world = load_world(scenario.world, details=scenario.details)
-        for fault in scenario.faults:
-            _check_fault(scenario, world, fault)
-        _check_rides(scenario, world)
-        start, goal = _ends(scenario, world)
-        around = _around(world, (start.locale, goal.locale, *_named(scenario)))
-        faces = _faces(scenario, world.faces_within(around))
-        elevators = Elevators.of_links(_links_in(world, around), world, scenario.rides)
-        building = _storeys(world, around, faces, elevators, scenario.render.samples)(world.floor_m(start.locale))
-        heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
-        start_world, goal_world = _pose(world, start, scenario.start.heading_rad), _pose(world, goal, heading)
-    except WorldError as error:
-        raise ScenarioError(f"{scenario.name}: {error}") from None
-    room_m = ROBOT_RADIUS_M + building.obstacles.clearance_m(start_world)
-    if room_m < ROBOT_RADIUS_M:
-        expected = f"expected {ROBOT_RADIUS_M} m of room at the start"
-        raise ScenarioError(f"{scenario.name}: goal: {expected}, got {room_m:.2f} m")
+    world = _world(scenario)
+    check_names(scenario, world)
+    start, goal = _ends(scenario, world)
+    around = _around(world, (start.locale, goal.locale, *named_in(scenario)))
+    faces = faces_of(scenario, world, world.faces_within(around))
+    elevators = Elevators.of_links(_links_in(world, around), world, scenario.rides)
+    on_floor = _storeys(world, around, faces, elevators, scenario.render.samples)
+    building = on_floor(world.floor_m(start.locale))
+    check_room(scenario, world, start, building, on_floor)
+    heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
+    start_world = replace(start, heading_rad=scenario.start.heading_rad).in_world(world)
+    goal_world = replace(goal, heading_rad=heading).in_world(world)
     return Stage(scenario, world, building, start_world, goal_world, world.floor_m(goal.locale))
 
 
-def _faces(scenario: Scenario, faces: Sequence[Face]) -> Sequence[Face]:
-    """Those of the building, with what was moved where it is now. Raises WorldError where there is no such thing."""
+def _world(scenario: Scenario) -> World:
+    """The building. Raises ScenarioError where it or its details cannot be read."""
     try:
-        return with_moved(faces, scenario.moved)
-    except ValueError as error:
-        raise WorldError(f"moved: {error}") from None
+        return load_world(scenario.world, details=scenario.details)
+    except WorldError as error:
+        of_details = str(error).startswith(tuple(map(str, scenario.details)))
+        raise scenario.refused(("details" if of_details else "world",), str(error)) from None
 
 
 def _ends(scenario: Scenario, world: World) -> tuple[Place, Place]:
-    """Where a scenario's mission begins and ends. Raises WorldError where the world has no such place."""
+    """Where a scenario's mission begins and ends. Raises ScenarioError where the world has no such place."""
     try:
         return places_of(scenario.goal, world)
     except ValueError as error:
-        raise WorldError(f"goal: {error}") from None
+        raise scenario.refused(("goal",), str(error)) from None
 
 
 def _around(world: World, locales: Sequence[str]) -> str:
@@ -154,39 +148,3 @@ def _locale_finder(world: World, around: str, floor_m: float) -> Callable[[Pose2
         return inside[0] if inside else world.locale_at([*p, floor_m]) or ""
 
     return locale_at
-
-
-def _pose(world: World, place: Place, heading_rad: float) -> Pose2:
-    try:
-        return replace(place, heading_rad=heading_rad).in_world(world)
-    except ValueError as error:
-        raise WorldError(f"goal: {error}") from None
-
-
-def _named(scenario: Scenario) -> list[str]:
-    """The locales that the faults of a scenario name."""
-    return [name for fault in scenario.faults for name in _named_by(fault)]
-
-
-def _named_by(fault: Fault) -> list[str]:
-    named = [fault.moment.in_locale]
-    if isinstance(fault, Displacement) and fault.place is not None:
-        named.append(fault.place.locale)
-    return [name for name in named if name]
-
-
-def _check_fault(scenario: Scenario, world: World, fault: Fault) -> None:
-    for name in _named_by(fault):
-        if name not in world.locales:
-            raise ScenarioError(f"{scenario.name}: faults: expected {near(name, world.locales)}, got {name!r}")
-
-
-def _check_rides(scenario: Scenario, world: World) -> None:
-    if not scenario.rides:
-        return
-    rides = {link.name: link.between for link in world.links if link.kind == "elevator"}
-    landings = sorted({name for between in rides.values() for name in between})
-    for helper in scenario.rides:
-        for name, known in ((helper.passage, list(rides)), (helper.presses, landings)):
-            if name and name not in known:
-                raise ScenarioError(f"{scenario.name}: rides: expected {near(name, known)}, got {name!r}")

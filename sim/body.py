@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sim.actuator import STEP_M, ActuatorParameters, Slip, Wheels, arc_displacement, arc_steps
 from sim.building import Building
-from sim.faults import Ailment, Displacement, Fault, FaultWatch, LightsOff, Occlusion, free_displacement
+from sim.faults import Ailment, Displacement, Fault, FaultWatch, LightsOff, Occlusion, free_displacement, kind_of
 from sim.occluder import Occluder
 from sim.optics import Optics
 from sim.rolling import Roll
@@ -27,6 +27,8 @@ FRAME_S = 0.1
 """Time that taking a picture takes [s]."""
 WATCHDOG_S = 0.5
 """A base that hears nothing any more goes on for so long before it stops by itself [s]."""
+SHORT_M = 0.005
+"""A bump that moves the robot less far than it should, by more than this, is told of."""
 GOES_ON: Mapping[str, float] = {"link_lost": WATCHDOG_S, "nonsense": WATCHDOG_S, "stall": 0.0}
 """Ailments that break a motion off, and how long it goes on [s]."""
 
@@ -61,6 +63,7 @@ class SimulatedBody:
         self._watch = FaultWatch.of(faults)
         self._dark_until_s = 0.0
         self._occluders: tuple[Occluder, ...] = ()
+        self._hindered: list[str] = []
         self._ailing: dict[str, tuple[float, float]] = {}
         self._frames = 0
         self._known: Mapping[int, bytes] = {}
@@ -93,6 +96,11 @@ class SimulatedBody:
     def curvature_per_m(self) -> float:
         """Of the arc that its wheels make of a straight way, on the average. Not for knowledge sources."""
         return self._wheels.curvature_per_m
+
+    @property
+    def amiss(self) -> tuple[str, ...]:
+        """Which faults did not happen, or not as they were asked for, in words. Not for knowledge sources."""
+        return (*self._hindered, *(f"{kind_of(fault)}: its moment did not come" for fault in self._watch.pending))
 
     @property
     def ailing(self) -> tuple[str, ...]:
@@ -325,7 +333,11 @@ class SimulatedBody:
         elif isinstance(fault, Ailment):
             self._ailing[fault.kind] = (self._truth.time_s, self._truth.time_s + fault.duration_s)
         elif isinstance(fault, Displacement):
-            there = free_displacement(self._truth.world_from_robot, fault, self._fault_rng, self._is_free)
+            before = self._truth.world_from_robot
+            there = free_displacement(before, fault, self._fault_rng, self._is_free)
+            moved_m = there.distance_to(before)
+            if fault.least_m - moved_m > SHORT_M:
+                self._hindered.append(f"{fault.kind}: {moved_m:.2f} m of {fault.least_m:.2f} m, for want of room")
             self._truth = replace(self._truth, world_from_robot=there, locale=self._building.locale_at(there))
 
     def _is_broken_off(self) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from sim.truth import Truth
 from world_models.body import Ride
+from world_models.bounds import Bounds, check_bounds
 from world_models.frames import Pose2, flattened
 from world_models.locales import Link
 from world_models.location import Frames
@@ -31,8 +32,8 @@ class Helper:
     times: int = 1000
 
     def __post_init__(self) -> None:
-        if not (self.comes_s >= 0.0 and self.takes_s >= 0.0 and self.times >= 0):
-            raise ValueError(f"expected times of 0 and more, got {self}")
+        patience, often = Bounds(0.0, 1e6), Bounds(0, 10**9)
+        check_bounds(self, {"comes_s": patience, "takes_s": patience, "times": often})
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sim.ailments import AILMENTS
 from sim.faults import Ailment, Displacement, Fault, LightsOff, Moment, Occlusion
 from sim.settings import read_settings
+from world_models.bounds import Bounds, check_bounds
 from world_models.location import Place
-from world_models.toml_source import Node, WorldError
+from world_models.toml_source import Node
+
+FAR_M = 5.0
+"""Nobody is bumped or carried further, but to a place that is named."""
+BOUNDS: Mapping[str, Bounds] = {
+    "after_m": Bounds(0.0, 1e6),
+    "after_s": Bounds(0.0, 1e6),
+    "forward_m": Bounds(-FAR_M, FAR_M),
+    "left_m": Bounds(-FAR_M, FAR_M),
+    "turn_rad": Bounds(-2.0 * math.pi, 2.0 * math.pi),
+    "distance_m": Bounds(0.0, FAR_M),
+    "duration_s": Bounds(0.0, 1e6, above=True),
+    "part": Bounds(0.0, 0.99, above=True),
+    "to_x_m": Bounds(-1e5, 1e5),
+    "to_y_m": Bounds(-1e5, 1e5),
+    "to_heading_rad": Bounds(-2.0 * math.pi, 2.0 * math.pi),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +49,9 @@ class FaultTable:
     to_y_m: float = 0.0
     to_heading_rad: float = 0.0
 
+    def __post_init__(self) -> None:
+        check_bounds(self, BOUNDS)
+
 
 def read_fault(node: Node) -> Fault:
     """One of a scenario's ``[[faults]]``. Raises WorldError where it is none."""
@@ -38,19 +60,13 @@ def read_fault(node: Node) -> Fault:
     if table.kind == "lights_off":
         return LightsOff(moment, table.duration_s)
     if table.kind == "occluded":
-        return _occlusion(node, moment, table)
+        return Occlusion(moment, table.duration_s, table.part)
     if table.kind in AILMENTS:
         return Ailment(table.kind, moment, table.duration_s)
     if table.kind not in ("bump", "kidnap"):
-        raise node.fail(f"kind = bump, kidnap, lights_off, occluded or one of {', '.join(AILMENTS)}", repr(table.kind))
+        kinds = f"kind = bump, kidnap, lights_off, occluded or one of {', '.join(AILMENTS)}"
+        raise node.fail(kinds, repr(table.kind) if "kind" in node else "none")
     there = Place(table.to_locale, table.to_x_m, table.to_y_m, table.to_heading_rad) if table.to_locale else None
     return Displacement(
         table.kind, moment, table.forward_m, table.left_m, table.turn_rad, table.distance_m, there
     )
-
-
-def _occlusion(node: Node, moment: Moment, table: FaultTable) -> Occlusion:
-    try:
-        return Occlusion(moment, table.duration_s, table.part)
-    except ValueError as error:
-        raise WorldError(f"{node.where}: faults: {error}") from None

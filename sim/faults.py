@@ -49,6 +49,11 @@ class Displacement:
     place: Place | None = None
     absolute: Pose2 | None = None
 
+    @property
+    def least_m(self) -> float:
+        """How far the robot is moved at the least, where there is room; a place that is named is always come to."""
+        return 0.0 if self.place is not None else abs(self.distance_m - math.hypot(self.forward_m, self.left_m))
+
     def drawn(self, rng: np.random.Generator) -> Pose2:
         """A displacement in the robot's frame; always two draws from ``rng``."""
         direction, coin = float(rng.uniform(-math.pi, math.pi)), float(rng.random())
@@ -99,6 +104,13 @@ class Ailment:
 
 
 Fault = Displacement | LightsOff | Occlusion | Ailment
+
+
+def kind_of(fault: Fault) -> str:
+    """What a scenario calls it."""
+    if isinstance(fault, LightsOff):
+        return "lights_off"
+    return "occluded" if isinstance(fault, Occlusion) else fault.kind
 
 
 def placed(fault: Fault, world: Frames) -> Fault:

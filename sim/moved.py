@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from world_models.bounds import Bounds, check_bounds
 from world_models.faces import Face
 from world_models.regions import Region
 
@@ -25,6 +26,9 @@ class Moved:
     x_m: float = 0.0
     y_m: float = 0.0
 
+    def __post_init__(self) -> None:
+        check_bounds(self, {"x_m": Bounds(-1000.0, 1000.0), "y_m": Bounds(-1000.0, 1000.0)})
+
 
 def with_moved(faces: Sequence[Face], moved: Sequence[Moved]) -> tuple[Face, ...]:
     """The faces of a building in which things stand elsewhere.
@@ -33,12 +37,13 @@ def with_moved(faces: Sequence[Face], moved: Sequence[Moved]) -> tuple[Face, ...
         ValueError: there is no such thing.
     """
     for thing in moved:
-        if not any(_is_of(face, thing) for face in faces):
+        if not any(is_of(face, thing) for face in faces):
             raise ValueError(f"expected a thing of the building, as locale/name, got {thing.thing!r}")
-    return tuple(_put(face, [thing for thing in moved if _is_of(face, thing)]) for face in faces)
+    return tuple(_put(face, [thing for thing in moved if is_of(face, thing)]) for face in faces)
 
 
-def _is_of(face: Face, moved: Moved) -> bool:
+def is_of(face: Face, moved: Moved) -> bool:
+    """Whether a face is one of the thing's."""
     return face.name == moved.thing or face.name.startswith(f"{moved.thing}/")
 
 

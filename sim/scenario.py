@@ -16,14 +16,18 @@ from sim.moved import Moved
 from sim.optics import check_lens
 from sim.rasterizer import sample_offsets
 from sim.sensor import SensorParameters
-from sim.settings import known_keys, merged, near, parsed, read_settings
+from sim.settings import MOST, known_keys, merged, near, parsed, read_settings
+from world_models.bounds import Bounds, check_bounds
 from world_models.camera import Camera, CameraMount
 from world_models.phrases import check_command
 from world_models.store_schema import SUFFIXES
-from world_models.toml_source import Node, Source, WorldError
+from world_models.toml_source import Key, Node, Source, WorldError
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "sim" / "scenarios"
+MOST_BENT = 1e4
+"""Coefficients of real lenses are about 1, of long ones some hundreds."""
+TURN = Bounds(-2.0 * math.pi, 2.0 * math.pi)
 
 
 class ScenarioError(ValueError):
@@ -38,12 +42,20 @@ class Start:
     put_down_sigma_m: float = 0.0
     put_down_sigma_rad: float = 0.0
 
+    def __post_init__(self) -> None:
+        check_bounds(self, {"heading_rad": TURN, "put_down_sigma_m": Bounds(0.0, 2.0),
+                            "put_down_sigma_rad": Bounds(0.0, math.pi)})
+
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
     """The heading wanted at the goal, in the last locale's frame; NaN for any."""
 
     heading_rad: float = math.nan
+
+    def __post_init__(self) -> None:
+        if self.matters:
+            check_bounds(self, {"heading_rad": TURN})
 
     @property
     def matters(self) -> bool:
@@ -63,10 +75,14 @@ class CameraSettings:
     distortion: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        small, large = sorted((self.width_px, self.height_px))
-        if not (0.05 <= self.field_of_view_rad <= 2.6 and small >= 16 and large <= 4096):
-            raise ValueError("expected a field of view of 3 to 149 degrees and 16 to 4096 px, got "
-                             f"{math.degrees(self.field_of_view_rad):g} degrees, {self.width_px} x {self.height_px} px")
+        side = Bounds(16, 4096)
+        check_bounds(self, {"width_px": side, "height_px": side, "field_of_view_rad": Bounds(0.05, 2.6),
+                            "mount_height_m": Bounds(0.0, 5.0, above=True),
+                            "mount_forward_m": Bounds(-2.0, 2.0),
+                            "mount_tilt_rad": Bounds(-math.pi / 2.0, math.pi / 2.0)})
+        bent = max((abs(k) for k in self.distortion), default=0.0)
+        if bent > MOST_BENT:
+            raise ValueError(f"expected distortion coefficients of at most {MOST_BENT:g} in size, got one of {bent:g}")
         if self.distortion:
             check_lens(self.camera)
 
@@ -116,8 +132,9 @@ class Limits:
     max_collisions: int = 3
 
     def __post_init__(self) -> None:
-        if min(self.max_time_s, self.max_cycles, self.max_path_m) <= 0 or self.max_collisions < 0:
-            raise ValueError(f"expected limits above 0, got {self}")
+        some = Bounds(0.0, MOST, above=True)
+        check_bounds(self, {"max_time_s": some, "max_cycles": some, "max_path_m": some,
+                            "max_collisions": Bounds(0, MOST)})
 
 
 SECTIONS: Mapping[str, type[Any]] = {
@@ -146,6 +163,7 @@ class Scenario:
         moved: what stands elsewhere in the building than in the robot's model.
         rides: who presses the buttons of elevators.
         folder, data: where the file is, and its tables as read, for :func:`with_settings`.
+        source: the file, to point at; settings: the keys that were set otherwise than there.
     """
 
     name: str
@@ -167,6 +185,14 @@ class Scenario:
     rides: tuple[Helper, ...] = ()
     folder: Path = SCENARIOS
     data: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    source: Source = field(default=Source("scenario", {}, {}), repr=False)
+    settings: tuple[str, ...] = ()
+
+    def refused(self, key: Key, why: str) -> ScenarioError:
+        """What to raise where one of its values does not go with the building."""
+        path = ".".join(str(part) for part in key)
+        where = f"--set {path}" if path in self.settings else f"{self.source.where(key)}: {path}"
+        return ScenarioError(f"{where}: {why}")
 
 
 def list_scenarios() -> tuple[str, ...]:
@@ -233,9 +259,10 @@ def _with_setting(scenario: Scenario, key: str, value: Any) -> Scenario:
         kept = {k: v for k, v in data.get(path[0], {}).items() if same[k][0] != same[path[1]][0]}
         data = {**data, path[0]: kept}
     try:
-        return _scenario(Source("--set", merged(data, path, value), {}), scenario.name, scenario.folder)
+        changed = _scenario(Source("--set", merged(data, path, value), {}), scenario.name, scenario.folder)
+        return replace(changed, source=scenario.source, settings=(*scenario.settings, key))
     except WorldError as error:
-        raise ScenarioError(f"--set {key}: {str(error).partition(': ')[2]}") from None
+        raise ScenarioError(f"--set {key}: {str(error).partition(': ')[2].removeprefix(f'{key}: ')}") from None
 
 
 def _scenario(source: Source, name: str, folder: Path) -> Scenario:
@@ -253,6 +280,7 @@ def _scenario(source: Source, name: str, folder: Path) -> Scenario:
         rides=tuple(read_settings(item, Helper) for item in node["rides"].items()) if "rides" in node else (),
         folder=folder,
         data=source.data,
+        source=source,
         **sections,
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,9 +11,24 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from world_models.bounds import Bounds, check_bounds
+
 MEAN, SPREAD = np.float32(510.0), np.float32(1.0 / np.sqrt((256.0**2 - 1.0) / 3.0))
 """Mean and reciprocal of the standard deviation of the sum of four random bytes."""
 LEAST, HALF, MOST = np.float32(0.0), np.float32(0.5), np.float32(255.0)
+
+BOUNDS: Mapping[str, Bounds] = {
+    "gain": Bounds(0.0, 1000.0),
+    "gain_sigma": Bounds(0.0, 10.0),
+    "blur_px": Bounds(0.0, 50.0),
+    "read_noise": Bounds(0.0, 1000.0),
+    "shot_noise": Bounds(0.0, 1000.0),
+    "jpeg_quality": Bounds(1, 100),
+    "frames_per_s": Bounds(1.0, 1000.0),
+    "exposure_s": Bounds(0.0, 10.0),
+    "lights_off_gain": Bounds(0.0, 1000.0),
+}
+"""Up to pictures in which nothing is seen any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +58,7 @@ class SensorParameters:
     lights_off_gain: float = 0.02
 
     def __post_init__(self) -> None:
-        for name in ("gain", "gain_sigma", "blur_px", "read_noise", "shot_noise", "lights_off_gain", "exposure_s"):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise ValueError(f"expected {name} >= 0, got {getattr(self, name)}")
-        if not 1.0 <= self.frames_per_s <= 1000.0:
-            raise ValueError(f"expected frames_per_s in 1..1000, got {self.frames_per_s}")
-        if not 1 <= self.jpeg_quality <= 100:
-            raise ValueError(f"expected jpeg_quality in 1..100, got {self.jpeg_quality}")
+        check_bounds(self, BOUNDS)
 
 
 def exposed(

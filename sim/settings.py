@@ -12,10 +12,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any, TypeVar, get_type_hints
 
+from world_models.bounds import OutOfBoundsError
 from world_models.toml_source import Node, WorldError
 from world_models.units import FOOT_M, INCH_M
 
 T = TypeVar("T")
+MOST = 10**9
+"""No setting is larger."""
 
 
 def spellings(field: str) -> dict[str, float]:
@@ -42,17 +45,22 @@ def read_settings(node: Node, kind: type[T]) -> T:
     known = known_keys(kind)
     hints = get_type_hints(kind)
     values: dict[str, Any] = {}
+    written: dict[str, str] = {}
     for key, item in node.entries():
         if key not in known:
             raise item.fail(f"{near(key, known)}", f"the key {key!r}")
         name, factor = known[key]
         if name in values:
-            raise item.fail(f"{name} only once", f"it again as {key}")
-        values[name] = _value(item, hints[name], factor)
+            raise item.fail(f"only one of {written[name]} and {key}", "both")
+        values[name], written[name] = _value(item, hints[name], factor), key
     try:
         return kind(**values)
     except WorldError:
         raise
+    except OutOfBoundsError as error:
+        key = written[error.key]
+        number = "a whole number" if hints[error.key] is int else "a number"
+        raise node[key].fail(f"{number} {error.bounds.words(known[key][1])}") from None
     except (TypeError, ValueError) as error:
         raise WorldError(f"{node.where}: {'.'.join(map(str, node.key))}: {error}") from None
 
@@ -63,12 +71,14 @@ def _value(item: Node, hint: Any, factor: float) -> Any:
     if hint is str:
         return item.text()
     if hint is int:
-        if isinstance(item.value, bool) or not isinstance(item.value, int) or abs(item.value) > 10**9:
+        if isinstance(item.value, bool) or not isinstance(item.value, int):
             raise item.fail("a whole number")
+        if abs(item.value) > MOST:
+            raise item.fail(f"a whole number from {-MOST} to {MOST}")
         return item.value
     if hint == tuple[float, ...]:
-        return tuple(number.number(-1e9, 1e9) for number in item.items())
-    return item.number(-1e9, 1e9) * factor
+        return tuple(number.number(-MOST, MOST) for number in item.items())
+    return item.number(-MOST, MOST) * factor
 
 
 FEW = 12

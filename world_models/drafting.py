@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,11 +36,11 @@ class Draft:
     """What has been read so far.
 
     Attributes:
-        base: the world file; within: the files that are made from this one, by name, so that none contains itself.
+        base: the world file; within: the files that are made from this one, so that none contains itself.
     """
 
     base: Source
-    within: tuple[str, ...] = ()
+    within: tuple[Path, ...] = ()
     name: str = ""
     shelf: Shelf = field(default_factory=Shelf)
     defaults: dict[str, tuple[Node, float]] = field(default_factory=dict)
@@ -109,9 +110,9 @@ class Draft:
     def _copy(self, name: str, node: Node) -> None:
         """A locale with all that is in it, out of another world file."""
         source = named_file(node["from"])
-        if source.name in (self.base.name, *self.within):
+        if source.file in (self.base.file, *self.within):
             raise node["from"].fail("another world file, that is not made from this one")
-        other = Draft(source, (self.base.name, *self.within))
+        other = Draft(source, (self.base.file, *self.within))
         other.read_base()
         inside = subtree(other.blueprint(), node)
         prefix = node["prefix"].text() if "prefix" in node else ""

@@ -7,19 +7,28 @@ import re
 from world_models.location import Place
 from world_models.units import FOOT_M
 
+FAR_FT = 1e6
 _NUMBER = r"\s*([-+]?\d+(?:\.\d*)?)\s*"
 _PLACE = rf"\(\s*([\w'-]+)\s+\({_NUMBER},{_NUMBER},{_NUMBER}\)\s*\)"
 _GOAL = re.compile(rf"\s*\(\s*ptrans\s+{_PLACE}\s*{_PLACE}\s*\)\s*")
 
 
 def parse_ptrans(text: str) -> tuple[Place, Place]:
-    """From where to where; coordinates are feet in each locale's own frame, and z, on the floor, is not used.
+    """From where to where; coordinates are feet in each locale's own frame, and z is 0: wheels stand on the floor.
 
     Raises:
-        ValueError: the text has another form.
+        ValueError: the text has another form, or names a place above or below the floor, or far off.
     """
     found = _GOAL.fullmatch(text)
     if found is None:
         raise ValueError(f"expected a goal like (ptrans (locale (x,y,z)) (locale (x,y,z))), got {text!r}")
-    a, ax, ay, _, b, bx, by, _ = found.groups()
-    return Place(a, float(ax) * FOOT_M, float(ay) * FOOT_M), Place(b, float(bx) * FOOT_M, float(by) * FOOT_M)
+    a, ax, ay, az, b, bx, by, bz = found.groups()
+    return _place(a, ax, ay, az), _place(b, bx, by, bz)
+
+
+def _place(locale: str, x: str, y: str, z: str) -> Place:
+    if float(z) != 0.0:
+        raise ValueError(f"expected z = 0, the floor of {locale}, got {z}")
+    if max(abs(float(x)), abs(float(y))) > FAR_FT:
+        raise ValueError(f"expected coordinates of at most {FAR_FT:g} ft, got ({x}, {y})")
+    return Place(locale, float(x) * FOOT_M, float(y) * FOOT_M)

@@ -13,6 +13,8 @@ from typing import Any
 Key = tuple[str | int, ...]
 """The way to a value: table names, keys and positions in arrays, from the top of the file."""
 
+MOST_SHOWN = 10**80
+
 
 class WorldError(ValueError):
     """A world file that cannot be read: names the file, the line, what was expected and what came."""
@@ -23,7 +25,7 @@ class Source:
     """One TOML file.
 
     Attributes:
-        name: for messages; data: its tables; lines: the line on which each value starts.
+        name: for messages, the path as it was given; data: its tables; lines: the line on which each value starts.
         folder: from where files that it names are looked for.
         text: as it was read.
         depth: how many files named each other until this one was named.
@@ -40,12 +42,12 @@ class Source:
     def read(path: Path, depth: int = 0) -> Source:
         """Raises WorldError where the file is missing, not text or not TOML."""
         try:
-            text = path.read_bytes().decode("utf-8").replace("\r\n", "\n")
-            return replace(Source.parse(text, path.name), folder=path.parent, depth=depth)
+            text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")  # some editors begin with a mark
+            return replace(Source.parse(text, str(path)), folder=path.parent, depth=depth)
         except OSError as error:
             raise WorldError(f"{path}: expected a readable file, got: {error.strerror}") from None
         except UnicodeDecodeError as error:
-            raise WorldError(f"{path.name}: expected UTF-8 text, got byte {error.object[error.start]:#04x} "
+            raise WorldError(f"{path}: expected UTF-8 text, got byte {error.object[error.start]:#04x} "
                              f"at offset {error.start}") from None
 
     @staticmethod
@@ -62,11 +64,18 @@ class Source:
         return Source(name, data, line_numbers(text), text=text)
 
     @property
+    def file(self) -> Path:
+        """The same for one file, however it was named on the way to it."""
+        return Path(self.name).resolve()
+
+    @property
     def root(self) -> Node:
         return Node(self.data, (), self)
 
     def where(self, key: Key) -> str:
-        """``file:line`` of the value, or of the nearest table that holds it."""
+        """``file:line`` of the value, or of the nearest table that holds it; no line where there was no text."""
+        if self.data and not self.lines:
+            return self.name
         while key and key not in self.lines:
             key = key[:-1]
         return f"{self.name}:{self.lines.get(key, 1)}"
@@ -86,9 +95,9 @@ class Node:
 
     def fail(self, expected: str, got: str | None = None) -> WorldError:
         """The error to raise when this value is not what was expected."""
-        shown = _shortened(repr(self.value)) if got is None else got
+        came = _shortened(shown(self.value)) if got is None else got
         path = ".".join(str(part) for part in self.key) or "the file"
-        return WorldError(f"{self.where}: {path}: expected {expected}, got {shown}")
+        return WorldError(f"{self.where}: {path}: expected {expected}, got {came}")
 
     def table(self, required: tuple[str, ...] = (), optional: tuple[str, ...] = ()) -> Node:
         """This node, after checking that it is a table with the required keys and none but these."""
@@ -151,6 +160,19 @@ class Node:
         if not isinstance(self.value, list) or len(self.value) not in counts:
             raise self.fail(f"an array of {' or '.join(str(count) for count in counts)} numbers")
         return tuple(item.number(low, high) for item in self.items())
+
+
+def shown(value: Any) -> str:
+    """A value as a TOML file has it, for messages."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int) and abs(value) >= MOST_SHOWN:
+        return "a number of more than 80 digits"  # Python refuses to write out those of some thousands
+    if isinstance(value, list):
+        return f"[{', '.join(shown(item) for item in value)}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key} = {shown(item)}' for key, item in value.items())}}}"
+    return value.isoformat() if hasattr(value, "isoformat") else repr(value)  # dates and times
 
 
 def _shortened(text: str) -> str:

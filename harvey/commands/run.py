@@ -53,13 +53,13 @@ def _out(args: Namespace, seed: int, many: bool) -> Path:
 def _check(task: Task) -> int:
     stage = task.stage()
     from harvey.rehearsal import rehearse
-    from harvey.summary import prospects
+    from harvey.summary import foreseen, prospects
 
     ahead, outcome = rehearse(stage.scenario)
     print(prospects(ahead))
-    testable = all(p.verdict != "not testable" for p in ahead)
-    print(f"\nin thought, {stage.scenario.name} ends: {outcome.kind}, {outcome.reason}")
-    return 0 if outcome.kind == "reached" and testable else 1
+    told, bodes_well = foreseen(ahead, outcome)
+    print(f"\nin thought, {stage.scenario.name} {told}")
+    return 0 if bodes_well else 1
 
 
 def _one(task: Task, args: Namespace) -> int:
@@ -99,5 +99,7 @@ COMMAND = Command(
         ("harvey run my_mission.toml --set start.heading_deg=80 --out runs/try", "a mission of your own"),
     ),
     _arguments, _run,
-    "Exit code 0: the goal was reached; 1: it was not; 2: the input cannot be used.",
+    "Exit code 0: the goal was reached; 1: it was not; 2: the input cannot be used.\n"
+    "With --check, 0: in thought the goal is reached, and no milestone is worse than weak; 1: it is not reached, or a\n"
+    "milestone is ambiguous (another place looks like it) or not testable (hardly anything of it would be seen).",
 )

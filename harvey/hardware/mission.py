@@ -14,8 +14,9 @@ from typing import Any
 from harvey.errors import BadInput
 from harvey.run_head import RunHead
 from sim.scenario import ROOT, Arrival, Servo, Start
-from sim.settings import known_keys, merged, near, parsed, read_settings
+from sim.settings import MOST, known_keys, merged, near, parsed, read_settings
 from world_models.actuator import ActuatorModel
+from world_models.bounds import Bounds, check_bounds
 from world_models.location import diagonal
 from world_models.phrases import check_command
 from world_models.store_schema import SUFFIXES
@@ -73,8 +74,8 @@ class DriveLimits:
     max_cycles: int = 20000
 
     def __post_init__(self) -> None:
-        if min(self.max_time_s, self.max_cycles) <= 0:
-            raise ValueError(f"expected limits above 0, got {self}")
+        some = Bounds(0.0, MOST, above=True)
+        check_bounds(self, {"max_time_s": some, "max_cycles": some})
 
 
 SECTIONS: Mapping[str, type[Any]] = {

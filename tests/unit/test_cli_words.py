@@ -20,14 +20,15 @@ from harvey.experiments.report import Report
 from harvey.explain.sentences import sentence
 from harvey.records import EntryRecord
 from harvey.referee import MissionResult
-from harvey.summary import one, several
+from harvey.rehearsal import Prospect
+from harvey.summary import foreseen, one, several
 from harvey.tables import table
 from harvey.units import degrees, metres, turn
 from world_models.body import MotorCommand
 from world_models.frames import Pose2
 from world_models.location import Hypothesis, diagonal
 from world_models.percepts import Track, Tracks
-from world_models.task import Leg
+from world_models.task import Leg, Outcome
 
 FOUND = Track("door-frame", (1.0, 2.0, 3.0), "Frame-3", (10.0, 20.0), 2.5, (100.0, 80.0), (95.8, 81.5), 0.97, 0.1)
 
@@ -70,6 +71,28 @@ def test_a_table_aligns_numbers_right_and_words_left() -> None:
     shown = table(["seed", "how"], [["9", "reached"], ["10", "lost"], ["all", "1"]], last_is_summary=True)
     assert shown.splitlines() == ["seed  how", "-" * 13, "9     reached", "10    lost", "-" * 13, "all   1"]
     assert table(["n"], [["9"], ["10"]]).splitlines()[2:] == [" 9", "10"]
+
+
+def ahead(*verdicts: str) -> list[Prospect]:
+    return [Prospect("M", "hall", 0.0, 0.0, 0.0, 1, 9, 0.01, 0.01, verdict) for verdict in verdicts]
+
+
+REACHED, BLOCKED = Outcome("reached", "all verified"), Outcome("blocked", "no way")
+
+
+@pytest.mark.parametrize(("verdicts", "outcome", "told", "well"), [
+    (("clear", "clear"), REACHED, "ends: reached, all verified", True),
+    (("clear", "weak"), REACHED, "ends: reached, all verified; 1 milestone weak", True),
+    (("clear", "ambiguous"), REACHED, "may not reach its goal: of 2 on the way, 1 milestone ambiguous", False),
+    (("not testable", "not testable", "ambiguous"), REACHED,
+     "may not reach its goal: of 3 on the way, 2 milestones not testable and 1 milestone ambiguous", False),
+    ((), BLOCKED, "ends: blocked, no way", False),
+    (("clear", "not testable"), BLOCKED, "ends: blocked, no way; 1 milestone not testable", False),
+])
+def test_what_is_foreseen_agrees_with_the_milestones(
+    verdicts: tuple[str, ...], outcome: Outcome, told: str, well: bool
+) -> None:
+    assert foreseen(ahead(*verdicts), outcome) == (told, well)
 
 
 def result(seed: int, outcome: str, error_m: float, collisions: int = 0) -> MissionResult:

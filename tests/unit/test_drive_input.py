@@ -63,7 +63,7 @@ def test_a_goal_may_be_said_in_words_and_is_understood_before_anything_moves(
     (f'world = "w"\ngoal = "{GOAL}"\n[base]\nprot = "x"', "expected one of port"),
     (f'world = "w"\ngoal = "{GOAL}"\n[base]\nradius_m = -1', "expected a radius of 0.02 to 2 m, got -1"),
     (f'world = "w"\ngoal = "{GOAL}"\n[camera]\nrate_hz = 0', "expected 0.1 to 1000 pictures a second"),
-    (f'world = "w"\ngoal = "{GOAL}"\n[limits]\nmax_time_s = 0', "expected limits above 0"),
+    (f'world = "w"\ngoal = "{GOAL}"\n[limits]\nmax_time_s = 0', "limits.max_time_s: expected a number above 0"),
     (f'world = "w"\ngoal = "{GOAL}"\n[start]\nheading_deg = nan', "heading"),
     ("world = ", "m.toml:1: expected TOML"),
 ])

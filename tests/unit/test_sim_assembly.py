@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -96,6 +97,48 @@ def test_a_scenario_that_does_not_fit_the_world_is_refused(main_stage: Stage) ->
     ):
         with pytest.raises(ScenarioError, match=message):
             set_stage(bad)
+
+
+SMALL = """world = "research_center"
+goal = "(ptrans (hallway (4,4,0)) (hallway (24,4,0)))"
+"""
+
+
+@pytest.mark.parametrize(("old", "new", "told"), [
+    ("(4,4,0)", "(4,400,0)", "m.toml:2: goal: expected a start within hallway, which reaches from (0.0, 0.0) to"),
+    ("(4,4,0)", "(4,0.1,0)", "m.toml:2: goal: expected 0.35 m of room at the start, got 0.01 m"),
+    ("(hallway (24", "(halway (24", "m.toml:2: goal: expected a locale of"),
+    ('"research_center"', '"nowhere.toml"', "m.toml:1: world: "),
+    ("", '[[faults]]\nkind = "bump"\nin_locale = "halway"\n', "m.toml:5: faults.0.in_locale: expected one of hallway"),
+    ("", '[[faults]]\nkind = "kidnap"\nto_locale = "hallway"\nto_y_ft = 400\n',
+     "m.toml:5: faults.0.to_locale: expected a place within hallway"),
+    ("", '[[moved]]\nthing = "hallway/notices-by-students"\nx_ft = 1000\n',
+     "m.toml:3: moved.0: expected hallway/notices-by-students to stay within hallway"),
+    ("", '[[moved]]\nthing = "hallway/chandelier"\n', "m.toml:4: moved.0.thing: expected a thing of the building"),
+    ("", 'details = ["nothing.toml"]\n', "m.toml:3: details: "),
+])
+def test_what_does_not_go_with_the_building_is_pointed_at(
+    old: str, new: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("b").mkdir()
+    Path("b/m.toml").write_text(SMALL.replace(old, new, 1) if old else SMALL + new)
+    with pytest.raises(ScenarioError) as caught:
+        set_stage(load_scenario("b/m.toml"))
+    assert str(caught.value).startswith(f"b/{told}")
+
+
+def test_what_was_set_otherwise_is_named_by_its_key() -> None:
+    goal = "(ptrans (hallway (4,400,0)) (hallway (24,4,0)))"
+    scenario = with_settings(parse_scenario(SMALL, "m.toml"), {"goal": goal})
+    with pytest.raises(ScenarioError, match=r"^--set goal: expected a start within hallway"):
+        set_stage(scenario)
+
+
+@pytest.mark.parametrize("place", ["(4,4,3)", "(4,4,-0.5)", "(4e,4,0)", "(9999999,4,0)", f"({'9' * 400},4,0)"])
+def test_a_place_is_on_the_floor_and_not_far_off(place: str) -> None:
+    with pytest.raises(ScenarioError, match=r"m\.toml:2: goal: expected "):
+        parse_scenario(SMALL.replace("(24,4,0)", place), "m.toml")
 
 
 def test_relative_files_belong_to_the_scenarios_folder() -> None:

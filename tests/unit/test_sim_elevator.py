@@ -95,9 +95,9 @@ def test_the_same_noise_is_drawn_with_and_without_a_ride(helped: Stage) -> None:
 
 
 @pytest.mark.parametrize(("rides", "message"), [
-    ('[[rides]]\npassage = "lift"\n', "rides: expected one of .*, got 'lift'"),
-    ('[[rides]]\npresses = "hall-1"\n', "rides: expected one of car-1, got 'hall-1'"),
-    ("[[rides]]\ncomes_s = -1\n", "rides.0: expected times of 0 and more"),
+    ('[[rides]]\npassage = "lift"\n', r"tower:7: rides\.0\.passage: expected one of .*, got 'lift'"),
+    ('[[rides]]\npresses = "hall-1"\n', r"tower:7: rides\.0\.presses: expected one of car-1, got 'hall-1'"),
+    ("[[rides]]\ncomes_s = -1\n", "rides.0.comes_s: expected a number from 0 to 1e\\+06, got -1"),
     ("[[rides]]\nwho = 3\n", "expected one of .*, got the key 'who'"),
 ])
 def test_mistakes_in_rides_are_told(folder: Path, rides: str, message: str) -> None:

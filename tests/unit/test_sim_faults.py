@@ -10,7 +10,7 @@ import pytest
 from sim.body import SimulatedBody
 from sim.box_room import box_room
 from sim.building import Building
-from sim.faults import Displacement, Fault, FaultWatch, LightsOff, Moment, free_displacement
+from sim.faults import Ailment, Displacement, Fault, FaultWatch, LightsOff, Moment, free_displacement
 from world_models.body import MotorCommand
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
@@ -56,6 +56,17 @@ def test_a_kidnap_ends_in_a_free_place_of_the_same_locale() -> None:
     assert all(p.x_m > 0.5 and p.y_m > 0.5 for p in free)
     assert {round(math.hypot(p.x_m - 1.0, p.y_m - 1.0), 6) for p in free} == {1.0}
     assert {round(p.heading_rad, 6) for p in free} == {0.35, -0.35}
+
+
+def test_what_did_not_happen_as_it_was_asked_for_is_told() -> None:
+    robot = body(
+        Displacement("bump", forward_m=3.0), Displacement("bump", left_m=0.1), Displacement("kidnap", turn_rad=1.0),
+        LightsOff(Moment(after_s=1e6)), Ailment("stall", Moment("attic")),
+    )
+    robot.move(0.3)
+    blocked, *late = robot.amiss
+    assert blocked.startswith("bump: 0.") and blocked.endswith(" m of 3.00 m, for want of room")
+    assert late == ["lights_off: its moment did not come", "stall: its moment did not come"]
 
 
 def test_a_blocked_bump_goes_as_far_as_there_is_room() -> None:

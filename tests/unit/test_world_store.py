@@ -76,6 +76,42 @@ def test_files_that_are_no_text_are_refused(tmp_path: Path) -> None:
         load_world(tmp_path / "latin.toml")
 
 
+def test_a_file_is_named_as_it_was_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    there = Path("houses")
+    there.mkdir()
+    (there / "a.toml").write_text(HEAD + KITCHEN.replace("8", "nan"))
+    (there / "b.toml").write_text("name = \n")
+    (there / "c.toml").write_bytes(b'name = "caf\xe9"\n')
+    for name, told in (("a", ":5: locales.kitchen.size.1"), ("b", ":1: expected TOML"), ("c", ": expected UTF-8")):
+        with pytest.raises(WorldError) as caught:
+            load_world(there / f"{name}.toml")
+        assert str(caught.value).startswith(f"{there / name}.toml{told}")
+
+
+def test_a_world_that_is_made_from_itself_is_refused_however_it_is_named(tmp_path: Path) -> None:
+    (tmp_path / "houses").mkdir()
+    file = tmp_path / "houses" / "a.toml"
+    file.write_text(HEAD + KITCHEN + '[locales.annexe]\nfrom = "../houses/a.toml"\n')
+    with pytest.raises(WorldError, match=r"a\.toml:7: .*another world file, that is not made from this one"):
+        load_world(file)
+
+
+def test_a_byte_order_mark_is_read_over(tmp_path: Path) -> None:
+    (tmp_path / "marked.toml").write_bytes(b"\xef\xbb\xbf" + (HEAD + KITCHEN).encode())
+    assert load_world(tmp_path / "marked.toml").rooms == ("kitchen",)
+
+
+@pytest.mark.parametrize(("value", "told"), [
+    ("1979-05-27", "1979-05-27"), ("07:32:00", "07:32:00"), ("true", "true"), ("[true, 07:32:00]", "[true, 07:32:00]"),
+    ("{ a = 1 }", "{a = 1}"), ("0x" + "f" * 5000, "a number of more than 80 digits"), ("-inf", "-inf"),
+])
+def test_values_are_told_as_the_file_has_them(value: str, told: str) -> None:
+    with pytest.raises(WorldError, match=r"cottage\.toml:2: units: expected one of feet, metres, got") as caught:
+        read(HEAD.replace('"feet"', value) + KITCHEN)
+    assert str(caught.value).endswith(f", got {told}")
+
+
 def test_line_ends_of_other_systems_are_read(tmp_path: Path) -> None:
     (tmp_path / "dos.toml").write_bytes((HEAD + KITCHEN).replace("\n", "\r\n").encode())
     assert load_world(tmp_path / "dos.toml").rooms == ("kitchen",)
