@@ -15,7 +15,9 @@ from harvey.run_directory import RUNS, vacant
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("scenario", metavar="SCENARIO", help="a name from harvey list, or a TOML file")
     parser.add_argument("--seed", metavar="N", default="0", help="of all chance: 3, 0..19 or 1,4,9 (0)")
-    parser.add_argument("--out", metavar="DIR", help="where the run is kept (runs/SCENARIO-SEED; several: one each)")
+    parser.add_argument("--out", metavar="DIR",
+                        help="where the run is kept (runs/SCENARIO-SEED; several: one each); an older run of the same"
+                             " scenario and seed there goes, another one is moved aside")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
                         help="change a setting of the scenario, as servo.action=off; may be repeated")
     parser.add_argument("--body", metavar="BODY", default="simulated",
