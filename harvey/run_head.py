@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from blackboard.encoding import plain
 from harvey.again.observations import MisfitError, decoded, fields_of
@@ -156,7 +156,7 @@ def _whole(value: Any, kind: type[T]) -> T:
     """A dataclass from JSON types. Raises TypeError, ValueError."""
     if not isinstance(value, dict):
         raise ValueError(f"expected an object, got {value!r}")
-    lacking = [f.name for f in fields(kind)  # type: ignore[arg-type]
+    lacking = [f.name for f in fields(cast(Any, kind))
                if f.name not in value and f.default is MISSING and f.default_factory is MISSING]
     if lacking:
         raise ValueError(f"expected {', '.join(lacking)} as well, got {', '.join(value) or 'nothing'}")
