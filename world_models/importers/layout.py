@@ -33,6 +33,8 @@ LARGEST_M = 2000.0
 ROBOT_M = 0.36
 """Radius of a robot that should find a place in a room."""
 FAR_M = 2.0
+MEETING_M = 2.5 * THIN_WALL_M
+"""Spaces that are no further apart, once thin walls are between all that touch, meet."""
 THICK_M = 0.89
 """Of the walls of old houses, as a world may have them: rooms that a door joins, where none are nearer."""
 IN_DOORWAY_M = 0.05
@@ -179,7 +181,7 @@ def _open_up(layout: Layout, a: str, b: str, outlines: Mapping[str, Floats]) -> 
     height = min(plan.space(room).height_m for room in (a, b)) - HEADER_M
     solid = [footprint(thing) for room in (a, b) for thing in layout.furnishings.get(room, ()) if in_the_way(thing)]
     barriers = plan.barriers.get(plan.space(a).storey, ())
-    cut = wide_opening(f"{a}-to-{b}", a, b, outlines, height, own, 2.5 * THIN_WALL_M, solid, barriers)
+    cut = wide_opening(f"{a}-to-{b}", a, b, outlines, height, own, MEETING_M, solid, barriers)
     if cut is None or overlap(cut, layout.cuts, layout.rooms):
         account.left_out.append(f"{a} and {b} meet without a wall, but not along a line with room for an opening")
         return
@@ -295,7 +297,6 @@ def neighbours_without_wall(spaces: Sequence[Space], which: set[str],
     Where there are barriers, only those between which they leave room for a wide opening.
     """
     kept, _ = apart({space.name: space.outline for space in spaces if space.name in which})
-    thickest_m = 2.5 * THIN_WALL_M
-    pairs = [(a, b) for a, b in all_pairs(kept) if any(s.gap_m < thickest_m for s in facing(a, kept[a], b, kept[b]))]
+    pairs = [(a, b) for a, b in all_pairs(kept) if any(s.gap_m < MEETING_M for s in facing(a, kept[a], b, kept[b]))]
     return {frozenset((a, b)) for a, b in pairs
-            if not barriers or wide_opening("", a, b, kept, 1.0, (), thickest_m, (), barriers) is not None}
+            if not barriers or wide_opening("", a, b, kept, 1.0, (), MEETING_M, (), barriers) is not None}
