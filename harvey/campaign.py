@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from harvey.referee import MissionResult
     from harvey.tally import Tally
     from sim.assembly import Stage
+    from sim.scenario import Scenario
 
 Follow = Callable[["Tally"], Sink]
 """Makes the sink that shows what a tally counts; it is called after the tally."""
@@ -53,13 +55,34 @@ class Task:
 
     def stage(self) -> Stage:
         """Raises BadInput where the scenario or a setting cannot be used."""
-        from sim.assembly import set_stage
         from sim.scenario import ScenarioError, load_scenario, with_settings
+        from world_models.store import WorldError, fingerprint
 
         try:
-            return set_stage(with_settings(load_scenario(self.scenario), dict(self.settings)))
+            scenario = with_settings(load_scenario(self.scenario), dict(self.settings))
+            try:
+                files = tuple(fingerprint(path) for path in (scenario.world, *scenario.details))
+            except (OSError, WorldError):
+                files = ()  # whoever reads them says what is wrong
+            return _stage(_Staged((scenario.source.text, str(scenario.folder), self.settings, files), scenario))
         except ScenarioError as error:
             raise BadInput(str(error)) from None
+
+
+@dataclass(frozen=True, slots=True)
+class _Staged:
+    """A scenario; the same as another where all the texts are that it and its building were read from."""
+
+    texts: tuple[object, ...]
+    scenario: Scenario = field(compare=False)
+
+
+@lru_cache(maxsize=2)
+def _stage(staged: _Staged) -> Stage:
+    """Set once for all the seeds that a process drives."""
+    from sim.assembly import set_stage
+
+    return set_stage(staged.scenario)
 
 
 def seeds_of(text: str) -> tuple[int, ...]:

@@ -19,7 +19,7 @@ from harvey.minds import Mind, Sources, mind_of
 from harvey.ports import Body, BodyPort
 from harvey.referee import MissionResult, Referee
 from harvey.run_directory import RunDirectory
-from harvey.run_head import SIMULATOR, RunHead
+from harvey.run_head import SIMULATOR, RunHead, known_world
 from harvey.wiring import command, knowledge_sources, robot_model
 from logs.disk import CannotWriteError
 from logs.errors import RecordingError
@@ -72,7 +72,8 @@ def run_mission(
 def head_of(stage: Stage, seed: int, body: str = IN_PROCESS) -> RunHead:
     """How a run of a scenario begins."""
     s = stage.scenario
-    return RunHead.of(SIMULATOR, s.name, seed, s.world, robot_model(s), s.servo, command(s), scenario=s.data,
+    robot = robot_model(s, known_world(s.world))
+    return RunHead.of(SIMULATOR, s.name, seed, s.world, robot, s.servo, command(s), scenario=s.data,
                       folder=str(s.folder), body=body)
 
 

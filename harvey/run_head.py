@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, replace
+from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -20,6 +21,7 @@ from world_models.camera import Camera, CameraMount
 from world_models.robot import RobotModel
 from world_models.store import fingerprint, load_world
 from world_models.task import Command
+from world_models.world import World
 
 SIMULATOR, HARDWARE = "simulator", "hardware"
 PARTS: Mapping[str, type[Any]] = {"camera": Camera, "mount": CameraMount, "actuator": ActuatorModel}
@@ -120,7 +122,7 @@ class RunHead:
         path = ROOT / self.world
         if _sha256_or_none(path) != self.world_sha256:
             raise BadInput(f"{path}: expected the world file as it was when the run was made, got another or none")
-        world = load_world(path)
+        world = _world(path, self.world_sha256)
         return _made("robot", lambda: RobotModel(world, **self._known()))
 
     def task(self) -> Command:
@@ -142,6 +144,19 @@ class RunHead:
             except (TypeError, ValueError) as error:
                 raise MisfitError.within(name, error) from None
         return made
+
+
+def known_world(path: Path) -> World:
+    """The world of a file as it is now; runs that begin in one process with the same world share what they know of it.
+
+    Raises WorldError, OSError.
+    """
+    return _world(ROOT / _portable(path), _sha256(path))
+
+
+@lru_cache(maxsize=2)
+def _world(path: Path, _sha256: str) -> World:
+    return load_world(path)
 
 
 def _made(what: str, make: Callable[[], T]) -> T:

@@ -29,6 +29,7 @@ from world_models.location import diagonal
 from world_models.robot import RobotModel
 from world_models.store import load_world
 from world_models.task import Command
+from world_models.world import World
 
 EXPERTS: tuple[type[Expert], ...] = (
     Interpreter,
@@ -57,10 +58,13 @@ def knowledge_sources(robot: RobotModel) -> tuple[KnowledgeSource, ...]:
     return tuple(expert(robot) for expert in EXPERTS)
 
 
-def robot_model(scenario: Scenario) -> RobotModel:
-    """What the robot knows: the world file without the building's details, its camera and its wheels' kind."""
+def robot_model(scenario: Scenario, world: World | None = None) -> RobotModel:
+    """What the robot knows: the world file without the building's details, its camera and its wheels' kind.
+
+    ``world`` is that file's world where it has been read already.
+    """
     camera = scenario.camera
-    return RobotModel(load_world(scenario.world), camera.camera, camera.mount, ActuatorModel(),
+    return RobotModel(world or load_world(scenario.world), camera.camera, camera.mount, ActuatorModel(),
                       continuous=scenario.motion.continuous)
 
 
