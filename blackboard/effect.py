@@ -32,6 +32,15 @@ class Retract(NamedTuple):
 Effect = Post | Revise | Retract
 
 
+def to_say(known: Entry[Any] | None, value: Any | None, because: tuple[Any, ...]) -> Effect | None:
+    """What makes the board say ``value`` where it says what ``known`` says, or nothing; None where it does already."""
+    if known is None:
+        return None if value is None else Post(value, because)
+    if value is None:
+        return Retract(known, because)
+    return None if known.value == value else Revise(known, value, because)
+
+
 def kind_of(effect: Effect) -> type[Any]:
     """The class of the value that an effect touches."""
     return type(effect.value if isinstance(effect, Post) else effect.entry.value)

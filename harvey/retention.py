@@ -16,6 +16,7 @@ from blackboard.index import Index
 from blackboard.level import Level
 from blackboard.retention import Forget
 from blackboard.servoing import OPEN, Discrepancy
+from knowledge_sources.obstruction_finder import LOOKS
 from knowledge_sources.questions import last_escalated
 from world_models.body import BodyFault, Course, Frame, Look, MotionReport, MotorCommand, Recovery, Ride, RideReport
 from world_models.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
@@ -65,7 +66,7 @@ def is_last_of_its_level(view: View, found: Entry[Discrepancy]) -> bool:
 
 RETENTION: tuple[Forget[Any], ...] = (
     Forget(Frame, keep=2, unless=is_template),
-    Forget(Segments, keep=2, unless=is_of_use),
+    Forget(Segments, keep=LOOKS, unless=is_of_use),
     Forget(LineMatch, keep=2, unless=named_by(MATCH)),
     Forget(PoseFix, keep=2, unless=named_by(FIX)),
     Forget(Certificate, keep=2),

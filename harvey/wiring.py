@@ -18,6 +18,7 @@ from knowledge_sources.milestone_judge import MilestoneJudge
 from knowledge_sources.milestone_selector import MilestoneSelector
 from knowledge_sources.mission_keeper import MissionKeeper
 from knowledge_sources.motor import Motor
+from knowledge_sources.obstruction_finder import ObstructionFinder
 from knowledge_sources.passenger import Passenger
 from knowledge_sources.plan_adjuster import PlanAdjuster
 from knowledge_sources.relocalizer import Relocalizer
@@ -41,6 +42,7 @@ EXPERTS: tuple[type[Expert], ...] = (
     DeadReckoner,
     CorrelatorTracker,
     LineFinder,
+    ObstructionFinder,
     Matcher,
     MedRAndT,
     MilestoneJudge,

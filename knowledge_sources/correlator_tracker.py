@@ -26,7 +26,7 @@ from knowledge_sources.methods.correlation import Template, extract_template
 from knowledge_sources.methods.edge_alignment import aligned
 from knowledge_sources.methods.rectified import Rectified
 from knowledge_sources.methods.tracking import HALF_PX, TRACKS, Followed, Image, begin, correct, follow
-from knowledge_sources.questions import held, open_discrepancy, standing_in
+from knowledge_sources.questions import held, open_discrepancy, standing_in, unmeasured_doubt
 from knowledge_sources.tolerances import PLAN_PX, action_px
 from world_models.actuator import Drift
 from world_models.body import Frame
@@ -86,6 +86,8 @@ class CorrelatorTracker(Expert):
 
     def rate(self, view: View, trigger: Change) -> float | None:
         if held(view) is None or view.latest(Frame) is None or open_discrepancy(view, Level.GOAL) is not None:
+            return None
+        if unmeasured_doubt(view) is not None:  # it could not explain what it saw; others look for where the robot is
             return None
         return 0.9
 

@@ -75,7 +75,7 @@ class MilestoneJudge(Expert):
         yield verdict
         yield Revise(milestone, replace(milestone.value, status=certificate.verdict), (verdict,))
         c = certificate
-        if _may_look_again(view, c, milestone.value):
+        if _may_look_again(c, milestone.value):
             return
         magnitude = c.deviation_px if c.verdict == "verified" or c.deviation_px > PLAN_PX else math.inf
         what = f"{milestone.value.what.partition(', because')[0]} is {c.verdict}"
@@ -136,10 +136,9 @@ class MilestoneJudge(Expert):
         )
 
 
-def _may_look_again(view: View, certificate: Certificate, milestone: Milestone) -> bool:
-    """Whether another view of a sketch's milestone may tell what this one could not, while nothing is in doubt."""
-    told = certificate.verdict != "not testable" or not milestone.sketch
-    return not told and len(milestone.tried) + 1 < MOST_LOOKS and open_discrepancy(view, Level.PLAN) is None
+def _may_look_again(certificate: Certificate, milestone: Milestone) -> bool:
+    """Whether another view may tell what this one could not."""
+    return certificate.verdict == "not testable" and len(milestone.tried) + 1 < MOST_LOOKS
 
 
 def _milestone_of(view: View, fix: PoseFix) -> Entry[Milestone] | None:

@@ -30,6 +30,7 @@ from knowledge_sources.questions import (
     open_discrepancy,
     open_milestone,
     standing_in,
+    unmeasured_doubt,
 )
 from world_models.body import Look
 from world_models.frames import Pose2, wrap_angle
@@ -48,6 +49,8 @@ GOOD_PART = 0.3
 """A view is good enough when it tells the place to this part of the tolerance there."""
 GOOD_RAD = math.radians(0.25)
 LEAST_LINES = 10
+CHECK_M = 0.1
+"""So well a check of the belief should tell the place."""
 OTHERWISE_RAD = math.radians(20.0)
 """Looks that differ by less show much the same."""
 GLANCES_RAD = tuple(math.radians(a) for a in (30, -30, 60, -60, 90, -90, 135, -135, 180))
@@ -58,7 +61,7 @@ class MilestoneSelector(Expert):
 
     It prefers the view that the robot has, then the one it will have next, then the one that would tell most; where a
     view could not be told, another one is tried. It also checks the belief in between when tracking could not explain
-    what it saw.
+    what it saw, first in the view that it has. What was just found to stand before the camera is not looked behind.
     """
 
     level = Level.PLAN
@@ -67,25 +70,32 @@ class MilestoneSelector(Expert):
         Watch(Discrepancy, (Posted, Revised)),
         Watch(Hypothesis, (Revised,), lambda h: h.is_held),
         Watch(Milestone, (Revised,), lambda m: not m.is_open),
+        Watch(Obstruction, (Posted, Revised)),
     )
     writes = (Milestone, Look)
 
     def rate(self, view: View, trigger: Change) -> float | None:
+        if isinstance(trigger.entry.value, Obstruction):
+            return 0.9 if held(view) is not None and _awaited(view) is not None else None
         task = self._task(view)
         if task is None:
             return None
         return 0.7 if isinstance(task.value, Discrepancy) else 0.5
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, task, waiting = held(view), self._task(view), open_milestone(view)
-        if belief is None or task is None:
+        belief = held(view)
+        if belief is None:
+            return
+        if isinstance(trigger.entry.value, Obstruction):
+            yield from self._expected_anew(view, trigger.entry, belief)
+            return
+        task, waiting = self._task(view), open_milestone(view)
+        if task is None:
             return
         if isinstance(task.value, PlanSketch):
             yield from self._proposed(view, task, belief)
         elif waiting is None:
-            what = f"check of the belief, because {task.value.what}"
-            check = Milestone("", -1, what, self._heading(belief.value))
-            yield from self._looked_for(view, None, check, task, belief)
+            yield from self._checked(view, task, belief)
         else:
             here = replace(waiting.value, look_heading_rad=self._heading(belief.value))
             yield from self._looked_for(view, waiting, here, task, belief, _car_of(view.get(here.sketch), here.index))
@@ -97,13 +107,38 @@ class MilestoneSelector(Expert):
             return None
         if waiting is not None and waiting.value.status == "expected":
             return None
-        doubt = open_discrepancy(view, Level.PLAN)
-        if doubt is not None and doubt.value.magnitude is None:
+        doubt = unmeasured_doubt(view)
+        if doubt is not None and (waiting is None or waiting.cycle < doubt.cycle):
             return doubt
         if waiting is not None:
             return waiting if self._faces(belief.value, waiting.value) else None
         sketch = deepest_sketch(view)
         return sketch if sketch is not None and not sketch.value.verified else None
+
+    def _checked(self, view: View, doubt: Entry[Discrepancy], belief: Entry[Hypothesis]) -> Iterable[Effect]:
+        """A look in between: in the view that the robot has, and if it could not be told, in another one from here."""
+        tried = _tried_since(view, doubt)
+        check = Milestone("", -1, f"check of the belief, because {doubt.value.what}", self._heading(belief.value),
+                          tried=tried)
+        if not tried:
+            yield from self._looked_for(view, None, check, doubt, belief)
+            return
+        pose = belief.value.world_from_robot(self._robot.world)
+        robot = standing_in(view, self._robot, belief.value.locale)
+        heading = best_heading(robot, pose, _otherwise(_glances(pose), tried), CHECK_M)
+        yield Post(replace(check, look_heading_rad=heading), (doubt, belief))
+
+    def _expected_anew(
+        self, view: View, hidden: Entry[Obstruction], belief: Entry[Hypothesis]
+    ) -> Iterable[Effect]:
+        """The milestone whose picture was taken, without what is hidden in it."""
+        waiting = _awaited(view)
+        if waiting is None:
+            return
+        m, pose = waiting.value, belief.value.world_from_robot(self._robot.world)
+        robot = standing_in(view, self._robot, belief.value.locale)
+        seen = expectation(robot, pose, m, _car_of(view.get(m.sketch), m.index))
+        yield Revise(waiting, seen, (hidden, waiting, belief))
 
     def _proposed(self, view: View, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         """The milestone before the sketch's next subgoal, seen from the first direction that is good enough."""
@@ -134,8 +169,7 @@ class MilestoneSelector(Expert):
 
     def _direction(self, robot: RobotModel, sketch: PlanSketch, pose: Pose2, tried: Sequence[float]) -> float:
         before = sketch.subgoals[sketch.at - 1] if sketch.at else None
-        headings = [h for h in self._candidates(sketch, pose)
-                    if all(abs(wrap_angle(h - other)) > OTHERWISE_RAD for other in tried)]
+        headings = _otherwise(self._candidates(sketch, pose), tried)
         return best_heading(robot, pose, headings, before.tolerance_m if before else 0.1, _car(sketch, sketch.at))
 
     def _candidates(self, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
@@ -146,13 +180,28 @@ class MilestoneSelector(Expert):
         if sketch.current is not None:
             end = sketch.current.destination.in_world(self._robot.world)
             yield math.atan2(end.y_m - pose.y_m, end.x_m - pose.x_m)
-        yield from (wrap_angle(pose.heading_rad + glance) for glance in GLANCES_RAD)
+        yield from _glances(pose)
 
     def _heading(self, belief: Hypothesis) -> float:
         return belief.world_from_robot(self._robot.world).heading_rad
 
     def _faces(self, belief: Hypothesis, milestone: Milestone) -> bool:
         return abs(wrap_angle(self._heading(belief) - milestone.look_heading_rad)) <= FACING_RAD
+
+
+def _glances(pose: Pose2) -> Iterator[float]:
+    return (wrap_angle(pose.heading_rad + glance) for glance in GLANCES_RAD)
+
+
+def _otherwise(headings: Iterable[float], tried: Sequence[float]) -> list[float]:
+    """Those that show something else than what was tried."""
+    return [h for h in headings if all(abs(wrap_angle(h - other)) > OTHERWISE_RAD for other in tried)]
+
+
+def _awaited(view: View) -> Entry[Milestone] | None:
+    """The milestone whose picture was asked for and is not judged yet."""
+    waiting = open_milestone(view)
+    return waiting if waiting is not None and waiting.value.status == "expected" else None
 
 
 def _car_of(sketch: Entry[PlanSketch] | None, index: int) -> str:
@@ -172,6 +221,14 @@ def _tried(view: View, sketch: Entry[PlanSketch]) -> tuple[float, ...]:
         return ()
     m = last.value
     return (*m.tried, m.look_heading_rad) if (m.sketch, m.index) == (sketch.id, sketch.value.at) else ()
+
+
+def _tried_since(view: View, doubt: Entry[Discrepancy]) -> tuple[float, ...]:
+    """From where the belief was checked in vain since it is in doubt."""
+    last = view.latest(Milestone)
+    if last is None or last.value.status != "not testable" or last.cycle < doubt.cycle:
+        return ()
+    return (*last.value.tried, last.value.look_heading_rad)
 
 
 def best_heading(

@@ -24,6 +24,7 @@ from knowledge_sources.questions import (
     open_fault,
     open_milestone,
     under_way,
+    unmeasured_doubt,
 )
 from world_models.actuator import Drift
 from world_models.body import BodyFault, MotorCommand
@@ -47,7 +48,8 @@ class Motor(Expert):
     """Commands the next increment of a leg from where the robot believes it is: this closes the action-level loop.
 
     It begins a leg when a verified sketch has a primitive subgoal; it turns where a milestone is to be looked for; it
-    keeps still while anything above the action level is in doubt, a command is under way, or the body is at fault.
+    keeps still while a command is under way, or the body is at fault. While anything above the action level is in
+    doubt it does not drive, and turns only to where a look is to end that doubt.
     """
 
     level = Level.ACTION
@@ -62,9 +64,11 @@ class Motor(Expert):
     writes = (MotorCommand, Leg, Discrepancy)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        if is_over(view) or open_fault(view) is not None or not is_settled(view) or is_in_doubt(view):
+        if is_over(view) or open_fault(view) is not None or not is_settled(view):
             return None
         milestone = open_milestone(view)
+        if is_in_doubt(view) and (milestone is None or not _is_to_end_doubt(view, milestone)):
+            return None
         if milestone is not None:
             return 0.3 if milestone.value.status == "turning" and self._look_error(view, milestone.value) else None
         if under_way(view) is not None:
@@ -145,6 +149,12 @@ class Motor(Expert):
         """One increment of a turn; a long one in equal parts, so that landmarks stay in view from part to part."""
         largest = self._robot.actuator.turn_increment_rad
         return turn_rad / max(1, math.ceil(abs(turn_rad) / largest))
+
+
+def _is_to_end_doubt(view: View, milestone: Entry[Milestone]) -> bool:
+    """Whether a milestone was chosen as another view by which to measure what the plan level doubts."""
+    doubt = unmeasured_doubt(view)
+    return (doubt is not None and milestone.cycle >= doubt.cycle and open_discrepancy(view, Level.GOAL) is None)
 
 
 def _leg_wanted(view: View) -> Entry[PlanSketch] | None:

@@ -57,6 +57,12 @@ def open_discrepancy(view: View, level: Level) -> Entry[Discrepancy] | None:
     return view.newest(OPEN, level)
 
 
+def unmeasured_doubt(view: View) -> Entry[Discrepancy] | None:
+    """What the action level has passed up, while the plan level has not yet looked how far off it is."""
+    doubt = open_discrepancy(view, Level.PLAN)
+    return doubt if doubt is not None and doubt.value.magnitude is None else None
+
+
 def last_escalated(view: View, level: Level) -> Entry[Discrepancy] | None:
     """The last discrepancy that a level passed up."""
     return view.latest(Discrepancy, lambda found: found.level is level and found.status == "escalated")

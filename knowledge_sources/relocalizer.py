@@ -10,21 +10,20 @@ import numpy as np
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
-from blackboard.effect import Effect, Post, Retract, Revise
+from blackboard.effect import Effect, Post, Retract, Revise, to_say
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.expert import Expert
 from knowledge_sources.methods.glances import Glance, moved
 from knowledge_sources.methods.relocation import Candidate, Finding, Verdict, finding
-from knowledge_sources.methods.standing_still import is_opaque, obstruction_in
+from knowledge_sources.methods.standing_still import before_camera
 from knowledge_sources.questions import active_goal, held, is_over, is_settled, open_discrepancy
 from world_models.body import Look, MotionReport, MotorCommand
 from world_models.frames import Pose2
 from world_models.location import Hypothesis, Place, covariance_tuple
 from world_models.obstruction import Obstruction
 from world_models.percepts import Glimpse, Panorama, Segments
-from world_models.robot import RobotModel
 from world_models.task import Goal, PlanSketch
 
 PROBES = 8
@@ -83,11 +82,11 @@ class Relocalizer(Expert):
         before = _panorama_since(view, lost)
         glimpses = self._glimpses(view, segments, before)
         looks, hidden = [_glance(view, g) for g in glimpses], view.latest(Obstruction)
-        obstruction = _obstruction(self._robot, looks, hidden)
+        obstruction = before_camera(looks, self._robot.camera, None if hidden is None else hidden.value)
         if obstruction is not None:
             looks = [replace(g, segments_px=obstruction.without_its_own(g.segments_px)) for g in looks]
         because: tuple[object, ...] = (segments, lost)
-        if (change := _told(hidden, obstruction, because)) is not None:
+        if (change := to_say(hidden, obstruction, because)) is not None:
             yield change
         if obstruction is not None:
             because = (segments, lost, hidden if change is None else change)
@@ -178,23 +177,6 @@ def _has_just_ridden(view: View) -> bool:
     """Whether no milestone has borne out an elevator ride yet: then it may be on any floor."""
     return view.latest(PlanSketch, lambda s: s.is_active and s.at > 0 and not s.verified
                        and s.subgoals[s.at - 1].is_ride) is not None
-
-
-def _obstruction(robot: RobotModel, looks: list[Glance], known: Entry[Obstruction] | None) -> Obstruction | None:
-    """What stands before the camera, by these looks; else what was found before, unless it is not opaque now."""
-    found = obstruction_in(looks, robot.camera)
-    if found is None and known is not None and is_opaque(known.value, [g.segments_px for g in looks]):
-        return known.value
-    return found
-
-
-def _told(known: Entry[Obstruction] | None, now: Obstruction | None, because: tuple[object, ...]) -> Effect | None:
-    """What changes of what is known to stand before the camera."""
-    if now is None:
-        return None if known is None else Retract(known, because)
-    if known is None:
-        return Post(now, because)
-    return None if known.value == now else Revise(known, now, because)
 
 
 def _in_words(result: Finding) -> str:

@@ -62,7 +62,8 @@ def aligned(
 ) -> Aligned | None:
     """The pose that moves model lines onto the edges of a picture; None where too few of them are found.
 
-    It is None too where the belief is so loose that the nearest edge need not be a line's own.
+    It is None too where the belief is so loose that the nearest edge need not be a line's own; where that is so of some
+    lines only, they are left out until the others have made it sure enough.
 
     Args:
         image: (h, w) grey, without lens distortion.
@@ -70,15 +71,18 @@ def aligned(
         world_from_robot, covariance: what is believed, (3, 3) over (x, y, heading), world.
     """
     smooth = np.asarray(cv2.GaussianBlur(image, (0, 0), 1.0), np.uint8)
-    pose, found = world_from_robot, None
+    pose, doubt, found = world_from_robot, covariance, None
     for across_px in ACROSS_PX:
         seen = _edges(robot, smooth, lines_world, pose, across_px)
-        if found is None and (seen is None or _doubt_px(seen, covariance) > across_px):
+        if seen is None:
             return None
-        found = None if seen is None else _solved(seen, pose, world_from_robot, covariance)
+        doubt_px = seen.doubt_px(doubt)
+        if found is None and _for_most(doubt_px) > across_px:
+            return None
+        found = _solved(seen.only(doubt_px <= across_px), pose, world_from_robot, covariance)
         if found is None:
             return None
-        pose = found.world_from_robot
+        pose, doubt = found.world_from_robot, found.covariance
     return found
 
 
@@ -89,6 +93,15 @@ class _Edges:
     offsets_px: Floats
     slopes: Floats
     line: NDArray[np.int64]
+
+    def doubt_px(self, covariance: Floats) -> Floats:
+        """(n,) how far a pose that is so sure may put each across its line: 3 deviations [px]."""
+        variances = np.einsum("ni,ij,nj->n", self.slopes, covariance, self.slopes)
+        return np.asarray(3.0 * np.sqrt(np.maximum(variances, 0.0)))
+
+    def only(self, which: NDArray[np.bool_]) -> _Edges:
+        """Some of them."""
+        return _Edges(self.offsets_px[which], self.slopes[which], self.line[which])
 
 
 def _edges(robot: RobotModel, image: NDArray[np.uint8], lines: Floats, pose: Pose2, across_px: float) -> _Edges | None:
@@ -112,10 +125,8 @@ def _edges(robot: RobotModel, image: NDArray[np.uint8], lines: Floats, pose: Pos
     return _Edges(offset[good], slopes[good], line[good])
 
 
-def _doubt_px(edges: _Edges, covariance: Floats) -> float:
-    """How far the belief may put lines across themselves, as most of them have it: 3 deviations [px]."""
-    variances = np.einsum("ni,ij,nj->n", edges.slopes, covariance, edges.slopes)
-    return 3.0 * float(np.sqrt(np.percentile(variances, MOST_LINES))) if len(variances) else np.inf
+def _for_most(doubt_px: Floats) -> float:
+    return float(np.percentile(doubt_px, MOST_LINES)) if len(doubt_px) else np.inf
 
 
 def _places(ends_px: Floats) -> tuple[NDArray[np.int64], Floats]:

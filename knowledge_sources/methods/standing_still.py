@@ -25,8 +25,8 @@ OVERLAP = 0.5
 """So much of the shorter one must lie beside the other."""
 LEAST_TWINS, LEAST_PART = 2, 0.6
 """Chance makes a twin in one look, or in a few of many: there must be one in so many, and in such a part of them."""
-LEAST_AREA = 0.01
-"""A smaller part of the picture is not worth being left out."""
+LEAST_AREA, MOST_AREA = 0.01, 0.5
+"""A smaller part of a picture is not worth being left out. Where a larger one stands still, the robot did not turn."""
 INSIDE_PX, MOST_INSIDE = 8.0, 0.1
 """Within the outline, further in than so, nothing of the building is seen: no more than such a part of its length."""
 
@@ -41,12 +41,23 @@ def obstruction_in(glances: Sequence[Glance], camera: Camera) -> Obstruction | N
     for least in range(LEAST_TWINS, len(glances)):
         still = [twins >= max(least, LEAST_PART * others) for twins, others in found]
         hull = _hull(glances, still)
-        if len(hull) < 3 or _area(hull) < LEAST_AREA * camera.width * camera.height:
+        part = _area(hull) / (camera.width * camera.height) if len(hull) >= 3 else 0.0
+        if part < LEAST_AREA:
             return None
+        if part > MOST_AREA:
+            continue
         obstruction = Obstruction(tuple((float(x), float(y)) for x, y in hull))
         if is_opaque(obstruction, [g.segments_px[~some] for g, some in zip(glances, still, strict=True)]):
             return obstruction
     return None
+
+
+def before_camera(glances: Sequence[Glance], camera: Camera, known: Obstruction | None) -> Obstruction | None:
+    """What stands before the camera, by these looks; else what was found before, unless it is not opaque now."""
+    found = obstruction_in(glances, camera)
+    if found is None and known is not None and is_opaque(known, [g.segments_px for g in glances]):
+        return known
+    return found
 
 
 def is_opaque(obstruction: Obstruction, seen: Sequence[Floats]) -> bool:

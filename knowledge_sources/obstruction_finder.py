@@ -1,0 +1,61 @@
+"""Obstruction finder (§4: a model is incomplete, and so is a view): what hides a part of every picture of a place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import islice
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, to_say
+from blackboard.entry import Entry
+from blackboard.level import Level
+from knowledge_sources.expert import Expert
+from knowledge_sources.methods.glances import Glance
+from knowledge_sources.methods.standing_still import before_camera
+from knowledge_sources.questions import active_goal
+from world_models.frames import Pose2
+from world_models.obstruction import Obstruction
+from world_models.percepts import Segments
+
+LEAST_LOOKS, LOOKS = 3, 6
+"""What stands still in so many looks at the least is before the camera; of two it may do so by chance. So many are
+asked, the last ones."""
+
+
+class ObstructionFinder(Expert):
+    """Finds what stands still in the last looks for milestones, in several directions, before the new one is judged.
+
+    While the robot is lost the relocalizer asks the same of its probes.
+    """
+
+    level = Level.PLAN
+    watches = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
+    writes = (Obstruction,)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        return 0.9 if len(_looks(view)) >= LEAST_LOOKS else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        looks, known = _looks(view), view.latest(Obstruction)
+        glances = [Glance(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
+                   for s, heading_rad in looks]
+        now = before_camera(glances, self._robot.camera, None if known is None else known.value)
+        because = (*(s for s, _ in looks), *(() if known is None else (known,)))
+        change = to_say(known, now, because)
+        if change is not None:
+            yield change
+
+
+def _looks(view: View) -> list[tuple[Entry[Segments], float]]:
+    """The last looks for milestones, each with the direction in which it was taken [rad, world].
+
+    None from before the goal: the robot was lost then, and did not know in which direction it looked.
+    """
+    goal = active_goal(view)
+    since = 0 if goal is None else goal.cycle
+    looked = ((s, view.get(s.value.milestone)) for s in view.newest_first(Segments) if s.cycle >= since)
+    known = ((s, m.value.look_heading_rad) for s, m in looked if m is not None)
+    return list(islice(known, LOOKS))
