@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import islice
 
 import numpy as np
@@ -16,6 +16,7 @@ from knowledge_sources.expert import Expert
 from knowledge_sources.methods.glances import Glance
 from knowledge_sources.methods.standing_still import before_camera
 from knowledge_sources.questions import active_goal
+from world_models.camera import Camera
 from world_models.frames import Pose2
 from world_models.obstruction import Obstruction
 from world_models.percepts import Segments
@@ -23,6 +24,9 @@ from world_models.percepts import Segments
 LEAST_LOOKS, LOOKS = 3, 6
 """What stands still in so many looks at the least is before the camera; of two it may do so by chance. So many are
 asked, the last ones."""
+LEAST_AREA = 0.04
+"""A smaller part of the picture is not asked for: looks from places near each other are much alike, and what is small
+stands still in them by chance too often."""
 
 
 class ObstructionFinder(Expert):
@@ -42,11 +46,22 @@ class ObstructionFinder(Expert):
         looks, known = _looks(view), view.latest(Obstruction)
         glances = [Glance(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
                    for s, heading_rad in looks]
-        now = before_camera(glances, self._robot.camera, None if known is None else known.value)
+        now = _seen_by_the_last(glances, self._robot.camera, None if known is None else known.value)
         because = (*(s for s, _ in looks), *(() if known is None else (known,)))
         change = to_say(known, now, because)
         if change is not None:
             yield change
+
+
+def _seen_by_the_last(
+    glances: Sequence[Glance], camera: Camera, known: Obstruction | None
+) -> Obstruction | None:
+    """What all looks show, the last first; else what fewer of them do, as it was not there in the earlier ones."""
+    for number in range(len(glances), LEAST_LOOKS - 1, -1):
+        found = before_camera(glances[:number], camera, known, LEAST_AREA)
+        if found is not None:
+            return found
+    return None
 
 
 def _looks(view: View) -> list[tuple[Entry[Segments], float]]:

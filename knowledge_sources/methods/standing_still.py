@@ -31,18 +31,19 @@ INSIDE_PX, MOST_INSIDE = 8.0, 0.1
 """Within the outline, further in than so, nothing of the building is seen: no more than such a part of its length."""
 
 
-def obstruction_in(glances: Sequence[Glance], camera: Camera) -> Obstruction | None:
+def obstruction_in(glances: Sequence[Glance], camera: Camera, least_area: float = LEAST_AREA) -> Obstruction | None:
     """What hides the same part of all looks; None where nothing does, or looks in too few directions were taken.
 
     Its outline is round the segments that stand still. Were it not opaque, other segments would be seen within: then
     those that stand still in the fewest looks are left out, as they may do so by chance, until nothing is to be left.
+    ``least_area`` is the least part of the picture.
     """
     found = [_twins(glances, k) for k in range(len(glances))]
     for least in range(LEAST_TWINS, len(glances)):
         still = [twins >= max(least, LEAST_PART * others) for twins, others in found]
         hull = _hull(glances, still)
         part = _area(hull) / (camera.width * camera.height) if len(hull) >= 3 else 0.0
-        if part < LEAST_AREA:
+        if part < least_area:
             return None
         if part > MOST_AREA:
             continue
@@ -52,9 +53,11 @@ def obstruction_in(glances: Sequence[Glance], camera: Camera) -> Obstruction | N
     return None
 
 
-def before_camera(glances: Sequence[Glance], camera: Camera, known: Obstruction | None) -> Obstruction | None:
+def before_camera(
+    glances: Sequence[Glance], camera: Camera, known: Obstruction | None, least_area: float = LEAST_AREA
+) -> Obstruction | None:
     """What stands before the camera, by these looks; else what was found before, unless it is not opaque now."""
-    found = obstruction_in(glances, camera)
+    found = obstruction_in(glances, camera, least_area)
     if found is None and known is not None and is_opaque(known, [g.segments_px for g in glances]):
         return known
     return found

@@ -28,7 +28,15 @@ from harvey.retention import RETENTION
 from harvey.wiring import EXPERTS, command, robot_model
 from knowledge_sources.escalator import MOST_CHECKS, MOST_LOST
 from knowledge_sources.expert import Expert
-from knowledge_sources.questions import active_goal, held, open_discrepancy, open_milestone, rolling
+from knowledge_sources.milestone_judge import MOST_LOOKS
+from knowledge_sources.questions import (
+    active_goal,
+    held,
+    open_discrepancy,
+    open_milestone,
+    rolling,
+    unmeasured_doubt,
+)
 from knowledge_sources.tolerances import PLAN_PX
 from sim.scenario import load_scenario, with_settings
 from world_models.body import Course, Frame, Look, MotionReport, MotorCommand
@@ -42,8 +50,12 @@ PERCEIVERS = {"correlator_tracker", "line_finder", "matcher", "med_r_and_t", "mi
 SURE = diagonal(0.002, 0.001)
 
 
+UNTOLD = -1.0
+"""What a picture says of a milestone where it cannot be told."""
+
+
 def figure(frame: Entry[Frame]) -> float:
-    """What a picture says: how far things are from where they are expected [px]."""
+    """What a picture says: how far things are from where they are expected [px], or UNTOLD."""
     return float(frame.value.jpeg)
 
 
@@ -55,7 +67,9 @@ class ScriptedTracker(Expert):
     writes = (Hypothesis, Discrepancy)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        return 0.9 if held(view) is not None and open_discrepancy(view, Level.GOAL) is None else None
+        if unmeasured_doubt(view) is not None or open_discrepancy(view, Level.GOAL) is not None:
+            return None
+        return 0.9 if held(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, last = held(view), open_discrepancy(view, Level.ACTION)
@@ -81,14 +95,17 @@ class ScriptedJudge(Expert):
         belief, milestone, last = held(view), open_milestone(view), open_discrepancy(view, Level.PLAN)
         assert belief is not None and milestone is not None
         px = figure(trigger.entry)
-        verdict = "verified" if px <= PLAN_PX else "refuted"
+        verdict = "not testable" if px == UNTOLD else "verified" if px <= PLAN_PX else "refuted"
         here, nothing = belief.value.world_from_robot(self._robot.world), np.zeros((0, 2))
         fix = Post(PoseFix("", here, np.array(SURE), nothing[:, 0] > 0, nothing, ()), (trigger.entry,))
         yield fix
         told = Certificate(milestone.id, _next_fix(view), verdict, "", 9, 9, 9, 1.0, 0.5, 0.0, 0.0, px, PLAN_PX, 0.0)
         yield Post(told, (fix, milestone))
         yield Revise(milestone, replace(milestone.value, status=verdict), (fix,))
-        found = Discrepancy(Level.PLAN, "a milestone is elsewhere", px, (0.0, PLAN_PX), "px")
+        if px == UNTOLD and len(milestone.value.tried) + 1 < MOST_LOOKS:
+            return
+        magnitude = math.inf if px == UNTOLD else px
+        found = Discrepancy(Level.PLAN, "a milestone is elsewhere", magnitude, (0.0, PLAN_PX), "px")
         yield Post(found, (fix,)) if last is None else Revise(last, found, (fix,))
 
 
@@ -213,6 +230,11 @@ class Ladder:
                 assert any(reason.id.startswith(("Milestone", "Leg", "PlanSketch")) for reason in entry.because)
             elif isinstance(value, MotorCommand) and value.move_m > 0.0:
                 assert not above or not self.is_in_doubt(above)
+            elif isinstance(value, MotorCommand) and self.is_in_doubt(above):  # it turns, for another look
+                assert unmeasured_doubt(self.view) is not None and Level.GOAL not in above
+                assert any(reason.id.startswith("Milestone") for reason in entry.because)
+            elif isinstance(value, Milestone):
+                assert len(value.tried) < MOST_LOOKS
             elif isinstance(value, Course) and value.is_rolling:
                 assert not self.is_in_doubt(above)
 
@@ -236,6 +258,7 @@ class Ladder:
 
 
 figures = st.sampled_from([0.0, 1.0, 5.9, 6.1, 20.0, 29.9, 30.1, 500.0, math.inf])
+of_milestones = figures | st.just(UNTOLD)
 
 
 class LadderMachine(RuleBasedStateMachine):
@@ -247,9 +270,13 @@ class LadderMachine(RuleBasedStateMachine):
         super().__init__()
         self.ladder = Ladder(self.continuous)
 
-    @rule(purpose=st.sampled_from(["track", "milestone", "probe"]), px=figures)
+    @rule(purpose=st.sampled_from(["track", "probe"]), px=figures)
     def pictures_say(self, purpose: str, px: float) -> None:
         self.ladder.body.says[purpose] = px
+
+    @rule(px=of_milestones)
+    def pictures_of_milestones_say(self, px: float) -> None:
+        self.ladder.body.says["milestone"] = px
 
     @rule(cycles=st.integers(1, 40))
     def go_on(self, cycles: int) -> None:
@@ -285,7 +312,7 @@ TestRollingLadder.settings = settings(max_examples=12, stateful_step_count=12, d
 
 
 @settings(max_examples=20, deadline=None)
-@given(track=figures, milestone=figures, probe=figures, continuous=st.booleans())
+@given(track=figures, milestone=of_milestones, probe=figures, continuous=st.booleans())
 def test_whatever_pictures_go_on_saying_the_mission_ends_and_says_how(
     track: float, milestone: float, probe: float, continuous: bool
 ) -> None:
@@ -296,10 +323,30 @@ def test_whatever_pictures_go_on_saying_the_mission_ends_and_says_how(
     assert ladder.outcome is not None
     raised = [d for d in ladder.seen.values() if d.times]
     assert all(d.times <= (MOST_CHECKS if d.level is Level.ACTION else MOST_LOST) for d in raised)
-    if track <= ACTION_PX and milestone <= PLAN_PX:
+    if track <= ACTION_PX and 0.0 <= milestone <= PLAN_PX:
         assert ladder.outcome.kind == "reached" and not raised
-    if milestone > PLAN_PX:
+    if milestone > PLAN_PX or milestone == UNTOLD:
         assert ladder.outcome.kind == "lost"
+
+
+def test_in_doubt_it_looks_in_other_directions_before_it_is_lost() -> None:
+    """Landmarks are lost once; of the looks that follow the last that is allowed tells that all is well."""
+    ladder = Ladder()
+    ladder.go_on(30)
+    ladder.body.says.update(track=500.0, milestone=UNTOLD)
+    looked: list[float] = []
+    while len(looked) < MOST_LOOKS and ladder.outcome is None:
+        if len(looked) == MOST_LOOKS - 1:
+            ladder.body.says.update(track=1.0, milestone=1.0)
+        ladder.go_on(1)
+        milestone = open_milestone(ladder.view)
+        if unmeasured_doubt(ladder.view) is not None and milestone is not None and milestone.value.status == "expected":
+            looked = [*milestone.value.tried, milestone.value.look_heading_rad]
+    assert len({round(heading, 3) for heading in looked}) == MOST_LOOKS
+    ladder.go_on(2000)
+    assert ladder.outcome is not None and ladder.outcome.kind == "reached"
+    assert not any(d.level is Level.GOAL for d in ladder.seen.values())
+    assert len(ladder.view.all(Goal)) == 1
 
 
 def test_a_robot_that_something_stops_again_and_again_gives_up() -> None:

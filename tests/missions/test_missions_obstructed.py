@@ -19,12 +19,14 @@ HIDDEN = fault("occluded", "hallway", 3.0, part=0.2, duration_s=1000.0)
 def test_it_finds_what_is_before_its_camera_and_looks_past_it() -> None:
     known: list[Obstruction] = []
     behind: list[np.ndarray] = []
+    found_by: list[str] = []
 
     def watch(decision: Decision) -> None:
         for change in decision.made:
             value = change.entry.value
             if isinstance(value, Obstruction):
                 known.append(value)
+                found_by.append(change.entry.author)
             if isinstance(value, Milestone) and value.expected_px and known:
                 behind.append(known[-1].hidden_part(value.expected_px))
 
@@ -32,6 +34,7 @@ def test_it_finds_what_is_before_its_camera_and_looks_past_it() -> None:
     result = run_mission(stage, 1, sinks=[watch])
     assert result.outcome == "reached" and result.final_error_m < 0.0254
     assert result.collisions == 0 and result.milestones["false_accepts"] == 0
+    assert found_by[0] == "obstruction_finder" and result.relocalizations == 0
 
     grid = np.stack(np.meshgrid(np.arange(512.0), np.arange(512.0)), axis=-1)
     said = known[-1].covers(grid)
