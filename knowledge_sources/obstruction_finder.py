@@ -15,7 +15,7 @@ from blackboard.level import Level
 from knowledge_sources.expert import Expert
 from knowledge_sources.methods.glances import Glance
 from knowledge_sources.methods.standing_still import before_camera
-from knowledge_sources.questions import active_goal
+from knowledge_sources.questions import active_goal, unmeasured_doubt
 from world_models.camera import Camera
 from world_models.frames import Pose2
 from world_models.obstruction import Obstruction
@@ -32,7 +32,8 @@ stands still in them by chance too often."""
 class ObstructionFinder(Expert):
     """Finds what stands still in the last looks for milestones, in several directions, before the new one is judged.
 
-    While the robot is lost the relocalizer asks the same of its probes.
+    It asks when a view could not be told, or the belief is in doubt: where nothing is hidden all is as expected. While
+    the robot is lost the relocalizer asks the same of its probes.
     """
 
     level = Level.PLAN
@@ -40,6 +41,9 @@ class ObstructionFinder(Expert):
     writes = (Obstruction,)
 
     def rate(self, view: View, trigger: Change) -> float | None:
+        milestone = view.get(trigger.entry.value.milestone)
+        if milestone is None or not (milestone.value.tried or unmeasured_doubt(view) is not None):
+            return None
         return 0.9 if len(_looks(view)) >= LEAST_LOOKS else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
