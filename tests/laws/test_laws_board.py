@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from blackboard.board import Blackboard, StaleError
 from blackboard.change import Posted, Retracted, Revised
-from blackboard.effect import Effect, Post, Retract, Revise
+from blackboard.effect import Effect, Post, Retract, Revise, to_say
 from blackboard.entry import Entry, Ref
 from blackboard.index import Index
 from strategies import Note, Tally, notes, tallies, values
@@ -212,3 +212,17 @@ def test_an_entry_that_was_retracted_never_comes_back_under_its_name() -> None:
     assert again.entry.id == "Note-2"
     with pytest.raises(StaleError, match=r"Note-1\.0 is retracted"):
         board.apply([Revise(posted.entry, Note("b"))], author="x", cycle=4)
+
+
+@given(st.one_of(st.none(), st.text(max_size=3)), st.one_of(st.none(), st.text(max_size=3)))
+def test_what_is_to_be_said_is_said_and_nothing_changes_where_it_was(before: str | None, after: str | None) -> None:
+    board = Blackboard()
+    if before is not None:
+        board.apply([Post(Note(before))], author="x", cycle=1)
+    known = board.view.latest(Note)
+    change = to_say(known, None if after is None else Note(after), ())
+    made = () if change is None else board.apply([change], author="x", cycle=2)
+    now = board.view.latest(Note)
+    assert (None if now is None else now.value) == (None if after is None else Note(after))
+    assert (made == ()) is (before == after)
+    assert len(board.view) == (0 if after is None else 1)

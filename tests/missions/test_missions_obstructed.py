@@ -1,4 +1,4 @@
-"""A fifth of the view is hidden for good: the robot finds out what hides it, and arrives."""
+"""A fifth of the view is hidden for good: the robot finds out what hides it, and arrives without being lost."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from blackboard.journal import Decision
 from harvey.experiments.short_missions import HALLWAY, fault
 from harvey.mission import run_mission
-from sim.assembly import set_stage
+from sim.assembly import Stage, set_stage
 from sim.faults import Occlusion
 from sim.scenario import parse_scenario
 from world_models.obstruction import Obstruction
@@ -41,3 +41,10 @@ def test_it_finds_what_is_before_its_camera_and_looks_past_it() -> None:
     true = stage.scenario.faults[0]
     assert isinstance(true, Occlusion) and abs(np.mean(said) - true.part) < 0.02
     assert behind and all(np.all(part <= 0.3) for part in behind)
+
+
+def test_where_nothing_is_hidden_nobody_asks_what_is(short_stage: Stage) -> None:
+    chosen: list[str] = []
+    result = run_mission(short_stage, 3, sinks=[lambda d: chosen.append(d.chosen.source.name if d.chosen else "")])
+    assert result.outcome == "reached" and "milestone_judge" in chosen
+    assert "obstruction_finder" not in chosen
