@@ -150,8 +150,8 @@ def test_where_nothing_is_before_the_camera_nothing_is_found(seed: int) -> None:
 
 
 def test_it_is_found_by_looks_for_milestones_too_and_hardly_ever_where_nothing_is() -> None:
-    """Six looks in two directions from places along the way: four in five; of a hundred at the most three find a little
-    something where nothing is, which the next looks take back."""
+    """Six looks in two directions from places along the way: nine in ten. Of a hundred where nothing is at the
+    most three find a little something, which the next looks take back."""
     grid = np.stack(np.meshgrid(np.arange(0, 512, 8.0), np.arange(0, 512, 8.0)), axis=-1)
     right, wrong = 0, 0
     for seed in range(100):
@@ -165,7 +165,7 @@ def test_it_is_found_by_looks_for_milestones_too_and_hardly_ever_where_nothing_i
         if nothing is not None:
             wrong += 1
             assert np.mean(nothing.covers(grid)) <= 0.1
-    assert right >= 80 and wrong <= 3
+    assert right >= 90 and wrong <= 3
 
 
 @few
