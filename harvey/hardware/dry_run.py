@@ -14,6 +14,7 @@ from harvey.errors import BadInput
 from harvey.hardware.base import kind_of, open_base
 from harvey.hardware.mission import HardwareMission
 from harvey.rehearsal import Prospect, rehearsed
+from harvey.summary import foreseen
 from harvey.units import count
 from knowledge_sources.drivers.base import Base, BaseFault
 from knowledge_sources.drivers.video_camera import CameraFault, VideoCamera
@@ -147,11 +148,8 @@ class DryRun:
         if outcome.kind != "reached":
             yield Check("plan", outcome.reason, "another start or goal, or a world with a way between them")
             return
-        blind = [p.what for p in self.prospects if p.verdict == "not testable"]
-        weak = sum(1 for p in self.prospects if p.verdict == "weak")
-        found = f"{count(len(self.prospects), 'milestone')}, {weak} of them weak"
-        yield Check("plan", found) if not blind else Check(
-            "plan", f"{blind[0]} cannot be tested", "put into the world what hangs on the walls there")
+        said, can_be = foreseen(self.prospects, outcome)
+        yield Check("plan", said, "" if can_be else "put into the world what hangs on the walls there")
 
     def _base(self) -> Iterator[Check]:
         try:
