@@ -39,6 +39,8 @@ LEAST_GLANCES = 2
 LEAST_LINES = 12
 LEAST_PART, LEAST_EXPLAINED, WEAKEST = 0.6, 0.35, 0.35
 """What must be accounted for: of the expected lines, of what is seen, and of the lines of each single glance."""
+LEAST_TOGETHER = 1.15
+"""And so much of the first two together: a place a few inches beside the right one has a little of both."""
 SURE, SURE_PART = 40.0, 0.75
 """Where the model has little of what there is, as before full shelves, the lines that it has must tell so much more: by
 the logarithm of their likelihood, and by the part of them that is accounted for."""
@@ -70,8 +72,9 @@ class Candidate:
         """Whether enough is borne out, in every glance."""
         e = self.evidence
         is_sure = e.likelihood >= SURE and e.accounted >= SURE_PART * e.seen
+        is_explained = e.explained >= max(LEAST_EXPLAINED, LEAST_TOGETHER - e.accounted / max(e.seen, 1))
         return (e.accounted >= LEAST_LINES and e.accounted >= LEAST_PART * e.seen and e.weakest >= WEAKEST
-                and (e.explained >= LEAST_EXPLAINED or is_sure))
+                and (is_explained or is_sure))
 
     @property
     def place(self) -> Place:
