@@ -44,17 +44,22 @@ class ObstructionFinder(Expert):
         milestone = view.get(trigger.entry.value.milestone)
         if milestone is None or not (milestone.value.tried or unmeasured_doubt(view) is not None):
             return None
-        return 0.9 if len(_looks(view)) >= LEAST_LOOKS else None
+        return 0.9 if self._news(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        news = self._news(view)
+        if news is not None:
+            yield news
+
+    def _news(self, view: View) -> Effect | None:
+        """What the last looks say that the board does not."""
         looks, known = _looks(view), view.latest(Obstruction)
         glances = [Glance(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
                    for s, heading_rad in looks]
+        if len(glances) < LEAST_LOOKS:
+            return None
         now = _seen_by_the_last(glances, self._robot.camera, None if known is None else known.value)
-        because = (*(s for s, _ in looks), *(() if known is None else (known,)))
-        change = to_say(known, now, because)
-        if change is not None:
-            yield change
+        return to_say(known, now, (*(s for s, _ in looks), *(() if known is None else (known,))))
 
 
 def _seen_by_the_last(
