@@ -125,7 +125,8 @@ class MilestoneSelector(Expert):
             return
         pose = belief.value.world_from_robot(self._robot.world)
         robot = standing_in(view, self._robot, belief.value.locale)
-        heading = best_heading(robot, pose, _otherwise(_glances(pose), tried), CHECK_M)
+        headings = _otherwise(_glances(pose), tried) or [pose.heading_rad]
+        heading = best_heading(robot, pose, headings, CHECK_M)
         yield Post(replace(check, look_heading_rad=heading), (doubt, belief))
 
     def _expected_anew(
