@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -25,18 +25,23 @@ def deciding_code() -> str:
 
 
 def code_in(root: Path) -> str:
-    """The same of a program elsewhere: of its files' names and contents, whatever the line ends. Raises OSError."""
+    """The same of a program elsewhere. Raises OSError."""
+    return digest_of(root, [WIRING, *files_in(root, PACKAGES, (".py",))])
+
+
+def digest_of(root: Path, names: Iterable[str]) -> str:
+    """Of files' names and contents, in the order of their names and whatever the line ends. Raises OSError."""
     said = hashlib.sha256()
-    for name in sorted([WIRING, *_files(str(root))]):
+    for name in sorted(names):
         with open(f"{root}/{name}", "rb") as file:
             text = file.read().replace(b"\r\n", b"\n")
         said.update(f"{name} {len(text)}\n".encode() + text)
     return said.hexdigest()[:DIGITS]
 
 
-def _files(root: str) -> Iterator[str]:
-    """Relative to the root, with slashes on any system."""
-    for package in PACKAGES:
+def files_in(root: Path, packages: Iterable[str], endings: tuple[str, ...]) -> Iterator[str]:
+    """Names relative to the root, with slashes on any system."""
+    for package in packages:
         for folder, _, names in os.walk(f"{root}/{package}"):
-            inside = folder[len(root) + 1 :].replace(os.sep, "/")
-            yield from (f"{inside}/{name}" for name in names if name.endswith(".py"))
+            inside = folder[len(str(root)) + 1 :].replace(os.sep, "/")
+            yield from (f"{inside}/{name}" for name in names if name.endswith(endings))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -117,14 +117,13 @@ class MilestoneSelector(Expert):
 
     def _checked(self, view: View, doubt: Entry[Discrepancy], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         """A look in between: in the view that the robot has, and if it could not be told, in another one from here."""
-        tried = _tried_since(view, doubt)
+        tried = _tried(view, lambda m: m.cycle >= doubt.cycle)
         check = Milestone("", -1, f"check of the belief, because {doubt.value.what}", self._heading(belief.value),
                           tried=tried)
         if not tried:
             yield from self._looked_for(view, None, check, doubt, belief)
             return
-        pose = belief.value.world_from_robot(self._robot.world)
-        robot = standing_in(view, self._robot, belief.value.locale)
+        robot, pose = self._standing(view, belief.value)
         headings = _otherwise(_glances(pose), tried) or [pose.heading_rad]
         heading = best_heading(robot, pose, headings, CHECK_M)
         yield Post(replace(check, look_heading_rad=heading), (doubt, belief))
@@ -136,16 +135,15 @@ class MilestoneSelector(Expert):
         waiting = _awaited(view)
         if waiting is None:
             return
-        m, pose = waiting.value, belief.value.world_from_robot(self._robot.world)
-        robot = standing_in(view, self._robot, belief.value.locale)
+        m, (robot, pose) = waiting.value, self._standing(view, belief.value)
         seen = expectation(robot, pose, m, _car_of(view.get(m.sketch), m.index))
         yield Revise(waiting, seen, (hidden, waiting, belief))
 
     def _proposed(self, view: View, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         """The milestone before the sketch's next subgoal, seen from the first direction that is good enough."""
-        pose = belief.value.world_from_robot(self._robot.world)
-        robot = standing_in(view, self._robot, belief.value.locale)
-        s, tried = sketch.value, _tried(view, sketch)
+        robot, pose = self._standing(view, belief.value)
+        s = sketch.value
+        tried = _tried(view, lambda m: (m.value.sketch, m.value.index) == (sketch.id, s.at))
         heading = self._direction(robot, s, pose, tried)
         milestone = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}", heading, tried=tried)
         if self._faces(belief.value, milestone):
@@ -158,8 +156,7 @@ class MilestoneSelector(Expert):
         belief: Entry[Hypothesis], car: str = "",
     ) -> Iterable[Effect]:
         """Predict the landmarks from the believed pose, but those in a car, and ask for the picture."""
-        pose, hidden = belief.value.world_from_robot(self._robot.world), view.latest(Obstruction)
-        robot = standing_in(view, self._robot, belief.value.locale)
+        hidden, (robot, pose) = view.latest(Obstruction), self._standing(view, belief.value)
         expected = expectation(robot, pose, milestone, car)
         if not has_followed(view) or open_discrepancy(view, Level.PLAN) is not None:
             anticipate(robot, belief.value.locale, pose)  # the judge will ask whether it is another door
@@ -182,6 +179,10 @@ class MilestoneSelector(Expert):
             end = sketch.current.destination.in_world(self._robot.world)
             yield math.atan2(end.y_m - pose.y_m, end.x_m - pose.x_m)
         yield from _glances(pose)
+
+    def _standing(self, view: View, belief: Hypothesis) -> tuple[RobotModel, Pose2]:
+        """The robot where it believes that it stands, and its pose there in the world."""
+        return standing_in(view, self._robot, belief.locale), belief.world_from_robot(self._robot.world)
 
     def _heading(self, belief: Hypothesis) -> float:
         return belief.world_from_robot(self._robot.world).heading_rad
@@ -215,19 +216,10 @@ def _car(sketch: PlanSketch, index: int) -> str:
     return before.destination.locale if before is not None and before.is_ride else ""
 
 
-def _tried(view: View, sketch: Entry[PlanSketch]) -> tuple[float, ...]:
-    """From where the sketch's milestone was looked for just now, in vain but without a doubt about the place."""
+def _tried(view: View, is_same: Callable[[Entry[Milestone]], bool]) -> tuple[float, ...]:
+    """From where the last milestone, if it is the same one, was looked for in vain."""
     last = view.latest(Milestone)
-    if last is None or last.value.status != "not testable":
-        return ()
-    m = last.value
-    return (*m.tried, m.look_heading_rad) if (m.sketch, m.index) == (sketch.id, sketch.value.at) else ()
-
-
-def _tried_since(view: View, doubt: Entry[Discrepancy]) -> tuple[float, ...]:
-    """From where the belief was checked in vain since it is in doubt."""
-    last = view.latest(Milestone)
-    if last is None or last.value.status != "not testable" or last.cycle < doubt.cycle:
+    if last is None or last.value.status != "not testable" or not is_same(last):
         return ()
     return (*last.value.tried, last.value.look_heading_rad)
 

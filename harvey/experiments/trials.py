@@ -6,7 +6,6 @@ nor a break changes what a campaign finds. What was found by other code than tod
 
 from __future__ import annotations
 
-import hashlib
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -17,6 +16,7 @@ from typing import Any, TypeVar
 
 from tqdm import tqdm
 
+from harvey.deciding_code import digest_of, files_in
 from harvey.run_directory import RUNS
 from harvey.workers import by_workers
 
@@ -76,12 +76,8 @@ def _line(record: dict[str, Any]) -> str:
 @cache
 def code_digest() -> str:
     """The code that decides, as a digest of its files."""
-    digest = hashlib.sha256()
     root = Path(__file__).resolve().parents[2]
-    for package in PACKAGES:
-        for path in sorted(p for p in (root / package).rglob("*") if p.suffix in (".py", ".toml")):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    return digest_of(root, files_in(root, PACKAGES, (".py", ".toml")))
 
 
 def _kept(path: Path, trials: int, kind: type[R]) -> Iterator[tuple[int, R]]:
