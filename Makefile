@@ -6,19 +6,20 @@ SCENARIO ?= lab-to-allens-office
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --quiet --disable-pip-version-check
 LOCK := .venv-lock
-COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --generate-hashes --strip-extras \
+COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe \
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
 
 # One thread: faster for matrices as small as ours, and the order of additions never varies.
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help run test environment lock clean
+.PHONY: help run test environment compiled lock clean
 
 help:
 	@echo "make run          prepare everything, then drive: harvey run $(SCENARIO)"
 	@echo "make test         ruff, mypy, import contracts, pytest"
 	@echo "make environment  only prepare $(VENV), for running and for testing"
+	@echo "make compiled     the board as machine code in build/compiled (needs a C compiler; no mission needs it)"
 	@echo "make lock         write requirements.lock and requirements-dev.lock anew from pyproject.toml"
 	@echo "make clean        remove environments and caches; recordings in runs/ stay"
 	@echo "Options: PYTHON=$(PYTHON) (3.11 or newer), VENV=$(VENV), SCENARIO=$(SCENARIO)"
@@ -33,6 +34,9 @@ test: $(VENV)/.ready-to-test
 	@echo "== pytest" && $(BIN)/pytest -n 2
 
 environment: $(VENV)/.ready-to-test
+
+compiled: $(VENV)/.ready-to-test
+	@$(BIN)/python -m harvey.compiled build/compiled
 
 $(BIN)/python:
 	@$(PYTHON) -c "" 2>/dev/null \
@@ -64,5 +68,5 @@ lock:
 	@rm -rf $(LOCK)
 
 clean:
-	rm -rf .venv .venv-* .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf build .venv .venv-* .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

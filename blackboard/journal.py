@@ -120,13 +120,13 @@ class JournalLines:
         """A decision's line, without its newline."""
         cycle, seen, observed, focus, activated, obviated, chosen, runner_up, pending, made, refused = d
         texts = self._texts
-        told = ",".join(map(self._change, observed)) if observed else ""
-        refs = ",".join(map(self._ref, seen)) if seen else ""
-        bids = ",".join(map(self._bid, activated)) if activated else ""
+        told = ",".join([self._change(c) for c in observed]) if observed else ""
+        refs = ",".join([self._ref(c) for c in seen]) if seen else ""
+        bids = ",".join([self._bid(a) for a in activated]) if activated else ""
         next_best = "null" if runner_up is None else texts.get(runner_up.number) or self._bid(runner_up)
-        dropped = ",".join(map(self._dropped, obviated)) if obviated else ""
+        dropped = ",".join([self._dropped(o) for o in obviated]) if obviated else ""
         executed = "null" if chosen is None else self._last_time(chosen)
-        acts = ",".join(map(self._change, made)) if made else ""
+        acts = ",".join([self._change(c) for c in made]) if made else ""
         return (
             f'{{"cycle":{cycle},"focus":"{WORDS[focus]}","observed":[{told}],"seen":[{refs}],"activated":[{bids}],'
             f'"obviated":[{dropped}],"chosen":{executed},"runner_up":{next_best},"pending":{pending},"made":[{acts}],'

@@ -96,6 +96,7 @@ AS_IN_MISSIONS = Load(
 ALL = Load(
     "a change wakes 14", 14.0, lambda: [Worker(), *(Rival(number, lambda _task: True) for number in range(1, 14))]
 )
+LOADS = (ONE, AS_IN_MISSIONS, ALL)
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,7 +77,8 @@ def _line(record: dict[str, Any]) -> str:
 def code_digest() -> str:
     """The code that decides, as a digest of its files."""
     root = Path(__file__).resolve().parents[2]
-    return digest_of(root, files_in(root, PACKAGES, (".py", ".toml")))
+    files = [files_in(root, package, (".py", ".toml")) for package in PACKAGES]
+    return digest_of({name: path for found in files for name, path in found.items()})
 
 
 def _kept(path: Path, trials: int, kind: type[R]) -> Iterator[tuple[int, R]]:

@@ -8,19 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from elsewhere import ROOT, SEED, drive_elsewhere
 from harvey.mission import run_mission
 from sim.assembly import Stage
-
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = """
-import sys
-from pathlib import Path
-from harvey.experiments.short_missions import OFFICE
-from harvey.mission import run_mission
-from sim.assembly import set_stage
-from sim.scenario import parse_scenario
-run_mission(set_stage(parse_scenario(OFFICE, "across-allens-office")), 3, out=Path(sys.argv[1]))
-"""
 
 
 def _other_python() -> Path | None:
@@ -43,6 +33,6 @@ def test_another_python_writes_the_same_journal(short_stage: Stage, tmp_path: Pa
     if python is None:
         pytest.skip("no environment with another Python is here: make environment PYTHON=python3.13 VENV=.venv-3.13")
     here, there = tmp_path / "here", tmp_path / "there"
-    run_mission(short_stage, 3, out=here)
-    subprocess.run([python, "-c", PROGRAM, there], cwd=ROOT, check=True, timeout=1200)
+    run_mission(short_stage, SEED, out=here)
+    drive_elsewhere(python, there)
     assert (here / "journal.jsonl").read_bytes() == (there / "journal.jsonl").read_bytes()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from harvey.deciding_code import DIGITS, PACKAGES, WIRING, code_in, deciding_code
+from harvey.deciding_code import DECIDING, DIGITS, WIRING, code_in, deciding_code
 
 ROOT = Path(__file__).parents[2]
 
@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
     """The same files elsewhere."""
-    for name in PACKAGES:
+    for name in DECIDING:
         shutil.copytree(ROOT / name, tmp_path / name)
     (tmp_path / WIRING).parent.mkdir()
     shutil.copy(ROOT / WIRING, tmp_path / WIRING)
@@ -32,7 +32,8 @@ def test_the_same_files_are_the_same_program_wherever_they_are(program: Path) ->
 
 
 @pytest.mark.parametrize(
-    "name", ["knowledge_sources/motor.py", "blackboard/agenda.py", "world_models/robot.py", WIRING])
+    "name", ["knowledge_sources/motor.py", "knowledge_sources/methods/conviction.toml", "blackboard/agenda.py",
+             "world_models/robot.py", WIRING])
 def test_a_changed_file_is_another_program(program: Path, name: str) -> None:
     (program / name).write_text((program / name).read_text(encoding="utf-8") + "# otherwise\n", encoding="utf-8")
     assert code_in(program) != deciding_code()
@@ -43,3 +44,12 @@ def test_a_file_that_was_renamed_or_is_new_makes_another_program(program: Path) 
     renamed = code_in(program)
     (program / "knowledge_sources" / "gearbox.py").write_text("")
     assert len({renamed, code_in(program), deciding_code()}) == 3
+
+
+def test_a_board_that_was_compiled_of_other_source_is_another_program(program: Path, tmp_path: Path) -> None:
+    board = tmp_path / "compiled"
+    shutil.copytree(program / "blackboard", board / "blackboard")
+    (board / "blackboard" / "agenda.cpython-311-x86_64-linux-gnu.so").write_bytes(b"machine code")
+    assert code_in(program, board) == deciding_code()
+    (board / "blackboard" / "agenda.py").write_text("as it was last week")
+    assert code_in(program, board) != deciding_code()

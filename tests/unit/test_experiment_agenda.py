@@ -41,7 +41,7 @@ def test_with_forgetting_the_board_stays_small() -> None:
 def test_a_peer_that_is_not_installed_leaves_its_column_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(agenda_peers, "has", lambda _peer: False)
     assert agenda._clips(10) is None and agenda._py_trees(10, 5) is None
-    assert any("py_trees is not installed" in note for note in agenda._notes(1))
+    assert any("py_trees is not installed" in note for note in agenda._notes(1, ""))
 
 
 @pytest.mark.skipif(not agenda_peers.has("clips"), reason="clipspy is not installed: pip install '.[peers]'")
