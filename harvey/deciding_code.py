@@ -14,7 +14,7 @@ from pathlib import Path
 
 import blackboard
 
-DECIDING: dict[str, tuple[str, ...]] = {
+DECIDING: Mapping[str, tuple[str, ...]] = {
     "blackboard": (".py",), "world_models": (".py",), "knowledge_sources": (".py", ".toml"),
 }
 """The packages that decide, with the endings of their files; a run names its world's bytes itself."""
