@@ -76,6 +76,16 @@ class Appended:
         return CannotWriteError(error.errno, f"cannot write the {self._what}: {error.strerror}", str(self._path))
 
 
+def is_being_written(path: Path) -> bool:
+    """Whether a process, this one included, has the file as :class:`Appended` now. Raises OSError."""
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
+
+
 def sync_folder(path: Path) -> None:
     """Force the names of a folder's files onto the disk, where the file system can do that."""
     folder = os.open(path, os.O_RDONLY)

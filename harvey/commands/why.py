@@ -16,6 +16,7 @@ from harvey.explain.story import LEGEND, Story, lines_of, story
 from harvey.explain.trace import cycle_lines
 from harvey.explain.walk import explain, principal
 from harvey.run_directory import RunDirectory, open_run
+from logs.disk import is_being_written
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -47,7 +48,7 @@ def _run(args: Namespace) -> int:
         return 0
     refs = _refs(history, args)
     if not asked and args.at is None and history.cut_off is not None:
-        print(_cut_off(run, history.cut_off), file=sys.stderr if args.json else sys.stdout)
+        print(_unfinished(run, history.cut_off), file=sys.stderr if args.json else sys.stdout)
     if args.json:
         print(json.dumps([_record(one) for one in _stories(history, args, refs)], indent=2))
     else:
@@ -55,8 +56,10 @@ def _run(args: Namespace) -> int:
     return 0
 
 
-def _cut_off(run: RunDirectory, cycle: int) -> str:
+def _unfinished(run: RunDirectory, cycle: int) -> str:
     """What to say first of a run that has no outcome."""
+    if is_being_written(run.journal):
+        return f"The run is still going on, in cycle {cycle} or later.\nThe last thing that its journal tells of:\n"
     go_on = f"harvey resume {run.path} goes on with it"
     return (f"The run was cut off in cycle {cycle}, before it had an outcome: {go_on}.\n"
             "The last thing that its journal tells of:\n")

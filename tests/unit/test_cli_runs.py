@@ -20,6 +20,7 @@ from harvey.deciding_code import deciding_code
 from harvey.errors import BadInput, Terminated
 from harvey.explain.sentences import MAKERS
 from harvey.records import read_records
+from logs.disk import Appended
 from logs.journal_file import read_journal
 from logs.reader import read_decisions
 from world_models.frames import Pose2
@@ -164,6 +165,20 @@ def test_a_run_that_was_cut_off_says_so_first(run: Path, tmp_path: Path, capsys:
     for asked in ([str(run)], [cut, "Frame-1"], [cut, "--at", "3"]):
         assert main(["why", *asked]) == 0
         assert "cut off" not in "".join(capsys.readouterr())
+
+
+def test_a_run_that_is_still_driven_is_not_called_cut_off(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = (run / "journal.jsonl").read_text().splitlines(keepends=True)
+    driven = copied(run, tmp_path / "driven", journal="".join(lines[:20]))
+    journal = driven / "journal.jsonl"
+    writer = Appended(journal, "journal", keep=journal.stat().st_size)
+    assert main(["why", str(driven)]) == 0
+    assert capsys.readouterr().out.startswith("The run is still going on, in cycle 20 or later.\n")
+    writer.close()
+    assert main(["why", str(driven)]) == 0
+    assert capsys.readouterr().out.startswith("The run was cut off in cycle 20")
 
 
 def headed(run: Path, to: Path, **head: str) -> Path:
