@@ -27,6 +27,8 @@ FRAME_S = 0.1
 """Time that taking a picture takes [s]."""
 WATCHDOG_S = 0.5
 """A base that hears nothing any more goes on for so long before it stops by itself [s]."""
+DRAWS = 100
+"""So often a place to be put down at is drawn, until one is free."""
 SHORT_M = 0.005
 """A bump that moves the robot less far than it should, by more than this, is told of."""
 GOES_ON: Mapping[str, float] = {"link_lost": WATCHDOG_S, "nonsense": WATCHDOG_S, "stall": 0.0}
@@ -72,10 +74,20 @@ class SimulatedBody:
         self._stuck = False
         self._roll = Roll()
         self._counted = Pose2(0.0, 0.0, 0.0)
-        x, y, turn = placing.standard_normal(3) * (put_down_sigma_m, put_down_sigma_m, put_down_sigma_rad)
-        there = start @ Pose2(x, y, turn)
+        self._truth = Truth(start, locale=building.locale_at(start))
+        there = self._put_down(placing, put_down_sigma_m, put_down_sigma_rad)
         self._truth = Truth(there, locale=building.locale_at(there))
         self._track = [self._truth]
+
+    def _put_down(self, rng: np.random.Generator, sigma_m: float, sigma_rad: float) -> Pose2:
+        """A place about the start that is free; the start itself where none is found."""
+        start = self._truth.world_from_robot
+        for _ in range(DRAWS):
+            x, y, turn = rng.standard_normal(3) * (sigma_m, sigma_m, sigma_rad)
+            there = start @ Pose2(x, y, turn)
+            if self._is_free(there):
+                return there
+        return start
 
     @property
     def truth(self) -> Truth:
@@ -346,6 +358,6 @@ class SimulatedBody:
         return any(now_s >= began_s + goes_on_s for began_s, goes_on_s in since)
 
     def _is_free(self, pose: Pose2) -> bool:
-        """Free of walls, and still in the same locale: a kidnap does not go through a wall."""
+        """Free of walls, and still in the same locale: nobody carries it through a wall."""
         same = self._building.locale_at(pose) == self._truth.locale
         return same and self._building.obstacles.clearance_m(pose) >= 0.02

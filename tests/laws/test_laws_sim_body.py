@@ -27,6 +27,11 @@ def body(seed: int, put_down_sigma: float = 0.0) -> SimulatedBody:
                          put_down_sigma_m=put_down_sigma, put_down_sigma_rad=put_down_sigma)
 
 
+@given(st.integers(0, 10**6), st.floats(0.0, 2.0))
+def test_nobody_puts_it_down_in_a_wall(seed: int, sigma: float) -> None:
+    assert BUILDING.obstacles.clearance_m(body(seed, sigma).truth.world_from_robot) >= 0.0
+
+
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 10**6), COMMANDS)
 def test_no_wall_is_entered_and_a_contact_cuts_the_claim(seed: int, commands: list[tuple[float, float]]) -> None:
