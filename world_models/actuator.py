@@ -7,19 +7,35 @@ gives as constant "to 3 decimal places": 228.3 in of 240 in.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from world_models.bounds import Bounds, check_bounds
 from world_models.frames import Pose2, wrap_angle
 
+BOUNDS: Mapping[str, Bounds] = {
+    "reach": Bounds(0.1, 2.0),
+    "reach_sigma": Bounds(1e-6, 1.0),
+    "curvature_sigma_per_m": Bounds(1e-6, 10.0),
+    "bend_sigma_per_m": Bounds(1e-6, 10.0),
+    "turn_sigma": Bounds(1e-6, 1.0),
+    "turn_sigma_rad": Bounds(1e-6, math.pi / 2.0),
+    "skitter_m": Bounds(1e-6, 1.0),
+    "increment_m": Bounds(0.01, 10.0),
+    "turn_increment_rad": Bounds(0.01, math.pi),
+    "speed_m_per_s": Bounds(0.001, 10.0),
+    "brake_m_per_s2": Bounds(0.001, 100.0),
+}
+"""Far beyond any wheels, but such that what is computed with them is finite and a leg comes to its end."""
 STRANGE = 4.0
 
 
 @dataclass(frozen=True, slots=True)
 class ActuatorModel:
-    """Standard deviations of one motion.
+    """Standard deviations of one motion; OutOfBoundsError for what no wheels do.
 
     Attributes:
         reach: metres gone per metre commanded (Table 1: 228.3 / 240).
@@ -44,6 +60,9 @@ class ActuatorModel:
     turn_increment_rad: float = math.radians(20.0)
     speed_m_per_s: float = 0.4
     brake_m_per_s2: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_bounds(self, BOUNDS)
 
     def commanded_m(self, distance_m: float) -> float:
         """What to command so that about this distance is gone."""

@@ -65,6 +65,9 @@ def test_a_goal_may_be_said_in_words_and_is_understood_before_anything_moves(
     (f'world = "w"\ngoal = "{GOAL}"\n[camera]\nrate_hz = 0', "expected 0.1 to 1000 pictures a second"),
     (f'world = "w"\ngoal = "{GOAL}"\n[limits]\nmax_time_s = 0', "limits.max_time_s: expected a number above 0"),
     (f'world = "w"\ngoal = "{GOAL}"\n[start]\nheading_deg = nan', "heading"),
+    (f'world = "w"\ngoal = "{GOAL}"\n[actuator]\nreach = 0', "actuator.reach: expected a number from 0.1 to 2"),
+    (f'world = "w"\ngoal = "{GOAL}"\n[actuator]\nturn_increment_deg = 400',
+     "turn_increment_deg: expected a number from 0.572958 to 180, got 400"),
     ("world = ", "m.toml:1: expected TOML"),
 ])
 def test_a_mission_that_cannot_be_read_is_named_with_its_line(
