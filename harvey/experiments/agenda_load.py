@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -108,17 +109,28 @@ class Speed:
     usual_s: float
 
 
-def measure(load: Load, pending: int, parts: int, rng: np.random.Generator) -> Speed:
-    """Fill the agenda, and run parts of PART_CYCLES cycles with the journal written to a file; processor time."""
-    with TemporaryDirectory() as folder:
-        journal = JournalFile(Path(folder) / "journal.jsonl")
-        scheduler = Scheduler(load.sources(), sinks=[journal])
-        tasks = round(pending / load.a_cycle)
-        scheduler.tell([Post(Task.of(int(draw))) for draw in rng.integers(1 << 31, size=tasks)], "user")
-        scheduler.step()
-        parts_s = [_part_s(scheduler) for _ in range(parts)]
-        journal.close()
-    return Speed(pending, min(parts_s), sorted(parts_s)[len(parts_s) // 2])
+def measure(load: Load, waiting: Sequence[int], parts: int, seed: int) -> list[Speed]:
+    """For each number that wait: fill an agenda, and run parts of PART_CYCLES cycles, the journal written to a file.
+
+    The parts of all of them take turns, so that a machine that is slow for a while is so for all; processor time.
+    """
+    rng = np.random.default_rng(seed)
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(TemporaryDirectory()))
+        schedulers = []
+        for pending in waiting:
+            journal = JournalFile(folder / f"{pending}.jsonl")
+            stack.callback(journal.close)
+            schedulers.append(_filled(Scheduler(load.sources(), sinks=[journal]), round(pending / load.a_cycle), rng))
+        rounds = [[_part_s(scheduler) for scheduler in schedulers] for _ in range(parts)]
+    return [Speed(pending, min(took), sorted(took)[parts // 2])
+            for pending, took in zip(waiting, zip(*rounds, strict=True), strict=True)]
+
+
+def _filled(scheduler: Scheduler, tasks: int, rng: np.random.Generator) -> Scheduler:
+    scheduler.tell([Post(Task.of(int(draw))) for draw in rng.integers(1 << 31, size=tasks)], "user")
+    scheduler.step()
+    return scheduler
 
 
 def _part_s(scheduler: Scheduler) -> float:

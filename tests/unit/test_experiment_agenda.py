@@ -27,8 +27,9 @@ def test_a_load_wakes_as_many_as_it_says_and_each_comes_to_its_end(load: Load) -
 
 
 def test_a_measurement_fills_the_agenda_first() -> None:
-    speed = measure(ONE, 50, 2, np.random.default_rng(0))
-    assert speed.pending == 50 and 0.0 < speed.best_s <= speed.usual_s < 1.0
+    few, more = measure(ONE, [10, 50], 2, 0)
+    assert (few.pending, more.pending) == (10, 50)
+    assert 0.0 < few.best_s <= few.usual_s < 1.0 and 0.0 < more.best_s <= more.usual_s < 1.0
     assert PART_CYCLES >= 1000
 
 
