@@ -1,7 +1,8 @@
 """The board compiled: its mechanism as machine code, made of the same source by mypyc where a C compiler is at hand.
 
-No mission needs it: there the experts take a hundred times longer than the board. It is for many small, fast experts.
-``make compiled`` writes a package that stands in for ``blackboard`` wherever its folder comes first on Python's path::
+No mission needs it: most of a cycle is the experts' there, ``harvey experiment agenda`` says how much. It is for boards
+with many small, fast experts. ``make compiled`` writes a package that stands in for ``blackboard`` wherever its folder
+comes first on Python's path::
 
     PYTHONPATH=build/compiled harvey run lab-to-allens-office
 
