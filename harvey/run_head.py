@@ -13,6 +13,7 @@ from typing import Any, TypeVar, cast
 
 from blackboard.encoding import plain
 from harvey.again.observations import MisfitError, decoded, fields_of
+from harvey.arithmetic import arithmetic
 from harvey.deciding_code import deciding_code
 from harvey.errors import BadInput
 from sim.scenario import ROOT, Servo
@@ -49,6 +50,7 @@ class RunHead:
         body: simulator: how the body is reached, as :func:`harvey.hardware.serial_body.reached` knows it.
         harvey: version; code: what :func:`harvey.deciding_code.deciding_code` says of the program that decides, ""
             in a run that is older than that.
+        arithmetic: how the libraries calculated, as :func:`harvey.arithmetic.arithmetic` tells; "" in an older run.
     """
 
     kind: str
@@ -66,6 +68,7 @@ class RunHead:
     body: str = "simulated"
     harvey: str = field(default_factory=lambda: version("harvey"))
     code: str = field(default_factory=deciding_code)
+    arithmetic: str = field(default_factory=arithmetic)
 
     @staticmethod
     def of(
@@ -95,26 +98,29 @@ class RunHead:
         except (ValueError, RecursionError) as error:
             raise BadInput(f"{path}: expected JSON, got: {error}") from None
         try:
-            head: RunHead = decoded({"code": "", **data} if isinstance(data, dict) else data, RunHead)
+            head: RunHead = decoded({"code": "", "arithmetic": "", **data} if isinstance(data, dict) else data, RunHead)
         except (ValueError, TypeError) as error:
             raise BadInput(f"{path}: {error}") from None
         return head
 
     def is_like(self, other: RunHead) -> bool:
-        """Whether both are written alike, whatever code decides: then their runs began alike."""
-        return json.dumps(asdict(replace(self, code=""))) == json.dumps(asdict(replace(other, code="")))
+        """Whether both are written alike, whoever decides: then their runs began alike."""
+        one, two = (replace(head, code="", arithmetic="") for head in (self, other))
+        return json.dumps(asdict(one)) == json.dumps(asdict(two))
 
     def here(self) -> RunHead:
         """The same, for a run that this program decides."""
-        return replace(self, harvey=version("harvey"), code=deciding_code())
+        return replace(self, harvey=version("harvey"), code=deciding_code(), arithmetic=arithmetic())
 
     def decided_elsewhere(self) -> str:
-        """What to say of a run that was decided by another program than this; "" where none is known of."""
+        """What to say of a run that another program or processor decided than this; "" where none is known of."""
         here = self.here()
         if self.harvey != here.harvey:
             return f"was decided by version {self.harvey} of harvey, and this is {here.harvey}"
         if self.code and self.code != here.code:
             return f"was decided by other code than this ({self.code} by its run.json, and here {here.code})"
+        if self.arithmetic and self.arithmetic != here.arithmetic:
+            return f"was calculated on another processor ({self.arithmetic}, and this is {here.arithmetic})"
         return ""
 
     def model(self) -> RobotModel:

@@ -6,6 +6,8 @@ an ``@example`` beside its law. Neither asks how long an example takes: the firs
 
 from hypothesis import settings
 
+import harvey  # noqa: F401  # before numpy: it tells the libraries how to calculate
+
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("search", derandomize=False, print_blob=True, deadline=None)
 settings.load_profile("same")

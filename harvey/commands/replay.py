@@ -87,7 +87,8 @@ def _again(run: RunDirectory) -> int:
 def _perhaps(head: RunHead, elsewhere: str) -> str:
     """What a difference may come from, as far as the run tells who decided it."""
     if elsewhere:
-        return f"The run {elsewhere}: that may be why. It takes the program that made the run to decide it as it was."
+        return (f"The run {elsewhere}: that may be why. It takes the program that made the run, and a processor like"
+                " its own, to decide it as it was.")
     if not head.code:
         return ("The program may have changed since the run was made, whose run.json does not say by which code it was "
                 "decided.")

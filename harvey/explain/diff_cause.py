@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from harvey.run_head import RunHead
 
 MOST_SETTINGS = 8
-IGNORED = frozenset({"harvey", "code", "folder", "world_sha256"})
+IGNORED = frozenset({"harvey", "code", "arithmetic", "folder", "world_sha256"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,11 +121,13 @@ def _cycle(history: History, ref: str) -> int:
 
 
 def settings(first: RunHead, second: RunHead) -> Iterator[str]:
-    """What was set differently, and by which code it was decided where both say so and differ."""
+    """What was set differently, and by which code and on what it was decided where both say so and differ."""
     if first.harvey != second.harvey:
         yield f"decided by harvey {first.harvey} against {second.harvey}"
     elif first.code and second.code and first.code != second.code:
         yield f"decided by different code: {first.code} against {second.code}"
+    if first.arithmetic and second.arithmetic and first.arithmetic != second.arithmetic:
+        yield f"calculated on different processors: {first.arithmetic} against {second.arithmetic}"
     ours, theirs = (json.loads(json.dumps(asdict(head))) for head in (first, second))
     keys = [key for key in {**ours, **theirs} if key not in IGNORED]
     told = [f"{path}: {short(a)} against {short(b)}" for key in keys

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from harvey.arithmetic import arithmetic
 from harvey.campaign import Task, run_all, seeds_of, settings_of
 from harvey.cli import main
 from harvey.deciding_code import deciding_code
@@ -191,6 +193,7 @@ def headed(run: Path, to: Path, **head: str) -> Path:
 @pytest.mark.parametrize(("head", "words"), [
     ({"harvey": "0.0.1"}, "was decided by version 0.0.1 of harvey, and this is"),
     ({"code": "0123456789abcdef"}, "was decided by other code than this (0123456789abcdef by its run.json, and here"),
+    ({"arithmetic": "abacus"}, "was calculated on another processor (abacus, and this is"),
 ])
 def test_a_run_of_another_program_is_called_that(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], head: dict[str, str], words: str
@@ -203,7 +206,7 @@ def test_a_run_of_another_program_is_called_that(
     out = capsys.readouterr().out
     assert f"note: the second run {words}" in out
     assert "first run was" not in out
-    assert "decided by" in out.partition("set differently: ")[2]
+    assert re.search("decided by|calculated on different", out.partition("set differently: ")[2])
     text = (other / "journal.jsonl").read_text()
     (other / "journal.jsonl").write_text(text.replace('"rating":0.8', '"rating":0.7', 1))
     assert main(["replay", str(other)]) == 1
@@ -217,12 +220,13 @@ def test_a_run_of_another_program_is_called_that(
     assert "is not decided again as it was" in err
 
 
-def test_a_run_that_is_older_than_the_name_of_its_code_is_read(
+def test_a_run_that_is_older_than_the_names_of_its_code_and_arithmetic_is_read(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     older = headed(run, tmp_path / "older")
     data = json.loads((older / "run.json").read_text())
     assert data.pop("code") == deciding_code()
+    assert data.pop("arithmetic") == arithmetic()
     (older / "run.json").write_text(json.dumps(data))
     assert main(["replay", str(older)]) == 0
     assert "note" not in capsys.readouterr().out

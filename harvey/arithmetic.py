@@ -1,0 +1,71 @@
+"""Arithmetic: how the libraries calculate, so that the same run is decided the same on the next machine too.
+
+OpenBLAS, numpy, OpenCV and Intel's IPP within it look at what the processor can do, and choose: with broader registers
+sums are added in another order, and a last digit comes out another. In a mission that is another decision a minute
+later. So on every x86-64 processor with AVX2 and FMA they may use these and no more, though it have AVX-512 as well. On
+any other, as an ARM, they choose for themselves: a run is the same each time there, and may differ from one made
+elsewhere.
+
+One thread for linear algebra and for pictures: faster for matrices as small as ours and where every core has a mission
+of its own, and the order of additions never varies.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+ONE_THREAD: Mapping[str, str] = dict.fromkeys(
+    ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"), "1")
+AVX2: Mapping[str, str] = {"OPENBLAS_CORETYPE": "Haswell", "OPENCV_IPP": "avx2"}
+"""What makes OpenBLAS and IPP use AVX2: a processor without it would stumble over the first product of matrices."""
+NO_AVX512: Mapping[str, str] = {
+    "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR", "OPENCV_CPU_DISABLE": "AVX512-SKX",
+}
+"""What keeps numpy and OpenCV from using more. Where there is no more to use they would warn; it is not said then."""
+COMMON = "x86-64 with AVX2"
+"""The name of the arithmetic that all such processors share."""
+CALCULATE = ("numpy", "scipy", "cv2")
+CPUINFO = Path("/proc/cpuinfo")
+
+
+def settle() -> None:
+    """Tell the libraries by the environment; what it says already stays.
+
+    They ask it when they are first imported. Where one of them is already, nothing is said: it would be half true.
+    """
+    if not any(name in sys.modules for name in CALCULATE):
+        for name, value in {**ONE_THREAD, **instructions(_flags())}.items():
+            os.environ.setdefault(name, value)
+
+
+def instructions(flags: frozenset[str]) -> dict[str, str]:
+    """Variables of the environment that choose the instructions, for a processor with these flags of Linux."""
+    if not {"avx2", "fma"} <= flags:
+        return {}
+    return {**AVX2, **(NO_AVX512 if "avx512f" in flags else {})}
+
+
+def arithmetic() -> str:
+    """Whose results these are, for a run to tell: :data:`COMMON`, or else the processor by its name."""
+    chosen = instructions(_flags())
+    if chosen and all(os.environ.get(name) == value for name, value in chosen.items()):
+        return COMMON
+    return f"{platform.machine()} {_cpuinfo().get('model name', '')}".strip()
+
+
+def _flags() -> frozenset[str]:
+    return frozenset(_cpuinfo().get("flags", "").split())
+
+
+def _cpuinfo() -> dict[str, str]:
+    """What Linux says of the first processor; nothing where there is no Linux."""
+    try:
+        first = CPUINFO.read_text(encoding="utf-8", errors="replace").partition("\n\n")[0]
+    except OSError:
+        return {}
+    parted = (line.partition(":") for line in first.splitlines())
+    return {key.strip(): value.strip() for key, _, value in parted}
