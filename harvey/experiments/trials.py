@@ -1,7 +1,8 @@
 """Many trials over all cores, kept as they are done: a campaign that is broken off goes on where it was.
 
 A trial is told by its place in the list alone, and its result follows from it alone; so neither the number of workers
-nor a break changes what a campaign finds. What was found by other code than today's is found anew.
+nor a break changes what a campaign finds. What other code than today's found, or another kind of processor, is found
+anew.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any, TypeVar
 
 from tqdm import tqdm
 
+from harvey.arithmetic import arithmetic
 from harvey.deciding_code import digest_of, files_in
 from harvey.run_directory import RUNS
 from harvey.workers import by_workers
@@ -49,7 +51,7 @@ def found_by_all(work: Callable[[T], R], trials: Sequence[T], kind: type[R], fol
     path = folder / "found.jsonl"
     known: dict[int, R] = dict(_kept(path, len(trials), kind))
     part = path.with_suffix(".part")
-    part.write_text("".join([_line({"code": code_digest()}), *(_found_line(*kept) for kept in known.items())]), "utf-8")
+    part.write_text("".join([_line(_finder()), *(_found_line(*kept) for kept in known.items())]), "utf-8")
     part.replace(path)
     with (
         path.open("a", encoding="utf-8") as out,
@@ -73,6 +75,11 @@ def _line(record: dict[str, Any]) -> str:
     return f"{json.dumps(record)}\n"
 
 
+def _finder() -> dict[str, str]:
+    """Who finds here: a campaign's first line."""
+    return {"code": code_digest(), "arithmetic": arithmetic()}
+
+
 @cache
 def code_digest() -> str:
     """The code that decides, as a digest of its files."""
@@ -82,9 +89,9 @@ def code_digest() -> str:
 
 
 def _kept(path: Path, trials: int, kind: type[R]) -> Iterator[tuple[int, R]]:
-    """What an earlier process of the same code found; a line that was cut off is left out."""
+    """What an earlier process of the same code found likewise; a line that was cut off is left out."""
     lines = path.read_text(encoding="utf-8").split("\n")[:-1] if path.is_file() else []
-    if not lines or json.loads(lines[0]).get("code") != code_digest():
+    if not lines or json.loads(lines[0]) != _finder():
         return
     for record in map(json.loads, lines[1:]):
         if record["number"] < trials:

@@ -1,4 +1,4 @@
-"""Laws of campaigns: a break changes nothing; what other code found is found anew; results keep the trials' order."""
+"""Laws of campaigns: a break changes nothing; what others found is found anew; results keep the trials' order."""
 
 from __future__ import annotations
 
@@ -45,8 +45,11 @@ def test_a_campaign_that_was_broken_off_goes_on_where_it_was(tmp_path: Path) -> 
     assert found_by_all(spoilt, NUMBERS, Square, tmp_path) == FOUND
 
 
-def test_what_other_code_found_is_found_anew(tmp_path: Path) -> None:
-    lines = [{"code": "of yesterday"}, *({"number": n, "found": {"of": 0, "value": 0.0}} for n in range(4))]
+@pytest.mark.parametrize("finder", [{"code": "of yesterday"}, {"arithmetic": "abacus"}])
+def test_what_another_found_is_found_anew(tmp_path: Path, finder: dict[str, str]) -> None:
+    found_by_all(square, [], Square, tmp_path)
+    here = json.loads((tmp_path / "found.jsonl").read_text(encoding="utf-8"))
+    lines = [here | finder, *({"number": n, "found": {"of": 0, "value": 0.0}} for n in range(4))]
     (tmp_path / "found.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
     assert found_by_all(square, NUMBERS, Square, tmp_path) == FOUND
 
