@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from rerun.experimental import ViewerClient
@@ -75,14 +76,16 @@ def _visit(client: Any, cycle: int, picture: Path) -> None:
 
 
 def _await(client: Any) -> None:
+    """Until it has drawn something: without a driver a viewer answers at first, and dies of its first frame."""
     for _ in range(ATTEMPTS):
         try:
-            client.get_state()
+            with TemporaryDirectory() as folder:
+                client.save_screenshot(str(Path(folder).resolve() / "first.png"))
             return
         except Exception as error:  # the client's errors have no common type
             last = error
             time.sleep(1.0)
-    raise RecordingError(f"the viewer does not answer ({last}); {NEEDS}")
+    raise RecordingError(f"the viewer draws nothing ({last}); {NEEDS}")
 
 
 def _executable() -> str | None:

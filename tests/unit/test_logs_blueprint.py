@@ -10,6 +10,7 @@ import pytest
 import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
+import logs.look as looking
 from logs.blueprint import blueprint
 from logs.errors import RecordingError
 from logs.look import look
@@ -129,3 +130,26 @@ def test_no_view_reports_anything(recording: Path, tmp_path: Path) -> None:
 def test_a_recording_that_is_not_there_is_told(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"none\.rrd: expected a recording, got no such file"):
         look(tmp_path / "none.rrd", tmp_path, [1])
+
+
+def test_a_viewer_that_dies_of_its_first_frame_is_told(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As one without a graphics driver does, after it has answered."""
+    class Dying:
+        quits = 0
+
+        def get_state(self) -> None: ...
+
+        def save_screenshot(self, path: str) -> None:
+            raise ConnectionError("transport error")
+
+        def quit(self) -> None:
+            self.quits += 1
+
+    dying = Dying()
+    monkeypatch.setattr(looking.ViewerClient, "spawn", lambda **_: dying)
+    monkeypatch.setattr(looking.time, "sleep", lambda _: None)
+    with pytest.raises(RecordingError, match=r"draws nothing \(transport error\); a headless viewer needs a graphics"):
+        look(recording, tmp_path / "pictures", [7])
+    assert dying.quits == 1
