@@ -35,11 +35,12 @@ CPUINFO = Path("/proc/cpuinfo")
 def settle() -> None:
     """Tell the libraries by the environment; what it says already stays.
 
-    They ask it when they are first imported. Where one of them is already, nothing is said: it would be half true.
+    They ask it when they are first imported. Where one of them is already, nothing is said of instructions: half of
+    them would use these, half others, and the run would be named after neither.
     """
-    if not any(name in sys.modules for name in CALCULATE):
-        for name, value in {**ONE_THREAD, **instructions(_flags())}.items():
-            os.environ.setdefault(name, value)
+    late = any(name in sys.modules for name in CALCULATE)
+    for name, value in {**ONE_THREAD, **({} if late else instructions(_flags()))}.items():
+        os.environ.setdefault(name, value)
 
 
 def instructions(flags: frozenset[str]) -> dict[str, str]:
