@@ -1,7 +1,7 @@
 """Encoding: values as JSON text, by one encoder for each type, made when the type is first met.
 
 The text is that of ``json.dumps(plain(value))``, to the byte; ``plain`` says what it means, this is how it is fast. The
-law is in tests/laws/test_laws_journal.py.
+law is in tests/laws/board/test_laws_journal.py.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Retention: which entries leave memory, so that a board does not grow with the time that it runs.
 
 What is forgotten was posted, seen and journalled long ago, and nobody can need it any more: the rules that say so are
-handed over by who wires the experts. The law (tests/laws/test_laws_retention.py): with and without them the decisions
-are the same, to the byte. A forgotten revision can still be read in the archive.
+handed over by who wires the experts. The law (tests/laws/board/test_laws_retention.py): with and without them the
+decisions are the same, to the byte. A forgotten revision can still be read in the archive.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ A discrepancy within its level's bound is corrected where it arose. Beyond it, i
 plan -> goal, and measured anew by that level's own means. The highest level with an open discrepancy is in focus; while
 there is none, action work comes first, because a move may be under way.
 
-Laws (tests/laws/test_laws_servoing.py): no level is skipped; every escalation exceeds its stated bound; nothing above a
-level is in focus while all open discrepancies belong to it.
+Laws (tests/laws/board/test_laws_servoing.py): no level is skipped; every escalation exceeds its stated bound; nothing
+above a level is in focus while all open discrepancies belong to it.
 """
 
 from __future__ import annotations

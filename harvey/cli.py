@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from harvey.commands import COMMANDS
 from harvey.errors import BadInput, Terminated, terminable
 from logs.errors import RecordingError
-from world_models.toml_source import WorldError
+from world_models.files.toml.source import WorldError
 
 EPILOG = """examples:
   harvey list                                       what there is to run

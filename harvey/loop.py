@@ -8,7 +8,7 @@ from blackboard.change import Quiescence
 from blackboard.effect import Post
 from blackboard.journal import Decision
 from blackboard.scheduler import RAISED, Scheduler
-from world_models.task import Goal, Outcome
+from world_models.entries.task import Goal, Outcome
 
 Over = Callable[[Scheduler], str | None]
 """Why a run has to end after this cycle, in words; None as long as it may go on."""

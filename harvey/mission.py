@@ -12,25 +12,25 @@ from pathlib import Path
 from blackboard.effect import Post
 from blackboard.journal import Decision, Sink
 from blackboard.scheduler import Scheduler
-from harvey.diary import Diary
-from harvey.hardware.serial_body import IN_PROCESS, reached
+from harvey.agent import Agent, Sources, agent_of
 from harvey.loop import until_outcome
-from harvey.minds import Mind, Sources, mind_of
 from harvey.ports import Body, BodyPort
 from harvey.referee import MissionResult, Referee
-from harvey.run_directory import RunDirectory
-from harvey.run_head import SIMULATOR, RunHead, known_world
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import SIMULATOR, RunHead, known_world
+from harvey.run_files.run_recorder import RunRecorder
+from harvey.serial_body import IN_PROCESS, reached
 from harvey.wiring import command, knowledge_sources, robot_model
 from logs.disk import CannotWriteError
 from logs.errors import RecordingError
-from sim.assembly import Stage
-from sim.body import SimulatedBody
+from sim.body.simulated_body import SimulatedBody
 from sim.scenario import Limits
-from world_models.location import Hypothesis
-from world_models.task import Outcome
+from sim.stage import Stage
+from world_models.entries.location import Hypothesis
+from world_models.entries.task import Outcome
 
 Around = Callable[[Body, Callable[[], bool]], Body]
-"""Puts something between the mind and the body; the second argument tells whether the run is only told again."""
+"""Puts something between the agent and the body; the second argument tells whether the run is only told again."""
 
 LEAST_FREE = 1 << 18
 """A disk with less room than this is full [bytes]."""
@@ -53,19 +53,19 @@ def run_mission(
     """Run a scenario's mission to its outcome.
 
     Args:
-        out: directory for the files of :mod:`harvey.run_directory`; None keeps nothing.
+        out: directory for the files of :mod:`harvey.run_files.run_directory`; None keeps nothing.
         sinks: told of every decision.
         live: let a viewer watch.
         sources: which experts sit round the board.
         head: how the run begins, if otherwise than the scenario says.
-        body: how the body is reached (:func:`harvey.hardware.serial_body.reached`), where ``head`` does not say it.
-        around: puts something between the mind and the body.
+        body: how the body is reached (:func:`harvey.serial_body.reached`), where ``head`` does not say it.
+        around: puts something between the agent and the body.
     """
     head = head or head_of(stage, seed, body)
     run = None if out is None else RunDirectory(out)
-    with mind_of(head, sources) as mind:
-        diary = Diary(run, head, mind.robot, live=live)
-        mission = Mission(stage, head, mind, diary, sinks, around)
+    with agent_of(head, sources) as agent:
+        recorder = RunRecorder(run, head, agent.robot, live=live)
+        mission = Mission(stage, head, agent, recorder, sinks, around)
         return mission.driven(run, mission.begin)
 
 
@@ -78,28 +78,28 @@ def head_of(stage: Stage, seed: int, body: str = IN_PROCESS) -> RunHead:
 
 
 class Mission:
-    """One run: mind, simulated body and diary put together.
+    """One run: agent, simulated body and recorder put together.
 
     Attributes:
-        port: the body's, as the mind has it, but without the diary.
+        port: the body's, as the agent has it, but without the recorder.
         body: what is behind it; seed: of all its chance.
-        scheduler: the mind at work.
+        scheduler: the agent at work.
     """
 
     def __init__(
-        self, stage: Stage, head: RunHead, mind: Mind, diary: Diary, sinks: Sequence[Sink] = (),
+        self, stage: Stage, head: RunHead, agent: Agent, recorder: RunRecorder, sinks: Sequence[Sink] = (),
         around: Around = lambda body, _retelling: body,
     ) -> None:
-        self._began, self._stage, self._head, self._mind = time.perf_counter(), stage, head, mind
+        self._began, self._stage, self._head, self._agent = time.perf_counter(), stage, head, agent
         self.seed = head.seed
         self.body = stage.body(head.seed)
         self._opened = ExitStack()
         self.port = BodyPort(around(
-            self._opened.enter_context(reached(self.body, head.body)), lambda: diary.retelling))
-        self.diary = diary
-        self.kept = diary.kept(self.port)
-        self._referee = Referee(mind.robot, self.body)
-        self.scheduler: Scheduler = mind.scheduler(ports=(self.kept,), sinks=(*diary.sinks, self._referee, *sinks))
+            self._opened.enter_context(reached(self.body, head.body)), lambda: recorder.retelling))
+        self.recorder = recorder
+        self.kept = recorder.kept(self.port)
+        self._referee = Referee(agent.robot, self.body)
+        self.scheduler: Scheduler = agent.scheduler(ports=(self.kept,), sinks=(*recorder.sinks, self._referee, *sinks))
 
     def begin(self) -> Outcome:
         """From the command to the outcome."""
@@ -116,10 +116,10 @@ class Mission:
 
     def tell_truth(self) -> None:
         """Where the robot is, for the drawing."""
-        self.diary.truth(self.body.truth.world_from_robot, self.body.truth.time_s)
+        self.recorder.truth(self.body.truth.world_from_robot, self.body.truth.time_s)
 
     def driven(self, run: RunDirectory | None, drive: Callable[[], Outcome]) -> MissionResult:
-        """Drive, keep the result, and close the diary however it ends.
+        """Drive, keep the result, and close the recorder however it ends.
 
         A disk that takes no more stops the run: the simulated robot stands by then, as nobody commands it, and what was
         written before is whole, so that the run may go on when there is room.
@@ -144,7 +144,7 @@ class Mission:
         """Close the files; what to say where the recording's last part could not be written: it can be drawn anew."""
         self._opened.close()
         try:
-            self.diary.close()
+            self.recorder.close()
         except RecordingError:
             return "; the last part of its recording is not written (harvey repair draws it anew)"
         return ""
@@ -158,7 +158,7 @@ class Mission:
 
 
 def stopped(run: RunDirectory | None, error: Exception) -> Outcome:
-    """How a run ends whose diary cannot be written any more."""
+    """How a run ends whose recorder cannot be written any more."""
     full = run is not None and shutil.disk_usage(run.path).free < LEAST_FREE
     why = f"{error} (the disk is full)" if full else str(error)
     go_on = "" if run is None else f"; harvey resume {run.path} goes on with it"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from world_models.plan_view import GROUND, Shape, plan_of
-from world_models.world import World
+from world_models.building.plan_view import GROUND, Shape, plan_of
+from world_models.building.world import World
 
 DOTS_A_METRE, MOST_DOTS = 30.0, 6000.0
 LOOKS: Mapping[str, tuple[str, str]] = {

@@ -9,7 +9,17 @@ from typing import Any, Protocol
 from blackboard.change import Change, Posted, Retracted
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
-from world_models.body import BodyFault, Course, Frame, Look, MotionReport, MotorCommand, Recovery, Ride, RideReport
+from world_models.entries.body import (
+    BodyFault,
+    Course,
+    Frame,
+    Look,
+    MotionReport,
+    MotorCommand,
+    Recovery,
+    Ride,
+    RideReport,
+)
 
 
 class Body(Protocol):

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from blackboard.journal import Decision
-from sim.assembly import Stage
-from sim.body import SimulatedBody
-from sim.truth import cross_track_m
+from sim.body.simulated_body import SimulatedBody
+from sim.body.truth import cross_track_m
+from sim.stage import Stage
+from world_models.entries.location import Hypothesis
+from world_models.entries.percepts import PoseFix
+from world_models.entries.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch
 from world_models.frames import Pose2, wrap_angle
-from world_models.location import Hypothesis
-from world_models.percepts import PoseFix
 from world_models.robot import RobotModel
-from world_models.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch
 
 FALSE_M = 0.15
 """A milestone is accepted falsely when the robot is further than this from the pose that was certified."""

@@ -16,14 +16,24 @@ from blackboard.index import Index
 from blackboard.level import Level
 from blackboard.retention import Forget
 from blackboard.servoing import OPEN, Discrepancy
-from knowledge_sources.obstruction_finder import LOOKS
+from knowledge_sources.plan.obstruction_finder import LOOKS
 from knowledge_sources.questions import last_escalated
-from world_models.body import BodyFault, Course, Frame, Look, MotionReport, MotorCommand, Recovery, Ride, RideReport
-from world_models.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
-from world_models.task import Certificate, Goal, Leg, Milestone, PlanSketch
+from world_models.entries.body import (
+    BodyFault,
+    Course,
+    Frame,
+    Look,
+    MotionReport,
+    MotorCommand,
+    Recovery,
+    Ride,
+    RideReport,
+)
+from world_models.entries.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
+from world_models.entries.task import Certificate, Goal, Leg, Milestone, PlanSketch
 
 LAST_MOTIONS = 8
-"""The safekeeper looks so far back, and a little less, when it asks whether the base gets on."""
+"""The fault_handler looks so far back, and a little less, when it asks whether the base gets on."""
 
 FIX: Index[Certificate] = Index(Certificate, lambda certificate: certificate.fix)
 MATCH: Index[PoseFix] = Index(PoseFix, lambda fix: fix.match)

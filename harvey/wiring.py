@@ -5,40 +5,40 @@ from __future__ import annotations
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Servoing
-from knowledge_sources.correlator_tracker import CorrelatorTracker
-from knowledge_sources.dead_reckoner import DeadReckoner
-from knowledge_sources.escalator import Escalator
-from knowledge_sources.expert import Expert
-from knowledge_sources.helmsman import Helmsman
-from knowledge_sources.interpreter import Interpreter
-from knowledge_sources.line_finder import LineFinder
-from knowledge_sources.matcher import Matcher
-from knowledge_sources.med_r_and_t import MedRAndT
-from knowledge_sources.milestone_judge import MilestoneJudge
-from knowledge_sources.milestone_selector import MilestoneSelector
-from knowledge_sources.mission_keeper import MissionKeeper
-from knowledge_sources.motor import Motor
-from knowledge_sources.obstruction_finder import ObstructionFinder
-from knowledge_sources.passenger import Passenger
-from knowledge_sources.plan_adjuster import PlanAdjuster
-from knowledge_sources.relocalizer import Relocalizer
-from knowledge_sources.safekeeper import Safekeeper
-from knowledge_sources.sketcher import Sketcher
+from knowledge_sources.action.correlator_tracker import CorrelatorTracker
+from knowledge_sources.action.dead_reckoner import DeadReckoner
+from knowledge_sources.action.elevator_rider import ElevatorRider
+from knowledge_sources.action.fault_handler import FaultHandler
+from knowledge_sources.action.motor import Motor
+from knowledge_sources.action.path_follower import PathFollower
+from knowledge_sources.goal.interpreter import Interpreter
+from knowledge_sources.goal.mission_monitor import MissionMonitor
+from knowledge_sources.goal.relocalizer import Relocalizer
+from knowledge_sources.plan.escalator import Escalator
+from knowledge_sources.plan.line_finder import LineFinder
+from knowledge_sources.plan.matcher import Matcher
+from knowledge_sources.plan.med_r_and_t import MedRAndT
+from knowledge_sources.plan.milestone_judge import MilestoneJudge
+from knowledge_sources.plan.milestone_selector import MilestoneSelector
+from knowledge_sources.plan.obstruction_finder import ObstructionFinder
+from knowledge_sources.plan.plan_adjuster import PlanAdjuster
+from knowledge_sources.plan.sketcher import Sketcher
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from sim.scenario import Scenario, Servo
 from world_models.actuator import ActuatorModel
-from world_models.location import diagonal
+from world_models.building.world import World
+from world_models.entries.location import diagonal
+from world_models.entries.task import Command
+from world_models.files.store import load_world
 from world_models.robot import RobotModel
-from world_models.store import load_world
-from world_models.task import Command
-from world_models.world import World
 
-EXPERTS: tuple[type[Expert], ...] = (
+KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     Interpreter,
     Sketcher,
     MilestoneSelector,
     Motor,
-    Helmsman,
-    Passenger,
+    PathFollower,
+    ElevatorRider,
     DeadReckoner,
     CorrelatorTracker,
     LineFinder,
@@ -49,15 +49,15 @@ EXPERTS: tuple[type[Expert], ...] = (
     PlanAdjuster,
     Escalator,
     Relocalizer,
-    Safekeeper,
-    MissionKeeper,
+    FaultHandler,
+    MissionMonitor,
 )
 """Every expert, in no order that matters: control comes from triggers, ratings and levels."""
 
 
 def knowledge_sources(robot: RobotModel) -> tuple[KnowledgeSource, ...]:
     """The experts for a robot: each is built with what the robot knows of itself and its world, and nothing else."""
-    return tuple(expert(robot) for expert in EXPERTS)
+    return tuple(expert(robot) for expert in KNOWLEDGE_SOURCES)
 
 
 def robot_model(scenario: Scenario, world: World | None = None) -> RobotModel:

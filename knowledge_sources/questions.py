@@ -7,12 +7,12 @@ from blackboard.entry import Entry
 from blackboard.index import Index
 from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
-from world_models.body import BodyFault, Course, MotionReport, MotorCommand
-from world_models.location import Hypothesis
-from world_models.obstruction import Obstruction
-from world_models.percepts import Tracks
+from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand
+from world_models.entries.location import Hypothesis
+from world_models.entries.obstruction import Obstruction
+from world_models.entries.percepts import Tracks
+from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch
 from world_models.robot import RobotModel
-from world_models.task import Goal, Leg, Milestone, Outcome, PlanSketch
 
 HELD: Index[Hypothesis] = Index(Hypothesis, lambda h: h.is_held or None)
 ACTIVE_GOAL: Index[Goal] = Index(Goal, lambda g: g.is_active or None)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.camera import NEAR_M
-from world_models.location import Hypothesis
+from world_models.entries.location import Hypothesis
 from world_models.robot import RobotModel
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 class CannotWriteError(OSError):
-    """A file of the diary cannot be written any more, as when the disk is full; what was written before stays valid."""
+    """A file of a run cannot be written any more, as when the disk is full; what was written before stays valid."""
 
 
 class Appended:

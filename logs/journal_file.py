@@ -9,7 +9,7 @@ from typing import Any
 
 from blackboard.journal import Decision, JournalLines
 from logs.disk import Appended
-from world_models.body import Course, Look, MotorCommand, Recovery, Ride
+from world_models.entries.body import Course, Look, MotorCommand, Recovery, Ride
 
 
 class JournalError(ValueError):

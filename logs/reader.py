@@ -12,9 +12,9 @@ from rerun.chunk import RrdReader
 from rerun.error_utils import RerunWarning
 
 from logs.errors import RecordingError
-from logs.loggers.decisions import RECORD
-from logs.loggers.frames import NUMBER
-from logs.paths import IMAGE, RECORDS
+from logs.recording.loggers.decisions import RECORD
+from logs.recording.loggers.frames import NUMBER
+from logs.recording.paths import IMAGE, RECORDS
 
 ROW_ID = "rerun.controls.RowId"
 JPEG = "EncodedImage:blob"

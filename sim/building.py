@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from sim.collision import Obstacles
-from sim.elevator import Elevators
-from sim.mesh import FaceLike
-from sim.renderer import Renderer
+from sim.body.collision import Obstacles
+from sim.body.elevator import Elevators
+from sim.render.mesh import FaceLike
+from sim.render.renderer import Renderer
 from world_models.frames import Pose2
 
 NO_ELEVATORS = Elevators({}, {})
@@ -43,5 +43,5 @@ class Building:
     def of_faces(
         faces: Sequence[FaceLike], locale_at: Callable[[Pose2], str] = nowhere, samples: int = 8
     ) -> Building:
-        """A building with these faces; see :meth:`sim.renderer.Renderer.of_faces` for ``samples`` and the errors."""
+        """A building with these faces; see :meth:`~sim.render.renderer.Renderer.of_faces` for ``samples``."""
         return Building(Renderer.of_faces(faces, samples), Obstacles.of_faces(faces), locale_at)

@@ -8,20 +8,20 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from sim.actuator import ActuatorParameters
-from sim.elevator import Helper
-from sim.fault_table import read_fault
-from sim.faults import Fault
+from sim.body.actuator import ActuatorParameters
+from sim.body.elevator import Helper
+from sim.faults.fault_table import read_fault
+from sim.faults.faults import Fault
 from sim.moved import Moved
-from sim.optics import check_lens
-from sim.rasterizer import sample_offsets
-from sim.sensor import SensorParameters
-from sim.settings import MOST, known_keys, merged, near, parsed, read_settings
+from sim.render.optics import check_lens
+from sim.render.rasterizer import sample_offsets
+from sim.render.sensor import SensorParameters
 from world_models.bounds import Bounds, check_bounds
 from world_models.camera import Camera, CameraMount
+from world_models.files.compiled.schema import SUFFIXES
+from world_models.files.toml.settings import MOST, known_keys, merged, near, parsed, read_settings
+from world_models.files.toml.source import Key, Node, Source, WorldError
 from world_models.phrases import check_command
-from world_models.store_schema import SUFFIXES
-from world_models.toml_source import Key, Node, Source, WorldError
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "sim" / "scenarios"

@@ -13,9 +13,9 @@ PROGRAM = f"""
 import sys
 from pathlib import Path
 from blackboard import scheduler
-from harvey.experiments.short_missions import OFFICE
+from sim.made_up.short_missions import OFFICE
 from harvey.mission import run_mission
-from sim.assembly import set_stage
+from sim.stage import set_stage
 from sim.scenario import parse_scenario
 run_mission(set_stage(parse_scenario(OFFICE, "across-allens-office")), {SEED}, out=Path(sys.argv[1]))
 print(scheduler.__file__)

@@ -18,15 +18,15 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
-from world_models.body import Frame, Look, MotionReport, MotorCommand
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
+from world_models.entries.body import Frame, Look, MotionReport, MotorCommand
+from world_models.entries.location import Hypothesis, Place, diagonal
+from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
+from world_models.entries.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch, Subgoal
+from world_models.files.store import read_world
+from world_models.files.toml.source import Source
 from world_models.frames import Pose2
-from world_models.location import Hypothesis, Place, diagonal
-from world_models.percepts import LineMatch, PoseFix, Segments, Track, Tracks
-from world_models.store import read_world
-from world_models.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch, Subgoal
-from world_models.toml_source import Source
-from world_models.world import World
 
 HOUSE = """
 name = "house"

@@ -31,7 +31,7 @@ def silent(_view: View, _trigger: Change) -> Iterable[Effect]:
     return ()
 
 
-class Expert(KnowledgeSource):
+class Scripted(KnowledgeSource):
     """A knowledge source whose answers are given when it is built.
 
     Args:

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from world_models.entries.obstruction import Obstruction
 from world_models.frames import Pose, frozen
-from world_models.obstruction import Obstruction
 
 NEAR_M = 0.05
 """Nothing nearer than this to the optical centre is projected [m]."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
-from world_models.memory_frames import MemoryFrames
-from world_models.world import World
+from world_models.building.memory_frames import MemoryFrames
+from world_models.building.world import World
 
 T = TypeVar("T")
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from world_models.building.world import World
+from world_models.entries.location import Covariance, covariance_tuple
 from world_models.frames import Pose2, flattened
-from world_models.location import Covariance, covariance_tuple
-from world_models.world import World
 
 
 @dataclass(frozen=True, slots=True)

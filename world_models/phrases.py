@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from world_models.location import Place
-from world_models.memory_frames import words_of
-from world_models.outlines import distance_to_border, inside_polygon
+from world_models.building.memory_frames import words_of
+from world_models.building.outlines import distance_to_border, inside_polygon
+from world_models.building.world import World
+from world_models.entries.location import Place
 from world_models.ptrans import parse_ptrans
-from world_models.world import World
 
 GO = re.compile(r"\s*(?:please\s+)?(?:go|drive|move|(?:bring|take|carry)\s+(?:this|it))"
                 r"(?:\s+from\s+(?P<origin>.+?))?\s+to\s+(?P<destination>.+?)\s*[.!]?\s*", re.IGNORECASE)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from world_models.location import Place
+from world_models.entries.location import Place
 from world_models.units import FOOT_M
 
 FAR_FT = 1e6

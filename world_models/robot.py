@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from world_models.actuator import ActuatorModel
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
+from world_models.entries.obstruction import Obstruction
 from world_models.frames import Pose, Pose2
-from world_models.obstruction import Obstruction
-from world_models.world import World
 
 _THE_CAMERA = Camera(1.0, 1.0, 0.0, 0.0, 1, 1)
 """Stands for "the camera that the model is made with"."""

@@ -15,9 +15,9 @@ from harvey.errors import BadInput
 
 if TYPE_CHECKING:
     from harvey.hardware.calibration import Grey, Mounted
-    from knowledge_sources.drivers.video_camera import VideoCamera
-    from knowledge_sources.methods.calibration import Calibration
-    from knowledge_sources.methods.calibration_board import Pattern
+    from harvey.hardware.drivers.cameras.video_camera import VideoCamera
+    from knowledge_sources.methods.calibration.chessboard import Pattern
+    from knowledge_sources.methods.calibration.intrinsics import Calibration
 
 PATTERN = re.compile(r"(\d{1,3})x(\d{1,3})", re.ASCII)
 
@@ -59,14 +59,14 @@ def _arguments(parser: ArgumentParser) -> None:
     mount.add_argument("--board-ahead-mm", metavar="MM", type=_millimetres, dest="board_ahead_m",
                        help="from the robot's turning axis ahead to the nearest inner corners (standing: to the board)")
     mount.add_argument("--forward-mm", metavar="MM", type=_millimetres, dest="forward_m",
-                       help="or: from the turning axis ahead to the lens, by tape measure (0)")
+                       help="or: from the turning axis ahead to the lens, by stream measure (0)")
 
 
 def _run(args: Namespace) -> int:
     from harvey.hardware.calibration import boards_in, calibrated, grey_of, mounted, report
-    from knowledge_sources.methods.calibration_board import Pattern
-    from knowledge_sources.methods.calibration_picture import calibration_picture
-    from world_models.camera_file import camera_text
+    from knowledge_sources.methods.calibration.chessboard import Pattern
+    from knowledge_sources.methods.calibration.picture import calibration_picture
+    from world_models.files.toml.camera_file import camera_text
 
     board = _checked(args)
     try:
@@ -121,8 +121,8 @@ def _pictures(args: Namespace, pattern: Pattern) -> Iterator[tuple[str, Grey]]:
 
 def _live_place(args: Namespace) -> Grey:
     """A picture that is taken when the user says so."""
-    from knowledge_sources.drivers.video_camera import CameraFault
-    from knowledge_sources.methods.images import decode
+    from harvey.hardware.drivers.cameras.video_camera import CameraFault
+    from knowledge_sources.methods.features.images import decode
 
     where = "flat on the floor" if args.mount_board == "floor" else "upright on the floor"
     try:
@@ -137,7 +137,7 @@ def _live_place(args: Namespace) -> Grey:
 
 
 def _opened(source: str) -> VideoCamera:
-    from knowledge_sources.drivers.video_camera import CameraFault, VideoCamera
+    from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
 
     began_s = time.monotonic()
     try:
@@ -147,7 +147,7 @@ def _opened(source: str) -> VideoCamera:
 
 
 def _notes(calibration: Calibration, args: Namespace) -> tuple[str, ...]:
-    from knowledge_sources.methods.calibration import PARAMETERS
+    from knowledge_sources.methods.calibration.intrinsics import PARAMETERS
 
     sure = ", ".join(f"{name} {sigma:.2g}" for name, sigma in zip(PARAMETERS, calibration.deviations, strict=False))
     lines = [f"Written by harvey calibrate: {len(calibration.views)} views, {calibration.rms_px:.3f} px RMS.",

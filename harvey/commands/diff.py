@@ -6,10 +6,10 @@ from argparse import ArgumentParser, Namespace
 from itertools import islice
 
 from harvey.commands.command import Command
-from harvey.explain.diff import describe, first_difference
-from harvey.explain.diff_cause import apart, because, opening, settings
-from harvey.explain.journal import JournalHistory
-from harvey.run_directory import RunDirectory, open_run
+from harvey.diff.cause import apart, because, opening, settings
+from harvey.diff.first_difference import describe, first_difference
+from harvey.run_files.run_directory import RunDirectory, open_run
+from harvey.why.journal import JournalHistory
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -19,7 +19,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.run_head import RunHead
+    from harvey.run_files.run_head import RunHead
 
     first, second = open_run(args.first), open_run(args.second)
     heads = RunHead.read(first.path), RunHead.read(second.path)

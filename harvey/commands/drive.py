@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_directory import RUNS, vacant
+from harvey.run_files.run_directory import RUNS, vacant
 
 if TYPE_CHECKING:
     from blackboard.journal import Decision
-    from harvey.hardware.dry_run import Check, DryRun
     from harvey.hardware.mission import HardwareMission
+    from harvey.hardware.preflight import Check, Preflight
 
 OPTIONS: Mapping[str, tuple[str, str, str]] = {
     "world": ("world", "FILE", "the building: a world file, or the name of one that comes with Harvey"),
@@ -43,8 +43,8 @@ def _arguments(parser: ArgumentParser) -> None:
 
 def _run(args: Namespace) -> int:
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
-    from harvey.campaign import room_for
-    from harvey.hardware.dry_run import DryRun
+    from harvey.campaign.campaign import room_for
+    from harvey.hardware.preflight import Preflight
 
     mission = _mission(args)
     out = vacant(Path(args.out) if args.out else RUNS / f"{mission.name}-drive")
@@ -53,7 +53,7 @@ def _run(args: Namespace) -> int:
     def clock() -> float:
         return time.monotonic() - began
 
-    with DryRun(mission, out, clock) as dry:
+    with Preflight(mission, out, clock) as dry:
         if not checked(dry):
             return 2
         if args.dry_run:
@@ -62,7 +62,7 @@ def _run(args: Namespace) -> int:
         return _drive(mission, dry, clock, room_for(out, mission.name, 0), args.live)
 
 
-def checked(dry: DryRun) -> bool:
+def checked(dry: Preflight) -> bool:
     """Make all checks, and tell what came of each; whether nothing failed."""
     for check in dry.run():
         _tell(check)
@@ -73,9 +73,9 @@ def checked(dry: DryRun) -> bool:
 
 
 def _mission(args: Namespace) -> HardwareMission:
-    from harvey.campaign import settings_of
+    from harvey.campaign.campaign import settings_of
     from harvey.hardware.mission import load_mission
-    from world_models.store_schema import SUFFIXES
+    from world_models.files.compiled.schema import SUFFIXES
 
     given = {OPTIONS[name][0]: value for name in OPTIONS if (value := getattr(args, name)) is not None}
     settings: dict[str, Any] = {**dict(settings_of(args.settings)), **given}
@@ -93,7 +93,7 @@ def _tell(check: Check) -> None:
         print(f"{'':<21} -> {check.todo}", flush=True)
 
 
-def _drive(mission: HardwareMission, dry: DryRun, clock: Callable[[], float], out: Path, live: bool) -> int:
+def _drive(mission: HardwareMission, dry: Preflight, clock: Callable[[], float], out: Path, live: bool) -> int:
     from harvey.hardware.run import drive
 
     if dry.robot is None or dry.base is None or dry.camera is None:
@@ -121,8 +121,8 @@ def summary(result: Mapping[str, Any], out: Path) -> str:
 
 def follow(decision: Decision) -> None:
     """A line for every milestone, and for whatever is wrong with the body."""
-    from world_models.body import BodyFault
-    from world_models.task import Milestone
+    from world_models.entries.body import BodyFault
+    from world_models.entries.task import Milestone
 
     for change in (*decision.observed, *decision.made):
         value, said = change.entry.value, ""

@@ -13,7 +13,7 @@ from harvey.commands.command import Command, whole
 from harvey.errors import BadInput
 
 if TYPE_CHECKING:
-    from sim.body import SimulatedBody
+    from sim.body.simulated_body import SimulatedBody
     from sim.emulators.emulator import Emulator
     from sim.emulators.ground import Ground
 
@@ -72,7 +72,7 @@ def _camera(port: int | None, body: SimulatedBody | None) -> Iterator[None]:
     if port is None or body is None:
         yield
         return
-    from sim.camera_server import CameraServer
+    from sim.emulators.camera_server import CameraServer
 
     body.picture()  # the renderer is compiled before anybody waits for a picture
     with CameraServer(body, port) as camera:
@@ -85,10 +85,10 @@ def _base(args: Namespace) -> tuple[Emulator, Callable[[], tuple[float, str]], S
 
     With a scenario the line fails when the scenario's faults say so.
     """
-    from sim.emulators.ailing import AilingLine
     from sim.emulators.create2 import Create2Emulator
     from sim.emulators.denning import DenningEmulator
     from sim.emulators.denning_motion import Rolling
+    from sim.emulators.faulty_line import FaultyLine
     from sim.emulators.p2os import P2osEmulator
 
     ground, where, body = _ground(args)
@@ -97,7 +97,7 @@ def _base(args: Namespace) -> tuple[Emulator, Callable[[], tuple[float, str]], S
         emulator = DenningEmulator(Rolling(ground))
     else:
         emulator = P2osEmulator(ground) if args.kind == "p2os" else Create2Emulator(ground)
-    return emulator if body is None else AilingLine(emulator, body), where, body
+    return emulator if body is None else FaultyLine(emulator, body), where, body
 
 
 def _ground(args: Namespace) -> tuple[Ground, Callable[[], tuple[float, str]], SimulatedBody | None]:
@@ -111,9 +111,9 @@ def _ground(args: Namespace) -> tuple[Ground, Callable[[], tuple[float, str]], S
 
 
 def _body(name: str, seed: int, calibration: str | None) -> SimulatedBody:
-    from sim.assembly import set_stage
     from sim.scenario import ScenarioError, load_scenario
-    from world_models.camera_file import camera_text
+    from sim.stage import set_stage
+    from world_models.files.toml.camera_file import camera_text
 
     print(f"{name}: setting the stage", file=sys.stderr, flush=True)
     try:

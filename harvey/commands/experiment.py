@@ -16,7 +16,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey import experiments
+    import experiments
 
     report = experiments.run(args.name, quick=args.quick, seed=args.seed)
     print(json.dumps(report.record(), indent=2) if args.json else report.text())

@@ -13,15 +13,16 @@ def _arguments(_parser: ArgumentParser) -> None:
 
 
 def _run(_args: Namespace) -> int:
-    from harvey import experiments
+    import experiments
     from sim.scenario import list_scenarios, load_scenario
 
     print("scenarios (harvey run NAME):")
     for name in list_scenarios():
         print(_item(name, load_scenario(name).description))
-    print("\nexperiments (harvey experiment NAME):")
-    for name in experiments.names():
-        print(_item(name, experiments.PLANNED[name]))
+    for folder, group in experiments.EXPERIMENTS.items():
+        print(f"\nexperiments: {folder} (harvey experiment NAME):")
+        for name, what in group.items():
+            print(_item(name, what))
     print("\nA seed fixes noise and chance: the same scenario and seed give the same run. Without --seed it is 0;"
           "\n--seed 0..19 runs twenty. A mission of your own is a TOML file like those in sim/scenarios/.")
     return 0

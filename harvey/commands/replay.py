@@ -8,15 +8,15 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harvey.campaign import settings_of
+from harvey.campaign.campaign import settings_of
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_directory import RunDirectory, open_run, vacant
+from harvey.run_files.run_directory import RunDirectory, open_run, vacant
 from harvey.units import count
 
 if TYPE_CHECKING:
-    from harvey.again.replay import Told
-    from harvey.run_head import RunHead
+    from harvey.replay.replay import Told
+    from harvey.run_files.run_head import RunHead
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -42,10 +42,10 @@ def _run(args: Namespace) -> int:
 
 
 def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, str], ...]) -> int:
-    """Decide it again with a changed mind."""
-    from harvey.again.counterfactual import what_if
-    from harvey.again.counterfactual_words import told
-    from harvey.run_head import RunHead
+    """Decide it again with a changed agent."""
+    from harvey.replay.counterfactual import what_if
+    from harvey.replay.counterfactual_words import told
+    from harvey.run_files.run_head import RunHead
 
     out = RunDirectory(vacant(Path(args.out))) if args.out else None
     if out is not None and out.path.resolve() == run.path.resolve():
@@ -63,14 +63,14 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
 
 def _again(run: RunDirectory) -> int:
     """Decide it again as it was."""
-    from harvey.again.replay import pictures_of, replayed
-    from harvey.minds import mind_of
-    from harvey.run_head import RunHead
+    from harvey.agent import agent_of
+    from harvey.replay.replay import pictures_of, replayed
+    from harvey.run_files.run_head import RunHead
 
     pictures, agreed, head = pictures_of(run), 0, RunHead.read(run.path)
     elsewhere = head.decided_elsewhere()
-    with mind_of(head) as mind:
-        for told in shown(replayed(run, pictures, mind.scheduler())):
+    with agent_of(head) as agent:
+        for told in shown(replayed(run, pictures, agent.scheduler())):
             if not told.same:
                 print(f"{_difference(agreed, told)}\n\n{_perhaps(head, elsewhere)}")
                 return 1
@@ -97,8 +97,8 @@ def _perhaps(head: RunHead, elsewhere: str) -> str:
 
 def _difference(agreed: int, told: Told) -> str:
     from blackboard.journal import decision_record
-    from harvey.explain.diff import describe
-    from harvey.records import decision_of
+    from harvey.diff.first_difference import describe
+    from harvey.run_files.records import decision_of
 
     now = None if told.now is None else decision_of(decision_record(told.now))
     return "\n".join(["first: as recorded; second: as decided now", *describe(agreed, told.recorded, now)])
@@ -123,7 +123,7 @@ COMMAND = Command(
     ),
     _arguments, _run,
     "Neither simulator nor robot takes part. Exit code 0 where every decision is the same, 1 where one is not.\n\n"
-    "With --without or --set it tells what would have been: a changed mind is told what was observed, as long as it\n"
+    "With --without or --set it tells what would have been: a changed agent is told what was observed, as long as it\n"
     "asks its body for the same. From the first motion or picture that differs the record no longer answers; a run of\n"
     "the simulator then goes on by itself, in the same world with the same chance.",
 )

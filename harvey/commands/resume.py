@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_directory import RunDirectory, open_run
+from harvey.run_files.run_directory import RunDirectory, open_run
 from harvey.units import count
 
 if TYPE_CHECKING:
-    from harvey.again.resume import Remains
-    from harvey.run_head import RunHead
+    from harvey.replay.resume import Remains
+    from harvey.run_files.run_head import RunHead
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -29,9 +29,9 @@ def _arguments(parser: ArgumentParser) -> None:
 
 def _run(args: Namespace) -> int:
     run = open_run(args.run, "run.json")
-    from harvey.again.resume import remains_of, resume
-    from harvey.run_head import HARDWARE, RunHead
-    from harvey.summary import one
+    from harvey.campaign.summary import one
+    from harvey.replay.resume import remains_of, resume
+    from harvey.run_files.run_head import HARDWARE, RunHead
 
     remains = remains_of(run)
     if remains.outcome is not None and run.read_result().get("outcome") == remains.outcome.kind:
@@ -55,8 +55,8 @@ def _on_hardware(
     """Everything is checked as before a first move; then the mission goes on."""
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
     from harvey.commands.drive import checked, follow, summary, tell_how_to_stop
-    from harvey.hardware.dry_run import DryRun
     from harvey.hardware.mission import mission_again
+    from harvey.hardware.preflight import Preflight
     from harvey.hardware.resume import resume, stood_at
 
     mission, began_s = mission_again(head, moved), time.monotonic() - stood_at(run)[0]
@@ -64,7 +64,7 @@ def _on_hardware(
     def clock() -> float:
         return time.monotonic() - began_s
 
-    with DryRun(mission, run.path, clock) as dry:
+    with Preflight(mission, run.path, clock) as dry:
         if not checked(dry) or dry.base is None or dry.camera is None:
             return 2
         _tell(run, remains, head)

@@ -6,10 +6,10 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from harvey.campaign import Task, run_all, run_task, seeds_of, settings_of
+from harvey.campaign.campaign import Task, run_all, run_task, seeds_of, settings_of
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_directory import RUNS, vacant
+from harvey.run_files.run_directory import RUNS, vacant
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -31,7 +31,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.hardware.serial_body import body_kind
+    from harvey.serial_body import body_kind
 
     seeds, settings, body = seeds_of(args.seed), settings_of(args.settings), body_kind(args.body)
     tasks = tuple(
@@ -54,8 +54,8 @@ def _out(args: Namespace, seed: int, many: bool) -> Path:
 
 def _check(task: Task) -> int:
     stage = task.stage()
-    from harvey.rehearsal import rehearse
-    from harvey.summary import foreseen, prospects
+    from harvey.campaign.summary import foreseen, prospects
+    from harvey.dry_run import rehearse
 
     ahead, outcome = rehearse(stage.scenario)
     print(prospects(ahead))
@@ -65,9 +65,9 @@ def _check(task: Task) -> int:
 
 
 def _one(task: Task, args: Namespace) -> int:
-    from harvey.explain.trace import printing
-    from harvey.progress import following
-    from harvey.summary import one
+    from harvey.campaign.progress import following
+    from harvey.campaign.summary import one
+    from harvey.why.trace import printing
 
     sinks = (printing(sys.stdout),) if args.trace else ()
     print(f"{task.named}: setting the stage", file=sys.stderr, flush=True)
@@ -78,8 +78,8 @@ def _one(task: Task, args: Namespace) -> int:
 
 
 def _several(tasks: tuple[Task, ...]) -> int:
-    from harvey.progress import counted
-    from harvey.summary import several
+    from harvey.campaign.progress import counted
+    from harvey.campaign.summary import several
 
     tasks[0].stage()
     results = {task.seed: result for task, result in counted(run_all(tasks), len(tasks), sys.stderr)}

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_directory import RunDirectory, named_directory, open_run
+from harvey.run_files.run_directory import RunDirectory, named_directory, open_run
 
 OVERVIEW = "overview.rrd"
 
@@ -71,7 +71,7 @@ def _beside(runs: list[RunDirectory]) -> Path:
 
 
 def _write(runs: list[RunDirectory], overview: Path) -> None:
-    from logs.overview import RunFiles, write_overview
+    from logs.recording.overview import RunFiles, write_overview
 
     names = [run.path.name for run in runs]
     unique = len(set(names)) == len(names)

@@ -10,12 +10,12 @@ from typing import Any
 
 from harvey.commands.command import Command, whole
 from harvey.errors import BadInput
-from harvey.explain.history import History
-from harvey.explain.journal import JournalHistory
-from harvey.explain.story import LEGEND, Story, lines_of, story
-from harvey.explain.trace import cycle_lines
-from harvey.explain.walk import explain, principal
-from harvey.run_directory import RunDirectory, open_run
+from harvey.run_files.run_directory import RunDirectory, open_run
+from harvey.why.history import History
+from harvey.why.journal import JournalHistory
+from harvey.why.story import LEGEND, Story, lines_of, story
+from harvey.why.trace import cycle_lines
+from harvey.why.walk import explain, principal
 from logs.disk import is_being_written
 
 
@@ -76,7 +76,7 @@ def _refs(history: History, args: Namespace) -> list[str]:
 
 def _stories(history: History, args: Namespace, refs: Iterable[str]) -> Iterator[Story]:
     if args.milestone is not None:
-        from harvey.explain.milestone import milestone_story, milestones
+        from harvey.why.milestone import milestone_story, milestones
 
         yield from (milestone_story(history, id) for id in milestones(history, args.milestone))
     for ref in refs:
@@ -106,7 +106,7 @@ def _record(one: Story) -> dict[str, Any]:
 
 
 def _checked(history: History, as_json: bool) -> int:
-    from harvey.explain.reach import KINDS, check, named
+    from harvey.why.reach import KINDS, check, named
 
     found = check(history)
     if as_json:
@@ -122,7 +122,7 @@ def _checked(history: History, as_json: bool) -> int:
 
 
 def _print_not(run: RunDirectory, history: History, args: Namespace) -> None:
-    from harvey.explain.expert import answers
+    from harvey.why.why_not_answers import answers
 
     lines = list(answers(run, history, args.not_, args.at))
     print(json.dumps({"not": args.not_, "at": args.at, "because": lines}, indent=2) if args.json else "\n".join(lines))

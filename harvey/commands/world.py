@@ -13,7 +13,7 @@ from harvey.errors import BadInput
 from harvey.units import count
 
 if TYPE_CHECKING:
-    from world_models.world import World
+    from world_models.building.world import World
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -39,14 +39,14 @@ def _run(args: Namespace) -> int:
 
 
 def _load(file: str, details: list[str]) -> World:
-    from world_models.store import load_world
+    from world_models.files.store import load_world
 
     return load_world(_path(file), details=details)
 
 
 def _path(file: str) -> Path:
     """A file, or one that comes with the project, by its bare name."""
-    from world_models.store import SUFFIXES, WORLDS
+    from world_models.files.store import SUFFIXES, WORLDS
 
     shipped = WORLDS / f"{file}.toml"
     if file.endswith((".toml", *SUFFIXES)):
@@ -58,7 +58,7 @@ def _path(file: str) -> Path:
 
 
 def _compile(file: str, details: list[str], out: str | None) -> int:
-    from world_models.store import SUFFIXES, compile_file
+    from world_models.files.store import SUFFIXES, compile_file
 
     path = _path(file)
     if path.suffix != ".toml":
@@ -72,8 +72,8 @@ def _compile(file: str, details: list[str], out: str | None) -> int:
 
 
 def _import(file: str, out: str | None) -> int:
-    from world_models.importers import BuildingError, import_building
-    from world_models.store import load_world
+    from world_models.files.importers import BuildingError, import_building
+    from world_models.files.store import load_world
 
     path = Path(file)
     target = Path(out or path.with_suffix(".toml").name)
@@ -138,7 +138,7 @@ def _draw(world: World, out: Path) -> None:
 
 
 def _svg(world: World, out: Path) -> None:
-    from world_models.plan_view import plan_svg
+    from world_models.building.plan_view import plan_svg
 
     out.write_text(plan_svg(world), encoding="utf-8")
 
@@ -150,7 +150,7 @@ def _png(world: World, out: Path) -> None:
 
 
 def _recording(world: World, out: Path) -> None:
-    from logs.building_recording import record_building
+    from logs.recording.building_recording import record_building
 
     record_building(world, out)
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from harvey.errors import BadInput
-from knowledge_sources.drivers import create2, denning, p2os
-from knowledge_sources.drivers.base import Base
-from knowledge_sources.drivers.create2 import Create2Base
-from knowledge_sources.drivers.denning import DenningBase
-from knowledge_sources.drivers.link import Link, SerialLink
-from knowledge_sources.drivers.p2os import P2osBase
+from harvey.hardware.drivers.bases import create2, denning, p2os
+from harvey.hardware.drivers.bases.base import Base
+from harvey.hardware.drivers.bases.create2 import Create2Base
+from harvey.hardware.drivers.bases.denning import DenningBase
+from harvey.hardware.drivers.bases.link import Link, SerialLink
+from harvey.hardware.drivers.bases.p2os import P2osBase
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Protocol
 
-from knowledge_sources.drivers.base import Base, BaseFault
-from knowledge_sources.drivers.video_camera import CameraFault, VideoCamera
-from world_models.body import STOP_KEY, BodyFault, Course, Frame, MotionReport, MotorCommand, Odometry, Ride, RideReport
+from harvey.hardware.drivers.bases.base import Base, BaseFault
+from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
+from world_models.entries.body import (
+    STOP_KEY,
+    BodyFault,
+    Course,
+    Frame,
+    MotionReport,
+    MotorCommand,
+    Odometry,
+    Ride,
+    RideReport,
+)
 
 BASE_WORDS: Mapping[str, str] = {
     "silent": "link lost",

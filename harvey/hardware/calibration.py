@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harvey.errors import BadInput
+from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
 from harvey.units import count
-from knowledge_sources.drivers.video_camera import CameraFault, VideoCamera
-from knowledge_sources.methods.calibration import PARAMETERS, BoardView, Calibration, calibrate
-from knowledge_sources.methods.calibration_board import Pattern, find_corners
-from knowledge_sources.methods.calibration_mount import Mounting, mounting
-from knowledge_sources.methods.images import decode
+from knowledge_sources.methods.calibration.chessboard import Pattern, find_corners
+from knowledge_sources.methods.calibration.intrinsics import PARAMETERS, BoardView, Calibration, calibrate
+from knowledge_sources.methods.calibration.mounting import Mounting, mounting
+from knowledge_sources.methods.features.images import decode
 from world_models.camera import CameraMount
 
 ENDINGS = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm", ".webp")
@@ -172,7 +172,7 @@ def _mounting_lines(found: Mounting, board: Mounted) -> tuple[str, ...]:
              f"  board   {found.to_board_m:8.4f} +- {s[3]:.4f} m ahead of the camera"]
     if board.board_ahead_m is not None:
         forward = board.board_ahead_m - found.to_board_m
-        lines += [f"  forward {forward:8.4f} +- {s[3]:.4f} m, and what the tape measure errs",
+        lines += [f"  forward {forward:8.4f} +- {s[3]:.4f} m, and what the stream measure errs",
                   f"  yaw     {math.degrees(found.yaw_rad):8.3f} +- {math.degrees(s[4]):.3f} degrees to the left, if "
                   "the board was square to the robot"]
     for name, angle in (("roll", found.roll_rad), ("yaw", found.yaw_rad if board.board_ahead_m is not None else 0.0)):

@@ -12,16 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from harvey.errors import BadInput
-from harvey.run_head import RunHead
+from harvey.run_files.run_head import RunHead
 from sim.scenario import ROOT, Arrival, Servo, Start
-from sim.settings import MOST, known_keys, merged, near, parsed, read_settings
 from world_models.actuator import ActuatorModel
 from world_models.bounds import Bounds, check_bounds
-from world_models.location import diagonal
+from world_models.entries.location import diagonal
+from world_models.entries.task import Command
+from world_models.files.compiled.schema import SUFFIXES
+from world_models.files.toml.settings import MOST, known_keys, merged, near, parsed, read_settings
+from world_models.files.toml.source import Node, Source, WorldError
 from world_models.phrases import check_command
-from world_models.store_schema import SUFFIXES
-from world_models.task import Command
-from world_models.toml_source import Node, Source, WorldError
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """Resume on hardware: a mission that was cut off goes on; the base was stopped by its watchdog in between.
 
-Board, agenda and all that was pending come back by telling the journal again (:mod:`harvey.again.resume`). How far the
+Board, agenda and all that was pending come back by telling the journal again (:mod:`harvey.replay.resume`). How far the
 wheels carried out the command that nobody reported on is not known: whoever counted them is gone. So it is a fault like
 a cable that came off in mid-move. The wheels are asked, the belief is in doubt, and a milestone has to hold before the
 robot moves on.
@@ -14,20 +14,20 @@ from typing import Any
 
 from blackboard.effect import Post
 from blackboard.journal import Decision, Sink
-from harvey.again.reliving import RESUME
-from harvey.again.replay import checked, pictures_of, replayed
-from harvey.again.resume import Remains, is_command
 from harvey.errors import BadInput
 from harvey.hardware.body import Eye, Watching
+from harvey.hardware.drivers.bases.base import Base
+from harvey.hardware.drivers.cameras.video_camera import VideoCamera
 from harvey.hardware.mission import HardwareMission
 from harvey.hardware.run import HardwareRun, driven
-from harvey.records import read_records
-from harvey.run_directory import RunDirectory
-from harvey.run_head import RunHead
-from knowledge_sources.drivers.base import Base
-from knowledge_sources.drivers.video_camera import VideoCamera
-from world_models.body import BodyFault, Frame
-from world_models.task import Resumed
+from harvey.replay.body_replay import RESUME
+from harvey.replay.replay import checked, pictures_of, replayed
+from harvey.replay.resume import Remains, is_command
+from harvey.run_files.records import read_records
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import RunHead
+from world_models.entries.body import BodyFault, Frame
+from world_models.entries.task import Resumed
 
 
 def stood_at(run: RunDirectory) -> tuple[float, int]:
@@ -83,7 +83,7 @@ def _told_again(run: RunDirectory, robot: HardwareRun, clock: Callable[[], float
     scheduler, last = robot.scheduler, None
     for told in replayed(run, pictures_of(run), scheduler):
         last = checked(run, told).now
-    robot.diary.retelling = False
+    robot.recorder.retelling = False
     if last is None:
         robot.begin()
         return None

@@ -11,24 +11,24 @@ from typing import Any
 from blackboard.effect import Post
 from blackboard.journal import Decision, Sink
 from blackboard.scheduler import Scheduler
-from harvey.diary import Diary, Extent
+from harvey.agent import Agent, agent_of
 from harvey.hardware.body import Eye, HardwareBody, Watching
-from harvey.hardware.heart import Heart
+from harvey.hardware.drivers.bases.base import Base
+from harvey.hardware.drivers.cameras.video_camera import VideoCamera
+from harvey.hardware.heartbeat import Heartbeat
 from harvey.hardware.mission import HardwareMission
 from harvey.hardware.stop_key import stop_key
 from harvey.loop import until_outcome
-from harvey.minds import Mind, mind_of
 from harvey.ports import BodyPort
 from harvey.referee import Counts
-from harvey.run_directory import RunDirectory
-from harvey.run_head import HARDWARE, RunHead
-from knowledge_sources.drivers.base import Base
-from knowledge_sources.drivers.video_camera import VideoCamera
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import HARDWARE, RunHead
+from harvey.run_files.run_recorder import Extent, RunRecorder
 from logs.disk import CannotWriteError
 from logs.errors import RecordingError
-from world_models.body import Frame, MotionReport
+from world_models.entries.body import Frame, MotionReport
+from world_models.entries.task import Outcome
 from world_models.robot import RobotModel
-from world_models.task import Outcome
 
 
 class Odometer(Counts):
@@ -49,21 +49,21 @@ class Odometer(Counts):
 
 
 class HardwareRun:
-    """Mind, body of metal and diary put together; where a run goes on that was cut off, so much of it is ``whole``.
+    """Agent, body of metal and recorder put together; where a run goes on that was cut off, so much of it is ``whole``.
 
     Attributes:
-        port: the body's; kept: the same, whose pictures go into the diary.
-        diary, scheduler: the files, and the mind at work.
+        port: the body's; kept: the same, whose pictures go into the recorder.
+        recorder, scheduler: the files, and the agent at work.
     """
 
     def __init__(
-        self, run: RunDirectory, head: RunHead, mind: Mind, body: HardwareBody, *, sinks: Sequence[Sink] = (),
+        self, run: RunDirectory, head: RunHead, agent: Agent, body: HardwareBody, *, sinks: Sequence[Sink] = (),
         live: bool = False, whole: Extent | None = None,
     ) -> None:
         self.head, self.port = head, BodyPort(body)
-        self.diary = Diary(run, head, mind.robot, live=live, whole=whole)
-        self.kept = self.diary.kept(self.port)
-        self.scheduler: Scheduler = mind.scheduler(ports=(self.kept,), sinks=(*self.diary.sinks, *sinks))
+        self.recorder = RunRecorder(run, head, agent.robot, live=live, whole=whole)
+        self.kept = self.recorder.kept(self.port)
+        self.scheduler: Scheduler = agent.scheduler(ports=(self.kept,), sinks=(*self.recorder.sinks, *sinks))
 
     def begin(self) -> None:
         """Tell it what the user asked for."""
@@ -96,9 +96,9 @@ def driven(
     began = time.perf_counter()
     body, counts = HardwareBody(base, eye, clock=clock), Odometer()
     try:
-        with stop_key(body.stop_for_good), Heart(base) as heart, mind_of(head) as mind:
-            robot = HardwareRun(run, head, mind, body, sinks=(counts, *sinks), live=live, whole=whole)
-            diary, scheduler = robot.diary, robot.scheduler
+        with stop_key(body.stop_for_good), Heartbeat(base) as heart, agent_of(head) as agent:
+            robot = HardwareRun(run, head, agent, body, sinks=(counts, *sinks), live=live, whole=whole)
+            recorder, scheduler = robot.recorder, robot.scheduler
             try:
                 run.write_result({"scenario": mission.name, "seed": 0, "outcome": "unfinished"})
                 last = begin(robot)
@@ -106,7 +106,7 @@ def driven(
                     scheduler, over=lambda s: _over(mission, s, clock()), before=heart.tick, last=last)
             finally:
                 body.stop()
-                diary.close()
+                recorder.close()
     except (CannotWriteError, RecordingError) as error:
         outcome = Outcome("failed", f"stopped, because nothing more can be written down: {error}")
     finally:

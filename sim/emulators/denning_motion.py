@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from sim.emulators.ground import Ground
-from world_models.body import MotionReport, MotorCommand
+from world_models.entries.body import MotionReport, MotorCommand
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
-from sim.body import SimulatedBody
+from sim.body.simulated_body import SimulatedBody
 from world_models.frames import Pose2
 
 

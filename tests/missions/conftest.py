@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from harvey.experiments.short_missions import OFFICE
-from sim.assembly import Stage, set_stage
+from sim.made_up.short_missions import OFFICE
 from sim.scenario import parse_scenario
+from sim.stage import Stage, set_stage
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""What would have been: a mind without an expert, a landmark or a segment, told what the recorded run observed."""
+"""What would have been: a agent without an expert, a landmark or a segment, told what the recorded run observed."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from harvey.again.counterfactual import what_if
 from harvey.cli import main
 from harvey.errors import BadInput
 from harvey.mission import run_mission
-from harvey.records import DecisionRecord, read_records
-from harvey.run_directory import RunDirectory
+from harvey.replay.counterfactual import what_if
+from harvey.run_files.records import DecisionRecord, read_records
+from harvey.run_files.run_directory import RunDirectory
 from knowledge_sources import tolerances
-from sim.assembly import Stage
+from sim.stage import Stage
 
 SEEN, BEHIND, FAR = "allens-office/desk", "allens-office/bookshelf-1", "robot-laboratory/long-bench"
 """A landmark that milestones show, one that the robot has at its back, and one in another room."""

@@ -17,17 +17,17 @@ from pathlib import Path
 import pytest
 
 from harvey.cli import main
-from sim.assembly import set_stage
-from sim.body import SimulatedBody
-from sim.camera_server import CameraServer
-from sim.emulators.ailing import AilingLine
+from sim.body.simulated_body import SimulatedBody
+from sim.emulators.camera_server import CameraServer
 from sim.emulators.denning import DenningEmulator
 from sim.emulators.denning_motion import Rolling
+from sim.emulators.faulty_line import FaultyLine
 from sim.emulators.ground import BodyGround
 from sim.emulators.terminal import Terminal
-from sim.faults import Ailment, Fault, Moment
+from sim.faults.faults import Ailment, Fault, Moment
 from sim.scenario import Scenario, load_scenario
-from world_models.camera_file import camera_text
+from sim.stage import set_stage
+from world_models.files.toml.camera_file import camera_text
 
 GOAL = "(ptrans (hallway (4,4,0)) (hallway (9,4,0)))"
 GOAL_M, INCH_M = 9 * 0.3048, 0.0254
@@ -64,7 +64,7 @@ def emulated(folder: Path, *faults: Fault) -> Iterator[Emulated]:
     body, over = stage.body(0), threading.Event()
     body.picture()  # compiled before anybody waits for it
     base = DenningEmulator(Rolling(BodyGround(body)), watchdog_s=2.0)
-    terminal = Terminal(AilingLine(base, body))
+    terminal = Terminal(FaultyLine(base, body))
     server = threading.Thread(target=terminal.serve, kwargs={"until": over.is_set, "speed": 1.5})
     (folder / "camera.toml").write_text(camera_text(stage.scenario.camera.camera, stage.scenario.camera.mount))
     (folder / "mission.toml").write_text(MISSION)

@@ -9,8 +9,8 @@ import pytest
 
 from harvey.mission import run_mission
 from harvey.referee import MissionResult
-from sim.assembly import set_stage
 from sim.scenario import parse_scenario
+from sim.stage import set_stage
 from towers import tower
 
 RIDE = """

@@ -16,16 +16,16 @@ from blackboard.journal import Decision, plain
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from harvey.mission import run_mission
-from harvey.wiring import EXPERTS, knowledge_sources, robot_model
-from sim.assembly import Stage
-from sim.body import SimulatedBody
-from sim.truth import Truth
-from world_models.body import MotionReport
+from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources, robot_model
+from sim.body.simulated_body import SimulatedBody
+from sim.body.truth import Truth
+from sim.stage import Stage
+from world_models.entries.body import MotionReport
 from world_models.robot import RobotModel
 
-NAMES = [expert.__module__.rpartition(".")[2] for expert in EXPERTS]
-NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "safekeeper", "helmsman",
-              "passenger", "obstruction_finder"}
+NAMES = [expert.__module__.rpartition(".")[2] for expert in KNOWLEDGE_SOURCES]
+NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "fault_handler", "path_follower",
+              "elevator_rider", "obstruction_finder"}
 """Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
 the move, ride in elevators, or find what is before the camera."""
 

@@ -1,4 +1,4 @@
-"""Something between mind and body fails in mid-mission: it is an entry, nobody moves, and it ends declared."""
+"""Something between agent and body fails in mid-mission: it is an entry, nobody moves, and it ends declared."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import pytest
 from blackboard.journal import Decision
 from harvey.mission import run_mission
 from harvey.referee import MissionResult
-from sim.ailments import AILMENTS
-from sim.assembly import Stage
-from sim.faults import Ailment, Moment
-from world_models.body import BodyFault, MotionReport, MotorCommand, Recovery
-from world_models.task import Milestone
+from sim.body.faulty_body import AILMENTS
+from sim.faults.faults import Ailment, Moment
+from sim.stage import Stage
+from world_models.entries.body import BodyFault, MotionReport, MotorCommand, Recovery
+from world_models.entries.task import Milestone
 
 MID_MOVE_M = 0.7
 """The second increment has just begun."""

@@ -6,15 +6,15 @@ import json
 
 import pytest
 
-from harvey.experiments.short_missions import HALLWAY, fault
 from harvey.mission import run_mission
-from harvey.run_directory import RunDirectory
+from harvey.run_files.run_directory import RunDirectory
 from logs.journal_file import read_journal
-from logs.overview import read_series
-from logs.paths import CHAPTERS, HARVEY, TABLE, WHY
 from logs.reader import read_decisions, read_frames
-from sim.assembly import set_stage
+from logs.recording.overview import read_series
+from logs.recording.paths import CHAPTERS, HARVEY, TABLE, WHY
+from sim.made_up.short_missions import HALLWAY, fault
 from sim.scenario import parse_scenario
+from sim.stage import set_stage
 
 SCENARIO = (
     HALLWAY
@@ -66,9 +66,9 @@ def test_the_story_tells_what_went_wrong(run: RunDirectory) -> None:
     assert words.count("fault") == 2, "it begins and it ends"
     assert "in truth" in words and "lost" in words and "found" in words
     assert words.index("in truth") < words.index("lost") < words.index("found")
-    moods = [word for _, word in read_series(run.recording, HARVEY, "StateChange:state")]
-    assert {"drives", "doubts", "is lost", "is in trouble"} <= set(moods)
-    assert moods[-1] == json.loads(run.result.read_text())["outcome"]
+    activities = [word for _, word in read_series(run.recording, HARVEY, "StateChange:state")]
+    assert {"drives", "doubts", "is lost", "is in trouble"} <= set(activities)
+    assert activities[-1] == json.loads(run.result.read_text())["outcome"]
 
 
 def test_the_headline_follows_the_mood(run: RunDirectory) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from harvey.experiments.kidnap import is_right, is_wrong
-from harvey.experiments.kidnap_trial import Kidnap, floor_of, found_in, scenario_text
+from experiments.robustness.kidnap import is_right, is_wrong
+from experiments.robustness.kidnap_trial import Kidnap, floor_of, found_in, scenario_text
 from sim.scenario import load_scenario
 
 

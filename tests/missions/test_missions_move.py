@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from harvey.again.replay import pictures_of, replayed
-from harvey.again.resume import remains_of, resume
-from harvey.minds import mind_of
+from harvey.agent import agent_of
 from harvey.mission import run_mission
-from harvey.records import read_records
-from harvey.run_directory import RunDirectory
-from harvey.run_head import RunHead
-from sim.assembly import Stage, set_stage
+from harvey.replay.replay import pictures_of, replayed
+from harvey.replay.resume import remains_of, resume
+from harvey.run_files.records import read_records
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import RunHead
 from sim.scenario import parse_scenario, with_settings
+from sim.stage import Stage, set_stage
 
 SCENARIO = """
 world = "research_center"
@@ -50,8 +50,8 @@ def run(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
 
 
 def decided_again(run: RunDirectory) -> bool:
-    with mind_of(RunHead.read(run.path)) as mind:
-        return all(told.same for told in replayed(run, pictures_of(run), mind.scheduler()))
+    with agent_of(RunHead.read(run.path)) as agent:
+        return all(told.same for told in replayed(run, pictures_of(run), agent.scheduler()))
 
 
 def test_each_picture_on_the_move_corrects_the_course_and_all_of_it_is_decided_again_to_the_byte(
@@ -93,7 +93,7 @@ def test_who_is_carried_off_on_the_move_stops_at_once(tmp_path: Path) -> None:
     at = next(i for i, r in enumerate(records) for e in r.made if e.type == "Discrepancy" and e.author
               == "correlator_tracker" and e.value["magnitude"] in ("inf", float("inf")))
     after = [e for r in records[at + 1: at + 4] for e in r.made if e.type in ("Course", "MotorCommand")]
-    assert [(e.type, e.value["speed_m_per_s"], e.author) for e in after] == [("Course", 0.0, "helmsman")]
+    assert [(e.type, e.value["speed_m_per_s"], e.author) for e in after] == [("Course", 0.0, "path_follower")]
 
 
 def test_it_is_a_setting_like_any_other() -> None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from blackboard.journal import Decision
-from harvey.experiments.short_missions import HALLWAY, fault
 from harvey.mission import run_mission
-from sim.assembly import Stage, set_stage
-from sim.faults import Occlusion
+from sim.faults.faults import Occlusion
+from sim.made_up.short_missions import HALLWAY, fault
 from sim.scenario import parse_scenario
-from world_models.obstruction import Obstruction
-from world_models.task import Milestone
+from sim.stage import Stage, set_stage
+from world_models.entries.obstruction import Obstruction
+from world_models.entries.task import Milestone
 
 HIDDEN = fault("occluded", "hallway", 3.0, part=0.2, duration_s=1000.0)
 

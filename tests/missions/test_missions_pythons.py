@@ -10,7 +10,7 @@ import pytest
 
 from elsewhere import ROOT, SEED, drive_elsewhere
 from harvey.mission import run_mission
-from sim.assembly import Stage
+from sim.stage import Stage
 
 
 def _other_python() -> Path | None:

@@ -12,20 +12,20 @@ from typing import Any
 
 import pytest
 
-from harvey.again.repair import redrawn
-from harvey.again.replay import pictures_of, replayed
-from harvey.again.resume import remains_of, resume
+from experiments.robustness import crash
+from harvey.agent import agent_of
 from harvey.cli import main
-from harvey.experiments import crash
-from harvey.minds import mind_of
 from harvey.mission import run_mission
-from harvey.records import DecisionRecord, read_records
 from harvey.referee import MissionResult
-from harvey.run_directory import RunDirectory
-from harvey.run_head import RunHead
+from harvey.replay.repair import redrawn
+from harvey.replay.replay import pictures_of, replayed
+from harvey.replay.resume import remains_of, resume
+from harvey.run_files.records import DecisionRecord, read_records
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import RunHead
 from logs import disk
 from logs.reader import damage_of, read_decisions, read_frames
-from sim.assembly import Stage
+from sim.stage import Stage
 
 SEED = 3
 
@@ -56,8 +56,8 @@ def gone_on(run: RunDirectory, stage: Stage) -> MissionResult:
 
 def decided_again(run: RunDirectory) -> bool:
     """Whether the whole journal, the crash included, comes out again byte for byte."""
-    with mind_of(RunHead.read(run.path)) as mind:
-        return all(told.same for told in replayed(run, pictures_of(run), mind.scheduler()))
+    with agent_of(RunHead.read(run.path)) as agent:
+        return all(told.same for told in replayed(run, pictures_of(run), agent.scheduler()))
 
 
 def made_by(records: list[DecisionRecord], kind: str, which: int) -> int:

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-import harvey.minds
+import harvey.agent
 from blackboard.archive import Archive
 from blackboard.journal import Decision
 from harvey.mission import run_mission
 from harvey.retention import RETENTION
-from sim.assembly import Stage
-from world_models.body import Frame
+from sim.stage import Stage
+from world_models.entries.body import Frame
 
 
 def test_the_decisions_are_the_same_with_it_and_without(
@@ -21,7 +21,7 @@ def test_the_decisions_are_the_same_with_it_and_without(
     with_it, without = tmp_path / "with", tmp_path / "without"
     decisions: list[Decision] = []
     run_mission(short_stage, 3, out=with_it, sinks=[decisions.append])
-    monkeypatch.setattr(harvey.minds, "RETENTION", ())
+    monkeypatch.setattr(harvey.agent, "RETENTION", ())
     run_mission(short_stage, 3, out=without)
     assert (with_it / "journal.jsonl").read_bytes() == (without / "journal.jsonl").read_bytes()
     first = next(c.entry for d in decisions for c in d.observed if isinstance(c.entry.value, Frame))

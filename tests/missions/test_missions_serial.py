@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 
 from blackboard.journal import Decision, decision_line
-from harvey.hardware.serial_body import KINDS
 from harvey.mission import run_mission
 from harvey.referee import MissionResult
-from sim.assembly import Stage
-from sim.body import SimulatedBody
-from sim.faults import Ailment, Moment
-from world_models.body import BodyFault, MotorCommand, Recovery
+from harvey.serial_body import KINDS
+from sim.body.simulated_body import SimulatedBody
+from sim.faults.faults import Ailment, Moment
+from sim.stage import Stage
+from world_models.entries.body import BodyFault, MotorCommand, Recovery
 
 INCH_M = 0.0254
 WATCHDOG_S = {"denning": 0.5, "p2os": 2.0}

@@ -9,7 +9,7 @@ import pytest
 
 from harvey.mission import run_mission
 from harvey.referee import MissionResult
-from sim.assembly import Stage
+from sim.stage import Stage
 
 INCH_M = 0.0254
 KEYS = {

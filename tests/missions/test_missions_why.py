@@ -15,21 +15,21 @@ from pathlib import Path
 import pytest
 
 from blackboard.knowledge_source import KnowledgeSource
-from harvey.campaign import Task, run_task
+from experiments.scale.long_journal import write_hour
+from harvey.agent import agent_of
+from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
-from harvey.experiments.short_missions import OFFICE, fault
-from harvey.explain.ask import AskedView, board_at, changes, why_absent
-from harvey.explain.diff_cause import grounds, parting, same
-from harvey.explain.history import History
-from harvey.explain.hour import write_hour
-from harvey.explain.journal import JournalHistory
-from harvey.explain.links import reason
-from harvey.explain.milestone import milestone_story, milestones
-from harvey.explain.reach import check
-from harvey.explain.story import decided, lines_of, story
-from harvey.explain.why_not import in_cycle
-from harvey.minds import mind_of
-from harvey.run_head import RunHead
+from harvey.diff.cause import grounds, parting, same
+from harvey.run_files.run_head import RunHead
+from harvey.why.ask import AskedView, board_at, changes, why_absent
+from harvey.why.history import History
+from harvey.why.journal import JournalHistory
+from harvey.why.links import reason
+from harvey.why.milestone import milestone_story, milestones
+from harvey.why.reach import check
+from harvey.why.story import decided, lines_of, story
+from harvey.why.why_not import in_cycle
+from sim.made_up.short_missions import OFFICE, fault
 
 BUMPED = OFFICE + fault("bump", "allens-office", 3.0, left_m=0.3, turn_deg=10.0)
 MOTION = re.compile(
@@ -57,8 +57,8 @@ def history(runs: tuple[Path, Path]) -> History:
 
 @pytest.fixture(scope="module")
 def experts(runs: tuple[Path, Path]) -> Iterator[tuple[KnowledgeSource, ...]]:
-    with mind_of(RunHead.read(runs[0])) as mind:
-        yield mind.sources
+    with agent_of(RunHead.read(runs[0])) as agent:
+        yield agent.sources
 
 
 def test_every_decision_rests_on_something(runs: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:

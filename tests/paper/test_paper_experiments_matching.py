@@ -9,9 +9,11 @@ from typing import Any
 
 import pytest
 
-from harvey.experiments import corridor, figure12, matcher, trials
-from harvey.experiments.corridor_data import FOLDER, load_corridor
-from harvey.experiments.report import Report
+from experiments import trials
+from experiments.paper import figure12
+from experiments.perception import corridor, matcher
+from experiments.perception.corridor_data import FOLDER, load_corridor
+from experiments.report import Report
 
 PNG = b"\x89PNG"
 needs_photographs = pytest.mark.skipif(

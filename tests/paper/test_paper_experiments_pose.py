@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from harvey.experiments import pose_speed, table2, table3
-from harvey.experiments.report import Report
+from experiments.paper import pose_speed, table2, table3
+from experiments.report import Report
 
 
 def failing(report: Report) -> list[str]:

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose.descent import information_inverse
 from knowledge_sources.methods.pose.estimate import Array, Mask, PoseEstimate
-from knowledge_sources.methods.pose.guard import NO_SUBSET, estimate_at, guarded, prior_estimate, reasons
-from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.numerics.finish import NO_SUBSET, estimate_at, guarded, prior_estimate, reasons
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import information_inverse
+from knowledge_sources.methods.pose.numerics.subset_poses import concentrated, squared_distances, subset_poses
+from knowledge_sources.methods.pose.numerics.subsets import group_subsets, padded_rows, subsets_needed
 from knowledge_sources.methods.pose.r_and_t import PoseState
 from knowledge_sources.methods.pose.r_and_t_ml import likeliest, r_and_t_ml
-from knowledge_sources.methods.pose.subset_poses import concentrated, squared_distances, subset_poses
-from knowledge_sources.methods.pose.subsets import group_subsets, padded_rows, subsets_needed
 from world_models.camera import Camera
 from world_models.frames import Pose
 

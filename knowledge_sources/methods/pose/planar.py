@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose.descent import cross
 from knowledge_sources.methods.pose.estimate import Array
-from knowledge_sources.methods.pose.image_error import distance_slopes
-from knowledge_sources.methods.pose.lines import LineSet
+from knowledge_sources.methods.pose.line_set import LineSet
+from knowledge_sources.methods.pose.numerics.image_error import distance_slopes
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import cross
 from world_models.frames import Pose, Pose2, wrap_angle
 
 WEAK_SHIFT_M = 1.0

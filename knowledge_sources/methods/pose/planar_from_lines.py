@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose import kernels
-from knowledge_sources.methods.pose.caution import least_move, most_unexplained
-from knowledge_sources.methods.pose.descent import Descent, Normal, information_inverse
 from knowledge_sources.methods.pose.estimate import BEHIND, Array, Mask, PlanarEstimate
-from knowledge_sources.methods.pose.guard import reasons
-from knowledge_sources.methods.pose.image_error import aspects
-from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.numerics import line_kernels as kernels
+from knowledge_sources.methods.pose.numerics.cautious_update import least_move, most_unexplained
+from knowledge_sources.methods.pose.numerics.finish import reasons
+from knowledge_sources.methods.pose.numerics.image_error import aspects
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Descent, Normal, information_inverse
 from knowledge_sources.methods.pose.planar import (
     FEW,
     NOT_BETTER,

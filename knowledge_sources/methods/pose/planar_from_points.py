@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose import point_kernels
-from knowledge_sources.methods.pose.descent import Descent, Normal, information_inverse
 from knowledge_sources.methods.pose.estimate import BEHIND, Array, Mask, PlanarEstimate
-from knowledge_sources.methods.pose.lines import checked_sigma
+from knowledge_sources.methods.pose.line_set import checked_sigma
+from knowledge_sources.methods.pose.numerics import point_kernels
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Descent, Normal, information_inverse
 from knowledge_sources.methods.pose.planar import (
     FEW,
     PlanarPrior,

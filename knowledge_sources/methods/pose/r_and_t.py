@@ -7,13 +7,19 @@ from typing import Any, Literal
 
 import numpy as np
 
-from knowledge_sources.methods.pose import kernels
-from knowledge_sources.methods.pose.descent import Descent, Normal, descend, normal_equations, rotations
 from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
-from knowledge_sources.methods.pose.guard import FEW_LINES, all_kept, estimate_at, guarded, prior_estimate
-from knowledge_sources.methods.pose.kernels import PLANES
-from knowledge_sources.methods.pose.lines import TINY, LandmarkIds, LineSet, check_landmarks, line_set
-from knowledge_sources.methods.pose.plane_error import (
+from knowledge_sources.methods.pose.line_set import TINY, LandmarkIds, LineSet, check_landmarks, line_set
+from knowledge_sources.methods.pose.numerics import line_kernels as kernels
+from knowledge_sources.methods.pose.numerics.finish import FEW_LINES, all_kept, estimate_at, guarded, prior_estimate
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import (
+    Descent,
+    Normal,
+    descend,
+    normal_equations,
+    rotations,
+)
+from knowledge_sources.methods.pose.numerics.line_kernels import PLANES
+from knowledge_sources.methods.pose.numerics.plane_error import (
     Weighting,
     camera_ends,
     line_weights,

@@ -6,11 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose import kernels
-from knowledge_sources.methods.pose.caution import least_move, most_unexplained
-from knowledge_sources.methods.pose.descent import Descent, information_inverse
 from knowledge_sources.methods.pose.estimate import BEHIND, Array, PoseEstimate
-from knowledge_sources.methods.pose.guard import (
+from knowledge_sources.methods.pose.line_set import (
+    LandmarkIds,
+    LineSet,
+    check_landmarks,
+    checked_sigma,
+    line_set,
+    matched_arrays,
+)
+from knowledge_sources.methods.pose.numerics import line_kernels as kernels
+from knowledge_sources.methods.pose.numerics.cautious_update import least_move, most_unexplained
+from knowledge_sources.methods.pose.numerics.finish import (
     FEW_LINES,
     NOT_BETTER,
     UNDECIDED,
@@ -22,18 +29,11 @@ from knowledge_sources.methods.pose.guard import (
     open_direction,
     prior_estimate,
 )
-from knowledge_sources.methods.pose.image_error import OVERLAP_SLACK_PX
-from knowledge_sources.methods.pose.kernels import IMAGE
-from knowledge_sources.methods.pose.lines import (
-    LandmarkIds,
-    LineSet,
-    check_landmarks,
-    checked_sigma,
-    line_set,
-    matched_arrays,
-)
+from knowledge_sources.methods.pose.numerics.image_error import OVERLAP_SLACK_PX
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Descent, information_inverse
+from knowledge_sources.methods.pose.numerics.line_kernels import IMAGE
+from knowledge_sources.methods.pose.numerics.subset_poses import squared_distances
 from knowledge_sources.methods.pose.r_and_t import PoseState, compiled_descent, solve_e1
-from knowledge_sources.methods.pose.subset_poses import squared_distances
 from world_models.camera import Camera
 from world_models.frames import Pose
 

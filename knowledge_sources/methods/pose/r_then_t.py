@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose.descent import (
+from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
+from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, check_landmarks, line_set
+from knowledge_sources.methods.pose.numerics.finish import FEW_LINES, all_kept, estimate_at, guarded, prior_estimate
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import (
     Descent,
     Normal,
     cross,
@@ -15,10 +18,7 @@ from knowledge_sources.methods.pose.descent import (
     normal_equations,
     rotations,
 )
-from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
-from knowledge_sources.methods.pose.guard import FEW_LINES, all_kept, estimate_at, guarded, prior_estimate
-from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, check_landmarks, line_set
-from knowledge_sources.methods.pose.plane_error import (
+from knowledge_sources.methods.pose.numerics.plane_error import (
     Weighting,
     best_translation,
     camera_ends,

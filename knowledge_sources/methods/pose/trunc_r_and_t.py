@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose import kernels
 from knowledge_sources.methods.pose.estimate import Array, Mask, PoseEstimate
-from knowledge_sources.methods.pose.guard import WEAK_INFORMATION
-from knowledge_sources.methods.pose.image_error import OVERLAP_SLACK_PX
-from knowledge_sources.methods.pose.lines import LandmarkIds, LineSet, line_set
+from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, line_set
 from knowledge_sources.methods.pose.med_r_and_t import SUBSET, refined_on, subset_candidates
+from knowledge_sources.methods.pose.numerics import line_kernels as kernels
+from knowledge_sources.methods.pose.numerics.finish import WEAK_INFORMATION
+from knowledge_sources.methods.pose.numerics.image_error import OVERLAP_SLACK_PX
+from knowledge_sources.methods.pose.numerics.subset_poses import concentrated, squared_distances
 from knowledge_sources.methods.pose.r_and_t import PoseState
 from knowledge_sources.methods.pose.r_and_t_ml import r_and_t_ml
-from knowledge_sources.methods.pose.subset_poses import concentrated, squared_distances
 from world_models.camera import Camera
 from world_models.frames import Pose
 

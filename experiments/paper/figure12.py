@@ -1,0 +1,103 @@
+"""Figure 12: a simple 2D matching problem, and the trace of the local search that solves it (§6.1.1, §6.1.3)."""
+
+from __future__ import annotations
+
+from itertools import pairwise, zip_longest
+
+import numpy as np
+
+from experiments.report import Cell, Report
+from knowledge_sources.methods.matching.hough import Peak
+from knowledge_sources.methods.matching.image_matching import Match, TraceStep, format_trace, match_lines
+
+NAMES = "ABCD"
+MODEL = (
+    ((100.0, 100.0), (100.0, 220.0)),
+    ((100.0, 100.0), (220.0, 100.0)),
+    ((220.0, 100.0), (220.0, 220.0)),
+    ((100.0, 220.0), (220.0, 220.0)),
+)
+"""A left, B top, C right, D bottom [px]."""
+DATA = (
+    ((101.0, 103.0), (100.0, 165.0)),
+    ((100.5, 172.0), (99.5, 214.0)),
+    ((103.0, 101.0), (216.0, 99.5)),
+    ((219.0, 104.0), (220.5, 216.0)),
+    ((104.0, 220.5), (150.0, 219.5)),
+    ((158.0, 219.5), (214.0, 220.5)),
+    ((150.0, 227.0), (190.0, 225.0)),
+    ((226.0, 130.0), (225.0, 180.0)),
+    ((94.0, 150.0), (93.0, 190.0)),
+    ((130.0, 93.0), (170.0, 92.0)),
+    ((140.0, 108.0), (200.0, 110.0)),
+    ((213.0, 110.0), (212.0, 150.0)),
+    ((110.0, 212.0), (140.0, 213.0)),
+    ((228.0, 190.0), (229.0, 215.0)),
+    ((227.0, 105.0), (226.0, 125.0)),
+)
+"""Data lines 1 to 15 [px], each beside the model line under which the figure lists it."""
+PAPER: tuple[tuple[str, float], ...] = (
+    ("C8 D7", 17.44),
+    ("A1 C8 D7", 15.31),
+    ("A1 B3 C8 D7", 12.47),
+    ("A1 B3 C4 C8 D7", 10.52),
+    ("A1 B3 C4 D7", 7.47),
+    ("A1 B3 C4 D6 D7", 5.26),
+    ("A1 B3 C4 D6", 2.67),
+    ("A1 B3 C4 D5 D6", 1.88),
+    ("A1 A2 B3 C4 D5 D6", 1.61),
+)
+"""The figure's own rows: the pairs checked, and the evaluation."""
+FALSE_START = ((2, 7), (3, 6))
+"""C-8 and D-7."""
+PAIR_PX = 10.0
+
+
+def run(quick: bool, seed: int) -> Report:
+    """The paper's search from the paper's false start; nothing is drawn, so ``seed`` changes nothing."""
+    match = _search("paper")
+    shorter = _search("steepest")
+    states = list(zip_longest(PAPER, match.trace))
+    rows: list[tuple[Cell, ...]] = []
+    for i, (theirs, ours) in enumerate(states):
+        paper = theirs or (None, None)
+        name = "initial" if i == 0 else str(i)
+        rows.append((name, *paper, None, *((_named(ours), ours.evaluation) if ours else (None, None))))
+    errors = [step.evaluation for step in match.trace]
+    pairs = [set(step.pairs) for step in match.trace]
+    return Report(
+        "Figure 12: the trace of a local search",
+        ("state", "paper: pairs", "paper: E", "peer", "ours: pairs", "ours: E"),
+        tuple(rows),
+        notes=(
+            "Scene ours: the figure's drawing is not legible to the digit. Four model lines A-D, a square of 120 px,"
+            " and 15 data lines, each beside the model line under which the figure lists it."
+            " No peer prints such a trace.",
+            f"First improvement, k = 1, no exchanges, alpha .5, beta 4, pairs within {PAIR_PX:.0f} px and .3 rad, from"
+            " C-8 and D-7 at the model's own place. Omission weighs by relative model length (§6.1.3 allows it;"
+            " unweighted, four lines fully seen cost 2.0 and 1.61 cannot be reached).",
+            f"Steepest descent with exchanges from the same start ends at {_named(shorter.trace[-1])},"
+            f" E = {shorter.e_match:.2f}, in {shorter.steps} moves.",
+            "The trace as printed by the matcher; model 0-3 are A-D, data count from 0:",
+            *format_trace(match).splitlines(),
+        ),
+        claims=(
+            ("the evaluation falls at each step", all(b < a for a, b in pairwise(errors))),
+            ("each step adds or deletes one pair", all(len(a ^ b) == 1 for a, b in pairwise(pairs))),
+            ("both false pairs of the start are gone in the end", not set(FALSE_START) & pairs[-1]),
+            ("the final state is the figure's", _named(match.trace[-1]) == PAPER[-1][0]),
+        ),
+    )
+
+
+def _search(way: str) -> Match:
+    paper = way == "paper"
+    return match_lines(
+        np.array(MODEL), np.array(DATA), pair_px=PAIR_PX, start=Peak(0.0, (0.0, 0.0), 0.0), first_pairs=FALSE_START,
+        strategy="first" if paper else "steepest", replace=not paper, trace=True,
+    )
+
+
+def _named(step: TraceStep) -> str:
+    """Pairs as in the figure: A1 is model line A with data line 1."""
+    return " ".join(f"{NAMES[model]}{data + 1}" for model, data in sorted(step.pairs))

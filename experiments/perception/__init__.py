@@ -1,0 +1,1 @@
+"""How well is it seen? Lines, matching, milestones, calibration."""

@@ -1,0 +1,92 @@
+"""The baseline of the matcher: RANSAC over two pairs of lines, then ICP; what one would write first."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.matching.fit import Similarity2, best_fits
+from knowledge_sources.methods.matching.hough import line_table
+from knowledge_sources.methods.matching.pairs import PairTable, model_move, pair_table
+
+Array = NDArray[np.float64]
+
+DRAWS = 500
+NEAR_PX, NEAR_RAD = 3.0, 0.1
+ROUNDS = 8
+WINDOW_PX, WINDOW_RAD = 30.0, 0.3
+STILL = (1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def ransac_icp(model_px: Array, data_px: Array, rng: np.random.Generator) -> Similarity2:
+    """The move of the model: of 500 drawn from two pairs the one with most length near, refitted to what is near."""
+    centre = model_px.reshape(-1, 2).mean(axis=0)
+    model, data = line_table(model_px, centre), line_table(data_px, centre)
+    table = pair_table(model, data, np.full(len(model_px), WINDOW_PX), WINDOW_RAD)
+    placements = np.concatenate([np.array([STILL]), _drawn(table, rng)])
+    best = placements[int(np.argmax([_score(table, placement) for placement in placements]))]
+    for _ in range(ROUNDS):
+        best = _refitted(table, best)
+    return model_move(best, centre)
+
+
+def _drawn(table: PairTable, rng: np.random.Generator) -> Array:
+    """(d, 5) placements of the data that lay two data lines on two model lines."""
+    if len(table.model) < 2:
+        return np.zeros((0, 5))
+    i, k = rng.integers(0, len(table.model), (2, DRAWS))
+    turn = -0.5 * (table.angles[i] + table.angles[k])
+    rows = np.stack([table.across[i].mean(axis=1), table.across[k].mean(axis=1)], axis=1)
+    still = np.stack([np.cos(turn), np.sin(turn), np.zeros(DRAWS), np.zeros(DRAWS), np.ones(DRAWS)], axis=1)
+    apart = np.einsum("dea,da->de", rows, still)
+    crossing = np.abs(np.linalg.det(rows[:, :, 2:4])) > 0.3
+    alike = np.abs(table.angles[i] - table.angles[k]) < NEAR_RAD
+    kept = crossing & alike
+    still[kept, 2:4] = -np.linalg.solve(rows[kept][:, :, 2:4], apart[kept][..., None])[..., 0]
+    return np.asarray(still[kept & (np.abs(still[:, 2:4]).max(axis=1) <= WINDOW_PX)])
+
+
+def _near(table: PairTable, placement: Array) -> tuple[NDArray[np.bool_], Array]:
+    distance = np.abs(table.across @ placement).max(axis=1)
+    along = table.along @ placement
+    beside = (along.max(axis=1) < 0.0) | (along.min(axis=1) > table.lengths)
+    turned = np.abs(table.angles + np.arctan2(placement[1], placement[0]))
+    return (distance <= NEAR_PX) & (turned <= NEAR_RAD) & ~beside, distance
+
+
+def _score(table: PairTable, placement: Array) -> float:
+    """Length of the model that near data lines account for."""
+    near, _ = _near(table, placement)
+    found = np.bincount(table.model[near], table.shares[near], table.lines)
+    full = np.zeros(table.lines)
+    full[table.model] = table.lengths
+    return float(np.minimum(found, full).sum())
+
+
+def _refitted(table: PairTable, placement: Array) -> Array:
+    """Each near data line to its nearest model line, then the closed fit."""
+    near, distance = _near(table, placement)
+    order = np.lexsort((distance, table.data))
+    order = order[near[order]]
+    first = np.ones(len(order), bool)
+    first[1:] = table.data[order[1:]] != table.data[order[:-1]]
+    chosen = order[first]
+    return _fitted(table, chosen, placement)
+
+
+def told(model_px: Array, data_px: Array, owner: NDArray[np.intp]) -> Similarity2:
+    """The fit to the right pairs, told by ``owner`` (k,): the best that any search for pairs could give."""
+    centre = model_px.reshape(-1, 2).mean(axis=0)
+    model, data = line_table(model_px, centre), line_table(data_px, centre)
+    table = pair_table(model, data, np.full(len(model_px), 3.0 * WINDOW_PX), 2.0 * WINDOW_RAD)
+    right = np.flatnonzero(owner[table.data] == table.model)
+    return model_move(_fitted(table, right, np.array(STILL)), centre)
+
+
+def _fitted(table: PairTable, chosen: NDArray[np.intp], placement: Array) -> Array:
+    """The closed fit of some pairs, weighted by length; ``placement`` where there are fewer than two."""
+    if len(chosen) < 2:
+        return placement
+    rows = table.across[chosen] * np.sqrt(table.shares[chosen])[:, None, None]
+    form = np.einsum("pea,peb->ab", rows, rows) + 1e-6 * np.diag([0.0, 0.0, 1.0, 1.0, 0.0])
+    return np.asarray(best_fits(form[None], False, placement).placements[0])

@@ -1,0 +1,40 @@
+"""One case as a picture: what the camera saw, and where the model's lines would lie at the pose that was found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from experiments.chart import OURS, PEER
+from experiments.perception.milestones_cases import Case
+from experiments.perception.milestones_trials import certified
+from knowledge_sources.methods.features.images import decode_colour
+from knowledge_sources.methods.verification.line_check import verify
+from world_models.entries.percepts import PoseFix, Segments
+from world_models.entries.task import Certificate
+from world_models.robot import RobotModel
+
+
+def draw_case(robot: RobotModel, case: Case, path: Path) -> None:
+    """Accounted lines in blue, the others in orange (PNG)."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
+
+    view = certified(robot, case)
+    certificate, fix, segments = view.latest(Certificate), view.latest(PoseFix), view.latest(Segments)
+    assert certificate is not None and fix is not None and segments is not None
+    lines = np.array(case.milestone.expected, float).reshape(-1, 2, 3)
+    agreed = verify(robot, lines, segments.value.segments_px, fix.value.world_from_robot)
+    figure = Figure(figsize=(6.0, 6.4), dpi=110, layout="constrained")
+    axes = figure.add_subplot()
+    axes.imshow(decode_colour(case.jpeg))
+    found = np.nan_to_num(agreed.agreement.coverage) >= 0.5
+    for some, colour in ((found, OURS), (~found, PEER)):
+        shown = agreed.projected_px[some]
+        axes.add_collection(LineCollection(list(shown[np.isfinite(shown).all(axis=(1, 2))]), colors=colour))
+    c = certificate.value
+    axes.set_title(f"{case.kind}: {c.verdict}, p_false {c.p_false:.2g}", fontsize=10)
+    axes.set_axis_off()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, format="png")

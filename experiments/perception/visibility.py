@@ -1,0 +1,129 @@
+"""Does the model know what is visible? Its shadow volumes against the simulator's renderer, in made-up houses.
+
+A pixel's ray meets several surfaces; the renderer draws one of them. For a surface picked from those that the ray meets
+the model is asked whether the point on it is hidden. The two share no code: the renderer projects by itself and keeps
+a depth for every sample, the model cuts by planes and goes through doorways.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from experiments.report import Report
+from sim.render.mesh import build_mesh
+from sim.render.projection import Lens, view_of
+from sim.render.rasterizer import sample_offsets, visible_patches
+from world_models.building.outlines import inside_polygon
+from world_models.building.world import World
+from world_models.camera import Camera, CameraMount
+from world_models.files.store import read_world
+from world_models.files.toml.source import Source
+from world_models.frames import Pose, Pose2
+from world_models.visibility.lines_and_points import hidden
+
+CAMERA = Camera.from_field_of_view(math.radians(65.0), 256, 256)
+MOUNT = CameraMount(1.0, 0.1)
+HOUSES, QUICK_HOUSES, VIEWS, RAYS = 60, 8, 6, 300
+LEAST = 0.999
+ROBOT_M = 0.35
+"""Radius of the robot that carries the camera."""
+SAMPLES = 4
+
+
+def run(quick: bool, seed: int) -> Report:
+    """So many houses, views and rays."""
+    houses = QUICK_HOUSES if quick else HOUSES
+    rows, agreed, asked = [], 0, 0
+    for number in tqdm(range(houses), file=sys.stderr, disable=not sys.stderr.isatty(), leave=False):
+        same, points = agreement(np.random.default_rng([seed, number]))
+        agreed, asked = agreed + same, asked + points
+        rows.append((number, points, points - same))
+    worst = max(rows, key=lambda row: row[2] / max(row[1], 1))
+    part = agreed / asked
+    return Report(
+        "Visibility by the model against the renderer", ("what", "ours"),
+        (("houses", houses), ("points", asked), ("agree", agreed), ("agree, part of all", part),
+         ("most that disagree in one house", worst[2])),
+        notes=(f"Seed {seed}; {VIEWS} views a house from where a robot finds room, up to {RAYS} rays a view.",),
+        claims=((f"the two agree on {LEAST:.1%} of the points ({part:.4%})", part >= LEAST),),
+    )
+
+
+def agreement(rng: np.random.Generator, views: int = VIEWS, rays: int = RAYS) -> tuple[int, int]:
+    """(points on which model and renderer agree, points) in one made-up house."""
+    world = read_world(Source.parse(house(rng), "house.toml"))
+    mesh, lens, same, asked = build_mesh(world.faces), Lens.of(CAMERA), 0, 0
+    for _ in range(views):
+        pose = MOUNT.camera_from_robot @ _somewhere(world, rng).lifted().inverse()
+        seen = visible_patches(mesh, view_of(mesh, lens, pose.rotation, pose.translation), lens, SAMPLES)
+        points, drawn = _points(world, pose, seen, rng, rays)
+        same += int(np.sum(hidden(world, CAMERA, pose, points) == ~drawn))
+        asked += len(points)
+    return same, asked
+
+
+def house(rng: np.random.Generator) -> str:
+    """Two or three rooms in a row, one of them of odd shape, with open doors, boxes and boards, as a world file."""
+    text = ['name = "house"\nunits = "metres"', "[finishes]\nplain = { colour = [0.6, 0.6, 0.6] }",
+            '[defaults]\nheight = 2.6\nwalls = "plain"\nbaseboard = "plain"\nframe = "plain"', "[parts]"]
+    for part in range(3):
+        x, y, z = rng.uniform(0.2, 0.6), rng.uniform(0.3, 0.8), rng.uniform(0.4, 2.0)
+        text.append(f'p{part} = [ {{ x = [{-x:.3f}, {x:.3f}], y = [0.0, {y:.3f}], z = [0.0, {z:.3f}],'
+                    ' finish = "plain" },'
+                    f' {{ x = [{-x:.3f}, {x / 2:.3f}], y = [0.0, {y / 2:.3f}], z = [{z:.3f}, {z + 0.3:.3f}],'
+                    ' finish = "plain" } ]')
+    rooms, doors, at = int(rng.integers(2, 4)), [], 0.0
+    for room in range(rooms):
+        width, depth = rng.uniform(3.5, 6.0), rng.uniform(3.5, 5.0)
+        things = [f'{{ part = "p{rng.integers(3)}", at = [{rng.uniform(1.0, width - 1.0):.3f},'
+                  f' {rng.uniform(0.8, depth - 1.0):.3f}], turn = {rng.uniform(-30, 30):.2f} }}']
+        things += [f'{{ part = "p{rng.integers(3)}", wall = "north", along = {width * part:.3f} }}'
+                   for part in (0.25, 0.75)]
+        text.append(f"[locales.r{room}]\nkind = 'room'\nat = [{at:.3f}, 0]\nsize = [{width:.3f}, {depth:.3f}]\n"
+                    f"things = [ {', '.join(things)} ]")
+        if room:
+            doors.append(f"d{room} = {{ between = ['r{room - 1}', 'r{room}'], wall = 'east',"
+                         f" along = {rng.uniform(0.8, 2.6):.3f}, open = true }}")
+        at += width + rng.uniform(0.1, 0.4)
+    return "\n".join([*text, "[doors]", *doors])
+
+
+def _somewhere(world: World, rng: np.random.Generator) -> Pose2:
+    """Where a robot finds room; a camera nearer to a surface sees into it."""
+    while True:
+        room = str(rng.choice(world.rooms))
+        outline = world.outline(room)
+        point = rng.uniform(outline.min(axis=0) + ROBOT_M, outline.max(axis=0) - ROBOT_M)
+        if not any(inside_polygon(point, footprint, ROBOT_M) for footprint in world.obstacles(room)):
+            return Pose2(float(point[0]), float(point[1]), float(rng.uniform(-math.pi, math.pi)))
+
+
+def _points(world: World, pose: Pose, seen: NDArray[np.int16], rng: np.random.Generator, rays: int
+            ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Points (n, 3) where rays meet surfaces, one a ray, and whether the renderer draws that surface there (n,)."""
+    scene, eye = world.scene, pose.inverse().translation
+    points, drawn = [], []
+    for row, part, column in rng.integers((CAMERA.height, SAMPLES, CAMERA.width), size=(rays, 3)):
+        pixel = column + sample_offsets(SAMPLES)[part], row + (part + 0.5) / SAMPLES - 0.5
+        ray = pose.rotation.T @ CAMERA.rays(np.array([pixel]))[0]
+        met = _met(scene.polygons_world, scene.planes_world, eye, ray)
+        if len(met):
+            surface = int(rng.choice(met)) if rng.random() < 0.7 else int(seen[row, part, column])
+            if surface in met:
+                plane = scene.planes_world[surface]
+                points.append(eye + ray * ((plane[3] - plane[:3] @ eye) / (plane[:3] @ ray)))
+                drawn.append(surface == seen[row, part, column])
+    return np.array(points).reshape(-1, 3), np.array(drawn, bool)
+
+
+def _met(polygons: NDArray[np.float64], planes: NDArray[np.float64], eye: NDArray[np.float64],
+         ray: NDArray[np.float64]) -> NDArray[np.int64]:
+    """The surfaces whose front a ray meets."""
+    spokes = polygons - eye
+    inside = np.all(np.cross(spokes, np.roll(spokes, -1, axis=1)) @ ray <= 0.0, axis=1)
+    return np.flatnonzero(inside & (planes[:, :3] @ ray < -1e-9) & (planes[:, :3] @ eye > planes[:, 3]))

@@ -1,0 +1,220 @@
+"""One kidnap: a robot that stands elsewhere than it believes, and the experts that are to find out."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import shapely
+
+from blackboard.effect import Post
+from blackboard.level import Level
+from blackboard.scheduler import Scheduler
+from blackboard.servoing import Discrepancy, Servoing
+from harvey.loop import until_outcome
+from harvey.ports import BodyPort
+from harvey.retention import RETENTION
+from knowledge_sources.action.dead_reckoner import DeadReckoner
+from knowledge_sources.goal.mission_monitor import MissionMonitor
+from knowledge_sources.goal.relocalizer import Relocalizer
+from knowledge_sources.methods.localization.visibility_map import vantage_of
+from knowledge_sources.methods.motion.routes import free_space
+from knowledge_sources.plan.line_finder import LineFinder
+from knowledge_sources.tolerances import PLAN_PX
+from sim.body.faulty_body import FaultyBody
+from sim.body.simulated_body import SimulatedBody
+from sim.building import Building
+from sim.made_up.generated_floors import Floor, generated_floor
+from world_models.actuator import ActuatorModel
+from world_models.building.world import World
+from world_models.camera import Camera, CameraMount
+from world_models.entries.body import BodyFault, Frame
+from world_models.entries.location import Hypothesis, Place, diagonal
+from world_models.entries.percepts import Panorama
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+from world_models.units import FOOT_M
+
+ROOM_M = 0.45
+"""The robot is put down so far from walls and furniture at least."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kidnap:
+    """Which one.
+
+    Attributes:
+        floor: the seed that the floor is made with; rooms: how many it has.
+        symmetric: its corridors look the same from both ends, and the robot is put into one of them.
+        number: of the kidnap on that floor; with the floor's seed it gives all chance.
+    """
+
+    floor: int
+    rooms: int
+    symmetric: bool
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What came of one.
+
+    Attributes:
+        room, x_m, y_m, heading_rad: where the robot was put [world].
+        verdict: found, ambiguous or lost.
+        believed: the locale that it says it is in; error_m: how far it is from where it says; infinite for neither.
+        probes: looks that it took; places: how many were still thought possible at the end.
+        cpu_s: processor time, without the pictures and what is worked out once for a floor.
+    """
+
+    floor: int
+    rooms: int
+    number: int
+    room: str
+    x_m: float
+    y_m: float
+    heading_rad: float
+    verdict: str
+    believed: str
+    error_m: float
+    probes: int
+    places: int
+    cpu_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A floor with its building and a robot that knows the model of it."""
+
+    floor: Floor
+    robot: RobotModel
+    building: Building
+
+
+@lru_cache(maxsize=2)
+def _floor(seed: int, rooms: int, symmetric: bool) -> Floor:
+    return generated_floor(seed, rooms, symmetric=symmetric)
+
+
+def floor_of(trial: Kidnap) -> Floor:
+    """The floor of a kidnap."""
+    return _floor(trial.floor, trial.rooms, trial.symmetric)
+
+
+@lru_cache(maxsize=2)
+def _scene(floor: Floor) -> Scene:
+    camera = Camera.from_field_of_view(math.radians(65.0), 512, 512)
+    robot = RobotModel(floor.world, camera, CameraMount(1.0, 0.1, 0.0), ActuatorModel())
+    real = floor.building
+    building = Building.of_faces(real.faces, lambda pose: real.locale_at(pose.position) or "", 8)
+    for room in robot.world.rooms:
+        vantage_of(robot.world, room, robot.mount.height_m)
+    return Scene(floor, robot, building)
+
+
+def found_in(trial: Kidnap) -> Found:
+    """Carry the robot off, and let it find out."""
+    scene = _scene(floor_of(trial))
+    room, there, belief = _drawn(trial, scene.floor)
+    body = SimulatedBody(scene.building, there, scene.robot.camera, scene.robot.mount, seed=trial.number)
+    watch = _Watch(body)
+    scheduler = _lost(scene.robot, watch, belief)
+    began = time.process_time()
+    until_outcome(scheduler, over=lambda s: "found" if _is_found(s) else None)
+    cpu_s = time.process_time() - began - watch.cpu_s
+    view = scheduler.view
+    held = view.latest(Hypothesis, lambda h: h.is_held)
+    candidates = view.where(Hypothesis, lambda h: h.status == "candidate")
+    panorama = view.latest(Panorama)
+    is_found = _is_found(scheduler)
+    pose = body.truth.world_from_robot
+    error_m = held.value.world_from_robot(scene.robot.world).distance_to(pose) if held and is_found else math.inf
+    verdict = "found" if is_found else "ambiguous" if len(candidates) > 1 else "lost"
+    return Found(
+        trial.floor, trial.rooms, trial.number, room, there.x_m, there.y_m, there.heading_rad, verdict,
+        held.value.locale if held and is_found else "", error_m, len(panorama.value.glimpses) if panorama else 0,
+        len(candidates), cpu_s,
+    )
+
+
+class _Watch(FaultyBody):
+    """The body, with the time that its pictures take."""
+
+    def __init__(self, body: SimulatedBody) -> None:
+        super().__init__(body)
+        self.cpu_s = 0.0
+
+    def look(self, purpose: str) -> Frame | BodyFault:
+        began = time.process_time()
+        try:
+            return super().look(purpose)
+        finally:
+            self.cpu_s += time.process_time() - began
+
+
+def _lost(robot: RobotModel, body: FaultyBody, belief: Place) -> Scheduler:
+    """The experts round a board on which the goal level is in doubt."""
+    sources = (LineFinder(robot), DeadReckoner(robot), Relocalizer(robot), MissionMonitor(robot))
+    scheduler = Scheduler(sources, ports=(BodyPort(body),), servoing=Servoing(), retention=RETENTION)
+    held = Hypothesis(belief.locale, Pose2(belief.x_m, belief.y_m, belief.heading_rad or 0.0), diagonal(0.05, 0.02),
+                      "milestone")
+    doubt = Discrepancy(Level.GOAL, "somebody carried the robot off", None, (PLAN_PX, PLAN_PX), "px")
+    scheduler.tell([Post(held), Post(doubt)], "user")
+    return scheduler
+
+
+def _is_found(scheduler: Scheduler) -> bool:
+    held = scheduler.view.latest(Hypothesis, lambda h: h.is_held)
+    return held is not None and held.value.basis == "relocalization"
+
+
+def _drawn(trial: Kidnap, floor: Floor) -> tuple[str, Pose2, Place]:
+    """The room and pose [world] where the robot is put, and the place where it believes to be."""
+    rng = np.random.default_rng([trial.floor, trial.number])
+    rooms = floor.corridors if trial.symmetric else (*floor.corridors, *floor.rooms)
+    room, there = _anywhere(floor.building, rooms, rng)
+    believed, pose = _anywhere(floor.world, (*floor.corridors, *floor.rooms), rng)
+    return room, there, Place.of_world(floor.world, believed, pose.x_m, pose.y_m, pose.heading_rad)
+
+
+def _anywhere(world: World, rooms: tuple[str, ...], rng: np.random.Generator) -> tuple[str, Pose2]:
+    """A free place, every square metre being as likely as any other, with any heading."""
+    free = [free_space(world.outline(name), world.obstacles(name), ROOM_M) for name in rooms]
+    areas = np.array([space.area for space in free])
+    number = int(rng.choice(len(rooms), p=areas / areas.sum()))
+    x0, y0, x1, y1 = (float(v) for v in free[number].bounds)
+    while True:
+        x, y, heading = rng.uniform(x0, x1), rng.uniform(y0, y1), rng.uniform(-math.pi, math.pi)
+        if shapely.intersects_xy(free[number], x, y):
+            return rooms[number], Pose2(float(x), float(y), float(heading))
+
+
+def scenario_text(trial: Kidnap) -> str:
+    """A mission in which it happens: the robot sets out from where it believes to be, and is carried off at once."""
+    floor = floor_of(trial)
+    room, there, belief = _drawn(trial, floor)
+    place = Place.of_world(floor.world, room, there.x_m, there.y_m, there.heading_rad)
+    goal, spot = _anywhere(floor.world, (belief.locale,), np.random.default_rng([trial.floor, trial.number, 1]))
+    end = Place.of_world(floor.world, goal, spot.x_m, spot.y_m)
+    return f'''description = "Carried off to {room} at once. Written by harvey experiment kidnap."
+world = "floor-{floor.seed}.toml"
+details = ["floor-{floor.seed}-details.toml"]
+goal = "(ptrans ({belief.locale} ({_ft(belief.x_m)},{_ft(belief.y_m)},0)) ({goal} ({_ft(end.x_m)},{_ft(end.y_m)},0)))"
+
+[start]
+heading_deg = {math.degrees(belief.heading_rad or 0.0):.3f}
+
+[[faults]]
+kind = "kidnap"
+to_locale = "{room}"
+to_x_m = {place.x_m:.4f}
+to_y_m = {place.y_m:.4f}
+to_heading_deg = {math.degrees(place.heading_rad or 0.0):.3f}
+'''
+
+
+def _ft(metres: float) -> str:
+    return f"{metres / FOOT_M:.4f}"

@@ -1,0 +1,278 @@
+"""World files that somebody has spoilt: each must give a clear error, or a world that can be checked.
+
+Texts are cut, doubled, swapped and filled with what does not belong there; values of sound files are made huge, tiny,
+negative, of another type, or the name of something else; compiled worlds lose and change bytes; building files of
+other formats (IndoorGML, IFC) are spoilt in the same ways before they are imported. A time limit a file finds what
+never ends.
+"""
+
+from __future__ import annotations
+
+import re
+import signal
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from types import FrameType
+
+import numpy as np
+from tqdm import tqdm
+
+from experiments.report import Report
+from experiments.robustness.malformed_buildings_text import GML, IFC
+from experiments.robustness.malformed_worlds_text import SMALL
+from harvey.campaign.worker_pool import by_workers
+from world_models.files.importers import BuildingError, import_building
+from world_models.files.store import compile_file, load_world, read_world
+from world_models.files.toml.source import Source, WorldError
+
+FILES, QUICK_FILES = 10_000, 400
+CHUNK, QUICK_CHUNK = 100, 20
+"""Files that a worker takes at once."""
+IFC_EVERY = 50
+"""One file of so many is IFC: reading one takes a process of its own."""
+LIMIT_S = 30.0
+"""No file takes longer, on a machine that does other things too."""
+
+TOKEN = re.compile(r'"[^"\n]*"|[\w.+-]+|[^\w\s]|\s+')
+JUNK = ("-1", "0", "1e400", "1e-300", "nan", "inf", "-3.5", "99999999", "9" * 400, "true", "[]", "{}", '""', "'''", "=",
+        "1979-05-27", "\\", "\x00", "\u202e", "[[", "]]", "[locales]", "\n\n", "#", '"north"', '"kitchen"', "[0, 0, 0]",
+        '"side-1"', '"feet"', "0.0001", "100000", "[" * 200)
+
+
+def run(quick: bool, seed: int) -> Report:
+    """Spoil, read and check so many files."""
+    files, chunk = (QUICK_FILES, QUICK_CHUNK) if quick else (FILES, CHUNK)
+    found = list(_found(files, chunk, seed))
+    tally: dict[str, Counter[str]] = {}
+    for one in found:
+        tally.setdefault(one.spoiler, Counter())[one.verdict.split(":")[0]] += 1
+    wrong = [f"file {number} ({one.spoiler}): {one.verdict}" for number, one in enumerate(found)
+             if one.verdict.startswith(("traceback", "hang", "unclear"))]
+    rows = tuple((name, sum(seen.values()), seen["error"], seen["sound"], seen["faults"], seen["traceback"],
+                  seen["hang"], seen["unclear"]) for name, seen in tally.items())
+    return Report(
+        "Malformed worlds",
+        ("spoilt by", "files", "clear error", "sound", "with faults", "traceback", "hang", "unclear"), rows,
+        notes=(f"{files} files, seed {seed}; the slowest took {max(one.seconds for one in found):.2f} s (limit"
+               f" {LIMIT_S:.0f} s).",
+               "words, lines, values, characters: of a world's text; bytes: of a compiled world (SQLite); IndoorGML,"
+               " IFC: building files, spoilt in words and lines, then imported."
+               + ("" if _with_ifc() else " No IFC file was tried: ifcopenshell is not installed."),
+               "with faults: a world that could be read, whose check names what is wrong, with file and line.",
+               "unclear: an error or fault that does not say file, what was expected and what came.", *wrong[:10]),
+        claims=((f"all {files}: a clear error or a checked world, never a traceback or a hang", not wrong),),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What became of one file: how it was spoilt, ``judged``, and how long that took."""
+
+    spoiler: str
+    verdict: str
+    seconds: float
+
+
+def _found(files: int, chunk: int, seed: int) -> Iterator[Found]:
+    """All files in order, from worker processes."""
+    parts = [range(first, min(first + chunk, files)) for first in range(0, files, chunk)]
+    known: dict[int, list[Found]] = {}
+    with tqdm(total=files, unit="file", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+        for place, found in by_workers(partial(judged_all, seed=seed), parts):
+            known[place] = found
+            bar.update(len(found))
+    for place in range(len(parts)):
+        yield from known[place]
+
+
+def judged_all(numbers: Sequence[int], seed: int) -> list[Found]:
+    """What becomes of the files with these numbers."""
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        sound = _compiled(Path(folder))
+        for number in numbers:
+            name, suffix, spoil = spoiler_of(number)
+            content = spoil(np.random.default_rng([seed, number]), sound)
+            began = time.perf_counter()
+            verdict = judged(content, Path(folder), suffix)
+            found.append(Found(name, verdict, time.perf_counter() - began))
+    return found
+
+
+def _with_ifc() -> bool:
+    return find_spec("ifcopenshell") is not None
+
+
+Spoiler = Callable[[np.random.Generator, bytes], str | bytes]
+
+
+def spoiler_of(number: int) -> tuple[str, str, Spoiler]:
+    """How the file of this number is spoilt: name, ending of the file, and how."""
+    if number % IFC_EVERY == IFC_EVERY - 1 and _with_ifc():
+        return SPOILERS[-1]
+    return SPOILERS[number % (len(SPOILERS) - 1)]
+
+
+class _TooLongError(BaseException):
+    """The time limit; like KeyboardInterrupt it passes every ``except Exception``."""
+
+
+@contextmanager
+def _limited(seconds: float) -> Iterator[None]:
+    """Raises _TooLongError after so long; only the main thread can."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(_signal: int, _frame: FrameType | None) -> None:
+        raise _TooLongError
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def judged(content: str | bytes, folder: Path, suffix: str = ".toml") -> str:
+    """``error``, ``sound`` or ``faults``; or what must not be: ``traceback: ...``, ``hang``, ``unclear: ...``."""
+    try:
+        with _limited(LIMIT_S):
+            return _read(content, folder / f"world{suffix}")
+    except (WorldError, BuildingError) as error:
+        told = str(error)
+        clear = "world." in told and "expected" in told and ("got" in told or isinstance(error, BuildingError))
+        return "error" if clear else f"unclear: {told}"
+    except _TooLongError:
+        return "hang"
+    except Exception as error:
+        return f"traceback: {error!r}"
+
+
+def _read(content: str | bytes, path: Path) -> str:
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+        world = load_world(path)
+        world.locales.values()
+        faces, faults = world.faces, world.check()
+        assert faces is not None
+    elif path.suffix == ".toml":
+        faults = read_world(Source.parse(content, path.name)).check()
+    else:
+        path.write_text(content, encoding="utf-8")
+        faults = read_world(Source.parse(import_building(path).text, "world.toml")).check()
+    unclear = [str(f) for f in faults if "expected" not in f.what or "got" not in f.what or not f.source]
+    if unclear and not isinstance(content, bytes):
+        return f"unclear: {unclear[0]}"
+    return "faults" if faults else "sound"
+
+
+def _compiled(folder: Path) -> bytes:
+    (folder / "sound.toml").write_text(SMALL, encoding="utf-8")
+    compile_file(folder / "sound.toml", folder / "sound.world")
+    return (folder / "sound.world").read_bytes()
+
+
+def _words(text: str) -> Spoiler:
+    """Words and signs changed, taken out, put in or swapped."""
+    def spoil(rng: np.random.Generator, _sound: bytes) -> str:
+        tokens = TOKEN.findall(text)
+        for _ in range(int(rng.integers(1, 5))):
+            at, other = (int(i) for i in rng.integers(len(tokens), size=2))
+            match int(rng.integers(5)):
+                case 0:
+                    tokens[at] = JUNK[int(rng.integers(len(JUNK)))]
+                case 1:
+                    del tokens[at]
+                case 2:
+                    tokens.insert(at, JUNK[int(rng.integers(len(JUNK)))])
+                case 3:
+                    tokens[at], tokens[other] = tokens[other], tokens[at]
+                case _:
+                    tokens[at] = tokens[other]
+        return "".join(tokens)
+
+    return spoil
+
+
+def _lines(text: str) -> Spoiler:
+    """Lines taken out, doubled or moved, or the end cut off."""
+    def spoil(rng: np.random.Generator, _sound: bytes) -> str:
+        lines = text.splitlines(keepends=True)
+        for _ in range(int(rng.integers(1, 4))):
+            at, other = (int(i) for i in rng.integers(len(lines), size=2))
+            match int(rng.integers(4)):
+                case 0:
+                    del lines[at]
+                case 1:
+                    lines.insert(other, lines[at])
+                case 2:
+                    lines[at], lines[other] = lines[other], lines[at]
+                case _:
+                    lines = lines[: max(2, at)]
+        return "".join(lines)
+
+    return spoil
+
+
+def _either(one: Spoiler, other: Spoiler) -> Spoiler:
+    return lambda rng, sound: (one if rng.random() < 0.7 else other)(rng, sound)
+
+
+def _values(rng: np.random.Generator, _sound: bytes) -> str:
+    """Numbers made other numbers, names other names: the text stays TOML."""
+    numbers = list(re.finditer(r"(?<![\w.\"-])-?\d+(?:\.\d+)?(?![\w\"])", SMALL))
+    names = list(re.finditer(r'"[\w-]+"', SMALL))
+    text = SMALL
+    picks = [numbers[int(i)] for i in rng.integers(len(numbers), size=int(rng.integers(1, 4)))]
+    picks += [names[int(i)] for i in rng.integers(len(names), size=int(rng.integers(0, 2)))]
+    for found in sorted({p.start(): p for p in picks}.values(), key=lambda p: -p.start()):
+        if found.group().startswith('"'):
+            new = names[int(rng.integers(len(names)))].group()
+        else:
+            value = float(found.group())
+            new = repr((value * 10.0 ** rng.integers(-3, 4), -value, value + rng.normal(), 0.0, round(value * 2),
+                        value * (1 + 1e-9))[int(rng.integers(6))])
+        text = text[: found.start()] + new + text[found.end() :]
+    return text
+
+
+def _characters(rng: np.random.Generator, _sound: bytes) -> str:
+    """Single characters changed."""
+    text = list(SMALL)
+    for _ in range(int(rng.integers(1, 8))):
+        text[int(rng.integers(len(text)))] = chr(int(rng.choice([rng.integers(32, 127), rng.integers(1, 0xD7FF)])))
+    return "".join(text)
+
+
+def _bytes(rng: np.random.Generator, sound: bytes) -> bytes:
+    """A compiled world with bytes changed, or cut off."""
+    content = bytearray(sound)
+    if rng.random() < 0.1:
+        return bytes(content[: int(rng.integers(len(content)))])
+    for _ in range(int(rng.integers(1, 40))):
+        content[int(rng.integers(len(content)))] = int(rng.integers(256))
+    return bytes(content)
+
+
+def _building(text: str) -> Spoiler:
+    """A building file, a line an element, spoilt in its words or its lines."""
+    return _either(_words(text), _lines(text.replace("><", ">\n<")))
+
+
+SPOILERS: tuple[tuple[str, str, Spoiler], ...] = (
+    ("words", ".toml", _words(SMALL)), ("lines", ".toml", _lines(SMALL)), ("values", ".toml", _values),
+    ("characters", ".toml", _characters), ("bytes", ".world", _bytes), ("IndoorGML", ".gml", _building(GML)),
+    ("IFC", ".ifc", _building(IFC)))
+"""IFC is the last."""

@@ -1,0 +1,1 @@
+"""Drivers over bad serial lines."""

@@ -1,0 +1,314 @@
+"""A campus of any size round the Research Center, written straight into a compiled world.
+
+Every generated building has four floors of a corridor and 24 rooms, the floors joined by an elevator and laid out side
+by side on the plan; a row of buildings is a district with grounds of its own, and the grounds follow one another. The
+Research Center lies at the origin, as in its own file, so that the robot's numbers are the same in every campus.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from world_models.building.faces import Face, painted
+from world_models.building.frame_source import Packet
+from world_models.building.landmarks import Edges, Landmark
+from world_models.building.locales import Doorway, Link, Locale
+from world_models.building.regions import Finish, level
+from world_models.building.world import World
+from world_models.files.compiled.packing import packed, packed_array
+from world_models.files.compiled.writer import StoreWriter
+from world_models.files.store import WORLDS, load_world
+from world_models.frames import Pose
+
+DETAILS = Path(__file__).parents[2] / "sim" / "buildings" / "research_center_details.toml"
+FLOORS, ROOMS = 4, 24
+ROOM_M, CORRIDOR_M, HEIGHT_M, WALL_M, DOOR_M, DOOR_HEIGHT_M = 4.0, 2.4, 2.7, 0.15, 0.9, 2.1
+FLOOR_PITCH_M = 16.0
+BUILDING_M = (60.0, FLOORS * FLOOR_PITCH_M + 12.0)
+ROW = 30
+"""Buildings in a district."""
+LOCALES_IN_BUILDING = 1 + FLOORS * (2 + ROOMS)
+FIRST_M = 400.0
+"""The generated districts begin so far from the Research Center, out of everybody's sight."""
+WALL, FLOOR, CEILING, FRAME = (Finish((v, v, v)) for v in (0.78, 0.45, 0.9, 0.3))
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """A campus that was written: how many locales and faces it has."""
+
+    path: Path
+    locales: int
+    faces: int
+
+
+def make_campus(locales: int, folder: Path) -> Made:
+    """The campus with at least so many locales, made unless it is there already."""
+    buildings = max(0, -(-(locales - 12) // LOCALES_IN_BUILDING))
+    path = folder / f"campus-{buildings}.world"
+    if not path.is_file():
+        folder.mkdir(parents=True, exist_ok=True)
+        partial = path.with_name(f"{path.name}.{os.getpid()}")
+        try:
+            with closing(sqlite3.connect(partial)) as file:
+                _Campus(StoreWriter(file, "campus", [DETAILS.stem])).write(buildings)
+            os.replace(partial, path)
+        finally:
+            partial.unlink(missing_ok=True)
+    frames = load_world(path).frames
+    return Made(path, frames.counts()["locale"], frames.counts()["face"])
+
+
+class _Campus:
+    """The campus while it is written."""
+
+    def __init__(self, writer: StoreWriter) -> None:
+        self._writer = writer
+        self._counts = {"locale": 0, "room": 0, "open doorway": 0, "thing": 0, "face": 0, "landmark": 0}
+
+    def write(self, buildings: int) -> None:
+        layers = [load_world(WORLDS / "research_center.toml"),
+                  load_world(WORLDS / "research_center.toml", details=[DETAILS])]
+        side = FIRST_M + BUILDING_M[0] * ROW
+        deep = FIRST_M + BUILDING_M[1] * (buildings // ROW + 2)
+        self._add(Locale("campus", "campus", None, Pose.identity(),
+                         _rectangle(-FIRST_M, -FIRST_M, side + FIRST_M, deep), 50.0))
+        self._research_center(layers)
+        rows = [range(first, min(first + ROW, buildings)) for first in range(0, buildings, ROW)]
+        template = _Template()
+        with tqdm(total=buildings, desc="making the campus", unit="building", file=sys.stderr, leave=False,
+                  disable=not sys.stderr.isatty()) as bar:
+            before = "hallway"
+            for number, row in enumerate(rows):
+                before = self._district(number, row, before, template, bar)
+        detailed = dict(self._counts)
+        more = layers[1].counts()
+        for key in ("thing", "face", "landmark"):
+            detailed[key] += more[key] - layers[0].counts()[key]
+        self._writer.count(0, self._counts)
+        self._writer.count(1, detailed)
+        self._writer.finish()
+
+    def _add(self, locale: Locale, *, room: bool = False) -> None:
+        self._writer.add_locale(locale)
+        self._counts["locale"] += 1
+        self._counts["room"] += room
+
+    def _research_center(self, layers: Sequence[World]) -> None:
+        """The Research Center and its details as they are, one level further down."""
+        model, detailed = layers
+        for name, locale in model.locales.items():
+            self._add(replace(locale, parent="campus") if name == model.root else locale, room=model.is_room(name))
+        for doorway in model.doorways:
+            self._writer.add_doorway(doorway)
+        faces, marks = len(model.faces), len(model.landmarks)
+        for layer, world in enumerate((model, detailed)):
+            for packet in world.frames.all_packets():
+                kept = packet if layer == 0 else replace(
+                    packet, faces=tuple(p for p in packet.faces if p[0] >= faces),
+                    landmarks=tuple(p for p in packet.landmarks if p[0] >= marks))
+                self._writer.add_packet(kept, layer)
+            for thing in world.things[len(model.things) if layer else 0 :]:
+                self._writer.add_thing(thing, layer)
+        for key in ("open doorway", "thing", "face", "landmark"):
+            self._counts[key] += model.counts()[key]
+
+    def _district(self, number: int, row: range, before: str, template: _Template, bar: tqdm) -> str:
+        """A row of buildings; returns the name of its grounds, which follow those of ``before``."""
+        y = FIRST_M + number * BUILDING_M[1]
+        name, grounds = f"district-{number}", f"grounds-{number}"
+        width = BUILDING_M[0] * ROW
+        self._add(Locale(name, "district", "campus", Pose(np.eye(3), np.array([FIRST_M, y, 0.0])),
+                         _rectangle(0.0, 0.0, width, BUILDING_M[1]), 40.0))
+        self._add(Locale(grounds, "grounds", name, Pose.identity(), _rectangle(0.0, 0.0, width, 6.0), 40.0), room=True)
+        self._link(f"path-{number}", before, grounds, (FIRST_M + 1.0, y + 1.0))
+        for place, building in enumerate(row):
+            x = FIRST_M + place * BUILDING_M[0]
+            prefix = f"b{building}"
+            for locale in template.locales(prefix, name, x - FIRST_M, 8.0):
+                self._add(locale, room=locale.kind in ("office", "corridor"))
+            corridor = f"{prefix}-f0-corridor"
+            self._link(f"{prefix}-entrance", grounds, corridor, (x + 2.0, y + 2.0))
+            for floor in range(1, FLOORS):
+                self._link(f"{prefix}-elevator-{floor}", corridor, f"{prefix}-f{floor}-corridor", (x + 3.0, y + 12.0))
+            for doorway in template.doorways(prefix, x, y + 8.0):
+                self._writer.add_doorway(doorway)
+                self._counts["open doorway"] += 1
+            self._packets(template, prefix, x, y + 8.0, building)
+            bar.update()
+        return grounds
+
+    def _link(self, name: str, a: str, b: str, at: tuple[float, float]) -> None:
+        self._writer.add_link(Link(name, "elevator", (a, b), np.array([(*at, 0.0)] * 2)))
+
+    def _packets(self, template: _Template, prefix: str, x: float, y: float, building: int) -> None:
+        first = 10_000 + building * (template.faces + template.landmarks)
+        for packet in template.packets:
+            self._writer.add_packed(f"{prefix}-{packet.locale}", packet.neighbour and f"{prefix}-{packet.neighbour}",
+                                    packet.words_for(prefix, first), packet.numbers_at(x, y))
+        self._counts["face"] += template.faces
+        self._counts["landmark"] += template.landmarks
+
+
+@dataclass(frozen=True, eq=False)
+class _Moulded:
+    """A packet of the template building: what changes from building to building is names, numbers and places."""
+
+    locale: str
+    neighbour: str | None
+    faces: list[list[object]]
+    landmarks: list[list[object]]
+    numbers: NDArray[np.float64]
+    moves_x: NDArray[np.float64]
+    moves_y: NDArray[np.float64]
+
+    def words_for(self, prefix: str, first: int) -> str:
+        rows = [[[first + int(str(row[0])), *row[1:]] for row in part] for part in (self.faces, self.landmarks)]
+        return json.dumps(rows, separators=(",", ":")).replace('"@', f'"{prefix}-')
+
+    def numbers_at(self, x: float, y: float) -> bytes:
+        return packed_array(self.numbers + x * self.moves_x + y * self.moves_y)
+
+
+class _Template:
+    """One generated building at the origin."""
+
+    def __init__(self) -> None:
+        here, east, north = ([packed(p) for p in _packets(x, y)] for x, y in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+        self.packets = []
+        for packet, (words, numbers), (_, moved_x), (_, moved_y) in zip(
+                _packets(0.0, 0.0), here, east, north, strict=True):
+            base = np.frombuffer(numbers, "<f8")
+            faces, landmarks = json.loads(words)
+            self.packets.append(_Moulded(
+                packet.locale[1:], packet.neighbour and packet.neighbour[1:], faces, landmarks, base,
+                np.round(np.frombuffer(moved_x, "<f8") - base), np.round(np.frombuffer(moved_y, "<f8") - base)))
+        self.faces = sum(len(p.faces) for p in self.packets)
+        self.landmarks = sum(len(p.landmarks) for p in self.packets)
+
+    def locales(self, prefix: str, district: str, x: float, y: float) -> Iterator[Locale]:
+        yield Locale(prefix, "building", district, Pose(np.eye(3), np.array([x, y, 0.0])),
+                     _rectangle(-1.0, -1.0, ROOMS // 2 * (ROOM_M + WALL_M) + 1.0, FLOORS * FLOOR_PITCH_M), 30.0,
+                     {"owner": f"Department {prefix[1:]}"})
+        for floor in range(FLOORS):
+            name = f"{prefix}-f{floor}"
+            outline = _rectangle(-0.5, -0.5, ROOMS // 2 * (ROOM_M + WALL_M) + 0.5, 2 * ROOM_M + CORRIDOR_M + 1.0)
+            yield Locale(name, "floor", prefix, Pose(np.eye(3), np.array([0.0, floor * FLOOR_PITCH_M, 0.0])), outline,
+                         3.0, {"elevation_m": 3.5 * floor})
+            for room in _rooms():
+                frame = Pose(np.eye(3), np.array([room.x, room.y, 0.0]))
+                yield Locale(f"{name}-{room.name}", "corridor" if room.name == "corridor" else "office", name, frame,
+                             _rectangle(0.0, 0.0, room.width, room.depth), HEIGHT_M)
+
+    def doorways(self, prefix: str, x: float, y: float) -> Iterator[Doorway]:
+        for floor in range(FLOORS):
+            for room in _rooms()[1:]:
+                inner, outer = room.threshold(x, y + floor * FLOOR_PITCH_M)
+                name = f"{prefix}-f{floor}"
+                yield Doorway(f"{name}-{room.name}-door", (f"{name}-{room.name}", f"{name}-corridor"),
+                              np.array([inner, outer[::-1]]), DOOR_HEIGHT_M)
+
+
+@dataclass(frozen=True, slots=True)
+class _Room:
+    """A rectangle on its floor; the corridor lies to its north or south."""
+
+    name: str
+    x: float
+    y: float
+    width: float
+    depth: float
+    door_north: bool = True
+
+    def threshold(self, x: float, y: float) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+        """Feet of the jambs on the room's and on the corridor's wall, left one first as seen from the room."""
+        left = x + self.x + (self.width - DOOR_M) / 2
+        near = y + self.y + (self.depth if self.door_north else 0.0)
+        far = near + (WALL_M if self.door_north else -WALL_M)
+        ends = (left, left + DOOR_M) if self.door_north else (left + DOOR_M, left)
+        return [(end, near) for end in ends], [(end, far) for end in ends]
+
+
+def _rooms() -> list[_Room]:
+    """The corridor first."""
+    half, pitch = ROOMS // 2, ROOM_M + WALL_M
+    south = ROOM_M + WALL_M
+    rooms = [_Room("corridor", 0.0, south, half * pitch - WALL_M, CORRIDOR_M)]
+    rooms += [_Room(f"r{i}", i * pitch, 0.0, ROOM_M, ROOM_M) for i in range(half)]
+    rooms += [_Room(f"r{half + i}", i * pitch, south + CORRIDOR_M + WALL_M, ROOM_M, ROOM_M, False) for i in range(half)]
+    return rooms
+
+
+def _packets(x: float, y: float) -> list[Packet]:
+    """The faces and landmarks of the template with its corner at (x, y); names begin with @ for the building's."""
+    packets, faces, marks = [], 0, 0
+    for floor in range(FLOORS):
+        base = y + floor * FLOOR_PITCH_M
+        for room in _rooms():
+            own = _shell(f"@f{floor}-{room.name}", room, x, base)
+            mark = Landmark(f"{own[0].locale}/corners", own[0].locale, "wall", _corners(room, x, base))
+            packets.append(Packet(own[0].locale, None, tuple(enumerate(own, faces)), ((marks, mark),)))
+            faces, marks = faces + len(own), marks + 1
+            if room.name != "corridor":
+                door = _door(f"@f{floor}", room, x, base)
+                packets.append(Packet(own[0].locale, f"@f{floor}-corridor", tuple(enumerate(door, faces)), ()))
+                faces += len(door)
+    return packets
+
+
+def _shell(name: str, room: _Room, x: float, y: float) -> list[Face]:
+    x0, y0 = x + room.x, y + room.y
+    x1, y1 = x0 + room.width, y0 + room.depth
+    floor = [(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)]
+    ceiling = [(cx, cy, HEIGHT_M) for cx, cy, _ in reversed(floor)]
+    faces = [painted(f"{name}/floor", name, floor, FLOOR), painted(f"{name}/ceiling", name, ceiling, CEILING)]
+    sides = zip(("south", "east", "north", "west"), floor, [*floor[1:], floor[0]], strict=True)
+    return faces + [painted(f"{name}/{side}-wall", name, _upright(b, a, HEIGHT_M), WALL) for side, a, b in sides]
+
+
+def _corners(room: _Room, x: float, y: float) -> Edges:
+    """The four upright corners of a room."""
+    x0, y0 = x + room.x, y + room.y
+    x1, y1 = x0 + room.width, y0 + room.depth
+    rows = []
+    for cx, cy, nx, ny in ((x0, y0, 1.0, 1.0), (x1, y0, -1.0, 1.0), (x1, y1, -1.0, -1.0), (x0, y1, 1.0, -1.0)):
+        normals = np.array([(nx, 0.0, 0.0), (0.0, ny, 0.0)])
+        rows.append(([(cx, cy, 0.0), (cx, cy, HEIGHT_M)], normals, [level(WALL, n) for n in normals] + [float("nan")]))
+    return Edges.of(rows)
+
+
+def _door(prefix: str, room: _Room, x: float, y: float) -> list[Face]:
+    """The opening seen from both sides, jambs, soffit and threshold."""
+    (a, b), (c, d) = room.threshold(x, y)
+    name, locale, corridor = f"{prefix}-{room.name}-door", f"{prefix}-{room.name}", f"{prefix}-corridor"
+    low = [(*p, 0.0) for p in (a, b, d, c)]
+    high = [(*p, DOOR_HEIGHT_M) for p in (a, b, d, c)]
+    near = Face(f"{name}/in", locale, np.array(_upright(low[0], low[1], DOOR_HEIGHT_M)), "doorway", corridor)
+    far = Face(f"{name}/out", locale, np.array(_upright(low[2], low[3], DOOR_HEIGHT_M)), "doorway", corridor)
+    more = {"neighbour": corridor, "parent": near.name}
+    return [
+        near, far,
+        painted(f"{name}/left-jamb", locale, _upright(low[3], low[0], DOOR_HEIGHT_M), FRAME, **more),
+        painted(f"{name}/right-jamb", locale, _upright(low[1], low[2], DOOR_HEIGHT_M), FRAME, **more),
+        painted(f"{name}/soffit", locale, high[::-1], FRAME, **more),
+        painted(f"{name}/threshold", locale, low, FLOOR, **more),
+    ]
+
+
+def _upright(start: Sequence[float], end: Sequence[float], height: float) -> list[tuple[float, float, float]]:
+    return [(start[0], start[1], 0.0), (end[0], end[1], 0.0), (end[0], end[1], height), (start[0], start[1], height)]
+
+
+def _rectangle(x0: float, y0: float, x1: float, y1: float) -> NDArray[np.float64]:
+    return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])

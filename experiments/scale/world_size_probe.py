@@ -1,0 +1,114 @@
+"""One world, one process: runs missions in it when told to on standard input, and answers with a line of JSON.
+
+``open``: the file opened anew, and a far route in it. ``drive``: the whole mission in the simulator. ``memory``: what
+the process held at most. Times are of the processor.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from blackboard.effect import Post
+from blackboard.journal import Decision, JournalLines
+from blackboard.scheduler import Scheduler
+from harvey.loop import until_outcome
+from harvey.ports import BodyPort
+from harvey.wiring import command, knowledge_sources, robot_model, servoing
+from sim.body.faulty_body import FaultyBody
+from sim.scenario import parse_scenario
+from sim.stage import Stage, set_stage
+from world_models.building.world import World
+from world_models.files.compiled.sqlite_frames import SqliteFrames
+
+SCENARIO = """
+world = "{world}"
+details = ["research_center_details"]
+goal = "{goal}"
+
+[start]
+heading_deg = 90.0
+put_down_sigma_m = 0.02
+put_down_sigma_deg = 1.0
+"""
+
+
+class _Watcher:
+    """Counts the decisions, and sums up the journal's text."""
+
+    def __init__(self) -> None:
+        self.decisions = 0
+        self._line, self._digest = JournalLines(), hashlib.sha256()
+
+    def __call__(self, decision: Decision) -> None:
+        self.decisions += 1
+        self._digest.update(self._line(decision).encode())
+
+    @property
+    def journal(self) -> str:
+        return self._digest.hexdigest()
+
+
+def main(path: str, goal: str, seed: str) -> None:
+    """Answer until standard input ends."""
+    stage = staged(path, goal)
+    for line in sys.stdin:
+        match line.strip():
+            case "open":
+                answer = _opened(stage)
+            case "drive":
+                answer = _drive(stage, int(seed))
+            case _:
+                answer = {"mb": most_mb()}
+        print(json.dumps(answer), flush=True)
+
+
+def staged(path: str, goal: str) -> Stage:
+    """The mission in the world of a file, with its building."""
+    return set_stage(parse_scenario(SCENARIO.format(world=Path(path).as_posix(), goal=goal), "world-size"))
+
+
+def most_mb() -> float:
+    """The most memory that this process has held since it was started [MB] (Linux)."""
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    return int(status.split("VmHWM:")[1].split()[0]) / 1024.0
+
+
+def _opened(stage: Stage) -> dict[str, Any]:
+    began = time.process_time()
+    world = robot_model(stage.scenario).world
+    open_ms = 1000.0 * (time.process_time() - began)
+    return {"open_ms": open_ms, "far_ms": _far_ms(world)}
+
+
+def _far_ms(world: World) -> float:
+    """How long it takes to sketch the way to the last locale, and its first and last stretch."""
+    frames = world.frames
+    assert isinstance(frames, SqliteFrames)
+    last = frames.last_room()
+    began = time.process_time()
+    route = world.route("robot-laboratory", last)
+    if route is not None and route.steps:
+        world.route("robot-laboratory", route.steps[0].origin)
+        world.route(route.steps[-1].destination, last)
+    return 1000.0 * (time.process_time() - began)
+
+
+def _drive(stage: Stage, seed: int) -> dict[str, Any]:
+    watcher, robot = _Watcher(), robot_model(stage.scenario)
+    scheduler = Scheduler(knowledge_sources(robot), ports=(BodyPort(FaultyBody(stage.body(seed))),),
+                          servoing=servoing(stage.scenario.servo), sinks=(watcher,))
+    scheduler.tell([Post(command(stage.scenario))], "user")
+    outcome = until_outcome(scheduler)
+    frames = robot.world.frames
+    assert isinstance(frames, SqliteFrames)
+    return {"outcome": outcome.kind, "journal": watcher.journal, "decisions": watcher.decisions,
+            "touched": len(frames.touched), "frames": frames.touched}
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,162 @@
+"""Minds: the experts of a run round a board, as they were, or with something taken from them or set otherwise.
+
+``without`` takes an expert, a landmark or a face of the model, or one segment of one picture; ``constants`` sets the
+servo levels and the numbers that an expert's file states at its top.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from typing import Any, cast
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change
+from blackboard.effect import Effect, Post
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.scheduler import Scheduler
+from blackboard.servoing import Servoing
+from harvey.errors import BadInput
+from harvey.replay.constants import set_for_a_while
+from harvey.retention import RETENTION
+from harvey.run_files.run_head import RunHead
+from harvey.wiring import knowledge_sources, servoing
+from knowledge_sources.plan.line_finder import LineFinder
+from world_models.building.frame_source import FrameSource, Packet
+from world_models.building.landmarks import Edges
+from world_models.building.world import World
+from world_models.entries.percepts import Segments
+from world_models.files.toml.settings import near, parsed
+from world_models.frames import frozen
+from world_models.robot import RobotModel
+
+SEGMENT = re.compile(r"frame[- ](\d{1,9})[ ,-]+segment[- ](\d{1,9})", re.IGNORECASE | re.ASCII)
+SERVO = "servo."
+
+Sources = Callable[[RobotModel], Sequence[KnowledgeSource]]
+
+
+@dataclass(frozen=True, eq=False)
+class Agent:
+    """Who decides, and by which model.
+
+    Attributes:
+        robot: the model.
+        sources: the experts.
+        servoing: the servo levels that are on.
+    """
+
+    robot: RobotModel
+    sources: tuple[KnowledgeSource, ...]
+    servoing: Servoing
+
+    def scheduler(self, **more: Any) -> Scheduler:
+        """The experts round an empty board; ``more``: ports and sinks."""
+        return Scheduler(self.sources, servoing=self.servoing, **{"retention": RETENTION, **more})
+
+
+@contextmanager
+def agent_of(head: RunHead, sources: Sources = knowledge_sources) -> Iterator[Agent]:
+    """The agent of a run; its constants hold until the end of the ``with``.
+
+    Raises:
+        BadInput: something to be taken or set is not there; near names are listed.
+    """
+    names = [name for name in head.without if SEGMENT.fullmatch(name) is None]
+    segments = segments_named(head.without)
+    model = head.model()
+    known = [source.name for source in sources(model)]
+    robot = replace(model, world=_lacking(model.world, [name for name in names if name not in known], known))
+    levels = {key.removeprefix(SERVO): value for key, value in head.constants if key.startswith(SERVO)}
+    experts = tuple(s for s in sources(robot) if s.name not in names)
+    if segments:
+        experts = tuple(_Blinkered(robot, segments) if isinstance(s, LineFinder) else s for s in experts)
+    with set_for_a_while([(key, value) for key, value in head.constants if not key.startswith(SERVO)]):
+        yield Agent(robot, experts, _servoing(head, levels))
+
+
+def segments_named(names: Iterable[str]) -> tuple[tuple[int, int], ...]:
+    """(frame, segment) of the names that are of that kind."""
+    return tuple((int(m[1]), int(m[2])) for name in names if (m := SEGMENT.fullmatch(name)))
+
+
+def _servoing(head: RunHead, levels: dict[str, str]) -> Servoing:
+    servo = head.servo_settings()
+    for level, value in levels.items():
+        if level not in servo.__slots__:
+            raise BadInput(f"--set {SERVO}{level}: expected {near(level, servo.__slots__)}, got {level!r}")
+        if not isinstance(parsed(value), bool):
+            raise BadInput(f"--set {SERVO}{level}: expected on or off, got {value!r}")
+        servo = replace(servo, **{level: parsed(value)})
+    return servoing(servo)
+
+
+def _lacking(world: World, names: Sequence[str], experts: Sequence[str]) -> World:
+    """The model without some of its landmarks and faces; the building itself stays as it is."""
+    if not names:
+        return world
+    packets = list(world.frames.all_packets())
+    there = {mark.name for p in packets for _, mark in p.landmarks} | {f.name for p in packets for _, f in p.faces}
+    for name in names:
+        if name not in there:
+            raise BadInput(f"--without {name}: expected {_alike(name, experts, there)}, got {name!r}")
+    return World(cast(FrameSource, _Lacking(world.frames, frozenset(names))))
+
+
+def _alike(name: str, experts: Sequence[str], elements: Set[str]) -> str:
+    """The names that somebody may have meant."""
+    known = sorted({*experts, *elements}, key=lambda known: (known.count("/"), known))
+    meant = [text for text in known if name.lower() in text.lower()] or get_close_matches(name, known, 6, 0.5)
+    names = ", ".join(meant[:6]) or f"an expert ({', '.join(experts)}), a landmark or a face of the model"
+    return f"{names}, or as 'frame 88 segment 12'"
+
+
+class _Lacking:
+    """Frames without some of their faces; a landmark that is to lack keeps its number, but has no lines any more."""
+
+    def __init__(self, frames: FrameSource, names: frozenset[str]) -> None:
+        self._frames, self._names = frames, names
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._frames, name)
+
+    def packets(self, locale: str) -> tuple[Packet, ...]:
+        return tuple(self._without(packet) for packet in self._frames.packets(locale))
+
+    def all_packets(self) -> Iterator[Packet]:
+        return (self._without(packet) for packet in self._frames.all_packets())
+
+    def _without(self, packet: Packet) -> Packet:
+        landmarks = ((n, replace(m, edges=Edges.of(())) if m.name in self._names else m) for n, m in packet.landmarks)
+        faces = (pair for pair in packet.faces if pair[1].name not in self._names)
+        return replace(packet, faces=tuple(faces), landmarks=tuple(landmarks))
+
+
+class _Blinkered(LineFinder):
+    """The line finder, with some segments of some pictures left out."""
+
+    def __init__(self, robot: RobotModel, segments: Sequence[tuple[int, int]]) -> None:
+        super().__init__(robot)
+        self._segments = tuple(segments)
+
+    @property
+    def name(self) -> str:
+        return "line_finder"
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        hidden = [segment for frame, segment in self._segments if frame == trigger.entry.value.number]
+        for effect in super().act(view, trigger):
+            if isinstance(effect, Post) and isinstance(effect.value, Segments) and hidden:
+                yield Post(_fewer(effect.value, hidden), effect.because)
+            else:
+                yield effect
+
+
+def _fewer(found: Segments, hidden: Sequence[int]) -> Segments:
+    kept = np.setdiff1d(np.arange(len(found.segments_px)), hidden)
+    return replace(found, segments_px=frozen(found.segments_px[kept]), sigma_px=frozen(found.sigma_px[kept]))

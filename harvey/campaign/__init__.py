@@ -1,0 +1,1 @@
+"""Many missions: worker processes, progress and the table of results."""

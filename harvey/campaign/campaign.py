@@ -1,0 +1,159 @@
+"""Missions by scenario, settings and seed: one at a time or several in worker processes, with the same results."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from blackboard.journal import Sink
+from harvey.campaign.worker_pool import by_workers
+from harvey.errors import BadInput
+from harvey.run_files.run_directory import RunDirectory, new_run
+
+if TYPE_CHECKING:
+    from harvey.campaign.tally import Tally
+    from harvey.referee import MissionResult
+    from sim.scenario import Scenario
+    from sim.stage import Stage
+
+Follow = Callable[["Tally"], Sink]
+"""Makes the sink that shows what a tally counts; it is called after the tally."""
+
+WORKERS = 2
+MOST_SEEDS = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One mission to run.
+
+    Attributes:
+        scenario: name or file.
+        settings: (key, value) as in ``--set key=value``.
+        seed: of all chance.
+        out: its run directory; None keeps nothing.
+        body: how the simulated body is reached.
+        go_on: keep what is in ``out`` of this mission already, and go on where it was cut off.
+    """
+
+    scenario: str
+    settings: tuple[tuple[str, str], ...]
+    seed: int
+    out: Path | None = None
+    body: str = "simulated"
+    go_on: bool = False
+
+    @property
+    def named(self) -> str:
+        """In a line."""
+        return " ".join([self.scenario, f"seed {self.seed}", *(f"{key}={value}" for key, value in self.settings)])
+
+    def stage(self) -> Stage:
+        """Raises BadInput where the scenario or a setting cannot be used."""
+        from sim.scenario import ScenarioError, load_scenario, with_settings
+        from world_models.files.store import WorldError, fingerprint
+
+        try:
+            scenario = with_settings(load_scenario(self.scenario), dict(self.settings))
+            try:
+                files = tuple(fingerprint(path) for path in (scenario.world, *scenario.details))
+            except (OSError, WorldError):
+                files = ()  # whoever reads them says what is wrong
+            return _stage(_Staged((scenario.source.text, str(scenario.folder), self.settings, files), scenario))
+        except ScenarioError as error:
+            raise BadInput(str(error)) from None
+
+
+@dataclass(frozen=True, slots=True)
+class _Staged:
+    """A scenario; the same as another where all the texts are that it and its building were read from."""
+
+    texts: tuple[object, ...]
+    scenario: Scenario = field(compare=False)
+
+
+@lru_cache(maxsize=2)
+def _stage(staged: _Staged) -> Stage:
+    """Set once for all the seeds that a process drives."""
+    from sim.stage import set_stage
+
+    return set_stage(staged.scenario)
+
+
+def seeds_of(text: str) -> tuple[int, ...]:
+    """``3``, ``0..19`` (both included) or ``1,4,9``. Raises BadInput."""
+    seeds: list[int] = []
+    for part in text.split(","):
+        match = re.fullmatch(r"(\d{1,9})(?:\.\.(\d{1,9}))?", part.strip(), re.ASCII)
+        first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
+        if last < first or last - first >= MOST_SEEDS:
+            raise BadInput("--seed: expected a number from 0 to 999999999, a range as 0..19 or a list as 1,4,9,"
+                           f" of {MOST_SEEDS} at most, got {text!r}")
+        seeds += range(first, last + 1)
+    return tuple(dict.fromkeys(seeds))
+
+
+def settings_of(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """``key=value`` pairs. Raises BadInput."""
+    for text in texts:
+        if not text.partition("=")[0] or "=" not in text:
+            raise BadInput(f"--set: expected key=value, as servo.action=off, got {text!r}")
+    pairs = (text.partition("=") for text in texts)
+    return tuple((key.strip(), value.strip()) for key, _, value in pairs)
+
+
+def run_task(
+    task: Task, *, sinks: Sequence[Sink] = (), follow: Follow | None = None, live: bool = False
+) -> MissionResult:
+    """Run one mission; ``follow`` makes a sink that shows what is counted. Raises BadInput for what the user gave."""
+    stage = task.stage()
+    from harvey.campaign.tally import Tally
+    from harvey.mission import run_mission
+
+    tally = Tally(stage)
+    shown = (tally, follow(tally)) if follow else ()
+    if task.go_on and task.out is not None and (task.out / "run.json").exists():
+        return _kept_or_resumed(RunDirectory(task.out), task, stage, (*shown, *sinks), live)
+    out = None if task.out is None else room_for(task.out, stage.scenario.name, task.seed)
+    return run_mission(stage, task.seed, out=out, sinks=(*shown, *sinks), live=live, body=task.body)
+
+
+def room_for(out: Path, name: str, seed: int) -> Path:
+    """An empty directory for a run; says so where a run of something else had to be moved aside. Raises BadInput."""
+    path, aside = new_run(out, name, seed)
+    if aside is not None:
+        print(f"--out {out}: the run that was there is of another scenario or seed; it is kept in {aside}",
+              file=sys.stderr)
+    return path
+
+
+def _kept_or_resumed(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence[Sink], live: bool) -> MissionResult:
+    """What an earlier campaign did of this mission. Raises BadInput where another mission is there."""
+    from harvey.mission import head_of
+    from harvey.referee import MissionResult
+    from harvey.replay.resume import remains_of, resume
+    from harvey.run_files.run_head import RunHead
+
+    if not RunHead.read(run.path).is_like(head_of(stage, task.seed, task.body)):
+        raise BadInput(f"{run.path}: expected a run of {task.named}, got one that began otherwise")
+    remains, record = remains_of(run), run.read_result()
+    if remains.outcome is None or record.get("outcome") != remains.outcome.kind:
+        return resume(run, remains, sinks=sinks, live=live, stage=stage)
+    try:
+        return MissionResult(**record)
+    except TypeError as error:
+        raise BadInput(f"{run.result}: {error}") from None
+
+
+def run_all(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Task, MissionResult]]:
+    """Run several missions; they come as they are done, in whatever order.
+
+    A mission's result follows from its task alone, so that the number of workers changes nothing but the time.
+    """
+    for number, result in by_workers(run_task, tasks, workers):
+        yield tasks[number], result

@@ -1,0 +1,101 @@
+"""Progress of a mission on standard error: a bar on a terminal, lines elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, TextIO
+
+from tqdm import tqdm
+
+from blackboard.journal import Decision, Sink
+from harvey.campaign.campaign import Follow, Task
+from harvey.campaign.summary import millimetres
+from harvey.campaign.tally import Tally
+from harvey.units import count
+
+if TYPE_CHECKING:
+    from harvey.referee import MissionResult
+
+
+class Bar:
+    """A bar that fills as the way to go shrinks."""
+
+    def __init__(self, tally: Tally, out: TextIO) -> None:
+        self._tally = tally
+        self._bar = tqdm(total=tally.way_m, file=out, leave=False, dynamic_ncols=True,
+                         bar_format="{percentage:3.0f} %|{bar}| {desc} [{elapsed}]")
+
+    def __call__(self, decision: Decision) -> None:
+        tally = self._tally
+        self._bar.n = min(max(0.0, tally.way_m - tally.to_go_m), tally.way_m)
+        told = f"{tally.to_go_m:.1f} m to go, {count(tally.verified, 'milestone')} verified, cycle {decision.cycle}"
+        self._bar.set_description_str(told, refresh=False)
+        self._bar.update(0)
+
+    def close(self) -> None:
+        self._bar.close()
+
+
+class Lines:
+    """A line whenever a milestone is verified."""
+
+    def __init__(self, tally: Tally, out: TextIO) -> None:
+        self._tally, self._out, self._told = tally, out, 0
+
+    def __call__(self, decision: Decision) -> None:
+        if self._tally.verified > self._told:
+            self._told = self._tally.verified
+            verified = f"{count(self._told, 'milestone')} verified"
+            print(f"cycle {decision.cycle}: {verified}, {self._tally.to_go_m:.1f} m to go", file=self._out, flush=True)
+
+    def close(self) -> None:
+        """Nothing is left open."""
+
+
+@contextmanager
+def following(out: TextIO) -> Iterator[Follow]:
+    """Shows the progress of one mission, and tidies up however it ends."""
+    shown: list[Bar | Lines] = []
+
+    def follow(tally: Tally) -> Sink:
+        shown.append(Bar(tally, out) if out.isatty() else Lines(tally, out))
+        return shown[-1]
+
+    try:
+        yield follow
+    finally:
+        for item in shown:
+            item.close()
+
+
+@contextmanager
+def stages(total: int, out: TextIO) -> Iterator[Callable[[str], None]]:
+    """Work of so many parts; to be told of each as it begins. A bar on a terminal, a line for each elsewhere."""
+    with tqdm(total=total, file=out, disable=not out.isatty(), leave=False, dynamic_ncols=True,
+              bar_format="{percentage:3.0f} %|{bar}| {desc} [{elapsed}]") as bar:
+        begun = 0
+
+        def begin(what: str) -> None:
+            nonlocal begun
+            begun += 1
+            if out.isatty():
+                bar.n = begun - 1
+                bar.set_description_str(what)
+            else:
+                print(f"{begun} of {total}: {what}", file=out, flush=True)
+
+        yield begin
+
+
+def counted(
+    done: Iterable[tuple[Task, MissionResult]], total: int, out: TextIO
+) -> Iterator[tuple[Task, MissionResult]]:
+    """Missions as they are done, with a bar on a terminal and a line for each elsewhere."""
+    with tqdm(total=total, file=out, disable=not out.isatty(), unit="mission", leave=False) as bar:
+        for number, (task, result) in enumerate(done, 1):
+            if not out.isatty():
+                how = f"{result.outcome}, {millimetres(result.final_error_m)}"
+                print(f"{number} of {total}: {task.named}: {how}", file=out, flush=True)
+            bar.update()
+            yield task, result

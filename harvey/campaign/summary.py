@@ -1,0 +1,104 @@
+"""How missions went, in words and as a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from harvey.tables import table
+from harvey.units import INCH_M, count, degrees
+
+if TYPE_CHECKING:
+    from harvey.dry_run import Prospect
+    from harvey.referee import MissionResult
+    from world_models.entries.task import Outcome
+
+COLUMNS = ("seed", "outcome", "error mm", "inches", "milestones", "refuted", "wrong", "sketches", "replans",
+           "relocated", "collisions", "path m", "robot s", "cycles", "wall s")
+
+
+def millimetres(error_m: float) -> str:
+    """An error in millimetres and inches."""
+    return f"{error_m * 1000.0:.1f} mm ({error_m / INCH_M:.2f} inches)"
+
+
+def one(r: MissionResult, out: Path | None) -> str:
+    """The summary of one mission."""
+    m = r.milestones
+    lines = [
+        f"{r.outcome}: {r.reason}",
+        f"  final error   {millimetres(r.final_error_m)} from the goal, {degrees(r.final_heading_error_rad)} off",
+        f"  milestones    {m['verified']} verified, {m['refuted']} refuted, {m['not_testable']} not testable,"
+        f" {m['false_accepts']} accepted wrongly",
+        f"  plans         {count(r.sketches, 'sketch', 'sketches')}, {count(r.replans, 'replan')},"
+        f" {count(r.relocalizations, 'relocalization')}",
+        f"  collisions    {r.collisions}",
+        *(f"  amiss         {text}" for text in r.amiss),
+        f"  way           {r.path_length_m:.1f} m in {r.sim_time_s:.0f} s of the robot's time",
+        f"  took          {r.wall_time_s:.1f} s for {count(r.decisions, 'cycle')} and {count(r.frames, 'frame')}",
+    ]
+    if out is not None:
+        lines += [f"  recording     {out / 'recording.rrd'}", "",
+                  f"open it with    harvey view {out}", f"ask it with     harvey why {out}"]
+    return "\n".join(lines)
+
+
+def several(results: Sequence[MissionResult]) -> str:
+    """A table, one row a seed, with a summary row."""
+    rows = table(COLUMNS, [*(_cells(r) for r in results), _total(results)], last_is_summary=True)
+    return "\n".join([rows, *(f"seed {r.seed}: {text}" for r in results for text in r.amiss)])
+
+
+def prospects(ahead: Sequence[Prospect]) -> str:
+    """The milestones to come, one a row."""
+    columns = ("milestone", "in", "x m", "y m", "looking", "landmarks", "lines", "place mm", "heading deg",
+               "p wrong", "verdict")
+    return table(columns, [_prospect(p) for p in ahead])
+
+
+def foreseen(ahead: Sequence[Prospect], outcome: Outcome) -> tuple[str, bool]:
+    """How a mission ends in thought, and whether nothing speaks against driving it.
+
+    In thought every milestone is taken for verified, so that the goal is reached says little where one could not be.
+    """
+    doubtful = [(verdict, sum(1 for p in ahead if p.verdict == verdict)) for verdict in ("not testable", "ambiguous")]
+    doubts = [f"{count(number, 'milestone')} {verdict}" for verdict, number in doubtful if number]
+    weak = sum(1 for p in ahead if p.verdict == "weak")
+    if outcome.kind == "reached" and doubts:
+        return f"may not reach its goal: of {len(ahead)} on the way, {' and '.join(doubts)}", False
+    if outcome.kind == "reached":
+        return f"ends: reached, {outcome.reason}" + (f"; {count(weak, 'milestone')} weak" if weak else ""), True
+    return f"ends: {outcome.kind}, {outcome.reason}" + (f"; {' and '.join(doubts)}" if doubts else ""), False
+
+
+def _prospect(p: Prospect) -> tuple[str, ...]:
+    return (p.what, p.locale, f"{p.x_m:.2f}", f"{p.y_m:.2f}", f"{math.degrees(p.look_heading_rad):.0f}",
+            str(p.landmarks), str(p.lines), f"{p.sigma_m * 1000:.1f}", f"{math.degrees(p.sigma_rad):.2f}",
+            f"{p.p_false:.1g}", f"{p.verdict}: {p.alike} looks like it" if p.alike else p.verdict)
+
+
+def _cells(r: MissionResult) -> tuple[str, ...]:
+    counts, ways = _counts(r), _ways(r)
+    return (str(r.seed), r.outcome, f"{r.final_error_m * 1000:.1f}", f"{r.final_error_m / INCH_M:.2f}",
+            *(str(n) for n in counts), f"{ways[0]:.1f}", f"{ways[1]:.0f}", f"{ways[2]:.0f}", f"{ways[3]:.1f}")
+
+
+def _counts(r: MissionResult) -> tuple[int, ...]:
+    m = r.milestones
+    return (m["verified"], m["refuted"], m["false_accepts"], r.sketches, r.replans, r.relocalizations, r.collisions)
+
+
+def _ways(r: MissionResult) -> tuple[float, ...]:
+    return r.path_length_m, r.sim_time_s, r.decisions, r.wall_time_s
+
+
+def _total(results: Sequence[MissionResult]) -> tuple[str, ...]:
+    """Counts are summed, ways averaged, of errors the worst is told."""
+    reached = sum(1 for r in results if r.outcome == "reached")
+    worst_m = max(r.final_error_m for r in results)
+    sums = [sum(values) for values in zip(*(_counts(r) for r in results), strict=True)]
+    means = [math.fsum(values) / len(results) for values in zip(*(_ways(r) for r in results), strict=True)]
+    return ("all", f"{reached} of {len(results)} reached", f"max {worst_m * 1000:.1f}", f"{worst_m / INCH_M:.2f}",
+            *(str(n) for n in sums), f"{means[0]:.1f}", f"{means[1]:.0f}", f"{means[2]:.0f}", f"{means[3]:.1f}")

@@ -1,0 +1,270 @@
+"""Why two runs went apart: the first observation or setting that differs, what followed, and how far it went."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from harvey.diff.first_difference import differing_leaves, short
+from harvey.run_files.records import DecisionRecord, EntryRecord, as_line
+from harvey.run_files.run_directory import RunDirectory
+from harvey.tables import table
+from harvey.units import count, metres
+from harvey.why.history import History
+from harvey.why.links import STRANGE, reason, words
+from harvey.why.sentences import sentence
+
+if TYPE_CHECKING:
+    from harvey.run_files.run_head import RunHead
+
+MOST_SETTINGS = 8
+IGNORED = frozenset({"harvey", "code", "arithmetic", "folder", "world_sha256"})
+
+
+@dataclass(frozen=True, slots=True)
+class Parting:
+    """Where two runs part.
+
+    Attributes:
+        observation: ref of the first entry from outside that is not the same in both; "" where all are.
+        decision: cycle of the first decision that does something else; 0 where none does.
+        motion: the first motor command that differs; "" where none does.
+        expert: cycle of the first decision in which another expert, or the same on something else, acts; 0 for none.
+    """
+
+    observation: str
+    decision: int
+    motion: str
+    expert: int
+
+
+def parting(ours: History, theirs: History, agreed: int) -> Parting:
+    """Where two runs part that agree in their first ``agreed`` decisions."""
+    observation, motion, decision, expert = "", "", 0, 0
+    for cycle in ours.cycles[agreed:]:
+        one, other = ours.cycle_of(cycle), theirs.cycle_of(cycle)
+        if one is None or other is None:
+            break
+        observation = observation or _first(one.observed, other.observed)
+        acted = _acted(one), _acted(other)
+        if not expert and acted[0] != acted[1]:
+            expert = cycle
+        if not decision and (acted[0] != acted[1] or _first(one.made, other.made) or one.refused != other.refused):
+            decision = cycle
+        motion = motion or _first(_motions(one), _motions(other))
+        if observation and decision and motion and expert:
+            break
+    return Parting(observation, decision, motion, expert)
+
+
+def _first(ours: tuple[EntryRecord, ...], theirs: tuple[EntryRecord, ...]) -> str:
+    """The first entry that is not the same in both."""
+    for a, b in zip(ours, theirs, strict=False):
+        if not same(a, b):
+            return a.ref
+    longer = ours if len(ours) > len(theirs) else theirs
+    return longer[min(len(ours), len(theirs))].ref if len(ours) != len(theirs) else ""
+
+
+def same(a: EntryRecord | None, b: EntryRecord | None) -> bool:
+    """Whether two runs say the same of an entry, to the last bit."""
+    return a == b if a is None or b is None else a == b and as_line(a.value) == as_line(b.value)
+
+
+def _acted(d: DecisionRecord) -> tuple[str, str]:
+    return ("", "") if d.chosen is None else (d.chosen.source, d.chosen.trigger)
+
+
+def _motions(d: DecisionRecord) -> tuple[EntryRecord, ...]:
+    return tuple(r for r in d.made if r.type == "MotorCommand")
+
+
+def grounds(ours: History, theirs: History, ref: str) -> Iterator[tuple[EntryRecord, EntryRecord]]:
+    """From an entry that differs to the oldest difference that it rests on, by the shortest way.
+
+    What is nearest is not what it came from: a belief that differs since the first picture rests on the last one too.
+    """
+    above: dict[str, str] = {ref: ""}
+    met, roots = [ref], list[str]()
+    for name in met:  # which grows meanwhile
+        below = _differing(ours, theirs, name)
+        if not below:
+            roots.append(name)
+        for under in below:
+            if under not in above:
+                above[under] = name
+                met.append(under)
+    oldest = min(roots, key=lambda name: (_cycle(ours, name), name), default=ref)
+    way = [oldest]
+    while above[way[-1]]:
+        way.append(above[way[-1]])
+    for name in reversed(way):
+        a, b = ours.entry(name), theirs.entry(name)
+        if a is not None and b is not None:
+            yield a, b
+
+
+def _differing(ours: History, theirs: History, ref: str) -> list[str]:
+    """The reasons of an entry that both runs have and that are not the same in both."""
+    a, b = ours.entry(ref), theirs.entry(ref)
+    shared = [name for name in a.because if name in b.because] if a is not None and b is not None else []
+    pairs = ((name, ours.entry(name), theirs.entry(name)) for name in dict.fromkeys(shared))
+    return [name for name, one, other in pairs if one is not None and other is not None and not same(one, other)]
+
+
+def _cycle(history: History, ref: str) -> int:
+    record = history.entry(ref)
+    return 0 if record is None else record.cycle
+
+
+def settings(first: RunHead, second: RunHead) -> Iterator[str]:
+    """What was set differently, and by which code and on what it was decided where both say so and differ."""
+    if first.harvey != second.harvey:
+        yield f"decided by harvey {first.harvey} against {second.harvey}"
+    elif first.code and second.code and first.code != second.code:
+        yield f"decided by different code: {first.code} against {second.code}"
+    if first.arithmetic and second.arithmetic and first.arithmetic != second.arithmetic:
+        yield f"calculated on different processors: {first.arithmetic} against {second.arithmetic}"
+    ours, theirs = (json.loads(json.dumps(asdict(head))) for head in (first, second))
+    keys = [key for key in {**ours, **theirs} if key not in IGNORED]
+    told = [f"{path}: {short(a)} against {short(b)}" for key in keys
+            for path, a, b in differing_leaves({key: ours.get(key)}, {key: theirs.get(key)})]
+    yield from told[:MOST_SETTINGS]
+    if len(told) > MOST_SETTINGS:
+        yield f"and {len(told) - MOST_SETTINGS} more"
+
+
+def because(ours: History, theirs: History, agreed: int, settings: tuple[str, ...]) -> Iterator[str]:
+    """Why the runs part, in sentences. The runs are called first and second."""
+    where = parting(ours, theirs, agreed)
+    if where.observation:
+        yield from _observed(ours, theirs, where)
+    if where.decision:
+        yield from _decided(ours, theirs, where, settings)
+    if where.motion and where.motion not in (where.observation, ""):
+        yield from _moved(ours, theirs, where.motion)
+    if where.expert and where.expert != where.decision:
+        yield from _others(ours, theirs, where.expert)
+
+
+def _observed(ours: History, theirs: History, where: Parting) -> Iterator[str]:
+    a, b = ours.entry(where.observation), theirs.entry(where.observation)
+    cycle = (a or b or EntryRecord("", "", "", "", (), None, 0, True)).cycle
+    later = "" if not where.decision or cycle <= where.decision else ", after they had decided differently"
+    yield f"The first observation that differs is {where.observation}, in cycle {cycle}{later}:"
+    yield from _both(a, b)
+    if a is not None and b is not None and a.type == "Frame" and b.type == "Frame":
+        yield "  (the same picture was asked for, and another came: other noise, or the robot stood elsewhere)"
+
+
+def _both(a: EntryRecord | None, b: EntryRecord | None) -> Iterator[str]:
+    yield f"  first:  {sentence(a) if a else 'none'}"
+    yield f"  second: {sentence(b) if b else 'none'}"
+    if a is not None and b is not None:
+        leaves = list(differing_leaves(a.value, b.value))
+        if leaves and sentence(a) == sentence(b):
+            yield f"  (they differ in {', '.join(path for path, _, _ in leaves[:4])})"
+
+
+def _decided(ours: History, theirs: History, where: Parting, settings: tuple[str, ...]) -> Iterator[str]:
+    one, other = ours.decision(where.decision), theirs.decision(where.decision)
+    if _acted(one) != _acted(other):
+        yield from _others(ours, theirs, where.decision, "The first decision that differs is in cycle")
+    else:
+        ref = _first(one.made, other.made)
+        who = words(_acted(one)[0])
+        yield f"The first decision that differs is in cycle {where.decision}, of the {who}: {ref or 'nothing'}"
+        yield from _both(_made(one, ref), _made(other, ref))
+        if one.refused != other.refused:
+            yield f"  refused in the {'first' if one.refused else 'second'}: {(one.refused or other.refused).strip()}"
+        yield from _down(ours, theirs, ref)
+    if not where.observation or _cycle(ours, where.observation) > where.decision:
+        yield from _minds(one, other, settings)
+
+
+def _minds(one: DecisionRecord, other: DecisionRecord, settings: tuple[str, ...]) -> Iterator[str]:
+    """Everything that came from outside was the same: then who decides is not."""
+    only = [(name, sorted({c.source for c in a.activated} - {c.source for c in b.activated}))
+            for name, a, b in (("first", one, other), ("second", other, one))]
+    for name, sources in only:
+        if sources:
+            yield f"  able to act only in the {name}: {', '.join(map(words, sources))}"
+    why = "; ".join(settings) or "the runs name no setting that differs"
+    yield f"Until then both were told the same, so the experts, their settings or their code differ: {why}."
+
+
+def _made(d: DecisionRecord, ref: str) -> EntryRecord | None:
+    return next((r for r in d.made if r.ref == ref), None)
+
+
+def _down(ours: History, theirs: History, ref: str) -> Iterator[str]:
+    """What the difference comes from, down to what was observed."""
+    for a, b in list(grounds(ours, theirs, ref))[1:]:
+        yield f"  because of {a.ref}" + (", which came from outside" if a.observed else "") + ":"
+        yield from (f"  {line}" for line in _both(a, b))
+
+
+def _moved(ours: History, theirs: History, ref: str) -> Iterator[str]:
+    a, b = ours.entry(ref), theirs.entry(ref)
+    cycle = (a or b or EntryRecord("", "", "", "", (), None, 0, True)).cycle
+    yield f"The first motion that differs is {ref}, in cycle {cycle}:"
+    yield from _both(a, b)
+    yield from _down(ours, theirs, ref)
+
+
+def _others(ours: History, theirs: History, cycle: int, head: str = "They take other steps for the first time in cycle"
+            ) -> Iterator[str]:
+    yield f"{head} {cycle}:"
+    for name, history in (("first: ", ours), ("second:", theirs)):
+        d = history.decision(cycle)
+        if d.chosen is None:
+            yield f"  {name} nobody acts"
+        else:
+            made = "; ".join(f"{r.ref}: {sentence(r)}" for r in d.made[:2])
+            yield f"  {name} the {words(d.chosen.source)} on {d.chosen.trigger}, rated {d.chosen.rating:.2f}: {made}"
+
+
+def apart(first: RunDirectory, second: RunDirectory, ours: History, theirs: History) -> str:
+    """How the two runs went, side by side."""
+    rows = [["decisions", str(len(ours.cycles)), str(len(theirs.cycles))]]
+    for name in ("MotorCommand", "Frame", "Milestone", "PlanSketch", "Goal"):
+        rows.append([name, *(str(sum(id.startswith(name + "-") for id in h.newest)) for h in (ours, theirs))])
+    a, b = first.read_result(), second.read_result()
+    for key in ("outcome", "final_error_m", "sim_time_s", "path_length_m", "relocalizations", "collisions"):
+        if key in a or key in b:
+            rows.append([key, *(_cell(result.get(key)) for result in (a, b))])
+    try:
+        far, at = _furthest(ours, theirs)
+    except STRANGE:
+        far, at = 0.0, ""
+    tail = f"\nthe two beliefs were furthest apart before {at}: {metres(far)}" if at else ""
+    return table(["", "first", "second"], rows) + tail
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _furthest(ours: History, theirs: History) -> tuple[float, str]:
+    """How far apart the robots believed to stand when they gave the same motor command by number [m]."""
+    far, at = 0.0, ""
+    for ref in (ref for ref in ours.refs if ref.startswith("MotorCommand-")):
+        a, b = ours.entry(ref), theirs.entry(ref)
+        if a is None or b is None:
+            break
+        here, there = reason(ours, a, "Hypothesis"), reason(theirs, b, "Hypothesis")
+        if here is None or there is None or here.value["locale"] != there.value["locale"]:
+            continue
+        p, q = here.value["locale_from_robot"], there.value["locale_from_robot"]
+        away = math.hypot(p["x_m"] - q["x_m"], p["y_m"] - q["y_m"])
+        if away > far:
+            far, at = away, a.id
+    return far, at
+
+
+def opening(agreed: int) -> str:
+    """How long the runs agree."""
+    return f"The two runs agree for {count(agreed, 'decision')}."

@@ -1,0 +1,156 @@
+"""Rehearsal: the mission in thought, before it is driven: which milestones it will have, and what each can tell.
+
+The experts themselves plan, select and drive; but wheels do exactly what they are told, and every milestone is taken
+for seen. So the rehearsal has the plan that the mission will have, as long as nothing goes wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Quiescence, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from blackboard.scheduler import RAISED, Scheduler
+from harvey.wiring import command, knowledge_sources, robot_model
+from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
+from knowledge_sources.methods.verification.line_check import LEAST_ACCOUNTED
+from knowledge_sources.methods.verification.milestone_preview import least_p_false, lookalike
+from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
+from knowledge_sources.methods.verification.view_quality import view_quality
+from knowledge_sources.plan.milestone_selector import GOOD_PART, GOOD_RAD, LEAST_LINES
+from knowledge_sources.questions import held
+from sim.scenario import Scenario
+from world_models.entries.body import MotionReport, MotorCommand, Ride, RideReport
+from world_models.entries.location import Hypothesis, Place, diagonal
+from world_models.entries.task import Command, Milestone, Outcome, PlanSketch
+from world_models.robot import RobotModel
+
+TAKING_PART = ("interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "elevator_rider",
+               "mission_monitor")
+MOST_CYCLES = 20_000
+SEEN_M, SEEN_RAD = 0.003, 0.001
+"""How well a milestone is taken to tell the place, in thought."""
+
+
+@dataclass(frozen=True, slots=True)
+class Prospect:
+    """A milestone to come.
+
+    Attributes:
+        what: in words.
+        locale, x_m, y_m: where it will be looked for, in the locale's frame.
+        look_heading_rad: in which direction [rad, world].
+        landmarks: how many; lines: how many of their lines.
+        sigma_m, sigma_rad: how well they will tell the place.
+        p_false: probability of a wrong place that would be stated if all were seen where it is expected.
+        alike: another place of the same locale that looks like it, in words, or "".
+        verdict: clear; weak (it would not tell the place well, or not surely); ambiguous (another place looks like
+            it); or not testable (hardly anything of it is seen from the path).
+    """
+
+    what: str
+    locale: str
+    x_m: float
+    y_m: float
+    look_heading_rad: float
+    landmarks: int
+    lines: int
+    sigma_m: float
+    sigma_rad: float
+    verdict: str
+    p_false: float = 0.0
+    alike: str = ""
+
+
+class Believer(KnowledgeSource):
+    """Takes every milestone that is expected for verified."""
+
+    level = Level.PLAN
+    watches = (Watch(Milestone, (Posted, Revised), lambda m: m.status == "expected"),)
+    writes = (Milestone, Hypothesis)
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        belief, milestone = held(view), trigger.entry
+        if belief is not None:
+            sure = replace(belief.value, covariance=diagonal(SEEN_M, SEEN_RAD), basis="milestone")
+            yield Revise(belief, sure, (milestone,))
+            yield Revise(milestone, replace(milestone.value, status="verified"), (milestone,))
+
+
+class PerfectWheels:
+    """A port that claims to have done exactly what was asked."""
+
+    name = "body"
+
+    def answer(self, change: Change) -> Iterable[Effect]:
+        value = change.entry.value
+        if isinstance(change, Posted) and isinstance(value, MotorCommand):
+            yield Post(MotionReport(value.turn_rad, value.move_m, 0.0, 0.0), (change.entry,))
+        elif isinstance(change, Posted) and isinstance(value, Ride):
+            yield Post(RideReport(value.passage, value.destination, 0.0, 0.0), (change.entry,))
+
+
+def rehearse(scenario: Scenario) -> tuple[tuple[Prospect, ...], Outcome]:
+    """The milestones in the order in which they will come, and how the mission ends in thought."""
+    return rehearsed(replace(robot_model(scenario), continuous=False), command(scenario))
+
+
+def rehearsed(robot: RobotModel, task: Command) -> tuple[tuple[Prospect, ...], Outcome]:
+    """The same for any robot and whatever is asked of it."""
+    experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
+    scheduler = Scheduler([*experts, Believer()], ports=(PerfectWheels(),))
+    scheduler.tell([Post(replace(task, start_covariance=diagonal(SEEN_M, SEEN_RAD)))], "user")
+    prospects: list[Prospect] = []
+    while scheduler.view.latest(Outcome) is None and scheduler.cycle < MOST_CYCLES:
+        decision = scheduler.step()
+        if decision is None:
+            scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
+        elif decision.refused.startswith(RAISED):
+            return tuple(prospects), Outcome("failed", decision.refused.strip().splitlines()[-1])
+        else:
+            prospects += _prospects(robot, scheduler.view, decision.made)
+    outcome = scheduler.view.latest(Outcome)
+    return tuple(prospects), outcome.value if outcome else Outcome("failed", f"not there after {MOST_CYCLES} cycles")
+
+
+def _prospects(robot: RobotModel, view: View, made: Sequence[Change]) -> list[Prospect]:
+    """Those of the milestones that were just taken for verified."""
+    belief = held(view)
+    if belief is None:
+        return []
+    values = (change.entry.value for change in made)
+    milestones = (v for v in values if isinstance(v, Milestone) and v.status == "verified")
+    return [_prospect(robot, view, belief.value, milestone) for milestone in milestones]
+
+
+def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Milestone) -> Prospect:
+    lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
+    pose = belief.world_from_robot(robot.world)
+    mount = robot.standing_in(belief.locale).mount
+    quality = view_quality(lines, robot.camera, mount.camera_from_robot, pose, SIGMA_ACROSS_PX)
+    sharp = quality.sigma_m <= GOOD_PART * _tolerance_m(view, milestone) and quality.sigma_rad <= GOOD_RAD
+    standing = robot.standing_in(belief.locale)
+    seen = len(lines) >= LEAST_ACCOUNTED
+    p_false = least_p_false(standing, pose, lines, np.array(diagonal(SEEN_M, SEEN_RAD))) if seen else 1.0
+    other = lookalike(standing, belief.locale, pose, lines) if seen else None
+    clear = sharp and len(lines) >= LEAST_LINES and p_false <= POSE_CONFIDENCE.accept
+    return Prospect(
+        milestone.what, belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m,
+        milestone.look_heading_rad, len(milestone.landmarks), len(lines), quality.sigma_m, quality.sigma_rad,
+        "not testable" if not seen else "ambiguous" if other is not None else "clear" if clear else "weak",
+        p_false, "" if other is None else str(Place.of_world(robot.world, belief.locale, other.x_m, other.y_m)),
+    )
+
+
+def _tolerance_m(view: View, milestone: Milestone) -> float:
+    """Of the subgoal that the milestone ends."""
+    sketch = view.get(milestone.sketch)
+    if sketch is None or not isinstance(sketch.value, PlanSketch) or milestone.index < 1:
+        return 0.1
+    return float(sketch.value.subgoals[milestone.index - 1].tolerance_m)

@@ -1,0 +1,1 @@
+"""Drivers of robot bases over serial lines."""

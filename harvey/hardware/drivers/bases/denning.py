@@ -1,0 +1,163 @@
+"""A base that speaks the Denning-style line protocol (docs/protocol-denning.md).
+
+A command has a number and is carried out at most once: the base answers a repetition by how far the first one has come.
+So repeating it is the heartbeat, the question and the cure for what was lost, all in one.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator
+
+from harvey.hardware.drivers.bases.denning_wire import Decoder, Frame, encode, number
+from harvey.hardware.drivers.bases.driver import LOOK_S, Driver
+from harvey.hardware.drivers.bases.link import Link
+from world_models.entries.body import MotionReport, MotorCommand, Odometry
+
+BAUD = 38400
+NOBODY = "00000000"
+"""The token of a frame that belongs to no session yet."""
+
+REPEAT_S = 0.15
+"""What was not answered is said again after this."""
+
+PATIENCE_S = 1.0
+"""Silence of the base that is taken for a fault."""
+
+
+class DenningBase(Driver):
+    """A base over the Denning-style protocol."""
+
+    def __init__(self, link: Link, *, nonce: str | None = None) -> None:
+        """``nonce`` (eight hexadecimal digits) tells the answer to our greeting from one to an older greeting."""
+        super().__init__(link)
+        self._decoder = Decoder()
+        self._nonce = nonce or secrets.token_hex(4).upper()
+        self._token = NOBODY
+        self._seq = self._asked = 0
+        self._unresolved = False
+        self._speeds = (0.0, 0.0)
+
+    def _carried_out(self, command: MotorCommand) -> MotionReport:
+        self._ready()
+        self._seq += 1
+        self._unresolved = True
+        words = (number(command.turn_rad), number(command.move_m))
+        frame = Frame(self._token, self._seq, "GO", words)
+        ends_s = self._link.now() + self._longest_s(command)
+        for answer in self._answers(frame, ends_s):
+            if answer.verb == "DONE":
+                return self._report(answer)
+        self._cancel()
+        raise self._fault("stalled", f"not done after {self._longest_s(command):.1f} s", stopped=True)
+
+    def _halt(self) -> None:
+        if self._token == NOBODY:
+            self._greet()
+        self._cancel()
+
+    def _counted(self) -> Odometry:
+        self._ready()
+        self._asked += 1
+        frame = Frame(self._token, self._seq, "BEAT", (str(self._asked),))
+        for answer in self._answers(frame, self._link.now() + 2 * PATIENCE_S):
+            values = answer.numbers(1, 4)
+            if answer.verb == "HERE" and answer.words[0] == str(self._asked) and values is not None:
+                return Odometry(*values)
+        raise self._fault("silent", "no answer to a heartbeat")
+
+    def _reopened(self) -> None:
+        self._decoder.clear()
+
+    def _ready(self) -> None:
+        """A session, and no command of it that may still be carried out."""
+        if self._stop_asked.is_set():
+            raise self._fault("stopped", "a stop was asked for", stopped=True)
+        if self._token == NOBODY:
+            self._greet()
+        if self._unresolved:
+            self._cancel()
+
+    def _greet(self) -> None:
+        """Begin a session. A base that was moving in another one stops when it hears the first frame of this one."""
+        hello = Frame(NOBODY, 0, "HELLO", (self._nonce,))
+        for answer in self._answers(hello, self._link.now() + 2 * PATIENCE_S):
+            values = answer.numbers(1, 3)
+            if answer.verb == "HI" and answer.words[0] == self._nonce and values is not None and min(values) > 0:
+                self._token, self._seq, self._unresolved = answer.token, 0, False
+                self._speeds = (values[1], values[2])
+                return
+        raise self._fault("silent", "no answer to a greeting")
+
+    def _cancel(self) -> None:
+        """The command of the present number is over, or never will begin; the base says which, and stands."""
+        for answer in self._answers(Frame(self._token, self._seq, "STOP"), self._link.now() + 2 * PATIENCE_S):
+            if answer.verb == "DONE":
+                self._unresolved = False
+                return
+        raise self._fault("silent", "no answer to a stop")
+
+    def _answers(self, frame: Frame, ends_s: float) -> Iterator[Frame]:
+        """Say it, and again, and give what the base answers to it, until the caller has heard enough or time is up."""
+        heard_s = self._link.now()
+        while self._link.now() < ends_s:
+            self._link.write(encode(frame))
+            again_s = self._link.now() + REPEAT_S
+            while (left := again_s - self._link.now()) > 0:
+                for answer in self._decoder.feed(self._link.read(min(LOOK_S, left))):
+                    if answer.verb == "NO" and answer.token == frame.token and answer.seq == frame.seq:
+                        self._refused(answer)
+                    if answer.verb == "HI" if frame.verb == "HELLO" else self._is_about(answer, frame):
+                        heard_s = self._link.now()
+                        self._note(answer)
+                        yield answer
+                if self._stop_asked.is_set() and frame.verb == "GO":
+                    self._cancel()
+                    raise self._fault("stopped", "a stop was asked for", stopped=True)
+            if self._link.now() - heard_s > PATIENCE_S:
+                self._give_up(frame)
+
+    def _give_up(self, frame: Frame) -> None:
+        """Nothing is heard. Perhaps we still are: say stop, and then nothing more, so that the watchdog strikes."""
+        if frame.verb == "GO":
+            self._link.write(encode(Frame(self._token, self._seq, "STOP")))
+        noise = f", only noise ({self._decoder.rejected} lines so far)" if self._decoder.rejected else ""
+        raise self._fault("silent", f"nothing heard for {PATIENCE_S:g} s{noise}")
+
+    def _refused(self, answer: Frame) -> None:
+        why = " ".join(answer.words)
+        if answer.words[:1] == ("session",):
+            self._token, self._unresolved = NOBODY, False
+            raise self._fault("disconnected", "the base has begun anew and knows nothing of us", stopped=True)
+        if answer.words[:1] == ("range",):
+            self._unresolved = False
+            self._seq -= 1
+        raise self._fault("refused", why, stopped=answer.words[:1] == ("range",))
+
+    def _note(self, answer: Frame) -> None:
+        """Keep what a frame says of the motion so far."""
+        values = answer.numbers(1 if answer.verb == "DONE" else 0, 4)
+        if answer.verb in ("RUN", "DONE") and values is not None:
+            self._so_far = MotionReport(*values)
+
+    def _report(self, answer: Frame) -> MotionReport:
+        self._unresolved = False
+        if self._so_far is None or not answer.words:
+            told = " ".join(answer.words)
+            raise self._fault("nonsense", f"expected DONE with five words, got {told!r}", stopped=True)
+        if answer.words[0] == "watchdog":
+            raise self._fault("watchdog", "it heard too little of us and stopped by itself", stopped=True)
+        if answer.words[0] == "stalled":
+            raise self._fault("stalled", "its wheels were held", stopped=True)
+        if answer.words[0] != "ok":
+            raise self._fault("stopped", f"the motion ended early: {answer.words[0]}", stopped=True)
+        return self._so_far
+
+    def _longest_s(self, command: MotorCommand) -> float:
+        """Twice what the base's own speeds make of it, and some seconds."""
+        turn_rate, speed = self._speeds
+        return 2.0 * (abs(command.turn_rad) / turn_rate + command.move_m / speed) + 5.0
+
+    @staticmethod
+    def _is_about(answer: Frame, frame: Frame) -> bool:
+        return answer.token == frame.token and answer.seq == frame.seq

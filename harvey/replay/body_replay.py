@@ -1,0 +1,80 @@
+"""BodyReplay: a simulated body does again what the journal of its run says that it did.
+
+The same calls give the same answers, so that the simulated world comes to where it was when the run was cut off;
+pictures that are known are not made once more. Where the body answers otherwise than the journal says, that is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from blackboard.change import Change, Posted
+from blackboard.effect import Effect, Retract
+from blackboard.encoding import plain
+from blackboard.entry import Entry
+from blackboard.scheduler import Port
+from harvey.errors import BadInput
+from harvey.run_files.records import EntryRecord, as_line
+from sim.body.actuator import ActuatorParameters
+from world_models.entries.body import Course, MotorCommand
+from world_models.entries.task import Resumed
+
+RESUME = "resume"
+"""The author of what a run is told that goes on after a crash."""
+
+
+class BodyReplay:
+    """Asks a port of a simulated body again, and compares its answers with what was observed."""
+
+    def __init__(self, port: Port, seed: int, actuator: ActuatorParameters) -> None:
+        self._port, self._seed, self._actuator = port, seed, actuator
+
+    def __call__(self, made: Sequence[Change], observed: Sequence[EntryRecord]) -> None:
+        """Let the body do what the changes asked for. Raises BadInput where it answers otherwise than ``observed``."""
+        broken_off = interrupted_in(observed)
+        answers = [effect for change in made for effect in self.answer(change, str(change.entry.ref) in broken_off)]
+        now = [as_line(plain(effect.value)) for effect in answers if not isinstance(effect, Retract)]
+        then = [as_line(record.value) for record in observed if record.author == self._port.name]
+        if now != then:
+            number, pair = next((i, p) for i, p in enumerate(zip([*now, "nothing"], [*then, "nothing"], strict=False))
+                                if p[0] != p[1])
+            where = observed[0].cycle if observed else "its last"
+            raise BadInput(f"the simulated robot does not answer as it did in cycle {where} (answer {number + 1}): "
+                           f"expected {pair[1][:120]}, got {pair[0][:120]}")
+
+    def answer(self, change: Change, broken_off: bool) -> Iterable[Effect]:
+        """What the port answers; a command that was broken off is carried out in part, and a motion on the move stands.
+
+        How much of it follows from the seed: when the process ended, nobody could say how far the robot was.
+        """
+        value = change.entry.value
+        if broken_off and isinstance(value, Course):
+            old = change.entry
+            stopped = replace(value, speed_m_per_s=0.0)
+            change = Posted(Entry(old.id, old.revision, stopped, old.author, old.cycle, old.because))
+        elif broken_off and isinstance(value, MotorCommand):
+            number = int(change.entry.id.rpartition("-")[2])
+            part = float(np.random.default_rng([self._seed, number]).random())
+            old = change.entry
+            done = Entry(old.id, old.revision, part_of(value, part, self._actuator), old.author, old.cycle, old.because)
+            change = Posted(done)
+        return self._port.answer(change)
+
+
+def part_of(command: MotorCommand, part: float, actuator: ActuatorParameters) -> MotorCommand:
+    """What is done of a command when a part (0..1) of its time is over: first it turns, then it moves."""
+    turn_s = abs(command.turn_rad) / actuator.turn_speed_rad_per_s
+    move_s = command.move_m / actuator.speed_m_per_s
+    gone_s = part * (turn_s + move_s)
+    turned = min(1.0, gone_s / turn_s) if turn_s else 1.0
+    moved = max(0.0, gone_s - turn_s) / move_s if move_s else 1.0
+    return MotorCommand(command.turn_rad * turned, command.move_m * min(1.0, moved))
+
+
+def interrupted_in(observed: Sequence[EntryRecord]) -> frozenset[str]:
+    """The refs of the commands that a run, when it went on, was told not to have been answered."""
+    told = (record.value for record in observed if record.type == Resumed.__name__ and isinstance(record.value, dict))
+    return frozenset(str(ref) for value in told for ref in value.get("interrupted", ()))

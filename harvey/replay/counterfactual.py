@@ -1,0 +1,212 @@
+"""Counterfactuals: what a run would have done without an expert, a landmark or a segment, or with another constant.
+
+The changed agent is told what the recorded run observed, for as long as it asks its body for the same: then what was
+observed is what it would have observed. From the first motion or picture that differs, the recorded observations no
+longer hold. In the simulator the robot is there by then, as it has lived through the same up to here, and goes on by
+itself; a run on hardware ends there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from blackboard.change import Change
+from blackboard.effect import Post
+from blackboard.encoding import plain
+from blackboard.journal import Decision, decision_line, decision_record
+from blackboard.scheduler import Scheduler
+from harvey.agent import agent_of
+from harvey.campaign.campaign import room_for
+from harvey.loop import Over, endless, until_outcome
+from harvey.mission import UNFINISHED, Mission
+from harvey.ports import BodyPort
+from harvey.referee import MissionResult
+from harvey.replay.body_replay import RESUME, BodyReplay
+from harvey.replay.hidden_segments import check_segments
+from harvey.replay.replay import Live, pictures_of
+from harvey.replay.resume import stage_of
+from harvey.run_files.observations import effect_of
+from harvey.run_files.records import DecisionRecord, EntryRecord, as_line, decision_of, read_records
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import SIMULATOR, RunHead
+from harvey.run_files.run_recorder import RunRecorder
+from logs.journal_file import ACTED_ON
+from world_models.entries.task import Outcome
+
+ASKED = frozenset(kind.__name__ for kind in ACTED_ON)
+
+
+@dataclass(frozen=True, slots=True)
+class Parting:
+    """Where the changed agent asked its body for something else; None where one of them asked for nothing any more."""
+
+    then: DecisionRecord | None
+    now: DecisionRecord | None
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What would have been.
+
+    Attributes:
+        agreed: how many decisions are the same, to the byte, before the first that is not.
+        then, now: that one, as recorded and as decided; None where there is none.
+        answered: how many decisions had their requests to the body answered by the record.
+        parting: where the record could no longer answer; None where it could to the end.
+        outcome: how it ends; kind ``unfinished`` where it was left at the parting.
+        result: in the simulator: how it went, by the truth.
+    """
+
+    agreed: int
+    then: DecisionRecord | None
+    now: DecisionRecord | None
+    answered: int
+    parting: Parting | None
+    outcome: Outcome
+    result: MissionResult | None
+
+
+class _PartedError(Exception):
+    """The run is to end where it parts from the record."""
+
+
+def what_if(
+    run: RunDirectory, without: Sequence[str], constants: Sequence[tuple[str, str]], *,
+    out: RunDirectory | None = None, go_on: bool = True,
+) -> Answer:
+    """Decide a run again with a changed agent.
+
+    Args:
+        without: experts, landmarks, faces, or ``frame 88 segment 12``, to be taken away.
+        constants: (key, value) of servo levels and constants to be set.
+        out: where what would have been is kept, as a run; an older one there goes once it is clear what is asked.
+        go_on: in the simulator: go on where the record no longer answers.
+
+    Raises:
+        BadInput: the run cannot be used, or what is to be taken or set is not there.
+    """
+    then = RunHead.read(run.path)
+    head = replace(then.here(), without=(*then.without, *without), constants=(*then.constants, *constants))
+    player = _Player(run)
+    check_segments(player.records, without, then.without)
+    with agent_of(head) as agent:
+        if out is not None:
+            room_for(out.path, head.name, head.seed)
+        recorder = RunRecorder(out, head, agent.robot)
+        if head.kind != SIMULATOR:
+            scheduler = agent.scheduler(sinks=(*recorder.sinks, player.heard))
+            try:
+                return player.answer(player.played(scheduler, head, recorder), None)
+            finally:
+                recorder.close()
+        stage = stage_of(head)
+        mission = Mission(stage, head, agent, recorder, (player.heard,))
+        reliving = BodyReplay(mission.port, head.seed, stage.scenario.actuator)
+        result = mission.driven(out, lambda: _simulated(mission, player, head, reliving, go_on))
+        return player.answer(Outcome(result.outcome, result.reason), result)
+
+
+def _simulated(mission: Mission, player: _Player, head: RunHead, reliving: Live, go_on: bool) -> Outcome:
+    """By the record as far as it answers; then by the simulated robot, if it is to go on."""
+    mission.kept.closed = True
+    mission.body.recall(player.pictures)
+    outcome = player.played(
+        mission.scheduler, head, mission.recorder, live=reliving, before=mission.tell_truth, over=mission.over)
+    if player.parting is None or not go_on:
+        return outcome
+    mission.body.recall({})
+    mission.kept.closed = False
+    for change in player.open:
+        mission.scheduler.tell(mission.kept.answer(change), mission.kept.name)
+    return mission.go_on(player.last)
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """What a recorded decision asked of the body, and what was observed then."""
+
+    decision: DecisionRecord
+    asked: tuple[str, ...]
+    answers: tuple[EntryRecord, ...]
+
+
+class _Player:
+    """Answers a agent by the record of a run, as long as it asks for the same."""
+
+    def __init__(self, run: RunDirectory) -> None:
+        self.pictures = pictures_of(run)
+        self.records = list(read_records(run.journal))
+        self._steps = _steps(self.records)
+        self._agreed, self._differs = 0, False
+        self._first: tuple[DecisionRecord | None, DecisionRecord] | None = None
+        self._answered = 0
+        self.last: Decision | None = None
+        self.open: tuple[Change, ...] = ()
+        self.parting: Parting | None = None
+
+    def heard(self, decision: Decision) -> None:
+        """Sink: compares with the record until the first difference."""
+        self.last, self.open = decision, tuple(change for change in decision.made if is_asked(change))
+        if self._first is None:
+            recorded = self.records[self._agreed] if self._agreed < len(self.records) else None
+            if recorded is not None and recorded.line == decision_line(decision):
+                self._agreed += 1
+            else:
+                self._first = recorded, decision_of(decision_record(decision))
+
+    def played(
+        self, scheduler: Scheduler, head: RunHead, recorder: RunRecorder, *, live: Live = lambda made, observed: None,
+        before: Callable[[], None] = lambda: None, over: Over = endless,
+    ) -> Outcome:
+        """Decide until the end, or until the record no longer answers."""
+        scheduler.tell([Post(head.task())], "user")
+
+        def told() -> None:
+            self._tell(scheduler, recorder, live)
+            before()
+
+        try:
+            return until_outcome(scheduler, over=over, before=told)
+        except _PartedError:
+            return Outcome(UNFINISHED, "from here the recorded observations no longer hold")
+
+    def answer(self, outcome: Outcome, result: MissionResult | None) -> Answer:
+        """What was found."""
+        then, now = self._first or (None, None)
+        if self._first is None and self._agreed < len(self.records):
+            then = self.records[self._agreed]
+        return Answer(self._agreed, then, now, self._answered, self.parting, outcome, result)
+
+    def _tell(self, scheduler: Scheduler, recorder: RunRecorder, live: Live) -> None:
+        """What the record observed, if the last decision asked for what it asked for; ends the run if not."""
+        if not self.open:
+            return
+        made, self.open = self.open, ()
+        step = self._steps[self._answered] if self._answered < len(self._steps) else None
+        if step is None or step.asked != tuple(as_line(plain(change.entry.value)) for change in made):
+            self.open = made
+            now = decision_of(decision_record(self.last)) if self.last else None
+            self.parting = Parting(None if step is None else step.decision, now)
+            raise _PartedError
+        self._answered += 1
+        live(made, step.answers)
+        for record in step.answers:
+            effect = effect_of(record, self.pictures, scheduler.view.get)
+            recorder.keep(effect)
+            scheduler.tell([effect], record.author)
+
+
+def is_asked(change: Change) -> bool:
+    """Whether a port acts on a change."""
+    return isinstance(change.entry.value, ACTED_ON)
+
+
+def _steps(records: Sequence[DecisionRecord]) -> list[_Step]:
+    steps = []
+    for decision, after in zip(records, [*records[1:], None], strict=True):
+        asked = tuple(as_line(entry.value) for entry in decision.made if entry.type in ASKED)
+        if asked and after is not None:
+            answers = tuple(entry for entry in after.observed if entry.author in (BodyPort.name, RESUME))
+            steps.append(_Step(decision, asked, answers))
+    return steps

@@ -1,0 +1,72 @@
+"""What would have been, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from harvey.campaign.summary import millimetres
+from harvey.diff.first_difference import describe, differing_leaves
+from harvey.mission import UNFINISHED
+from harvey.replay.counterfactual import ASKED, Answer, Parting
+from harvey.run_files.records import DecisionRecord
+from harvey.run_files.run_directory import RunDirectory
+from harvey.units import count
+from harvey.why.sentences import sentence
+
+
+def told(answer: Answer, run: RunDirectory, changes: Sequence[str]) -> Iterator[str]:
+    """The first decision that differs, what changed, and how it ends; ``changes`` as ``without line_finder``."""
+    yield f"{run.path}, {' and '.join(changes)}:"
+    if answer.then is None and answer.now is None:
+        yield f"nothing would have changed: all of its {count(answer.agreed, 'decision')} are the same, byte for byte."
+        return
+    yield "first: as recorded; second: as it would have been"
+    yield from describe(answer.agreed, answer.then, answer.now)
+    yield ""
+    yield from _parting(answer)
+    yield from _end(answer, run)
+
+
+def _parting(answer: Answer) -> Iterator[str]:
+    if answer.parting is None:
+        yield "It asks its body for the same as in the record to the end, so what was observed holds to the end."
+        return
+    held = count(answer.answered, "request")
+    yield f"What was observed holds for {held} to the body, which are the same. Then it asks for something else:"
+    yield f"  as recorded:              {_asked(answer.parting.then)}"
+    yield f"  as it would have been:    {_asked(answer.parting.now)}"
+    yield from _leaves(answer.parting)
+    if answer.outcome.kind == UNFINISHED:
+        yield "From there the record cannot tell what it would have observed."
+    else:
+        yield "From there the record cannot tell what it would have observed; the simulated robot went on by itself."
+
+
+def _asked(decision: DecisionRecord | None) -> str:
+    if decision is None:
+        return "nothing any more"
+    asked = "; ".join(f"{entry.ref}, {sentence(entry)}" for entry in decision.made if entry.type in ASKED)
+    return f"cycle {decision.cycle}: {asked}"
+
+
+def _leaves(parting: Parting) -> Iterator[str]:
+    """The values in which the requests differ, in full: what is rounded in words may look the same."""
+    if parting.then is not None and parting.now is not None:
+        then, now = ([entry.value for entry in d.made if entry.type in ASKED] for d in (parting.then, parting.now))
+        for path, x, y in differing_leaves(then, now):
+            yield f"    {path}: {x} against {y}"
+
+
+def _end(answer: Answer, run: RunDirectory) -> Iterator[str]:
+    if answer.outcome.kind == UNFINISHED:
+        return
+    before = run.read_result()
+    yield ""
+    yield "How it ends:"
+    error_m = before.get("final_error_m")
+    truly = f", {millimetres(error_m)} from the goal" if isinstance(error_m, int | float) else ""
+    yield f"  as recorded:              {before.get('outcome', UNFINISHED)}{truly}"
+    now = f", {millimetres(answer.result.final_error_m)} from the goal" if answer.result is not None else ""
+    yield f"  as it would have been:    {answer.outcome.kind}{now}: {answer.outcome.reason}"
+
+

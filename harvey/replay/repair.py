@@ -1,0 +1,41 @@
+"""Repair: the recording of a run drawn anew from its journal and its pictures."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+from blackboard.journal import Sink
+from harvey.agent import agent_of
+from harvey.mission import Mission
+from harvey.replay.replay import checked, pictures_of, replayed
+from harvey.replay.resume import relived, remains_of, stage_of
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import SIMULATOR, RunHead
+from harvey.run_files.run_recorder import RunRecorder
+
+
+def redrawn(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
+    """Draw a run's recording anew; the old one stays until the new one is whole. Returns how many decisions it shows.
+
+    Raises:
+        BadInput: the run cannot be told again as it was.
+        RecordingError: the recording cannot be written.
+    """
+    decisions = remains_of(run).decisions
+    head, part = RunHead.read(run.path), run.recording.with_name("recording.rrd.part")
+    with agent_of(head) as agent:
+        recorder = RunRecorder(None, head, agent.robot, drawing=part)
+        try:
+            if head.kind == SIMULATOR:
+                stage = stage_of(head)
+                relived(run, Mission(stage, head, agent, recorder, sinks), stage)
+            else:
+                scheduler = agent.scheduler(sinks=(*recorder.sinks, *sinks))
+                for told in replayed(run, pictures_of(run), scheduler):
+                    checked(run, told)
+            recorder.close()
+            os.replace(part, run.recording)
+        finally:
+            part.unlink(missing_ok=True)
+    return decisions

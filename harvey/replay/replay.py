@@ -1,0 +1,113 @@
+"""Replay: a recorded run told again from its observations.
+
+A run is what it observed and nothing else: whatever came from outside is put on the board where the journal says it
+came, and every decision must come out as it stands in the journal, to the byte. So a replay needs neither simulator nor
+robot; and a run that was cut off gets its board, its agenda and all that is pending back by being told again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from blackboard.change import Change
+from blackboard.journal import Decision, decision_line
+from blackboard.scheduler import Scheduler
+from harvey.errors import BadInput
+from harvey.run_files.observations import effect_of
+from harvey.run_files.records import DecisionRecord, EntryRecord, read_records
+from harvey.run_files.run_directory import RunDirectory
+from logs.camera_file import Pictures
+from logs.reader import read_frames
+
+Live = Callable[[Sequence[Change], Sequence[EntryRecord]], None]
+"""Told of the changes that a decision made and of what was observed next."""
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A decision as recorded, and as it is decided now; None where nothing is left to decide.
+
+    Attributes:
+        line: as it stands in the journal, without its newline.
+    """
+
+    recorded: DecisionRecord
+    line: bytes
+    now: Decision | None
+
+    @property
+    def same(self) -> bool:
+        """To the byte."""
+        return self.now is not None and decision_line(self.now).encode() == self.line
+
+
+def replayed(
+    run: RunDirectory, pictures: Mapping[int, bytes], scheduler: Scheduler, *,
+    live: Live = lambda made, observed: None, before: Callable[[], None] = lambda: None,
+) -> Iterator[Told]:
+    """Each decision beside its record.
+
+    Args:
+        live: lets a simulated body live through it again.
+        before: called before each decision.
+
+    Raises:
+        BadInput: the journal cannot be read, or an observation cannot be told again.
+    """
+    made: Sequence[Change] = ()
+    for recorded, line in zip(read_records(run.journal), _lines(run), strict=False):
+        live(made, recorded.observed)
+        for observation in recorded.observed:
+            scheduler.tell([effect_of(observation, pictures, scheduler.view.get)], observation.author)
+        before()
+        told = Told(recorded, line, scheduler.step())
+        made = () if told.now is None else told.now.made
+        yield told
+
+
+def checked(run: RunDirectory, told: Told) -> Told:
+    """The same; raises BadInput where it was not decided as it was."""
+    if not told.same:
+        raise BadInput(f"{run.journal}: cycle {told.recorded.cycle} is not decided again as it was (harvey replay "
+                       f"{run.path} tells how); it takes the program that made the run")
+    return told
+
+
+def pictures_of(run: RunDirectory) -> Mapping[int, bytes]:
+    """The pictures of a run: from its camera file or, where it has none, from its recording.
+
+    Raises:
+        BadInput: the journal cannot be read, or the camera file is shorter than what it tells of.
+        RecordingError: there is no camera file, and the recording cannot be read.
+    """
+    sizes = list(_sizes(read_records(run.journal)))
+    if sizes and not run.camera.is_file():
+        return read_frames(run.recording)
+    pictures, there = Pictures(run.camera, sizes), camera_bytes(run)
+    if there < pictures.end:
+        raise BadInput(
+            f"{run.camera}: expected {pictures.end} bytes of pictures that the journal tells of, got {there}")
+    return pictures
+
+
+def camera_bytes(run: RunDirectory) -> int:
+    """Length of the camera file; 0 where there is none."""
+    return run.camera.stat().st_size if run.camera.is_file() else 0
+
+
+def _sizes(decisions: Iterable[DecisionRecord]) -> Iterator[tuple[int, int]]:
+    """(number, bytes) of every picture that was seen, in the order in which they came."""
+    for decision in decisions:
+        for record in decision.observed:
+            if record.type == "Frame":
+                try:
+                    yield int(record.value["number"]), int(record.value["jpeg"]["bytes"])
+                except (KeyError, TypeError, ValueError):
+                    raise BadInput(f"{record.ref}: expected a picture's number and length, got {record.value!r}"
+                                   ) from None
+
+
+def _lines(run: RunDirectory) -> Iterator[bytes]:
+    with run.journal.open("rb") as lines:
+        yield from (line.removesuffix(b"\n") for line in lines)

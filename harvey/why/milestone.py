@@ -1,0 +1,125 @@
+"""The story of a milestone: why it was looked for, what was expected, seen and judged, and what followed."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+
+from harvey.errors import BadInput
+from harvey.run_files.records import EntryRecord
+from harvey.why import facts
+from harvey.why.history import History
+from harvey.why.links import STRANGE, reason, words
+from harvey.why.sentences import sentence
+from harvey.why.story import Step, Story, decided
+
+FOLLOWED = ("Certificate", "Milestone", "Discrepancy")
+"""The entries of a verdict; what they wake is what follows."""
+
+
+def milestones(history: History, name: str) -> tuple[str, ...]:
+    """Ids of the milestones that a user means: ``Milestone-10``, ``M1 of hallway``, ``M1``, ``check``.
+
+    Raises:
+        BadInput: there is none of that name; near ones are listed.
+    """
+    ids = [id for id in history.newest if id.startswith("Milestone-")]
+    low = name.lower()
+    if exact := [id for id in ids if low in (id.lower(), history.newest[id].lower(), id.rpartition("-")[2])]:
+        return tuple(exact)
+    called = {id: _called(history, id) for id in ids}
+    found = tuple(id for id, what in called.items() if _means(low, what.lower()))
+    if not found:
+        history.verify()
+        there = list(dict.fromkeys(what.partition(", because")[0] for what in called.values()))
+        near = difflib.get_close_matches(name, there, n=4, cutoff=0.4) or there[:4]
+        raise BadInput(f"--milestone: expected a milestone of the run, as {', '.join(near) or 'none'}, got {name!r}")
+    return found
+
+
+def _called(history: History, id: str) -> str:
+    value = _last(history, id).value
+    return str(value.get("what", "")) if isinstance(value, dict) else ""
+
+
+def _means(low: str, what: str) -> bool:
+    return what == low or what.startswith((low + " ", low + ",")) or (" " in low and low in what)
+
+
+def _last(history: History, id: str) -> EntryRecord:
+    found = history.entry(history.newest[id])
+    if found is None:
+        raise BadInput(f"{id}: expected it in the journal, which says nothing of it")
+    return found
+
+
+def milestone_story(history: History, id: str) -> Story:
+    """Everything about one milestone, in the order in which it happened.
+
+    Raises:
+        BadInput: its entries have other fields than those known here.
+    """
+    last = _last(history, id)
+    try:
+        return _story(history, id, last)
+    except STRANGE as error:
+        what = "expected a milestone and its evidence as this version writes them, got others"
+        raise BadInput(f"{id}: {what} ({error!r})") from None
+
+
+def _story(history: History, id: str, last: EntryRecord) -> Story:
+    first = history.entry(f"{id}.0") or last
+    certificate = reason(history, last, "Certificate")
+    steps = [*_wanted(history, first), *_expected(history, last, certificate)]
+    if certificate is not None:
+        steps += _seen_and_judged(history, certificate)
+        steps += _followed(history, certificate)
+    else:
+        steps.append(Step("judged", f"It was never judged: when the run ended it was {last.value['status']}.",
+                          (last.ref,)))
+    name = facts.milestone_name(last.value)
+    head = f"{name[0].upper()}{name[1:]}: {last.value['status']}."
+    return Story(last.ref, head, decided(history, first), tuple(steps))
+
+
+def _wanted(history: History, first: EntryRecord) -> Iterator[Step]:
+    doubt, sketch = reason(history, first, "Discrepancy"), reason(history, first, "PlanSketch")
+    if doubt is not None:
+        yield Step("wanted", facts.doubt(doubt.value), (doubt.ref,))
+    if sketch is not None:
+        yield Step("wanted", facts.plan(sketch.value), (sketch.ref,))
+
+
+def _expected(history: History, last: EntryRecord, certificate: EntryRecord | None) -> Iterator[Step]:
+    judged = None if certificate is None else reason(history, certificate, "Milestone")
+    looked = judged or last
+    belief = reason(history, looked, "Hypothesis")
+    if belief is not None:
+        yield Step("believed", f"It believed that it stood at {facts.pose(belief.value)}.", (belief.ref,))
+    yield Step("expected", facts.expectation(looked.value), (looked.ref,))
+
+
+def _seen_and_judged(history: History, certificate: EntryRecord) -> Iterator[Step]:
+    fix, milestone = reason(history, certificate, "PoseFix"), reason(history, certificate, "Milestone")
+    match = None if fix is None else reason(history, fix, "LineMatch")
+    segments = None if match is None else reason(history, match, "Segments")
+    frame = None if segments is None else reason(history, segments, "Frame")
+    if fix is not None:
+        refs = tuple(r.ref for r in (fix, match, segments, frame) if r is not None)
+        yield Step("seen", facts.matched(history, fix), refs)
+    said = facts.verdict(certificate, milestone)
+    yield Step("judged", said[0].upper() + said[1:], (certificate.ref,))
+
+
+def _followed(history: History, certificate: EntryRecord) -> Iterator[Step]:
+    """What those did whom the verdict woke."""
+    for record in history.made(certificate.cycle):
+        if record.type not in FOLLOWED:
+            continue
+        for decision in history.naming(record.ref):
+            if decision.chosen is None or decision.chosen.trigger != record.ref:
+                continue
+            said = "; ".join(f"{r.ref}: {sentence(r)}" for r in decision.made if r.type != "Discrepancy")
+            text = said or "; ".join(sentence(r) for r in decision.made) or decision.refused or "nothing came of it"
+            yield Step("followed", f"In cycle {decision.cycle} the {words(decision.chosen.source)} acted: {text}.",
+                       (record.ref,))

@@ -1,0 +1,322 @@
+"""The story of an entry: the one chain from it down to pixels, model and goal that a person would tell.
+
+Everything that an entry rests on is a graph; told whole it is long. A story follows the main reasons only, tells each
+kind of thing once, at the place nearest to what is explained, and says by name from which entries each sentence comes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from textwrap import fill
+
+from harvey.run_files.records import Candidate, EntryRecord
+from harvey.units import number
+from harvey.why import facts
+from harvey.why.history import History
+from harvey.why.links import STRANGE, anchor_of, nearest, reason, tracks_of, within, words
+from harvey.why.sentences import PURPOSES, sentence
+from harvey.why.short import in_one_sentence
+
+MOST = 24
+"""So many things are told at the most."""
+MOST_PLAIN, MOST_MET = 12, 200
+TIMED_WITHIN = 100
+"""A time is looked for in so many decisions, backwards."""
+WIDTH = 120
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One sentence or two of a story.
+
+    Attributes:
+        label: what it is about, in a word or two.
+        text: the sentences.
+        refs: the entries that say so.
+    """
+
+    label: str
+    text: str
+    refs: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Story:
+    """Why an entry came about.
+
+    Attributes:
+        ref: the entry.
+        headline: what it is; of a motion the whole chain in one sentence.
+        decided: who decided it, when, against what.
+        steps: the reasons, from the entry downward.
+    """
+
+    ref: str
+    headline: str
+    decided: str
+    steps: tuple[Step, ...]
+
+
+LEGEND = """\
+Places are in metres in each room's own frame, headings counter-clockwise from its x axis; pixels count right and
+down from the top left. Model lines are edges that the map of the building says can be seen. Names in brackets are
+entries of the journal: ask on with harvey why RUN NAME."""
+
+
+def story(history: History, record: EntryRecord) -> Story:
+    """The story of one entry; where values have other fields than those known here, told by the entries as they are."""
+    teller = _Teller(history)
+    try:
+        steps = [*teller.reasons(record), *teller.context(record)]
+        head = in_one_sentence(history, record) or headline(record)
+    except STRANGE:
+        steps, head = list(_plain_steps(history, record)), _plainly(history, record)
+    return Story(record.ref, head, decided(history, record), tuple(steps))
+
+
+def _plain_steps(history: History, record: EntryRecord) -> Iterator[Step]:
+    """The entries nearest below, each in its own sentence."""
+    for below in itertools.islice(within(history, record), 1, MOST_PLAIN):
+        yield Step(LABELS.get(below.type, below.type), _plainly(history, below), (below.ref,))
+
+
+def headline(record: EntryRecord) -> str:
+    """What the entry is, as something that Harvey did where it is an act."""
+    v, said = record.value, sentence(record)
+    if record.type in ("MotorCommand", "Course"):
+        return f"Harvey was told to {said}."
+    if record.type == "Look":
+        return f"A picture was taken {PURPOSES.get(v.get('purpose'), '')}".rstrip() + "."
+    if record.type == "Hypothesis" and v.get("status") == "held":
+        return f"It believed that it stood at {facts.pose(v)}."
+    return f"{said[0].upper()}{said[1:]}." if said else record.ref
+
+
+def decided(history: History, record: EntryRecord) -> str:
+    """By whom, when and against what."""
+    when = f"cycle {record.cycle}" + _time(history, record)
+    if record.observed:
+        return f"It came from outside, from {record.author}, and was taken up in {when.rstrip(',')}."
+    decision = history.decision(record.cycle)
+    text = f"Decided in {when} by the {words(record.author)}"
+    if decision.chosen is None:
+        return text + "."
+    rival = decision.runner_up
+    second = f"; next best was {rated(rival)}" if rival else "; nobody else could act"
+    return f"{text}, woken by {decision.chosen.trigger}, rated {decision.chosen.rating:.2f}{second}."
+
+
+def rated(c: Candidate) -> str:
+    return f"the {words(c.source)}, rated {c.rating:.2f}"
+
+
+def _time(history: History, record: EntryRecord) -> str:
+    """The newest time that anything from outside told when the entry came about, which need not rest on that."""
+    cycles = history.cycles
+    for cycle in reversed(cycles[: bisect_right(cycles, record.cycle)][-TIMED_WITHIN:]):
+        told = [found for found in map(_time_of, history.decision(cycle).observed) if found is not None]
+        if told:
+            return f", {max(told):.1f} s into the run,"
+    return ""
+
+
+def _time_of(record: EntryRecord) -> float | None:
+    value = record.value.get("sim_time_s") if isinstance(record.value, Mapping) else None
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
+
+
+@dataclass(slots=True)
+class _Teller:
+    """Tells steps; ``told`` are the keys of those that were told already, ``met`` the entries that were come to."""
+
+    history: History
+    told: set[str] = field(default_factory=set)
+    met: set[str] = field(default_factory=set)
+
+    def reasons(self, record: EntryRecord) -> Iterator[Step]:
+        """What an entry rests on, below the entry itself."""
+        if record.type == "Hypothesis":
+            yield from self._belief(record)
+        elif record.type == "Certificate":
+            yield from self._certificate(record)
+        elif record.type == "PoseFix":
+            yield from self._matched(record)
+        for type in FOLLOW.get(record.type) or [r.rpartition("-")[0] for r in record.because]:
+            for below in self._below(record, type):
+                yield from self._tell(below, record)
+
+    def context(self, record: EntryRecord) -> Iterator[Step]:
+        """The plan, the goal and the command that all of it serves."""
+        for type in ("PlanSketch", "Goal", "Command"):
+            found = nearest(self.history, record, (type,))
+            key = found.id if found is not None and type in SEVERAL else type
+            if found is not None and found.id != record.id:
+                yield from self._one(key, LABELS[type], SAY[type](self.history, found), found)
+
+    def _below(self, record: EntryRecord, type: str) -> Iterator[EntryRecord]:
+        for ref in record.because:
+            found = self.history.entry(ref) if ref.rpartition("-")[0] == type else None
+            if found is not None and found.id != record.id:
+                yield found
+
+    def _tell(self, record: EntryRecord, above: EntryRecord) -> Iterator[Step]:
+        """An entry that something rests on, then what it rests on itself."""
+        perhaps = record.type == "Hypothesis" and record.value["status"] == "candidate"
+        key = record.id if record.type in SEVERAL or perhaps else record.type
+        if key in self.told or record.ref in self.met or len(self.told) > MOST or len(self.met) > MOST_MET:
+            return
+        self.met.add(record.ref)
+        if record.type == "Segments" and above.type in ("MotorCommand", "Look"):
+            frame = reason(self.history, record, "Frame")
+            yield from self._one(key, "seen", facts.puzzled(record, frame), record, frame)
+        elif perhaps:
+            text = f"It may have stood at {facts.pose(record.value)} ({number(record.value['weight']):.0%})."
+            yield from self._one(key, "thought", text, record)
+            for below in self._below(record, "Panorama"):
+                yield from self._tell(below, record)
+            return
+        elif record.type == "Hypothesis":
+            text = f"It believed that it stood at {facts.pose(record.value)}."
+            yield from self._one(key, "believed", text, record)
+        elif record.type not in FOLDED:
+            say = SAY.get(record.type, _plainly)
+            yield from self._one(key, LABELS.get(record.type, record.type), say(self.history, record), record)
+        yield from self.reasons(record)
+
+    def _one(self, key: str, label: str, text: str, *records: EntryRecord | None) -> Iterator[Step]:
+        if text and key not in self.told:
+            self.told.add(key)
+            yield Step(label, text, tuple(dict.fromkeys(r.ref for r in records if r is not None)))
+
+    def _belief(self, record: EntryRecord) -> Iterator[Step]:
+        """What it saw, what it had expected; what it was sure of last."""
+        if record.value["basis"] == "tracks":
+            yield from self._tracked(record)
+        elif record.value["basis"] == "odometry":
+            yield from self._rolled(record)
+        yield from self._anchored(record)
+
+    def _tracked(self, record: EntryRecord) -> Iterator[Step]:
+        history = self.history
+        before, frame = reason(history, record, "Hypothesis"), reason(history, record, "Frame")
+        tracks = tracks_of(history, record)
+        if tracks is not None:
+            moved = facts.moved_belief(record, before) if before is not None else ""
+            yield from self._one("Tracks", "seen", f"{facts.tracking(tracks, frame)} {moved}".strip(), tracks, frame)
+        if before is not None and before.value["basis"] == "odometry":
+            yield from self._rolled(before)
+
+    def _rolled(self, record: EntryRecord) -> Iterator[Step]:
+        report = reason(self.history, record, "MotionReport")
+        if report is not None:
+            text = f"That was expected because {facts.wheels(report)}, which led to {facts.pose(record.value)}."
+            yield from self._one("MotionReport", "expected", text, record, report)
+
+    def _anchored(self, record: EntryRecord) -> Iterator[Step]:
+        """What the belief began with: a milestone, finding itself anew, or what the user told."""
+        anchor = anchor_of(self.history, record)
+        if anchor is None:
+            return
+        command, certificate = (reason(self.history, anchor, type) for type in ("Command", "Certificate"))
+        if anchor.value["basis"] == "relocalization":
+            yield from self._recognized(anchor)
+        elif certificate is not None:
+            yield from self._certificate(certificate, f"In cycle {certificate.cycle} ")
+        elif command is not None:
+            text = f"Where it began it was told by the user: at {facts.pose(anchor.value)}."
+            yield from self._one("told", "told", text, anchor, command)
+
+    def _recognized(self, anchor: EntryRecord) -> Iterator[Step]:
+        """It was lost, and found where it was."""
+        segments, lost = reason(self.history, anchor, "Segments"), reason(self.history, anchor, "Discrepancy")
+        frame = None if segments is None else reason(self.history, segments, "Frame")
+        found = f"; {anchor.value['evidence']}" if anchor.value.get("evidence") else ""
+        text = (f"It found out anew where it was, in cycle {anchor.cycle}, from {facts.frame_number(frame)}: at"
+                f" {facts.pose(anchor.value)}{found}.")
+        yield from self._one("recognized", "recognized", text, anchor, segments, frame)
+        if lost is not None:
+            yield from self._tell(lost, anchor)
+
+    def _certificate(self, record: EntryRecord, when: str = "") -> Iterator[Step]:
+        history = self.history
+        fix, milestone = reason(history, record, "PoseFix"), reason(history, record, "Milestone")
+        said = when + facts.verdict(record, milestone)
+        yield from self._one(record.id, "checked", said[0].upper() + said[1:], record, milestone)
+        if fix is not None:
+            yield from self._matched(fix)
+
+    def _matched(self, fix: EntryRecord) -> Iterator[Step]:
+        """From pixels and model to a pose."""
+        match = reason(self.history, fix, "LineMatch")
+        segments = None if match is None else reason(self.history, match, "Segments")
+        yield from self._one(fix.id, "matched", facts.matched(self.history, fix), fix, match, segments)
+
+
+def _plainly(_history: History, record: EntryRecord) -> str:
+    said = sentence(record)
+    return f"{said[0].upper()}{said[1:]}."
+
+
+def _line(history: History, record: EntryRecord) -> str:
+    sketch = nearest(history, record, ("PlanSketch",))
+    return facts.line(record, sketch if sketch is not None and sketch.id == record.value["sketch"] else None)
+
+
+SAY: Mapping[str, Callable[[History, EntryRecord], str]] = {
+    "Leg": _line,
+    "Milestone": lambda _, r: facts.expectation(r.value),
+    "Discrepancy": lambda _, r: facts.doubt(r.value),
+    "PlanSketch": lambda _, r: facts.plan(r.value),
+    "Goal": lambda _, r: facts.goal(r.value),
+    "Command": lambda _, r: f"The user asked for it: {r.value['text']}.",
+}
+LABELS: Mapping[str, str] = {
+    "Leg": "driving", "Milestone": "looked for", "Discrepancy": "doubted", "PlanSketch": "plan", "Goal": "goal",
+    "Command": "command", "Tracks": "seen", "Frame": "picture", "MotionReport": "wheels", "MotorCommand": "motion",
+    "Course": "motion",
+    "Look": "look", "Segments": "seen", "Panorama": "thought", "BodyFault": "fault", "Recovery": "recovery",
+    "Ride": "ride", "RideReport": "ride", "Obstruction": "hidden",
+}
+FOLDED = frozenset({"PoseFix", "LineMatch", "Segments", "Certificate"})
+"""Told by the sentences of what rests on them."""
+SEVERAL = frozenset({"Discrepancy", "Goal", "PlanSketch", "BodyFault"})
+"""Of these a story may tell more than one."""
+FOLLOW: Mapping[str, tuple[str, ...]] = {
+    "MotorCommand": ("Leg", "Milestone", "Segments", "Panorama", "Discrepancy", "Hypothesis"),
+    "Panorama": ("Obstruction", "Panorama"),
+    "Course": ("Leg", "Discrepancy", "Hypothesis"),
+    "Leg": ("Hypothesis",),
+    "Milestone": ("Obstruction", "Certificate", "Discrepancy", "Hypothesis"),
+    "Certificate": ("Milestone",),
+    "PoseFix": ("LineMatch",),
+    "LineMatch": ("Segments", "Milestone"),
+    "Segments": ("Frame", "Milestone"),
+    "Tracks": ("Frame", "Hypothesis"),
+    "Hypothesis": ("BodyFault",),
+    "Discrepancy": ("Discrepancy", "BodyFault", "Certificate", "Hypothesis", "MotionReport"),
+    "Goal": ("PlanSketch", "Hypothesis"),
+    "PlanSketch": ("Milestone", "Leg", "PlanSketch", "Hypothesis"),
+    "Look": ("Milestone", "Discrepancy", "Segments", "Hypothesis"),
+    "Frame": ("Look", "Course"),
+    "MotionReport": ("MotorCommand", "Course"),
+    "Ride": ("PlanSketch", "Hypothesis"),
+    "RideReport": ("Ride",),
+}
+"""Which reasons a story follows, in which order; of a type that is not named here, all."""
+
+
+def lines_of(told: Story) -> Iterator[str]:
+    """A story as paragraphs: label, sentences and the entries that say so."""
+    yield _wrapped(f"{told.headline}  [{told.ref}]")
+    yield _wrapped(told.decided)
+    width = max((len(step.label) for step in told.steps), default=0)
+    for step in told.steps:
+        yield _wrapped(f"{step.text}  [{', '.join(step.refs)}]", f"  {step.label.ljust(width)}  ")
+
+
+def _wrapped(text: str, head: str = "") -> str:
+    return fill(text, WIDTH, initial_indent=head, subsequent_indent=" " * len(head), break_on_hyphens=False)

@@ -1,0 +1,91 @@
+"""Dead reckoner (§3.2): the belief follows the wheels' claim, and becomes less sure by what wheels are known to do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.questions import held
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.tolerances import PLAN_PX
+from world_models.actuator import Drift
+from world_models.entries.body import BodyFault, Course, Look, MotionReport, MotorCommand
+from world_models.entries.location import Hypothesis
+from world_models.frames import Pose2
+
+STOPPED = 0.7
+"""A move of which the wheels claim less than this part was stopped by something."""
+
+
+class DeadReckoner(RobotKnowledgeSource):
+    """Moves the held hypothesis by a motion report, on the arc that these wheels are known to drift by, and asks for a
+    picture to check it by.
+
+    What a broken-off motion lacks may have been done all the same, in part or whole, before the base stood: the belief
+    becomes less sure by that.
+    """
+
+    level = Level.ACTION
+    watches = (Watch(MotionReport, (Posted,)),)
+    writes = (Hypothesis, Drift, Look, Discrepancy)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        belief = held(view)
+        return None if belief is None or belief.value.motion == trigger.entry.id else 1.0
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        belief = held(view)
+        if belief is None:
+            return
+        world, report = self._robot.world, trigger.entry.value
+        actuator, before = self._robot.actuator, belief.value.world_from_robot(world)
+        known = view.latest(Drift)
+        drift = Drift.unknown(actuator, before.heading_rad) if known is None else known.value
+        request = view.get(trigger.entry.because[0].id)
+        on_the_move = request is not None and isinstance(request.value, Course)
+        pose, covariance = (actuator.rolled if on_the_move else actuator.moved)(
+            before, belief.value.covariance_world(world), report.turn_rad, report.move_m, drift.curvature_per_m
+        )
+        there = world.locale_at([*pose.position, world.floor_m(belief.value.locale)])
+        locale = there if there and world.is_room(there) else belief.value.locale  # in a doorway: still the old room
+        fault = None if request is None else view.latest(BodyFault, lambda f: f.request == request.id)
+        if request is not None and fault is not None:
+            covariance = covariance + _spread_of(pose, *self._lacking(request.value, report))
+        moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=trigger.entry.id)
+        step = Revise(belief, moved, (trigger.entry, belief) if fault is None else (trigger.entry, belief, fault))
+        yield step
+        rolled = drift.rolled(actuator, report.turn_rad, report.move_m, on_the_spot=not on_the_move)
+        yield Post(rolled, (trigger.entry,)) if known is None else Revise(known, rolled, (trigger.entry, known))
+        if on_the_move and fault is None:
+            return  # the picture is there: it was taken on the move
+        yield Post(Look("track"), (step,))
+        if request is None or fault is not None or on_the_move:
+            return
+        if report.move_m < STOPPED * request.value.move_m:
+            what = f"something stopped the robot: {report.move_m:.2f} m of {request.value.move_m:.2f} m are claimed"
+            stopped = Discrepancy(Level.ACTION, what, math.inf, (PLAN_PX, PLAN_PX), "px")
+            yield Post(stopped, (trigger.entry,))
+
+    def _lacking(self, request: MotorCommand | Course, report: MotionReport) -> tuple[float, float]:
+        """What may have been done beyond what is claimed: (turn [rad], move [m])."""
+        if isinstance(request, Course):
+            return 0.0, self._robot.actuator.stopping_m()
+        return request.turn_rad - report.turn_rad, request.move_m - report.move_m
+
+
+def _spread_of(pose: Pose2, turn_rad: float, move_m: float) -> NDArray[np.float64]:
+    """(3, 3) covariance, world, of a TURN and a MOVE of which any part may have been done, about where none was.
+
+    A part that is uniform in 0..d has the second moment d^2 / 3.
+    """
+    ahead = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad), 0.0]) * move_m
+    turned = np.array([0.0, 0.0, turn_rad])
+    return np.asarray((np.outer(ahead, ahead) + np.outer(turned, turned)) / 3.0)

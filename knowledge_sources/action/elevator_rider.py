@@ -1,0 +1,99 @@
+"""ElevatorRider (§4, Figure 8): an elevator is no place to drive through: the robot asks to be carried, and is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from knowledge_sources.questions import deepest_sketch, held, is_over, is_settled, open_discrepancy, open_fault
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.building.locales import Link
+from world_models.entries.body import BodyFault, Ride, RideReport
+from world_models.entries.location import Hypothesis
+from world_models.entries.percepts import Tracks
+from world_models.entries.task import PlanSketch
+from world_models.frames import Pose2
+
+LEVEL_M, LEVEL_RAD = 0.01, 0.003
+"""How much a car stands otherwise at one landing than at another."""
+
+
+class ElevatorRider(RobotKnowledgeSource):
+    """Asks for the ride that a verified sketch wants, and takes the belief over to the floor where the doors open.
+
+    It believes what it is told: that this is the floor. So nothing is done there before a milestone is verified.
+    """
+
+    level = Level.ACTION
+    watches = (
+        Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and s.verified),
+        Watch(RideReport, (Posted,)),
+        Watch(BodyFault, (Revised,)),
+    )
+    writes = (Ride, Hypothesis, PlanSketch, Tracks)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        if is_over(view) or held(view) is None:
+            return None
+        if isinstance(trigger.entry.value, RideReport):
+            return 1.0
+        return 0.3 if self._wanted(view) is not None else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        if isinstance(trigger.entry.value, RideReport):
+            yield from self._carried(view, trigger.entry)
+            return
+        wanted, belief = self._wanted(view), held(view)
+        if wanted is not None and belief is not None:
+            sketch, link = wanted
+            s = sketch.value
+            there = s.subgoals[s.at].destination.locale
+            yield Post(Ride(sketch.id, s.at, link.name, link.other(there), there), (sketch, belief))
+
+    def _wanted(self, view: View) -> tuple[Entry[PlanSketch], Link] | None:
+        """The sketch whose next subgoal is a ride that was not asked for yet, while nothing is in doubt."""
+        sketch = deepest_sketch(view)
+        if sketch is None or not sketch.value.verified or not is_settled(view) or open_fault(view) is not None:
+            return None
+        if any(open_discrepancy(view, level) is not None for level in (Level.PLAN, Level.GOAL)):
+            return None
+        s = sketch.value
+        if s.current is None or not s.current.is_ride:
+            return None
+        passage = self._robot.world.passage(s.current.passage)
+        asked = view.latest(Ride, lambda r: r.sketch == sketch.id and r.index == s.at)
+        return (sketch, passage) if asked is None and isinstance(passage, Link) else None
+
+    def _carried(self, view: View, report: Entry[RideReport]) -> Iterable[Effect]:
+        ride, belief = view.latest(Ride), held(view)
+        if ride is None or belief is None:
+            return
+        link = self._robot.world.passage(ride.value.passage)
+        assert isinstance(link, Link)
+        there = Revise(belief, self._after(belief.value, link, ride.value.destination), (report, belief))
+        yield there
+        tracks = view.latest(Tracks)
+        if tracks is not None:  # what was followed is left behind
+            yield Revise(tracks, replace(tracks.value, items=(), anchors=()), (report,))
+        sketch = view.get(ride.value.sketch)
+        if sketch is not None and sketch.value.is_active and sketch.value.at == ride.value.index:
+            yield Revise(sketch, sketch.value.advanced(), (report, there))
+
+    def _after(self, belief: Hypothesis, link: Link, destination: str) -> Hypothesis:
+        """As it stood to the one stop it stands to the other."""
+        world = self._robot.world
+        before, behind = (Pose2(*link.stop_of(name)) for name in (link.other(destination), destination))
+        pose = behind @ (before.inverse() @ belief.world_from_robot(world))
+        turn = behind.heading_rad - before.heading_rad
+        c, s = np.cos(turn), np.sin(turn)
+        turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        uneven = np.diag([LEVEL_M**2, LEVEL_M**2, LEVEL_RAD**2])
+        covariance = turned @ belief.covariance_world(world) @ turned.T + uneven
+        return Hypothesis.of_world(world, destination, pose, covariance, "ride", motion=belief.motion)

@@ -1,0 +1,172 @@
+"""Motor (§5): a primitive subgoal becomes a (TURN angle) and (MOVE distance), carried out increment by increment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.methods.motion.pure_pursuit import aim, as_seen, bearing, chord_turn, progress
+from knowledge_sources.questions import (
+    deepest_sketch,
+    held,
+    is_in_doubt,
+    is_over,
+    is_settled,
+    open_discrepancy,
+    open_fault,
+    open_milestone,
+    under_way,
+    unmeasured_doubt,
+)
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.actuator import Drift
+from world_models.entries.body import BodyFault, MotorCommand
+from world_models.entries.location import Hypothesis
+from world_models.entries.task import Leg, Milestone, PlanSketch
+from world_models.frames import Pose2, wrap_angle
+
+LOOKAHEAD_M = 1.2
+"""Steers at the point of the line so far ahead, two increments, so that it comes back to the line and not only to its
+end."""
+FACING_RAD = math.radians(3.0)
+"""Turned to within this, it sets off."""
+AIM_RAD = math.radians(0.5)
+BESIDE_M = 0.15
+"""So near to where a subgoal begins it comes back to the line that was planned; from further off it takes another."""
+CREEP_M = 0.25
+"""Nearer than this it steers straight at the end."""
+
+
+class Motor(RobotKnowledgeSource):
+    """Commands the next increment of a leg from where the robot believes it is: this closes the action-level loop.
+
+    It begins a leg when a verified sketch has a primitive subgoal; it turns where a milestone is to be looked for; it
+    keeps still while a command is under way, or the body is at fault. While anything above the action level is in
+    doubt it does not drive, and turns only to where a look is to end that doubt.
+    """
+
+    level = Level.ACTION
+    watches = (
+        Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and s.verified),
+        Watch(Leg, (Posted,)),
+        Watch(Hypothesis, (Posted, Revised), lambda h: h.is_held),
+        Watch(Milestone),
+        Watch(Discrepancy, (Revised,)),
+        Watch(BodyFault, (Revised,)),
+    )
+    writes = (MotorCommand, Leg, Discrepancy)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        if is_over(view) or open_fault(view) is not None or not is_settled(view):
+            return None
+        milestone = open_milestone(view)
+        if is_in_doubt(view) and (milestone is None or not _is_to_end_doubt(view, milestone)):
+            return None
+        if milestone is not None:
+            return 0.3 if milestone.value.status == "turning" and self._look_error(view, milestone.value) else None
+        if under_way(view) is not None:
+            return 0.3
+        return 0.3 if _leg_wanted(view) is not None else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        belief, milestone = held(view), open_milestone(view)
+        if belief is None:
+            return
+        if milestone is not None:
+            turn = self._bounded(self._look_error(view, milestone.value) or 0.0)
+            yield Post(MotorCommand(turn, 0.0), (milestone, belief))
+            return
+        driving = under_way(view)
+        if driving is None:
+            yield from self._set_off(view, belief)
+            return
+        yield from self._increment(view, driving[0], belief)
+
+    def _look_error(self, view: View, milestone: Milestone) -> float | None:
+        """How far to turn to face a milestone's landmarks [rad]; None when it faces them."""
+        belief = held(view)
+        if belief is None:
+            return None
+        here = belief.value.world_from_robot(self._robot.world)
+        error = wrap_angle(milestone.look_heading_rad - here.heading_rad)
+        return error if abs(error) > FACING_RAD else None
+
+    def _set_off(self, view: View, belief: Entry[Hypothesis]) -> Iterable[Effect]:
+        sketch = _leg_wanted(view)
+        if sketch is None or sketch.value.current is None:
+            return
+        subgoal, world = sketch.value.current, self._robot.world
+        here, end = belief.value.world_from_robot(world), subgoal.destination.in_world(world)
+        planned = subgoal.origin.in_world(world)
+        start = planned if planned.distance_to(here) <= BESIDE_M else here
+        heading = None if subgoal.destination.heading_rad is None else end.heading_rad
+        leg = Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m, subgoal.tolerance_m, heading)
+        yield Post(leg, (sketch, belief))
+
+    def _increment(self, view: View, leg: Entry[Leg], belief: Entry[Hypothesis]) -> Iterable[Effect]:
+        here = belief.value.world_from_robot(self._robot.world)
+        drift = view.latest(Drift)
+        command = self._next(leg.value, here, 0.0 if drift is None else drift.value.curvature_per_m)
+        seen = as_seen(leg.value, here, _aim(leg.value, here))
+        discrepancy = open_discrepancy(view, Level.ACTION)
+        corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
+        yield from corrected
+        if command is None:
+            yield Revise(leg, replace(seen, status="arrived"), (leg, belief, *corrected))
+            return
+        step = Revise(leg, replace(seen, increments=seen.increments + 1), (leg, belief, *corrected))
+        yield step
+        yield Post(command, (step, belief, *(() if drift is None else (drift,))))
+
+    def _next(self, leg: Leg, here: Pose2, curvature_per_m: float) -> MotorCommand | None:
+        """The next increment; None on arrival. It is an arc, whose chord is to lie in the direction to be gone."""
+        along, left = progress(leg, here)
+        away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
+        if away <= leg.tolerance_m * 0.8 or (along <= 0.0 and abs(left) <= leg.tolerance_m * 0.8):
+            return self._final_turn(leg, here)
+        turn = bearing(_aim(leg, here), here)
+        if abs(turn) > FACING_RAD:
+            return MotorCommand(self._bounded(turn), 0.0)
+        actuator = self._robot.actuator
+        distance = min(actuator.increment_m, actuator.commanded_m(away))
+        turn = chord_turn(turn, curvature_per_m, actuator.reach * distance)
+        return MotorCommand(turn if abs(turn) > AIM_RAD / 10 else 0.0, distance)
+
+    def _final_turn(self, leg: Leg, here: Pose2) -> MotorCommand | None:
+        if leg.heading_rad is None:
+            return None
+        turn = wrap_angle(leg.heading_rad - here.heading_rad)
+        return MotorCommand(self._bounded(turn), 0.0) if abs(turn) > AIM_RAD else None
+
+    def _bounded(self, turn_rad: float) -> float:
+        """One increment of a turn; a long one in equal parts, so that landmarks stay in view from part to part."""
+        largest = self._robot.actuator.turn_increment_rad
+        return turn_rad / max(1, math.ceil(abs(turn_rad) / largest))
+
+
+def _is_to_end_doubt(view: View, milestone: Entry[Milestone]) -> bool:
+    """Whether a milestone was chosen as another view by which to measure what the plan level doubts."""
+    doubt = unmeasured_doubt(view)
+    return (doubt is not None and milestone.cycle >= doubt.cycle and open_discrepancy(view, Level.GOAL) is None)
+
+
+def _leg_wanted(view: View) -> Entry[PlanSketch] | None:
+    """The sketch that is being carried out, if its milestone is verified and its subgoal at hand is primitive."""
+    sketch = deepest_sketch(view)
+    if sketch is None:
+        return None
+    s = sketch.value
+    return sketch if s.verified and s.current is not None and s.current.primitive else None
+
+
+def _aim(leg: Leg, here: Pose2) -> tuple[float, float]:
+    """The point of the line to steer at [m, world]: its end, once that is near."""
+    along, _ = progress(leg, here)
+    return (leg.x1_m, leg.y1_m) if along < CREEP_M else aim(leg, along, LOOKAHEAD_M)

@@ -1,0 +1,44 @@
+"""Interpreter (§3.3, §4): a command becomes a goal in conceptual-dependency form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Post
+from blackboard.level import Level
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.location import Hypothesis, Place
+from world_models.entries.task import Command, Goal, Outcome
+from world_models.frames import Pose2
+from world_models.phrases import places_of
+
+
+class Interpreter(RobotKnowledgeSource):
+    """Reads ``(ptrans (locale (x,y,z)) (locale (x,y,z)))``: from where to where, feet in each locale's own frame.
+
+    It also understands "Go from the laboratory to Allen's office", from the middle of one room to that of another. The
+    command's first place is also where the robot is told that it stands: the first hypothesis. What cannot be
+    understood ends the mission with the reason.
+    """
+
+    level = Level.GOAL
+    watches = (Watch(Command, (Posted,)),)
+    writes = (Goal, Hypothesis, Outcome)
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        command: Command = trigger.entry.value
+        try:
+            origin, destination = self._places(command)
+        except ValueError as error:
+            yield Post(Outcome("failed", f"the command was not understood: {error}"), (trigger.entry,))
+            return
+        pose = Pose2(origin.x_m, origin.y_m, command.start_heading_rad)
+        yield Post(Hypothesis(origin.locale, pose, command.start_covariance, "command"), (trigger.entry,))
+        yield Post(Goal(origin, destination), (trigger.entry,))
+
+    def _places(self, command: Command) -> tuple[Place, Place]:
+        origin, destination = places_of(command.text, self._robot.world)
+        return origin, replace(destination, heading_rad=command.arrival_heading_rad)

@@ -1,0 +1,212 @@
+"""Relocalizer (§2, §4): goal-level perceptual servoing. Lost, it looks about until it knows, and begins anew."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect, Post, Retract, Revise, to_say
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.methods.localization.obstructions import before_camera
+from knowledge_sources.methods.localization.relocation import Candidate, Finding, Verdict, finding
+from knowledge_sources.methods.localization.views import Glance, moved
+from knowledge_sources.questions import active_goal, held, is_over, is_settled, open_discrepancy
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.body import Look, MotionReport, MotorCommand
+from world_models.entries.location import Hypothesis, Place, covariance_tuple
+from world_models.entries.obstruction import Obstruction
+from world_models.entries.percepts import Glimpse, Panorama, Segments
+from world_models.entries.task import Goal, PlanSketch
+from world_models.frames import Pose2
+
+PROBES = 8
+"""Looks, and then it says that it does not know."""
+ROOMS = 80
+"""The most rooms that are searched, the nearest to the last belief first."""
+SAME_FLOOR_M = 0.5
+"""Rooms whose floors differ by less are on one floor."""
+DARK, DIM = 6.0, 40.0
+"""Of a dark frame the contrast and the brightness are less; a bright one without contrast shows a bare wall."""
+WAITS = 150
+"""So many dark frames are waited for light."""
+
+
+class Relocalizer(RobotKnowledgeSource):
+    """Keeps every place of the floor that bears out what it sees, and probes until one stands alone.
+
+    A probe is a turn or a short safe move, and a look: the one by which the places are expected to part best. When it
+    knows, a new top-level goal follows from the place where it is to the old destination, and so new sketches (§2).
+    When the building cannot tell the places apart it stays lost, and the places stay on the board: never does it choose
+    between places that look alike. What stands still in its looks while it turns is before the camera, and it looks
+    past it.
+    """
+
+    level = Level.GOAL
+    closes = Level.GOAL
+    watches = (
+        Watch(Discrepancy, (Posted,), lambda d: d.is_open and d.level is Level.GOAL),
+        Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "odometry"),
+        Watch(Segments, (Posted,), lambda s: s.milestone == ""),
+    )
+    writes = (Look, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama, Obstruction)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        lost = open_discrepancy(view, Level.GOAL)
+        if lost is None or held(view) is None or not is_settled(view) or is_over(view) or _has_just_ridden(view):
+            return None
+        return 0.7
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        lost, belief = open_discrepancy(view, Level.GOAL), held(view)
+        if lost is None or belief is None:
+            return
+        if not isinstance(trigger.entry.value, Segments):
+            yield Post(Look("probe"), (trigger.entry, lost))
+            return
+        if trigger.entry.value.contrast < DARK and trigger.entry.value.brightness < DIM:
+            if len(_probes_since(view, lost)) < WAITS:
+                yield Post(Look("probe"), (trigger.entry, lost))
+            return
+        yield from self._considered(view, trigger.entry, lost, belief)
+
+    def _considered(
+        self, view: View, segments: Entry[Segments], lost: Entry[Discrepancy], belief: Entry[Hypothesis]
+    ) -> Iterable[Effect]:
+        before = _panorama_since(view, lost)
+        glimpses = self._glimpses(view, segments, before)
+        looks, hidden = [_glance(view, g) for g in glimpses], view.latest(Obstruction)
+        obstruction = before_camera(looks, self._robot.camera, None if hidden is None else hidden.value)
+        if obstruction is not None:
+            looks = [replace(g, segments_px=obstruction.without_its_own(g.segments_px)) for g in looks]
+        because: tuple[object, ...] = (segments, lost)
+        if (change := to_say(hidden, obstruction, because)) is not None:
+            yield change
+        if obstruction is not None:
+            because = (segments, lost, hidden if change is None else change)
+        robot = self._robot.behind(obstruction).standing_in(belief.value.locale)
+        result = finding(robot, looks, self._rooms(belief.value))
+        if result.verdict is Verdict.AMBIGUOUS or result.probe is None or len(glimpses) >= PROBES:
+            result = self._within_reach(result, belief.value.locale)
+        for old in view.where(Hypothesis, lambda h: h.status == "candidate"):
+            yield Retract(old, (segments,))
+        told = Panorama(glimpses, _in_words(result))
+        seen = Post(told, because) if before is None else Revise(before, told, (*because, before))
+        yield seen
+        if result.verdict is Verdict.FOUND:
+            yield from self._found(view, (segments, seen), lost, belief, result.candidates[0])
+            return
+        for c in result.candidates:
+            yield Post(self._hypothesis(c, belief.value, "candidate", c.weight), (segments, seen, belief))
+        if result.verdict is Verdict.PROBE and result.probe is not None and len(glimpses) < PROBES:
+            yield Post(MotorCommand(result.probe.turn_rad, result.probe.move_m), (segments, lost, seen))
+
+    def _within_reach(self, result: Finding, locale: str) -> Finding:
+        """Of places that nothing more can tell apart the only one to which wheels lead from where the robot was.
+
+        Carried to another place of where it can drive to, it may look the same there: that stays ambiguous. But being
+        carried through a wall or up the stairs, to a place that looks just like one within reach, is not believed.
+        """
+        near = [c for c in result.candidates if self._robot.world.route(locale, c.room) is not None]
+        if result.verdict is Verdict.FOUND or len(near) != 1 or not near[0].stands:
+            return result
+        return Finding(Verdict.FOUND, (replace(near[0], weight=1.0),))
+
+    def _glimpses(
+        self, view: View, segments: Entry[Segments], before: Entry[Panorama] | None
+    ) -> tuple[Glimpse, ...]:
+        """The looks so far, as seen from where the robot is now, and the new one."""
+        old = () if before is None else before.value.glimpses
+        for report in () if before is None else view.since(MotionReport, before.cycle):
+            old = tuple(self._moved(g, report.value) for g in old)
+        here = Glimpse(segments.id, Pose2(0.0, 0.0, 0.0), covariance_tuple(np.zeros((3, 3))))
+        return (*old, here)
+
+    def _moved(self, glimpse: Glimpse, report: MotionReport) -> Glimpse:
+        actuator, claim = self._robot.actuator, (report.turn_rad, report.move_m)
+        step, spread = actuator.expected(*claim), actuator.spread(*claim)
+        pose, covariance = moved(glimpse.now_from_then, np.array(glimpse.covariance), step, spread)
+        return replace(glimpse, now_from_then=pose, covariance=covariance_tuple(covariance))
+
+    def _rooms(self, belief: Hypothesis) -> list[str]:
+        """The rooms of the floor, the nearest to the last belief first: nobody is carried off to another floor."""
+        world, here = self._robot.world, belief.world_from_robot(self._robot.world)
+        container, level_m = world.locale(belief.locale).parent or belief.locale, world.floor_m(belief.locale)
+        rooms = [name for name in world.rooms_in(container) if abs(world.floor_m(name) - level_m) < SAME_FLOOR_M]
+        while len(rooms) < 2 and (above := world.locale(container).parent) is not None:  # as from an elevator's car
+            container = above
+            rooms = [name for name in world.rooms_in(container) if abs(world.floor_m(name) - level_m) < SAME_FLOOR_M]
+        away = [(_distance(world.outline(name), here), name) for name in rooms]
+        return [name for _, name in sorted(away)[:ROOMS]]
+
+    def _found(
+        self, view: View, seen: tuple[Entry[Segments], Effect], lost: Entry[Discrepancy], belief: Entry[Hypothesis],
+        candidate: Candidate,
+    ) -> Iterable[Effect]:
+        """The belief is corrected, and a new top-level goal takes the place of the old one (§2)."""
+        here = Revise(belief, self._hypothesis(candidate, belief.value, "held", 1.0), (*seen, lost, belief))
+        yield here
+        yield Revise(lost, lost.value.corrected(), (here,))
+        for level in (Level.ACTION, Level.PLAN):
+            lower = open_discrepancy(view, level)
+            if lower is not None:
+                yield Revise(lower, lower.value.corrected(), (here,))
+        goal = active_goal(view)
+        if goal is None:
+            return
+        abandon = Revise(goal, replace(goal.value, status="abandoned"), (here,))
+        yield abandon
+        pose = candidate.world_from_robot
+        origin = Place.of_world(self._robot.world, candidate.room, pose.x_m, pose.y_m)
+        yield Post(Goal(origin, goal.value.destination), (here, abandon))
+
+    def _hypothesis(self, candidate: Candidate, belief: Hypothesis, status: str, weight: float) -> Hypothesis:
+        return Hypothesis.of_world(
+            self._robot.world, candidate.room, candidate.world_from_robot, candidate.covariance, "relocalization",
+            status=status, weight=weight, motion=belief.motion, evidence=str(candidate.evidence),
+        )
+
+
+def _has_just_ridden(view: View) -> bool:
+    """Whether no milestone has borne out an elevator ride yet: then it may be on any floor."""
+    return view.latest(PlanSketch, lambda s: s.is_active and s.at > 0 and not s.verified
+                       and s.subgoals[s.at - 1].is_ride) is not None
+
+
+def _in_words(result: Finding) -> str:
+    places = " or ".join(f"{c.room} ({c.weight:.0%})" for c in result.candidates)
+    if result.verdict is Verdict.FOUND:
+        return f"it is {places}, which stands alone"
+    if result.verdict is Verdict.AMBIGUOUS:
+        return f"ambiguous: {places}, which look alike from wherever could be looked"
+    if result.probe is None:
+        return f"perhaps {places}; nothing new could be seen from here"
+    move = f" and a move of {result.probe.move_m:.1f} m" if result.probe.move_m else ""
+    probe = f"a turn by {math.degrees(result.probe.turn_rad):.0f} degrees{move}"
+    return f"perhaps {places}; {probe} tells most" if places else f"no place bears it out; {probe} shows something new"
+
+
+def _glance(view: View, glimpse: Glimpse) -> Glance:
+    return Glance(view[glimpse.segments].value.segments_px, glimpse.now_from_then, np.array(glimpse.covariance))
+
+
+def _distance(outline: object, here: Pose2) -> float:
+    """From a robot to the nearest corner of a room [m]: good enough for an order."""
+    corners = np.asarray(outline, float)
+    return float(np.min(np.hypot(corners[:, 0] - here.x_m, corners[:, 1] - here.y_m)))
+
+
+def _panorama_since(view: View, lost: Entry[Discrepancy]) -> Entry[Panorama] | None:
+    found = view.latest(Panorama)
+    return found if found is not None and found.cycle >= lost.cycle else None
+
+
+def _probes_since(view: View, lost: Entry[Discrepancy]) -> tuple[Entry[Segments], ...]:
+    """The probes that were looked at since the robot is lost, this one included."""
+    return tuple(s for s in view.since(Segments, lost.cycle) if s.value.milestone == "")

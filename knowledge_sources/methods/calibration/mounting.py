@@ -1,0 +1,151 @@
+"""How a camera is mounted, from a board that lies on the floor, or stands upright on it, in front of the robot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.calibration.chessboard import Pattern
+from knowledge_sources.methods.calibration.intrinsics import Calibration, project_board
+from world_models.camera import Camera
+
+Floats = NDArray[np.float64]
+NAMES = ("height_m", "tilt_rad", "roll_rad", "to_board_m", "yaw_rad")
+
+
+@dataclass(frozen=True, eq=False)
+class Mounting:
+    """How a camera looks at the floor.
+
+    Attributes:
+        height_m: optical centre above the floor.
+        tilt_rad: downward; roll_rad: clockwise as the camera looks (its right side is low).
+        to_board_m: from the camera ahead along the floor: to the nearest inner corners of a lying board, to the middle
+            of a standing one.
+        yaw_rad: how far the board's rows are turned against the picture: that of the camera on the robot, to the left,
+            where the board was laid square to the robot.
+        covariance: (5, 5) of these.
+        rms_px: distance of the found corners from the projected ones.
+    """
+
+    height_m: float
+    tilt_rad: float
+    roll_rad: float
+    to_board_m: float
+    yaw_rad: float
+    covariance: Floats
+    rms_px: float
+
+    @property
+    def deviations(self) -> Floats:
+        """(5,) standard deviations, in the order of :data:`NAMES`."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def mounting(
+    calibration: Calibration, corners_px: Floats, pattern: Pattern, *, standing_at_m: float | None = None
+) -> Mounting:
+    """The mounting, from one view of a board.
+
+    Args:
+        standing_at_m: None for a board that lies flat on the floor; for an upright one how high its lowest row of inner
+            corners is above the floor.
+
+    Raises:
+        ValueError: the board is seen as no such board could be.
+    """
+    camera = calibration.camera
+    pose = _pose(camera, corners_px, pattern)
+
+    def told(values: Floats) -> Floats:
+        return _lying(values, pattern) if standing_at_m is None else _standing(values, pattern, standing_at_m)
+
+    values = told(pose)
+    px, jacobian = project_board(pattern, pose[:3], pose[3:], camera.matrix, np.asarray(camera.distortion))
+    slope = _derivative(told, pose)
+    covariance = slope @ _pose_covariance(jacobian, corners_px - px, calibration) @ slope.T
+    if not (values[0] > 0.0 and abs(values[1]) < 1.55 and abs(values[2]) < 0.8):
+        where = "on the floor" if standing_at_m is None else "upright"
+        raise ValueError(f"expected a board {where} before the camera, got one that puts it {values[0]:.2f} m high, "
+                         f"tilted by {math.degrees(values[1]):.0f} and rolled by {math.degrees(values[2]):.0f} degrees")
+    rms = float(np.sqrt(np.mean(np.sum((corners_px - px) ** 2, axis=1))))
+    height_m, tilt_rad, roll_rad, to_board_m, yaw_rad = (float(v) for v in values)
+    return Mounting(height_m, tilt_rad, roll_rad, to_board_m, yaw_rad, covariance, rms)
+
+
+def _pose(camera: Camera, corners_px: Floats, pattern: Pattern) -> Floats:
+    """(6,) rotation vector and place of the board in the camera's frame."""
+    k = np.asarray(camera.distortion)
+    found, turn, place = cv2.solvePnP(pattern.points, corners_px, camera.matrix, k, flags=cv2.SOLVEPNP_IPPE)
+    if not found:
+        raise ValueError("expected corners of a flat board, got none that a pose explains")
+    turn, place = cv2.solvePnPRefineLM(pattern.points, corners_px, camera.matrix, k, turn, place)
+    return np.concatenate([np.ravel(turn), np.ravel(place)])
+
+
+def _lying(pose: Floats, pattern: Pattern) -> Floats:
+    rotation, corners = _placed(pose, pattern)
+    up = rotation[:, 2] * (-1.0 if rotation[:, 2] @ corners[0] > 0.0 else 1.0)  # the side that is seen
+    return _told(up, float(-np.mean(corners @ up)), _nearest(corners @ _ahead(up), pattern), _rows(rotation, up))
+
+
+def _standing(pose: Floats, pattern: Pattern, lowest_m: float) -> Floats:
+    rotation, corners = _placed(pose, pattern)
+    axes = np.concatenate([rotation[:, :2].T, -rotation[:, :2].T])
+    up = axes[np.argmin(axes[:, 1])]  # of the ways along the board, the one that is most upward in the picture
+    heights = corners @ up
+    lowest = heights[heights < np.min(heights) + 0.5 * pattern.square_m]
+    ahead = _ahead(up)
+    return _told(up, lowest_m - float(np.mean(lowest)), float(np.mean(corners @ ahead)), _rows(rotation, up))
+
+
+def _placed(pose: Floats, pattern: Pattern) -> tuple[Floats, Floats]:
+    rotation = np.asarray(cv2.Rodrigues(pose[:3])[0], float)
+    return rotation, pattern.points @ rotation.T + pose[3:]
+
+
+def _nearest(distances: Floats, pattern: Pattern) -> float:
+    """The mean over the outermost row or column of corners that is nearest."""
+    grid = distances.reshape(pattern.rows, pattern.columns)
+    return float(min(np.mean(side) for side in (grid[0], grid[-1], grid[:, 0], grid[:, -1])))
+
+
+def _ahead(up: Floats) -> Floats:
+    """Where the camera looks along the floor, in its own frame."""
+    flat = np.array([0.0, 0.0, 1.0]) - up[2] * up
+    return np.asarray(flat / np.linalg.norm(flat))
+
+
+def _rows(rotation: Floats, up: Floats) -> float:
+    """How far the board's level lines are turned against the camera's right, seen from above, within 45 degrees."""
+    ahead = _ahead(up)
+    right = np.cross(ahead, up)
+    x, y = rotation[:, :2].T
+    level = x if abs(x @ up) < abs(y @ up) or abs(x @ right) > abs(y @ right) else y
+    angle = math.atan2(float(level @ ahead), float(level @ right))
+    return math.pi / 4.0 - (angle + math.pi / 4.0) % (math.pi / 2.0)  # the camera is turned the other way
+
+
+def _told(up: Floats, height_m: float, to_board_m: float, yaw_rad: float) -> Floats:
+    tilt, roll = math.atan2(-up[2], math.hypot(up[0], up[1])), math.atan2(-up[0], -up[1])
+    return np.array([height_m, tilt, roll, to_board_m, yaw_rad])
+
+
+def _derivative(told: Callable[[Floats], Floats], pose: Floats, step: float = 1e-6) -> Floats:
+    """(5, 6) by central differences."""
+    moves = step * np.eye(6)
+    return np.stack([(told(pose + m) - told(pose - m)) / (2.0 * step) for m in moves], axis=1)
+
+
+def _pose_covariance(jacobian: Floats, residuals_px: Floats, calibration: Calibration) -> Floats:
+    """(6, 6): from the corners' noise, here or in the calibration, and from what is not known of the intrinsics."""
+    here = float(np.sum(residuals_px**2)) / (residuals_px.size - 6)
+    by_pose, by_camera = jacobian[:, :6], jacobian[:, 6 : 6 + len(calibration.covariance)]
+    normal = np.linalg.inv(by_pose.T @ by_pose)
+    moved = normal @ by_pose.T @ by_camera
+    return np.asarray(max(here, calibration.sigma_px**2) * normal + moved @ calibration.covariance @ moved.T)

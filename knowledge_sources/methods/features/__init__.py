@@ -1,0 +1,1 @@
+"""What is in a picture: lines, regions, corners, template correlation."""

@@ -1,0 +1,1 @@
+"""Which image line shows which model line (§6.1)."""

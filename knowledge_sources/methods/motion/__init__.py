@@ -1,0 +1,1 @@
+"""Routes, clearance and the steering law."""

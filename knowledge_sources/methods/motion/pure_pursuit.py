@@ -1,0 +1,83 @@
+"""How a robot is steered along a straight leg (§5), and the law behind it.
+
+The law: *correcting the heading alone keeps the position error bounded along a segment.* Let y be the distance from the
+line, e the heading against it (both small), and let each increment of length d begin with a TURN towards the point of
+the line that lies L ahead, L >= d, and be an arc of the wheels' curvature c (§3.2). Before the increment the believed
+pose is wrong by at most b beside the line and by at most h in heading; the TURN itself errs by at most t, and what is
+known of the drift by at most k in curvature. After the turn the robot faces along ``-(y + b') / L + h' + t'``, with
+|b'| <= b, |h'| <= h, |t'| <= t, whatever its heading was before; the chord of the arc that is known is taken off the
+turn, so that the increment ends at::
+
+    y_next = (1 - d / L) y + d (-b' / L + h' + t') + k' d^2 / 2 ,   |k'| <= k
+
+The heading before the increment has dropped out, and y is multiplied by 0 <= 1 - d/L < 1. So from any start
+
+    |y_n| <= (1 - d / L)^n |y_0| + Y,      Y = b + L (h + t) + k d L / 2
+
+since the sum of the geometric series is L/d times what one increment adds. Y does not grow with the length of the
+segment; without the turns y grows with its square. Where drift is not known, k is the drift itself. Within an increment
+the arc strays from its chord by at most c d^2 / 8 more. On the move the same holds with d the way between two pictures
+and L the look-ahead then; the arc to steer takes the place of the turn.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from world_models.entries.task import Leg
+from world_models.frames import Pose2, wrap_angle
+
+
+def progress(leg: Leg, here: Pose2) -> tuple[float, float]:
+    """What is left along the leg, and how far to the left of it the robot is [m]."""
+    dx, dy = leg.x1_m - leg.x0_m, leg.y1_m - leg.y0_m
+    length = math.hypot(dx, dy) or 1.0
+    rx, ry = leg.x1_m - here.x_m, leg.y1_m - here.y_m
+    return (rx * dx + ry * dy) / length, (rx * dy - ry * dx) / length
+
+
+def bearing(point: tuple[float, float], here: Pose2) -> float:
+    """How far to the left of the robot's heading a point lies [rad]."""
+    return wrap_angle(math.atan2(point[1] - here.y_m, point[0] - here.x_m) - here.heading_rad)
+
+
+def aim(leg: Leg, along_m: float, lookahead_m: float) -> tuple[float, float]:
+    """The point of the line to steer at [m, world], where ``along_m`` are left of the leg."""
+    length = math.hypot(leg.x1_m - leg.x0_m, leg.y1_m - leg.y0_m)
+    part = min(1.0, max(0.0, (length - along_m + lookahead_m) / max(length, 1e-9)))
+    return leg.x0_m + part * (leg.x1_m - leg.x0_m), leg.y0_m + part * (leg.y1_m - leg.y0_m)
+
+
+def as_seen(leg: Leg, here: Pose2, point: tuple[float, float]) -> Leg:
+    """The leg with where the robot is beside it and where the point lies that it steers at: what a motion follows from.
+    """
+    along, left = progress(leg, here)
+    return replace(leg, to_go_m=along, left_m=left, aim_rad=bearing(point, here))
+
+
+def chord_turn(turn_rad: float, curvature_per_m: float, length_m: float) -> float:
+    """What to turn so that the chord of the arc that follows, and not its tangent, lies in a direction [rad]."""
+    return turn_rad - 0.5 * curvature_per_m * length_m
+
+
+def curvature_to(point: tuple[float, float], here: Pose2) -> float:
+    """Of the arc, tangent to the robot's heading, that leads through a point ahead [1/m]."""
+    away = math.hypot(point[0] - here.x_m, point[1] - here.y_m)
+    return 2.0 * math.sin(bearing(point, here)) / max(away, 1e-6)
+
+
+def bound_m(*, increment_m: float, lookahead_m: float, place_m: float, heading_rad: float, curvature_per_m: float,
+            ) -> float:
+    """Y of the law above: beyond which no error of position grows, at the ends of increments [m].
+
+    Args:
+        place_m, heading_rad: by how much the belief, and the turn, may be wrong: b, and h + t.
+        curvature_per_m: by how much the drift that is reckoned with may be: k.
+
+    Raises:
+        ValueError: the look-ahead is shorter than an increment.
+    """
+    if not 0.0 < increment_m <= lookahead_m:
+        raise ValueError(f"expected a look-ahead of at least the increment of {increment_m} m, got {lookahead_m} m")
+    return place_m + lookahead_m * heading_rad + 0.5 * curvature_per_m * increment_m * lookahead_m

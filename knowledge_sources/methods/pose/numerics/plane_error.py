@@ -1,0 +1,75 @@
+"""E1 and E2: distance of the model lines' ends to the observed projection planes (§6.2.2)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from knowledge_sources.methods.pose.estimate import Array
+from knowledge_sources.methods.pose.line_set import TINY, LineSet
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import cross, information_inverse
+
+Weighting = Literal["unit", "length"]
+
+
+def line_weights(lines: LineSet, weighting: Weighting) -> Array:
+    """The paper's weights sigma_i (n,): all one, or the segment's share of the mean length."""
+    if weighting == "unit":
+        return np.ones(len(lines))
+    if weighting == "length":
+        return np.asarray(lines.lengths_px / max(float(np.mean(lines.lengths_px)), TINY))
+    raise ValueError(f'expected weighting "unit" or "length", got {weighting!r}')
+
+
+def camera_ends(lines: LineSet, rotation: Array, translation: Array) -> Array:
+    """q = R p + T, (n, 2, 3) [m, camera]."""
+    return np.asarray(lines.points @ rotation.T + translation)
+
+
+def plane_distances_m(lines: LineSet, ends: Array) -> Array:
+    """n . q, (n, 2) [m]: the bracket of E1."""
+    return np.asarray(np.matmul(ends, lines.normals[:, :, None])[..., 0])
+
+
+def plane_jacobian(lines: LineSet, ends: Array) -> Array:
+    """Derivatives (n, 2, 6) of n . q by the left perturbation: (q x n, n)."""
+    turn = cross(ends, lines.normals[:, None, :])
+    return np.concatenate([turn, np.broadcast_to(lines.normals[:, None, :], ends.shape)], axis=-1)
+
+
+def best_translation(lines: LineSet, rotation: Array, translation: Array, weights: Array) -> Array:
+    """T (3,) that minimises E1 for a given R, exactly; what the lines do not say stays as in ``translation``."""
+    misses = plane_distances_m(lines, camera_ends(lines, rotation, translation))
+    weighted = lines.normals * weights[:, None]
+    moved = weighted.T @ misses.sum(axis=1)
+    values, vectors = np.linalg.eigh(2.0 * weighted.T @ lines.normals)
+    known = values > 1e-10 * max(float(values[-1]), TINY)
+    back = np.where(known, 1.0 / np.where(known, values, 1.0), 0.0)
+    return np.asarray(translation - vectors @ (back * (vectors.T @ moved)))
+
+
+def end_noise(lines: LineSet, vectors: Array) -> Array:
+    """How n . v moves when the observed ends move across their segment by one sigma: (n, k, 2) for v (n, k, 3)."""
+    first, second = lines.rays[:, 0], lines.rays[:, 1]
+    along = (second - first)[:, :2] * lines.focal_px
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(lines.lengths_px, TINY)[:, None]
+    shift = np.zeros_like(first)
+    shift[:, :2] = across * lines.sigma_px[:, None] / lines.focal_px
+    size = np.maximum(np.linalg.norm(cross(first, second), axis=1), TINY)[:, None]
+    planes = np.stack([cross(shift, second) / size, cross(first, shift) / size], axis=1)
+    return np.asarray(vectors @ np.swapaxes(planes, 1, 2))
+
+
+def propagated_covariance(lines: LineSet, rotation: Array, translation: Array, weights: Array) -> Array:
+    """(6, 6) covariance of the minimum of E1 with ``weights`` (n, 2): its noise carried through.
+
+    E1 is not a likelihood, so the inverse Hessian would not do. For E2 divide the weights by |q|^2.
+    """
+    ends = camera_ends(lines, rotation, translation)
+    jacobian = plane_jacobian(lines, ends)
+    weighted = jacobian * weights[..., None]
+    hessian = np.einsum("ika,ikb->ab", weighted, jacobian)
+    spread = np.einsum("ika,ikj->aij", weighted, end_noise(lines, ends)).reshape(6, -1)
+    gain = information_inverse(hessian) @ spread
+    return np.asarray(gain @ gain.T)

@@ -1,0 +1,22 @@
+"""One number of a method: its default, its unit, what it is and where it comes from.
+
+Each room has a ``settings.py`` with one frozen dataclass of such numbers. ``harvey settings`` prints them all, and
+``--set ROOM.NAME=VALUE`` replaces one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import field
+from typing import Any
+
+
+def setting(default: float, unit: str, what: str, source: str) -> Any:
+    """A field of a settings dataclass.
+
+    Args:
+        default: a whole number where only whole numbers make sense.
+        unit: ``px``, ``m``, ``rad``, ``s``, ``1`` for a ratio or a probability, ``count``.
+        what: one sentence, without the unit.
+        source: section or equation of the paper, or the experiment that chose it, or "engineering judgement".
+    """
+    return field(default=default, metadata={"unit": unit, "what": what, "source": source})

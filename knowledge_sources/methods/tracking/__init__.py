@@ -1,0 +1,1 @@
+"""Landmarks followed from frame to frame (§5)."""

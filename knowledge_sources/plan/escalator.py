@@ -1,0 +1,57 @@
+"""Escalator (§2, Figure 2): a discrepancy that its level may not correct goes one level up, but not for ever."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from blackboard.board import View
+from blackboard.change import Change, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.questions import deepest_sketch, is_over, last_escalated
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.task import Outcome
+
+MOST_CHECKS = 20
+"""So often may the plan level be asked in vain on the way to one subgoal: then something is in the way of it."""
+MOST_LOST = 12
+"""So often may the robot be lost in one mission."""
+GIVEN_UP: Mapping[Level, tuple[str, str]] = {
+    Level.PLAN: ("blocked", "on the way to one place it was not as expected {times} times, the last one:"),
+    Level.GOAL: ("lost", "lost {times} times, the last one:"),
+}
+"""How it ends when a level was asked too often, and why."""
+
+
+class Escalator(RobotKnowledgeSource):
+    """Closes a discrepancy beyond its bound and re-posts it one level up, to be measured anew there; when that was done
+    too often for the same thing, it ends the mission.
+
+    So the same failure is not answered in the same way for ever: each level is asked only so often.
+    """
+
+    level = Level.PLAN
+    watches = (Watch(Discrepancy, where=lambda d: d.exceeds),)
+    writes = (Discrepancy, Outcome)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        return 1.0
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        closed, raised = trigger.entry.value.escalated()
+        tried, last = _tried(view, raised.level), last_escalated(view, closed.level)
+        times = 1 + (last.value.times if last is not None and last.value.tried == tried else 0)
+        close = Revise(trigger.entry, replace(closed, tried=tried, times=times), trigger.entry.because)
+        yield close
+        yield Post(raised, (close,))
+        if times >= (MOST_CHECKS if raised.level is Level.PLAN else MOST_LOST) and not is_over(view):
+            kind, why = GIVEN_UP[raised.level]
+            yield Post(Outcome(kind, f"{why.format(times=times)} {closed.what}"), (close,))
+
+
+def _tried(view: View, level: Level) -> str:
+    """What is being tried: to reach the end of a subgoal, or, for the goal level, the mission."""
+    sketch = deepest_sketch(view) if level is Level.PLAN else None
+    return "the mission" if sketch is None else f"subgoal {sketch.value.at} of {sketch.id}"

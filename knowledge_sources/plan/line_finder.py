@@ -1,0 +1,58 @@
+"""Line finder (§1.2): straight line segments of a picture that was asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Post
+from blackboard.level import Level
+from knowledge_sources.methods.features.images import mean_and_spread
+from knowledge_sources.methods.features.lines import find_lines
+from knowledge_sources.methods.features.rectification import Rectified
+from knowledge_sources.questions import open_milestone
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.body import Frame
+from world_models.entries.percepts import Segments
+from world_models.frames import frozen
+from world_models.robot import RobotModel
+
+LEAST_LENGTH_PX = 10.0
+"""Shorter segments belong to what the model lacks more often than to what it has."""
+
+
+class LineFinder(RobotKnowledgeSource):
+    """Finds the segments of a frame in which a milestone, or the way back from being lost, is looked for.
+
+    It looks at the whole frame, not only where lines are expected: how much agrees by chance must be known too.
+    """
+
+    level = Level.PLAN
+    watches = (Watch(Frame, (Posted,), lambda f: f.purpose in ("milestone", "probe")),)
+    writes = (Segments,)
+
+    def __init__(self, robot: RobotModel) -> None:
+        super().__init__(robot)
+        self._picture = Rectified(robot.lens, robot.camera)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        return 0.8
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        frame = trigger.entry
+        image = self._picture(frame.value.jpeg)
+        found = find_lines(image, min_length_px=LEAST_LENGTH_PX)
+        brightness, contrast = mean_and_spread(image)
+        waiting = open_milestone(view) if frame.value.purpose == "milestone" else None
+        yield Post(
+            Segments(
+                frame.id,
+                "" if waiting is None else waiting.id,
+                frozen(found.segments_px),
+                frozen(found.sigma_offset_px),
+                contrast,
+                brightness,
+            ),
+            (frame,) if waiting is None else (frame, waiting),
+        )

@@ -1,0 +1,81 @@
+"""Matcher (§6.1): which of the segments show which of the lines that a milestone expects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Post
+from blackboard.level import Level
+from knowledge_sources.methods.matching.floor_matching import FloorMatch, match_on_floor
+from knowledge_sources.methods.matching.image_matching import Match, match_lines
+from knowledge_sources.questions import held
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.location import Hypothesis
+from world_models.entries.percepts import LineMatch, Segments
+from world_models.entries.task import Milestone
+from world_models.frames import frozen
+
+Floats = NDArray[np.float64]
+RIGID_PX = 6.0
+"""Up to this uncertainty in the image the picture moves nearly as one: §6.1's fit in the image is right. Beyond it,
+perspective bends the move, and the fit is made on the floor instead."""
+NEAR_M = 2.5
+"""The distance at which that uncertainty is taken."""
+PAIR_PX = 4.0
+
+
+class Matcher(RobotKnowledgeSource):
+    """Matches the projected model to the data lines before any pose is solved for.
+
+    The search, its objective and its start are §6.1's. Where the belief is sure enough the model is fitted as a rigid
+    figure in the image; where it is not, as a picture taken from a place on the floor near the believed one.
+    """
+
+    level = Level.PLAN
+    watches = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
+    writes = (LineMatch,)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        milestone = view.get(trigger.entry.value.milestone)
+        return 0.8 if milestone is not None and milestone.value.status == "expected" and held(view) else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        segments, belief = trigger.entry, held(view)
+        milestone = view[segments.value.milestone]
+        if belief is None:
+            return
+        m: Milestone = milestone.value
+        lines_world = np.array(m.expected, float).reshape(-1, 2, 3)
+        data_px = segments.value.segments_px
+        if not len(lines_world):
+            none = np.zeros((0, 2), np.int64)
+            yield Post(LineMatch(milestone.id, segments.id, none, frozen(lines_world), frozen(data_px[:0]), 0.0,
+                                 frozen(np.zeros(0))), (segments, milestone, belief))
+            return
+        found = self._found(m, lines_world, data_px, belief.value)
+        pairs = np.asarray(found.pairs, np.int64).reshape(-1, 2)
+        yield Post(
+            LineMatch(
+                milestone.id, segments.id, pairs, frozen(lines_world[pairs[:, 0]]), frozen(data_px[pairs[:, 1]]),
+                float(found.e_match), frozen(found.coverage),
+            ),
+            (segments, milestone, belief),
+        )
+
+    def _found(
+        self, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
+    ) -> Match | FloorMatch:
+        if self._robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / NEAR_M) <= RIGID_PX:
+            model_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
+            return match_lines(model_px, data_px, pair_px=PAIR_PX, objective="likelihood")
+        robot = self._robot.standing_in(belief.locale)
+        return match_on_floor(
+            lines_world, data_px, robot.camera, robot.mount.camera_from_robot,
+            belief.world_from_robot(self._robot.world), belief.covariance_world(self._robot.world),
+        )

@@ -1,0 +1,64 @@
+"""Med-R-and-T (§6.2.4): the robot's pose from matched lines of which some are matched wrongly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Post
+from blackboard.level import Level
+from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
+from knowledge_sources.methods.pose import planar_from_lines
+from knowledge_sources.questions import held
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.percepts import LineMatch, PoseFix
+from world_models.entries.task import Milestone
+from world_models.frames import frozen
+
+LOOSER = 4.0
+DOUBT = (0.05, math.radians(1.5))
+"""The belief enters as a prior that is looser by a factor and by these (m, rad): the lines shall decide."""
+
+
+class MedRAndT(RobotKnowledgeSource):
+    """Solves for the pose on the floor, and says which pairs do not agree with it.
+
+    The mounting of the camera is known (§3.2), so three of the six unknowns of §6.2 are left. Subsets of lines propose,
+    all lines judge, and those that agree decide together.
+    """
+
+    level = Level.PLAN
+    watches = (Watch(LineMatch, (Posted,)),)
+    writes = (PoseFix,)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        return 0.8 if held(view) is not None else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        match, belief, milestone = trigger.entry, held(view), view.get(trigger.entry.value.milestone)
+        if belief is None or milestone is None:
+            return
+        m: Milestone = milestone.value
+        prior = LOOSER * belief.value.covariance_world(self._robot.world)
+        prior = prior + np.diag([DOUBT[0] ** 2, DOUBT[0] ** 2, DOUBT[1] ** 2])
+        found = planar_from_lines(
+            match.value.lines_world,
+            match.value.segments_px,
+            self._robot.camera,
+            self._robot.standing_in(belief.value.locale).mount.camera_from_robot,
+            belief.value.world_from_robot(self._robot.world),
+            prior_covariance=prior,
+            landmark_ids=[m.landmark_of[i] for i in match.value.pairs[:, 0]],
+            sigma_px=SIGMA_ACROSS_PX,
+        )
+        yield Post(
+            PoseFix(
+                match.id, found.world_from_robot, frozen(found.covariance), np.asarray(found.inliers, bool),
+                frozen(found.residuals_px), tuple(reason or "" for reason in found.rejected),
+            ),
+            (match, belief),
+        )

@@ -1,0 +1,280 @@
+"""Milestone selector (§3.3, §4): which landmarks should be seen where, and from which direction they tell most."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
+from knowledge_sources.methods.localization.aliasing import anticipate
+from knowledge_sources.methods.verification.color_check import expected_looks
+from knowledge_sources.methods.verification.view_quality import ViewQuality, view_quality
+from knowledge_sources.questions import (
+    deepest_sketch,
+    has_followed,
+    held,
+    is_over,
+    is_settled,
+    open_discrepancy,
+    open_milestone,
+    standing_in,
+    unmeasured_doubt,
+)
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.body import Look
+from world_models.entries.location import Hypothesis
+from world_models.entries.obstruction import Obstruction
+from world_models.entries.task import Milestone, PlanSketch
+from world_models.frames import Pose2, wrap_angle
+from world_models.robot import RobotModel
+from world_models.visibility.lines_and_points import VisibleLines, visible_lines
+
+FACING_RAD = math.radians(3.5)
+LINES = 60
+"""The most lines that one milestone expects."""
+LENGTH_PX = 12.0
+CONTRAST = 0.05
+GOOD_PART = 0.3
+"""A view is good enough when it tells the place to this part of the tolerance there."""
+GOOD_RAD = math.radians(0.25)
+LEAST_LINES = 10
+CHECK_M = 0.1
+"""So well a check of the belief should tell the place."""
+OTHERWISE_RAD = math.radians(20.0)
+"""Looks that differ by less show much the same."""
+GLANCES_RAD = tuple(math.radians(a) for a in (30, -30, 60, -60, 90, -90, 135, -135, 180))
+
+
+class MilestoneSelector(RobotKnowledgeSource):
+    """Says what should be seen before a subgoal (M0 first), and asks to look.
+
+    It prefers the view that the robot has, then the one it will have next, then the one that would tell most; where a
+    view could not be told, another one is tried. It also checks the belief in between when tracking could not explain
+    what it saw, first in the view that it has. What was just found to stand before the camera is not looked behind.
+    """
+
+    level = Level.PLAN
+    watches = (
+        Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and not s.verified),
+        Watch(Discrepancy, (Posted, Revised)),
+        Watch(Hypothesis, (Revised,), lambda h: h.is_held),
+        Watch(Milestone, (Revised,), lambda m: not m.is_open),
+        Watch(Obstruction, (Posted, Revised)),
+    )
+    writes = (Milestone, Look)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        if isinstance(trigger.entry.value, Obstruction):
+            return 0.9 if held(view) is not None and _awaited(view) is not None else None
+        task = self._task(view)
+        if task is None:
+            return None
+        return 0.7 if isinstance(task.value, Discrepancy) else 0.5
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        belief = held(view)
+        if belief is None:
+            return
+        if isinstance(trigger.entry.value, Obstruction):
+            yield from self._expected_anew(view, trigger.entry, belief)
+            return
+        task, waiting = self._task(view), open_milestone(view)
+        if task is None:
+            return
+        if isinstance(task.value, PlanSketch):
+            yield from self._proposed(view, task, belief)
+        elif waiting is None:
+            yield from self._checked(view, task, belief)
+        else:
+            here = replace(waiting.value, look_heading_rad=self._heading(belief.value))
+            yield from self._looked_for(view, waiting, here, task, belief, _car_of(view.get(here.sketch), here.index))
+
+    def _task(self, view: View) -> Entry[Any] | None:
+        """What asks for a look now: a doubt, a milestone that is faced, or a sketch whose milestone is due."""
+        belief, waiting = held(view), open_milestone(view)
+        if belief is None or is_over(view) or not is_settled(view) or open_discrepancy(view, Level.GOAL) is not None:
+            return None
+        if waiting is not None and waiting.value.status == "expected":
+            return None
+        doubt = unmeasured_doubt(view)
+        if doubt is not None and (waiting is None or waiting.cycle < doubt.cycle):
+            return doubt
+        if waiting is not None:
+            return waiting if self._faces(belief.value, waiting.value) else None
+        sketch = deepest_sketch(view)
+        return sketch if sketch is not None and not sketch.value.verified else None
+
+    def _checked(self, view: View, doubt: Entry[Discrepancy], belief: Entry[Hypothesis]) -> Iterable[Effect]:
+        """A look in between: in the view that the robot has, and if it could not be told, in another one from here."""
+        tried = _tried(view, lambda m: m.cycle >= doubt.cycle)
+        check = Milestone("", -1, f"check of the belief, because {doubt.value.what}", self._heading(belief.value),
+                          tried=tried)
+        if not tried:
+            yield from self._looked_for(view, None, check, doubt, belief)
+            return
+        robot, pose = self._standing(view, belief.value)
+        headings = _otherwise(_glances(pose), tried) or [pose.heading_rad]
+        heading = best_heading(robot, pose, headings, CHECK_M)
+        yield Post(replace(check, look_heading_rad=heading), (doubt, belief))
+
+    def _expected_anew(
+        self, view: View, hidden: Entry[Obstruction], belief: Entry[Hypothesis]
+    ) -> Iterable[Effect]:
+        """The milestone whose picture was taken, without what is hidden in it."""
+        waiting = _awaited(view)
+        if waiting is None:
+            return
+        m, (robot, pose) = waiting.value, self._standing(view, belief.value)
+        seen = expectation(robot, pose, m, _car_of(view.get(m.sketch), m.index))
+        yield Revise(waiting, seen, (hidden, waiting, belief))
+
+    def _proposed(self, view: View, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
+        """The milestone before the sketch's next subgoal, seen from the first direction that is good enough."""
+        robot, pose = self._standing(view, belief.value)
+        s = sketch.value
+        tried = _tried(view, lambda m: (m.value.sketch, m.value.index) == (sketch.id, s.at))
+        heading = self._direction(robot, s, pose, tried)
+        milestone = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}", heading, tried=tried)
+        if self._faces(belief.value, milestone):
+            yield from self._looked_for(view, None, milestone, sketch, belief, _car_of(sketch, s.at))
+        else:
+            yield Post(milestone, (sketch, belief))
+
+    def _looked_for(
+        self, view: View, old: Entry[Milestone] | None, milestone: Milestone, task: Entry[Any],
+        belief: Entry[Hypothesis], car: str = "",
+    ) -> Iterable[Effect]:
+        """Predict the landmarks from the believed pose, but those in a car, and ask for the picture."""
+        hidden, (robot, pose) = view.latest(Obstruction), self._standing(view, belief.value)
+        expected = expectation(robot, pose, milestone, car)
+        if not has_followed(view) or open_discrepancy(view, Level.PLAN) is not None:
+            anticipate(robot, belief.value.locale, pose)  # the judge will ask whether it is another door
+        because = (task, belief) if hidden is None else (task, belief, hidden)
+        wish = Post(expected, because) if old is None else Revise(old, expected, because)
+        yield wish
+        yield Post(Look("milestone"), (wish,))
+
+    def _direction(self, robot: RobotModel, sketch: PlanSketch, pose: Pose2, tried: Sequence[float]) -> float:
+        before = sketch.subgoals[sketch.at - 1] if sketch.at else None
+        headings = _otherwise(self._candidates(sketch, pose), tried)
+        return best_heading(robot, pose, headings, before.tolerance_m if before else 0.1, _car(sketch, sketch.at))
+
+    def _candidates(self, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
+        wanted = sketch.subgoals[sketch.at - 1].destination if sketch.at else None
+        if wanted is not None and wanted.heading_rad is not None:
+            yield wanted.in_world(self._robot.world).heading_rad
+        yield pose.heading_rad
+        if sketch.current is not None:
+            end = sketch.current.destination.in_world(self._robot.world)
+            yield math.atan2(end.y_m - pose.y_m, end.x_m - pose.x_m)
+        yield from _glances(pose)
+
+    def _standing(self, view: View, belief: Hypothesis) -> tuple[RobotModel, Pose2]:
+        """The robot where it believes that it stands, and its pose there in the world."""
+        return standing_in(view, self._robot, belief.locale), belief.world_from_robot(self._robot.world)
+
+    def _heading(self, belief: Hypothesis) -> float:
+        return belief.world_from_robot(self._robot.world).heading_rad
+
+    def _faces(self, belief: Hypothesis, milestone: Milestone) -> bool:
+        return abs(wrap_angle(self._heading(belief) - milestone.look_heading_rad)) <= FACING_RAD
+
+
+def _glances(pose: Pose2) -> Iterator[float]:
+    return (wrap_angle(pose.heading_rad + glance) for glance in GLANCES_RAD)
+
+
+def _otherwise(headings: Iterable[float], tried: Sequence[float]) -> list[float]:
+    """Those that show something else than what was tried."""
+    return [h for h in headings if all(abs(wrap_angle(h - other)) > OTHERWISE_RAD for other in tried)]
+
+
+def _awaited(view: View) -> Entry[Milestone] | None:
+    """The milestone whose picture was asked for and is not judged yet."""
+    waiting = open_milestone(view)
+    return waiting if waiting is not None and waiting.value.status == "expected" else None
+
+
+def _car_of(sketch: Entry[PlanSketch] | None, index: int) -> str:
+    return "" if sketch is None else _car(sketch.value, index)
+
+
+def _car(sketch: PlanSketch, index: int) -> str:
+    """The elevator's car in which the subgoal before a milestone ends, after a ride: it looks alike on every floor."""
+    before = sketch.subgoals[index - 1] if index > 0 else None
+    return before.destination.locale if before is not None and before.is_ride else ""
+
+
+def _tried(view: View, is_same: Callable[[Entry[Milestone]], bool]) -> tuple[float, ...]:
+    """From where the last milestone, if it is the same one, was looked for in vain."""
+    last = view.latest(Milestone)
+    if last is None or last.value.status != "not testable" or not is_same(last):
+        return ()
+    return (*last.value.tried, last.value.look_heading_rad)
+
+
+def best_heading(
+    robot: RobotModel, pose: Pose2, headings: Iterable[float], tolerance_m: float, car: str = ""
+) -> float:
+    """The first heading from which the view is good enough for the tolerance, else the best [rad, world]."""
+    rated: list[tuple[ViewQuality, float]] = []
+    for heading in headings:
+        quality = _quality(robot, Pose2(pose.x_m, pose.y_m, heading), car)
+        sharp = quality.sigma_m <= GOOD_PART * tolerance_m and quality.sigma_rad <= GOOD_RAD
+        if sharp and quality.lines >= LEAST_LINES:
+            return heading
+        rated.append((quality, heading))
+    best = min(range(len(rated)), key=lambda i: (rated[i][0].lines < LEAST_LINES, rated[i][0].sigma_m, i))
+    return rated[best][1]
+
+
+def expectation(robot: RobotModel, pose: Pose2, milestone: Milestone, car: str = "") -> Milestone:
+    """The milestone with what should be seen from a pose; in an elevator's car, what is seen out of it."""
+    lines = _seen_from(robot, pose, car)
+    marks = sorted({int(i) for i in lines.landmark})
+    return replace(
+        milestone,
+        landmarks=tuple(robot.world.landmarks[i].name for i in marks),
+        expected=_nested(lines.lines_world),
+        expected_px=_nested(lines.segments_px),
+        landmark_of=tuple(marks.index(int(i)) for i in lines.landmark),
+        looks=expected_looks(robot, pose),
+        status="expected",
+    )
+
+
+def _quality(robot: RobotModel, pose: Pose2, car: str) -> ViewQuality:
+    return view_quality(
+        _seen_from(robot, pose, car).lines_world, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_ACROSS_PX
+    )
+
+
+def _seen_from(robot: RobotModel, pose: Pose2, car: str = "") -> VisibleLines:
+    """The clearest of the lines that should be seen, long ones with contrast, but none of those in a car."""
+    lines = visible_lines(
+        robot.world, robot.camera, robot.camera_from_world(pose), min_length_px=LENGTH_PX, min_contrast=CONTRAST,
+        max_distance_m=15.0,
+    )
+    if car:
+        marks = robot.world.landmarks
+        lines = lines[np.array([car not in (marks[i].locale, marks[i].neighbour) for i in lines.landmark], bool)]
+    if len(lines) <= LINES:
+        return lines
+    lengths = np.linalg.norm(lines.segments_px[:, 1] - lines.segments_px[:, 0], axis=1)
+    clear = np.minimum(lengths, 120.0) * np.minimum(lines.contrast, 0.3)
+    return lines[np.sort(np.argsort(-clear, kind="stable")[:LINES])]
+
+
+def _nested(array: NDArray[np.float64]) -> tuple[tuple[tuple[float, ...], ...], ...]:
+    return tuple(tuple(map(tuple, line)) for line in array.tolist())

@@ -1,0 +1,1 @@
+"""The rerun recording. The only importer of rerun."""

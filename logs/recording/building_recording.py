@@ -1,0 +1,22 @@
+"""A recording of nothing but a building: to walk round it in the viewer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import rerun.blueprint as rrb
+
+from logs.recording.blueprint import building_view
+from logs.recording.loggers.building import Building
+from logs.recording.stream import RecordingStream
+from world_models.building.world import World
+
+
+def record_building(world: World, out: Path) -> None:
+    """Write the building's surfaces, storey by storey, its doorways and room names. Raises RecordingError."""
+    look = rrb.Blueprint(building_view(world, world.name), rrb.TimePanel(state="hidden"), auto_views=False)
+    stream = RecordingStream(out, f"building of {world.name}", world.name, look)
+    try:
+        Building(world).begin(stream)
+    finally:
+        stream.close()

@@ -1,0 +1,90 @@
+"""The building: its surfaces without ceilings, its doorways and the names of its rooms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from logs.recording.board_mirror import Moment
+from logs.recording.palette import DOOR, NAME
+from logs.recording.paths import BUILDING, DOORWAYS, NAMES, WORLD
+from logs.recording.stream import RecordingStream
+from world_models.building.regions import LAMP
+from world_models.building.world import World
+
+HEAD_HIGH_M = 1.8
+"""A surface that faces down and hangs higher than this is a ceiling, and left out: one looks in from above."""
+
+STOREY_M = 0.5
+"""Rooms whose floors differ by less are of one storey."""
+
+SOFT_LIGHT = 0.75
+LAMP_LIGHT = 0.35
+
+
+class Building:
+    """Logs the world model once."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+
+    def begin(self, stream: RecordingStream) -> None:
+        stream.fix(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        for path, mesh in _meshes(self._world):
+            stream.fix(path, mesh)
+        stream.fix(NAMES, _names(self._world))
+        stream.fix(DOORWAYS, _doorways(self._world))
+
+    def log(self, stream: RecordingStream, moment: Moment) -> None:
+        """Buildings do not change."""
+
+
+def _meshes(world: World) -> Iterator[tuple[str, Any]]:
+    """A mesh for each storey, so that one can take the upper ones off; they are one where there is only one."""
+    regions = [(face, region) for face in world.faces for region in (*face.front, *face.back)]
+    colours = np.array([region.colour for _, region in regions])
+    floors = {name: world.floor_m(name) for name in world.rooms}
+    levels = np.array([floors.get(face.locale, 0.0) for face, _ in regions])
+    storeys = np.unique(np.round(levels, 1))
+    for number, level_m in enumerate(storeys):
+        of_storey = np.abs(levels - level_m) < STOREY_M
+        path = BUILDING if len(storeys) == 1 else f"{BUILDING}/storey-{number}"
+        yield path, _mesh(world, colours, of_storey, float(level_m))
+
+
+def _mesh(world: World, colours: NDArray[np.float64], of_storey: NDArray[np.bool_], floor_m: float) -> Any:
+    """The surfaces of a storey as a mesh that shows from their visible sides only: no wall stands in one's way."""
+    polygons, normals = world.scene.polygons_world, world.scene.planes_world[:, :3]
+    shown = of_storey & ((normals[:, 2] > -0.5) | (polygons[..., 2].min(axis=1) < floor_m + HEAD_HIGH_M))
+    light = SOFT_LIGHT + LAMP_LIGHT * normals @ (LAMP / np.linalg.norm(LAMP))
+    lit = np.clip(255.0 * light[:, None] * colours, 0, 255).astype(np.uint8)[shown]
+    corners = polygons.shape[1]
+    return rr.Mesh3D(
+        vertex_positions=polygons[shown].reshape(-1, 3), vertex_colors=np.repeat(lit, corners, axis=0),
+        triangle_indices=_triangles(len(lit), corners), face_rendering=rr.components.MeshFaceRendering.Front,
+    )
+
+
+def _triangles(count: int, corners: int) -> NDArray[np.int64]:
+    """(count * (corners - 2), 3) fans for convex polygons that lie one after the other."""
+    rest = np.arange(1, corners - 1)
+    fan = np.stack([np.zeros_like(rest), rest, rest + 1], axis=1)
+    return (fan[None] + corners * np.arange(count)[:, None, None]).reshape(-1, 3)
+
+
+def _names(world: World) -> Any:
+    middles = [[*world.outline(name).mean(axis=0), world.floor_m(name) + 0.05] for name in world.rooms]
+    return rr.Points3D(middles, labels=list(world.rooms), show_labels=True, radii=0.02, colors=[NAME])
+
+
+def _doorways(world: World) -> Any:
+    strips = []
+    for doorway in world.doorways:
+        (a, b), (c, d) = doorway.thresholds_world
+        height_m = world.floor_m(doorway.between[0]) + 0.02
+        strips.append([[*corner, height_m] for corner in (a, b, c, d, a)])
+    return rr.LineStrips3D(strips, colors=[DOOR], radii=0.03)

@@ -1,0 +1,135 @@
+"""Decisions: a plain sentence and a table row a cycle for people, and the whole record for programs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+import rerun as rr
+
+from blackboard.activation import Activation
+from blackboard.change import Change
+from blackboard.journal import Decision
+from blackboard.servoing import Discrepancy
+from logs.recording import words
+from logs.recording.board_mirror import Moment
+from logs.recording.deeds import Deeds
+from logs.recording.palette import DONE, LEVELS, REJECTED
+from logs.recording.paths import RECORDS, TABLE
+from logs.recording.stream import RecordingStream
+
+TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "doubted", "halted")
+"""Statuses of milestones, sketches, goals, hypotheses and legs that stand for something gone wrong."""
+
+COLUMNS = ("focus_level", "chosen_knowledge_source", "rating", "trigger_entry", "effects_on_the_board",
+           "runner_up_with_rating", "waiting")
+"""Of the decision table; the viewer makes a column as wide as its name."""
+
+MARKS: Mapping[str, str] = {"ERROR": "⚠ ", "WARN": "⚠ ", "INFO": "", "DEBUG": ""}
+
+RECORD = "record"
+"""The component that holds a decision's line."""
+
+
+class Record:
+    """A column of decisions' lines."""
+
+    @classmethod
+    def columns(cls, **components: Any) -> Iterable[Any]:
+        return rr.AnyValues.columns(True, **components)
+
+
+class TableRow:
+    """Columns of the sentence and of the table."""
+
+    @classmethod
+    def columns(cls, **components: Any) -> Iterator[Any]:
+        for name, values in components.items():
+            kind = rr.TextLog if name in ("text", "level", "color") else None
+            yield from kind.columns(**{name: values}) if kind else rr.AnyValues.columns(True, **{name: values})
+
+
+class Decisions:
+    """Logs every decision in three forms."""
+
+    def __init__(self, line_of: Callable[[Decision], str]) -> None:
+        """``line_of`` gives a decision's line in the journal."""
+        self._line_of = line_of
+        self._deeds = Deeds()
+
+    def begin(self, stream: RecordingStream) -> None:
+        """Nothing holds at all times."""
+
+    def log(self, stream: RecordingStream, moment: Moment) -> None:
+        decision = moment.decision
+        stream.log(RECORDS, Record, **{RECORD: [self._line_of(decision)]})
+        level = log_level(decision)
+        fields: dict[str, list[Any]] = {name: [value] for name, value in row(decision).items()}
+        stream.log(TABLE, TableRow, text=[MARKS[level] + sentence(decision, self._deeds)], level=[level],
+                 color=[_colour(decision)], **fields)
+
+
+def sentence(decision: Decision, deeds: Deeds) -> str:
+    """What was seen and decided, in words."""
+    seen = _told(decision.observed, deeds)
+    given = f" [{seen}]" if seen else ""
+    done = _told(decision.made, deeds) or "changes nothing"
+    if decision.chosen is None:
+        return f"nobody had anything to do{given}"
+    who = words.expert(decision.chosen.source.name)
+    if decision.refused:
+        return f"{who}: refused, {decision.refused.splitlines()[-1]}{given}"
+    return f"{who}: {done}{given}"
+
+
+def _told(changes: Iterable[Change], deeds: Deeds) -> str:
+    return "; ".join(words.numerous(said for change in changes if (said := deeds.tell(change))))
+
+
+def log_level(decision: Decision) -> str:
+    """INFO for the ordinary; WARN when something was refused or goes wrong; ERROR when an expert raised."""
+    if decision.refused:
+        return "ERROR" if decision.refused.startswith("raised") else "WARN"
+    return "WARN" if any(map(_is_trouble, decision.made)) else "INFO" if decision.made else "DEBUG"
+
+
+def _is_trouble(change: Change) -> bool:
+    value = change.entry.value
+    if isinstance(value, Discrepancy):
+        return value.exceeds or value.status == "escalated" or (value.is_open and value.magnitude is None)
+    return getattr(value, "status", "") in TROUBLES
+
+
+def _colour(decision: Decision) -> tuple[int, int, int, int]:
+    """Of the servo level at which the expert works, as in the lanes; red where the act was refused."""
+    if decision.refused:
+        return REJECTED
+    return LEVELS[str(decision.chosen.source.level)] if decision.chosen else DONE
+
+
+def row(decision: Decision) -> dict[str, str | float]:
+    """The decision table's columns, by :data:`COLUMNS`."""
+    chosen, second = decision.chosen, decision.runner_up
+    values = (
+        str(decision.focus),
+        chosen.source.name if chosen else "",
+        float(chosen.rating) if chosen else 0.0,
+        str(chosen.trigger.entry.ref) if chosen else "",
+        _deeds(decision.made),
+        _bid(second) if second else "",
+        float(decision.pending),
+    )
+    return dict(zip(COLUMNS, values, strict=True))
+
+
+def _bid(activation: Activation) -> str:
+    return f"{activation.source.name} (rating {activation.rating:.2f})"
+
+
+def _deeds(made: tuple[Change, ...]) -> str:
+    counts = Counter((change.kind.lower(), type(change.entry.value).__name__) for change in made)
+    named = {(c.kind.lower(), type(c.entry.value).__name__): str(c.entry.ref) for c in made}
+    parts = [f"{kind} {named[kind, what]}" if count == 1 else f"{kind} {count} x {what}"
+             for (kind, what), count in counts.items()]
+    return ", ".join(parts) or "did nothing"

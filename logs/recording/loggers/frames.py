@@ -1,0 +1,47 @@
+"""Frames: the camera's JPEG bytes, kept as they came, so that a run can be decided again from its recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import rerun as rr
+
+from logs.recording.board_mirror import Moment
+from logs.recording.paths import CAMERA, IMAGE
+from logs.recording.stream import RecordingStream
+from world_models.camera import Camera
+from world_models.entries.body import Frame
+
+NUMBER = "number"
+"""The component beside an image that holds the frame's number."""
+
+
+class Picture:
+    """Columns of a picture and of what is known about it."""
+
+    @classmethod
+    def columns(cls, **components: Any) -> Iterator[Any]:
+        for name, values in components.items():
+            if name == "blob":
+                yield from rr.EncodedImage.columns(blob=values)
+            else:
+                yield from rr.AnyValues.columns(True, **{name: values})
+
+
+class Frames:
+    """Logs each picture as it is delivered."""
+
+    def __init__(self, camera: Camera) -> None:
+        self._camera = camera
+
+    def begin(self, stream: RecordingStream) -> None:
+        camera = self._camera
+        stream.fix(CAMERA, rr.Pinhole(image_from_camera=camera.matrix, width=camera.width, height=camera.height))
+        stream.fix(IMAGE, rr.EncodedImage.from_fields(media_type="image/jpeg"))
+
+    def log(self, stream: RecordingStream, moment: Moment) -> None:
+        for entry in moment.changed(Frame):
+            frame = entry.value
+            stream.log(IMAGE, Picture, blob=[frame.jpeg], **{NUMBER: [frame.number]}, purpose=[frame.purpose],
+                     entry=[str(entry.ref)])

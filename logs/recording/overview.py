@@ -1,0 +1,220 @@
+"""Overview: several runs side by side, one row a run, in a recording of its own.
+
+It is made from the runs' recordings alone: what each was busy with, its milestones, its error and its way.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from rerun.chunk import RrdReader
+from rerun.error_utils import RerunWarning
+
+from logs.errors import RecordingError
+from logs.recording.activity import ACTIVITIES
+from logs.recording.loggers.lanes import GAP, style
+from logs.recording.overview_blueprint import overview_blueprint
+from logs.recording.palette import BELIEVED, DONE, MATCHED, REJECTED, VERDICTS, Colour, faint
+from logs.recording.paths import (
+    BELIEVED_ROBOT,
+    BUILDING,
+    CHAPTERS,
+    FLEET,
+    HARVEY,
+    MILESTONES,
+    MOODS_OF,
+    OFF,
+    POSITION,
+    SUMMARY,
+    TRUE_ROBOT,
+    WORLD,
+)
+from logs.recording.stream import RecordingStream
+from logs.recording.words import metres
+
+FOUND = "found himself"
+MARKED: Mapping[str, Colour] = {**VERDICTS, FOUND: BELIEVED}
+"""What is marked in a run's row of milestones."""
+
+MARK_CYCLES = 5
+"""A mark lasts so long, to be seen."""
+
+HEIGHT_M = 0.2
+"""Ways are drawn so high above the floor."""
+
+COLUMNS = ("run", "scenario", "seed", "outcome", "error", "milestones", "refuted", "relocated", "collisions", "cycles")
+
+Series = list[tuple[int, Any]]
+"""(cycle, value) in the order of time."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunFiles:
+    """A run to be shown.
+
+    Attributes:
+        name: of its row.
+        recording: its recording.
+        result: what its ``result.json`` holds; empty where there is none.
+    """
+
+    name: str
+    recording: Path
+    result: Mapping[str, Any]
+
+    @property
+    def outcome(self) -> str:
+        return str(self.result.get("outcome", "unfinished"))
+
+    @property
+    def colour(self) -> Colour:
+        """Of its line and its way."""
+        return {"reached": MATCHED, "unfinished": DONE}.get(self.outcome, REJECTED)
+
+
+def write_overview(runs: Sequence[RunFiles], path: Path, title: str) -> list[str]:
+    """Write the overview of some runs, in their order.
+
+    Returns:
+        what is missing: a line for each recording that could not be read, of which only the result is shown.
+
+    Raises:
+        RecordingError: the overview cannot be written.
+        ValueError: there are no runs.
+    """
+    if not runs:
+        raise ValueError("expected at least one run, got none")
+    tales, missing = [], []
+    for run in runs:
+        try:
+            tales.append((run, _Tale.of(run.recording)))
+        except RecordingError as error:
+            missing.append(str(error))
+    places = [place for _, tale in tales for _, place in tale.way]
+    stream = RecordingStream(path, f"overview {title}", title, overview_blueprint(places))
+    try:
+        stream.fix(SUMMARY, rr.TextDocument(summary(runs), media_type="text/markdown"))
+        for number, (run, tale) in enumerate(tales):
+            _Row(stream, number, run).draw(tale)
+        stream.fix(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        if tales:
+            stream.copy(tales[0][0].recording, f"/{BUILDING}/**")
+    finally:
+        stream.close()
+    return missing
+
+
+def summary(runs: Sequence[RunFiles]) -> str:
+    """The runs as a markdown table, and how many of them arrived."""
+    reached = sum(run.outcome == "reached" for run in runs)
+    table = [" | ".join(COLUMNS), "|".join("---" for _ in COLUMNS), *(" | ".join(_cells(run)) for run in runs)]
+    return "\n".join([f"**{reached} of {len(runs)} reached their goal.**", "", *table])
+
+
+def _cells(run: RunFiles) -> Iterator[str]:
+    r = run.result
+    milestones, error_m = r.get("milestones") or {}, r.get("final_error_m")
+    values = (run.name, r.get("scenario"), r.get("seed"), run.outcome,
+              metres(error_m) if isinstance(error_m, float) else None, milestones.get("verified"),
+              milestones.get("refuted"), r.get("relocalizations"), r.get("collisions"), r.get("decisions"))
+    yield from ("-" if value is None else str(value) for value in values)
+
+
+@dataclass(frozen=True, slots=True)
+class _Tale:
+    """What the overview takes from a recording: activities, turning points, errors, places; each over cycles."""
+
+    activities: Series
+    marks: Series
+    errors: Series
+    way: Series
+
+    @staticmethod
+    def of(path: Path) -> _Tale:
+        """Raises RecordingError where it cannot be read."""
+        true_way = read_series(path, TRUE_ROBOT, "Transform3D:translation")
+        return _Tale(
+            read_series(path, HARVEY, "StateChange:state"), read_series(path, CHAPTERS, "TextLog:level"),
+            read_series(path, POSITION, "Measurements:values") if true_way else [],
+            true_way or read_series(path, BELIEVED_ROBOT, "Transform3D:translation"))
+
+
+class _Row:
+    """What one run leaves in the overview."""
+
+    def __init__(self, stream: RecordingStream, number: int, run: RunFiles) -> None:
+        """A row's name begins with its number, since rows are sorted by name."""
+        self._tape, self._run = stream, run
+        self._part = rr.escape_entity_path_part(f"{number:03}_{run.name}")
+
+    def draw(self, tale: _Tale) -> None:
+        """Two lanes, a curve and a way."""
+        self._lane(f"{MOODS_OF}/{self._part}", tale.activities, ACTIVITIES)
+        self._lane(f"{MILESTONES}/{self._part}", list(_marks(tale.marks)), MARKED)
+        self._errors(tale.errors)
+        self._way(tale.way)
+
+    def _lane(self, path: str, states: Series, styles: Mapping[str, Colour]) -> None:
+        self._tape.fix(path, style(styles))
+        for cycle, state in states:
+            self._tape.at(cycle, 0.0)
+            self._tape.log(path, rr.StateChange, state=[state])
+
+    def _errors(self, errors: Series) -> None:
+        path = f"{OFF}/{self._part}"
+        self._tape.fix(path, rr.SeriesLines(names=[self._run.name], colors=[self._run.colour], widths=[1.5]))
+        for cycle, (ahead_mm, left_mm) in errors:
+            self._tape.at(cycle, 0.0)
+            self._tape.log(path, rr.Scalars, scalars=[math.hypot(ahead_mm, left_mm)])
+
+    def _way(self, places: Series) -> None:
+        path, colour = f"{FLEET}/{self._part}", self._run.colour
+        self._tape.fix(path, rr.Points3D.from_fields(colors=[colour], radii=0.25))
+        strip = np.array([(x, y, z + HEIGHT_M) for _, (x, y, z) in places], float).reshape(-1, 3)
+        self._tape.fix(f"{path}/way", rr.LineStrips3D([strip], colors=[faint(colour, 120)], radii=0.03))
+        for cycle, place in places:
+            self._tape.at(cycle, 0.0)
+            self._tape.log(path, rr.Points3D, positions=[place])
+
+
+def _marks(chapters: Series) -> Iterator[tuple[int, str]]:
+    """Milestones and the moments when he found himself again."""
+    marks = [(cycle, FOUND if word == "found" else word) for cycle, word in chapters if word in (*VERDICTS, "found")]
+    for number, (cycle, word) in enumerate(marks):
+        yield cycle, word
+        following = marks[number + 1][0] if number + 1 < len(marks) else cycle + MARK_CYCLES + 1
+        if following > cycle + MARK_CYCLES:
+            yield cycle + MARK_CYCLES, GAP
+
+
+def read_series(path: Path, entity: str, component: str) -> Series:
+    """(cycle, value) of a component in the order in which it was logged; a value of many is a list.
+
+    Raises:
+        RecordingError: the file is no recording, or is damaged.
+    """
+    if not path.is_file():
+        raise RecordingError(f"{path}: expected a recording, got no such file")
+    try:
+        rows = [row for batch in _batches(path, entity) if component in batch.schema.names
+                for row in zip(batch.column("rerun.controls.RowId").to_pylist(), batch.column("cycle").to_pylist(),
+                               batch.column(component).to_pylist(), strict=True)]
+    except Exception as error:  # the reader's errors have no common type; the cause is in the file in any case
+        raise RecordingError(f"{path}: expected a whole Rerun recording, got: {error}") from None
+    known = [row for row in sorted(rows, key=lambda row: row[0]) if row[2]]
+    return [(cycle, values[0] if len(values) == 1 else values) for _, cycle, values in known]
+
+
+def _batches(path: Path, entity: str) -> Iterator[Any]:
+    with warnings.catch_warnings():  # a recording without its footer, as a crash leaves it, is read as well
+        warnings.simplefilter("ignore", RerunWarning)
+        reader = RrdReader(path)
+    for chunk in reader.stream().filter(content=f"/{entity}", is_static=False):
+        yield chunk.to_record_batch()

@@ -1,0 +1,113 @@
+"""RecordingStream: the recording stream behind the loggers; it alone knows when what was logged reaches the disk."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+from typing import Any
+
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from logs.errors import RecordingError
+from logs.recording.columns import Batch, Columnar, Columns, Row
+
+APPLICATION = "harvey"
+
+FLUSH_CYCLES, LIVE_FLUSH_CYCLES = 128, 4
+"""A crash loses at most so many cycles of the recording (the journal loses none, so they can be drawn again); whoever
+watches sees it so late."""
+
+LOCALHOST, LIVE_PORT = "127.0.0.1", 9876
+
+BATCHING = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1 << 30, flush_num_rows=1 << 40)
+"""The stream itself never flushes: what is in a chunk then follows from the cycles alone, and equal runs are equal."""
+
+class RecordingStream:
+    """One recording: a file, a live server for a viewer, or both.
+
+    Rows are kept and sent as columns once in a while: that costs a tenth of logging them one by one.
+    """
+
+    def __init__(
+        self, path: Path | None, recording_id: str, title: str, blueprint: Any, *, live: bool = False,
+        live_port: int = LIVE_PORT,
+    ) -> None:
+        if path is None and not live:
+            raise ValueError("expected a path or live=True, got neither")
+        if live:
+            _expect_free_port(live_port)
+        self._path = path
+        self._stream = rr.RecordingStream(
+            APPLICATION, recording_id=recording_id, send_properties=False, batcher_config=BATCHING)
+        self._stream.set_log_time_enabled(False)
+        self._stream.set_log_tick_enabled(False)
+        self._guarded(lambda: self._stream.set_sinks(*_sinks(path, live, live_port), default_blueprint=blueprint))
+        self._stream.send_recording_name(title)
+        self._cycles, self._flush_cycles = 0, LIVE_FLUSH_CYCLES if live else FLUSH_CYCLES
+        self._now = (0, 0.0)
+        self._columns = Columns()
+        self._rows: dict[tuple[str, type[Columnar], tuple[str, ...]], list[Row]] = {}
+
+    def at(self, cycle: int, sim_time_s: float) -> None:
+        """What is logged from now on happened then."""
+        self._now = cycle, sim_time_s
+
+    def log(self, path: str, kind: type[Columnar], **components: Batch) -> None:
+        """Log one row at an entity path, now; each component is a batch of values, which may be empty."""
+        self._rows.setdefault((path, kind, tuple(components)), []).append((*self._now, components))
+
+    def fix(self, path: str, *what: Any) -> None:
+        """Log archetypes that hold at all times."""
+        self._stream.log(path, what[0], *what[1:], static=True)
+
+    def copy(self, recording: Path, content: str) -> None:
+        """Take over what another recording holds at all times, as ``/world/building/**``."""
+        self._stream.send_chunks(RrdReader(recording).stream().filter(content=content, is_static=True))
+
+    def end_cycle(self) -> None:
+        """Bring what was logged to the disk once in a while.
+
+        Raises:
+            RecordingError: the disk is full or gone.
+        """
+        self._cycles += 1
+        if self._cycles % self._flush_cycles == 0:
+            self.flush()
+
+    def flush(self) -> None:
+        """Bring what was logged to the disk; raises RecordingError where that fails."""
+        for (path, kind, names), rows in self._rows.items():
+            index, columns = self._columns.of(kind, names, rows)
+            self._stream.send_columns(path, index, columns)
+        self._rows.clear()
+        self._guarded(self._stream.flush)
+
+    def close(self) -> None:
+        """End the recording with its footer."""
+        try:
+            self.flush()
+        finally:
+            self._stream.disconnect()
+
+    def _guarded(self, act: Any) -> None:
+        try:
+            act()
+        except (RuntimeError, OSError, ValueError) as error:
+            raise RecordingError(f"{self._path or 'live recording'}: cannot be written: {error}") from None
+
+
+def _expect_free_port(port: int) -> None:
+    """The live server itself does not tell when somebody else listens there."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((LOCALHOST, port))
+        except OSError as error:
+            address = f"{LOCALHOST}:{port}"
+            raise RecordingError(f"live recording: {address} cannot be served: {error.strerror}") from None
+
+
+def _sinks(path: Path | None, live: bool, port: int) -> list[Any]:
+    file = [rr.FileSink(path)] if path is not None else []
+    return [*file, *([rr.GrpcServerSink(bind_ip=LOCALHOST, port=port)] if live else [])]

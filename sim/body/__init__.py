@@ -1,0 +1,1 @@
+"""The simulated robot: wheels, collisions, elevator rides, and the truth."""

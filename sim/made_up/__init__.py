@@ -1,0 +1,1 @@
+"""Made-up rooms, floors and missions for tests and experiments."""

@@ -1,0 +1,174 @@
+"""What the renderer draws: every region of the building as a one-sided, convex, flat patch, in arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.render.textures import POSTER, texture_code
+
+MOST = 32767
+"""The rasteriser counts patches in 16 bits."""
+
+COPLANAR_M = 1e-6
+"""Regions of a face that lie this near to its plane share it, so that the later one covers the earlier."""
+
+
+class RegionLike(Protocol):
+    """A flat convex area of one appearance (§3.4): what the mesh reads of a region."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def polygon_world(self) -> Any: ...
+    @property
+    def colour(self) -> Any: ...
+    @property
+    def texture(self) -> str: ...
+    @property
+    def texture_scale_m(self) -> float: ...
+    @property
+    def seed(self) -> int: ...
+
+
+class FaceLike(Protocol):
+    """A face with the regions on its two sides (§3.4): what the mesh reads of a face."""
+
+    @property
+    def front(self) -> Sequence[RegionLike]: ...
+    @property
+    def back(self) -> Sequence[RegionLike]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """P patches with V vertices in all.
+
+    Attributes:
+        vertices_world: (V, 3) [m], counter-clockwise from the visible side.
+        first: (P + 1,) int64; patch i owns the vertices ``first[i]:first[i + 1]``.
+        planes_world: (P, 4) unit normal n and offset d of n . p = d; the visible side is n . p > d.
+        axes_world: (P, 2, 3) unit texture axes s, t in the plane; t is as near to "up" as the plane allows.
+        origins_m: (P, 2) texture coordinates of the texture's origin.
+        colours: (P, 3) reflectance, 0..1.
+        textures: (P,) int64 codes of :mod:`sim.render.textures`.
+        scales_m: (P,) size of the texture's cells.
+        seeds: (P,) int64.
+    """
+
+    vertices_world: NDArray[np.float64]
+    first: NDArray[np.int64]
+    planes_world: NDArray[np.float64]
+    axes_world: NDArray[np.float64]
+    origins_m: NDArray[np.float64]
+    colours: NDArray[np.float64]
+    textures: NDArray[np.int64]
+    scales_m: NDArray[np.float64]
+    seeds: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.textures)
+
+
+def build_mesh(faces: Iterable[FaceLike]) -> Mesh:
+    """One patch for each region on each side of each face, in the order given.
+
+    Raises:
+        ValueError: a region is not a flat convex polygon of at least three distinct vertices, or is described wrongly.
+    """
+    patches = [patch for face in faces for side in (face.front, face.back) for patch in _side(side)]
+    if len(patches) > MOST:
+        raise ValueError(f"expected at most {MOST} regions, got {len(patches)}")
+    polygons = [polygon for polygon, _, _ in patches]
+    planes = np.array([plane for _, plane, _ in patches]).reshape(-1, 4)
+    axes = np.array([_texture_axes(plane[:3]) for plane in planes]).reshape(-1, 2, 3)
+    regions = [region for _, _, region in patches]
+    return Mesh(
+        vertices_world=np.concatenate([np.zeros((0, 3)), *polygons]),
+        first=np.concatenate([[0], np.cumsum([len(p) for p in polygons])]).astype(np.int64),
+        planes_world=planes,
+        axes_world=axes,
+        origins_m=np.array([_origin(r, p, a) for r, p, a in zip(regions, polygons, axes, strict=True)]).reshape(-1, 2),
+        colours=np.array([_colour(r) for r in regions]).reshape(-1, 3),
+        textures=np.array([texture_code(r.texture) for r in regions], np.int64),
+        scales_m=np.array([_scale(r) for r in regions], np.float64),
+        seeds=np.array([r.seed for r in regions], np.int64),
+    )
+
+
+def _side(regions: Sequence[RegionLike]) -> list[tuple[NDArray[np.float64], NDArray[np.float64], RegionLike]]:
+    """(polygon, plane, region) of one side of a face; coplanar regions get the first one's plane, to the last bit."""
+    out: list[tuple[NDArray[np.float64], NDArray[np.float64], RegionLike]] = []
+    for region in regions:
+        polygon = np.array(region.polygon_world, dtype=np.float64)
+        plane = plane_of(polygon, region.name)
+        shared = [p for _, p, _ in out if _lies_in(polygon, plane, p)]
+        out.append((polygon, shared[0] if shared else plane, region))
+    return out
+
+
+def _lies_in(polygon: NDArray[np.float64], own: NDArray[np.float64], plane: NDArray[np.float64]) -> bool:
+    off = np.abs(polygon @ plane[:3] - plane[3])
+    return bool(own[:3] @ plane[:3] > 0 and off.max() < COPLANAR_M)
+
+
+def plane_of(polygon_world: NDArray[np.float64], name: str = "polygon") -> NDArray[np.float64]:
+    """The plane (4,) = (unit normal, offset) of a flat convex polygon (k, 3), by Newell's sum.
+
+    Raises:
+        ValueError: fewer than three vertices, no area, not flat to 1 mm, or not convex.
+    """
+    p = np.asarray(polygon_world, float)
+    if p.ndim != 2 or p.shape[1] != 3 or len(p) < 3 or not np.all(np.isfinite(p)):
+        raise ValueError(f"region {name}: expected at least 3 finite vertices (k, 3), got shape {p.shape}")
+    ahead = np.roll(p, -1, axis=0)
+    normal = _cross(p - p[0], ahead - p[0]).sum(axis=0)
+    length = float(np.linalg.norm(normal))
+    if length < 1e-10:
+        raise ValueError(f"region {name}: expected a polygon with an area, got none")
+    normal = normal / length
+    offset = float(np.mean(p @ normal))
+    if np.abs(p @ normal - offset).max() > 1e-3:
+        raise ValueError(f"region {name}: expected a flat polygon, got vertices up to "
+                         f"{np.abs(p @ normal - offset).max():.4f} m off its plane")
+    corners = _cross(ahead - p, np.roll(ahead, -1, axis=0) - ahead) @ normal
+    if corners.min() < -1e-6:
+        raise ValueError(f"region {name}: expected a convex polygon, got a reflex corner")
+    return np.array([*normal, offset])
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """As numpy's, of rows (n, 3), but without its ado, which counts for a few rows at a time."""
+    ax, ay, az = a.T
+    bx, by, bz = b.T
+    return np.column_stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
+def _texture_axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2, 3): s along the plane's horizontal, t up the plane; on floors and ceilings s is world x."""
+    level = math.hypot(normal[0], normal[1])
+    s = np.array([-normal[1], normal[0], 0.0]) / level if level > 1e-6 else np.array([1.0, 0.0, 0.0])
+    return np.stack([s, np.cross(normal, s)])
+
+
+def _origin(region: RegionLike, polygon: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Wall textures are anchored in the world, so that neighbours continue; a poster starts at its own corner."""
+    return (polygon @ axes.T).min(axis=0) if texture_code(region.texture) == POSTER else np.zeros(2)
+
+
+def _colour(region: RegionLike) -> NDArray[np.float64]:
+    colour = np.asarray(region.colour, float)
+    if colour.shape != (3,) or not np.all((colour >= 0) & (colour <= 1)):
+        raise ValueError(f"region {region.name}: expected a colour of three numbers in 0..1, got {region.colour!r}")
+    return colour
+
+
+def _scale(region: RegionLike) -> float:
+    if not region.texture_scale_m > 0:
+        raise ValueError(f"region {region.name}: expected texture_scale_m > 0, got {region.texture_scale_m!r}")
+    return float(region.texture_scale_m)

@@ -1,0 +1,74 @@
+"""How the building falls on the image plane.
+
+Projection is written out here on purpose: it is an independent check on ``world_models.camera``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.render.mesh import Mesh
+from world_models.camera import Camera
+
+
+@dataclass(frozen=True, eq=False)
+class Lens:
+    """A pinhole: focal lengths and principal point [px], image size [px]; pixel (0, 0) is the first pixel's centre."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+
+    @staticmethod
+    def of(camera: Camera) -> Lens:
+        """Raises ValueError for a camera with lens distortion."""
+        if camera.distortion is not None:
+            raise ValueError(f"expected a camera without lens distortion, got {camera.distortion}")
+        return Lens(camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """The mesh as linear forms of the pixel (u, v, 1), for one pose of the camera.
+
+    Attributes:
+        facing: (P,) which patches turn their visible side to the camera.
+        inverse_depths: (P, 3); 1 / z [1/m] at a pixel is ``inverse_depths @ (u, v, 1)``.
+        textures: (P, 2, 3); a texture coordinate [m] is ``(textures @ (u, v, 1)) / inverse_depth + bases``.
+        bases_m: (P, 2).
+        vertices_camera: (V, 3) [m].
+    """
+
+    facing: NDArray[np.bool_]
+    inverse_depths: NDArray[np.float64]
+    textures: NDArray[np.float64]
+    bases_m: NDArray[np.float64]
+    vertices_camera: NDArray[np.float64]
+
+
+def view_of(mesh: Mesh, lens: Lens, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> View:
+    """The mesh seen by a camera at ``camera_from_world`` = (rotation (3, 3), translation (3,) [m])."""
+    centre = -rotation.T @ translation
+    normals, offsets = mesh.planes_world[:, :3], mesh.planes_world[:, 3]
+    beyond = offsets - normals @ centre
+    facing = beyond < -1e-6
+    reach = np.where(facing, beyond, -1.0)
+    return View(
+        facing=facing,
+        inverse_depths=_pixel_forms(normals @ rotation.T, lens) / reach[:, None],
+        textures=_pixel_forms(mesh.axes_world @ rotation.T, lens),
+        bases_m=mesh.axes_world @ centre - mesh.origins_m,
+        vertices_camera=mesh.vertices_world @ rotation.T + translation,
+    )
+
+
+def _pixel_forms(directions_camera: NDArray[np.float64], lens: Lens) -> NDArray[np.float64]:
+    """Directions d (..., 3) as forms (..., 3): d . ray(u, v) = form @ (u, v, 1)."""
+    x, y, z = directions_camera[..., 0], directions_camera[..., 1], directions_camera[..., 2]
+    return np.stack([x / lens.fx, y / lens.fy, z - x * lens.cx / lens.fx - y * lens.cy / lens.fy], axis=-1)

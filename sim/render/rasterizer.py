@@ -1,0 +1,287 @@
+"""Hidden-surface removal: which patch is seen at each sample of each pixel.
+
+Every pixel has N samples on N sub-rows, each at another one of N horizontal offsets (N rooks on a chessboard): a
+vertical or horizontal edge, as a level camera sees on every door, is then placed to 1/N px, where a square grid of N
+samples would place it to 1/sqrt(N) px.
+
+Jitted functions of this file call only one another, because numba's cache does not follow calls into other files.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sim.render.mesh import Mesh
+from sim.render.projection import Lens, View
+
+NEAR_M = 0.02
+"""Patches are cut at this depth in front of the optical centre [m]."""
+
+ROOKS: Mapping[int, tuple[int, ...]] = {
+    1: (0,),
+    4: (0, 2, 1, 3),
+    8: (1, 4, 7, 2, 6, 3, 0, 5),
+    16: (3, 8, 15, 12, 2, 7, 5, 10, 14, 1, 6, 11, 4, 0, 13, 9),
+}
+"""The column of the sample on each sub-row, found by search over permutations: the worst direction of an edge has an
+RMS error of 0.29, 0.15, 0.080 and 0.049 px (8 samples in bit-reversed order: 0.107)."""
+
+SHORT = 24
+"""Spans of fewer samples are filled one by one."""
+
+TILE = 8
+"""Side of the squares [px] in which patches are first found to be hidden."""
+
+NOTHING = -1
+"""The identity of the background."""
+
+
+def visible_patches(mesh: Mesh, view: View, lens: Lens, samples: int) -> NDArray[np.int16]:
+    """The patch seen at every sample, (height, N, width), ``NOTHING`` where none is."""
+    longest = int(np.diff(mesh.first).max(initial=0)) + 2
+    boxes, edges, ends = _outlines(
+        view.vertices_camera, mesh.first, view.facing, lens.fx, lens.fy, lens.cx, lens.cy, lens.width, lens.height,
+        longest,
+    )
+    _hide(boxes, _cover_tiles(boxes, edges, ends, view.inverse_depths, lens.width, lens.height))
+    rows, row_first = _patches_of_rows(boxes, lens.height)
+    seen: NDArray[np.int16] = _fill(
+        boxes, edges, ends, view.inverse_depths, rows, row_first, sample_offsets(samples), lens.width, lens.height
+    )
+    return seen
+
+
+def sample_offsets(samples: int) -> NDArray[np.float64]:
+    """(N,) horizontal offset [px] of the sample on each sub-row of a pixel.
+
+    Raises:
+        ValueError: there is no pattern of so many samples.
+    """
+    if samples not in ROOKS:
+        raise ValueError(f"expected {', '.join(map(str, ROOKS))} samples a pixel, got {samples!r}")
+    return (np.array(ROOKS[samples]) + 0.5) / samples - 0.5
+
+
+@njit(cache=True, error_model="numpy")
+def _clip_near(vertices: Any, start: int, end: int, out: Any) -> int:
+    """Cut a polygon in the camera frame at z = NEAR_M into ``out``; returns the number of vertices left."""
+    count = 0
+    for i in range(start, end):
+        j = i + 1 if i + 1 < end else start
+        za, zb = vertices[i, 2], vertices[j, 2]
+        if za >= NEAR_M:
+            out[count] = vertices[i]
+            count += 1
+        if (za >= NEAR_M) != (zb >= NEAR_M):
+            t = (NEAR_M - za) / (zb - za)
+            for axis in range(2):
+                out[count, axis] = vertices[i, axis] + t * (vertices[j, axis] - vertices[i, axis])
+            out[count, 2] = NEAR_M
+            count += 1
+    return count
+
+
+@njit(cache=True, error_model="numpy")
+def _add_edges(pixels: Any, k: int, down: bool, edges: Any, at: int) -> int:
+    """Append those of a polygon's edges that run down (or up) as upper end x, y and dx/dy; returns the new end.
+
+    Level edges bound nothing. Two neighbours get the same line from their common edge, to the last bit.
+    """
+    for i in range(k):
+        j = i + 1 if i + 1 < k else 0
+        if not down:
+            i, j = j, i
+        if pixels[i, 1] < pixels[j, 1]:
+            edges[at, 0], edges[at, 1] = pixels[i, 0], pixels[i, 1]
+            edges[at, 2] = (pixels[j, 0] - pixels[i, 0]) / (pixels[j, 1] - pixels[i, 1])
+            at += 1
+    return at
+
+
+@njit(cache=True, error_model="numpy")
+def _outlines(vertices: Any, first: Any, facing: Any, fx: float, fy: float, cx: float, cy: float,
+              width: int, height: int, longest: int) -> Any:
+    """Outlines in the image: edges (E, 3), and boxes (P, 5) of top, low, left, right [px] and greatest 1/z.
+
+    An unseen patch has an empty box.
+
+    Patch p's left edges are ``ends[p, 0]:ends[p, 1]``, its right ones ``ends[p, 1]:ends[p, 2]``: a patch is
+    counter-clockwise to the eye, so its edges run down on its left and up on its right.
+    """
+    count = len(first) - 1
+    boxes = np.zeros((count, 5))
+    edges = np.empty((len(vertices) + 2 * count, 3))
+    ends = np.zeros((count, 3), np.int64)
+    cut = np.empty((longest, 3))
+    pixels = np.empty((longest, 2))
+    at = 0
+    for p in range(count):
+        if not facing[p]:
+            continue
+        k = _clip_near(vertices, first[p], first[p + 1], cut)
+        top, low, left, right, nearest = np.inf, -np.inf, np.inf, -np.inf, 0.0
+        for i in range(k):
+            pixels[i, 0] = fx * cut[i, 0] / cut[i, 2] + cx
+            pixels[i, 1] = fy * cut[i, 1] / cut[i, 2] + cy
+            left, right = min(left, pixels[i, 0]), max(right, pixels[i, 0])
+            top, low = min(top, pixels[i, 1]), max(low, pixels[i, 1])
+            nearest = max(nearest, 1.0 / cut[i, 2])
+        if left < width - 0.5 and right > -0.5 and top < height - 0.5 and low > -0.5:
+            boxes[p] = (top, low, left, right, nearest)
+            ends[p, 0] = at
+            ends[p, 1] = _add_edges(pixels, k, True, edges, at)
+            at = _add_edges(pixels, k, False, edges, ends[p, 1])
+            ends[p, 2] = at
+    return boxes, edges, ends
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _span(edges: Any, ends: Any, y: float, width: int) -> Any:
+    """Where a convex outline is crossed by the line at ``y``: (left, right) [px]."""
+    left, right = -1.5, width + 0.5
+    for e in range(ends[0], ends[1]):
+        left = max(left, edges[e, 0] + edges[e, 2] * (y - edges[e, 1]))
+    for e in range(ends[1], ends[2]):
+        right = min(right, edges[e, 0] + edges[e, 2] * (y - edges[e, 1]))
+    return left, right
+
+
+@njit(cache=True, error_model="numpy")
+def _cover_tiles(boxes: Any, edges: Any, ends: Any, inverse_depths: Any, width: int, height: int) -> Any:
+    """For each tile of the image, a 1/z that something which covers all of the tile reaches everywhere in it."""
+    covered = np.zeros(((height + TILE - 1) // TILE, (width + TILE - 1) // TILE))
+    for p in range(len(boxes)):
+        if boxes[p, 1] - boxes[p, 0] < TILE or boxes[p, 3] - boxes[p, 2] < TILE:
+            continue
+        low = min(height, math.floor(boxes[p, 1] + 0.5)) // TILE
+        for ty in range(max(0, math.ceil((boxes[p, 0] + 0.5) / TILE)), low):
+            y = ty * TILE - 0.5
+            left, right = _span(edges, ends[p], y, width)
+            left_low, right_low = _span(edges, ends[p], y + TILE, width)
+            left, right = max(left, left_low), min(right, right_low)
+            for tx in range(max(0, math.ceil((left + 0.5) / TILE)), math.floor(min(right + 0.5, float(width)) / TILE)):
+                w = inverse_depths[p, 0] * (tx * TILE - 0.5) + inverse_depths[p, 1] * y + inverse_depths[p, 2]
+                w += min(0.0, TILE * inverse_depths[p, 0]) + min(0.0, TILE * inverse_depths[p, 1])
+                covered[ty, tx] = max(covered[ty, tx], w)
+    return covered
+
+
+@njit(cache=True, error_model="numpy")
+def _hide(boxes: Any, covered: Any) -> None:
+    """Empty the boxes of patches that lie behind what covers every tile that they reach into."""
+    high, wide = covered.shape
+    for p in range(len(boxes)):
+        if boxes[p, 1] <= boxes[p, 0]:
+            continue
+        hidden = True
+        for ty in range(_tile(boxes[p, 0], high), _tile(boxes[p, 1], high) + 1):
+            for tx in range(_tile(boxes[p, 2], wide), _tile(boxes[p, 3], wide) + 1):
+                hidden = hidden and boxes[p, 4] * 1.000001 < covered[ty, tx]
+            if not hidden:
+                break
+        if hidden:
+            boxes[p, 1] = boxes[p, 0]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _tile(at: float, count: int) -> int:
+    """The tile, 0..count - 1, in or next to which an image coordinate lies."""
+    return int(min(max(at + 0.5, 0.0) / TILE, count - 1.0))
+
+
+@njit(cache=True, error_model="numpy")
+def _patches_of_rows(boxes: Any, height: int) -> Any:
+    """The patches that reach into row y, ``rows[row_first[y]:row_first[y + 1]]``, in the mesh's order."""
+    spans = np.zeros((len(boxes), 2), np.int64)
+    row_first = np.zeros(height + 1, np.int64)
+    for p in range(len(boxes)):
+        top, low = boxes[p, 0], boxes[p, 1]
+        if low > top and low > -0.5 and top < height - 0.5:
+            spans[p, 0] = math.floor(max(top, -0.5) + 0.5)
+            spans[p, 1] = math.floor(min(low, height - 0.5001) + 0.5) + 1
+            for y in range(spans[p, 0], spans[p, 1]):
+                row_first[y + 1] += 1
+    for y in range(height):
+        row_first[y + 1] += row_first[y]
+    rows = np.empty(row_first[height], np.int64)
+    at = row_first.copy()
+    for p in range(len(boxes)):
+        for y in range(spans[p, 0], spans[p, 1]):
+            rows[at[y]] = p
+            at[y] += 1
+    return rows, row_first
+
+
+@njit(cache=True, error_model="numpy")
+def _fill_long(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest: Any, seen: Any, front: Any) -> None:
+    """Put a patch into a span of a sub-row wherever it is not farther than what is there.
+
+    Three plain loops and a mask of all ones or none: LLVM makes vector code of these, and not of one with an "if".
+    """
+    for i in range(len(columns)):
+        front[i] = -np.int16(inverse_depth + step * columns[i] >= nearest[i])
+    for i in range(len(columns)):
+        nearest[i] = np.maximum(nearest[i], inverse_depth + step * columns[i])
+    for i in range(len(columns)):
+        seen[i] = (seen[i] & ~front[i]) | (patch & front[i])
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _fill_short(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest: Any, seen: Any, r: int, start: int,
+                end: int) -> None:
+    """The same for columns ``start`` to ``end`` of sub-row r, one by one (unsigned: no look for negative indices)."""
+    for i in range(np.uint64(start), np.uint64(end)):
+        w = inverse_depth + step * columns[i]
+        if w >= nearest[r, i]:
+            nearest[r, i] = w
+            seen[r, i] = patch
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _column(x: float, width: int) -> int:
+    """The first column, 0..width, whose sample is not left of x; cheaper than math.ceil."""
+    return width - int(width - min(max(x, 0.0), float(width)))
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _fill_patch(p: int, heights: Any, boxes: Any, edges: Any, ends: Any, inverse_depths: Any, offsets: Any,
+                columns: Any, nearest: Any, seen: Any, front: Any) -> None:
+    """Put patch p into the sub-rows (N, width) of one pixel row; they lie at ``heights`` (N,) [px]."""
+    samples, width = nearest.shape
+    patch, step = np.int16(p), np.float32(inverse_depths[p, 0])
+    for r in range(samples):
+        y = heights[r]
+        if y < boxes[p, 0] or y >= boxes[p, 1]:
+            continue
+        left, right = _span(edges, ends[p], y, width)
+        start, end = _column(left - offsets[r], width), _column(right - offsets[r], width)
+        w = np.float32(inverse_depths[p, 0] * offsets[r] + inverse_depths[p, 1] * y + inverse_depths[p, 2])
+        if end - start < SHORT:
+            _fill_short(w, step, columns, patch, nearest, seen, r, start, end)
+        else:
+            _fill_long(w, step, columns[start:end], patch, nearest[r, start:end], seen[r, start:end], front[start:end])
+
+
+@njit(cache=True, error_model="numpy")
+def _fill(boxes: Any, edges: Any, ends: Any, inverse_depths: Any, rows: Any, row_first: Any, offsets: Any,
+          width: int, height: int) -> Any:
+    """Row by row, so that the depth buffer of one pixel row stays in the cache."""
+    samples = len(offsets)
+    seen = np.empty((height, samples, width), np.int16)
+    nearest = np.empty((samples, width), np.float32)
+    columns = np.arange(width).astype(np.float32)
+    front = np.empty(width, np.int16)
+    sub_rows = (np.arange(samples) + 0.5) / samples
+    for row in range(height):
+        heights = row - 0.5 + sub_rows
+        nearest[:] = 0.0
+        seen[row] = NOTHING
+        for p in rows[row_first[row] : row_first[row + 1]]:
+            _fill_patch(p, heights, boxes, edges, ends, inverse_depths, offsets, columns, nearest, seen[row], front)
+    return seen

@@ -1,0 +1,96 @@
+"""Whether a scenario goes with its building: what it names is there, and what it puts somewhere has room there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from sim.body.collision import ROBOT_RADIUS_M
+from sim.building import Building
+from sim.faults.faults import Displacement, Fault
+from sim.moved import is_of, with_moved
+from sim.scenario import Scenario
+from world_models.building.faces import Face
+from world_models.building.outlines import inside_polygon
+from world_models.building.world import World
+from world_models.entries.location import Place
+from world_models.files.toml.settings import near
+from world_models.units import FOOT_M
+
+STICKS_OUT_M = 0.15
+"""What hangs on a wall is at its border, and a little beyond."""
+
+
+def named_in(scenario: Scenario) -> list[str]:
+    """The locales that the faults of a scenario name."""
+    return [name for fault in scenario.faults for _, name in _named_by(fault)]
+
+
+def _named_by(fault: Fault) -> list[tuple[str, str]]:
+    """(key, locale)."""
+    named = [("in_locale", fault.moment.in_locale)]
+    if isinstance(fault, Displacement) and fault.place is not None:
+        named.append(("to_locale", fault.place.locale))
+    return [(key, name) for key, name in named if name]
+
+
+def check_names(scenario: Scenario, world: World) -> None:
+    """Raises ScenarioError where faults or helpers name a locale or a ride that the world lacks."""
+    for i, fault in enumerate(scenario.faults):
+        for key, name in _named_by(fault):
+            if name not in world.locales:
+                raise scenario.refused(("faults", i, key), f"expected {near(name, world.locales)}, got {name!r}")
+    if not scenario.rides:
+        return
+    rides = {link.name: link.between for link in world.links if link.kind == "elevator"}
+    landings = sorted({name for between in rides.values() for name in between})
+    for i, helper in enumerate(scenario.rides):
+        for key, name, known in (("passage", helper.passage, list(rides)), ("presses", helper.presses, landings)):
+            if name and name not in known:
+                raise scenario.refused(("rides", i, key), f"expected {near(name, known)}, got {name!r}")
+
+
+def faces_of(scenario: Scenario, world: World, faces: Sequence[Face]) -> Sequence[Face]:
+    """The faces of a building, with what was moved where it is now.
+
+    Raises:
+        ScenarioError: there is no such thing, or it was moved out of its locale.
+    """
+    for i, moved in enumerate(scenario.moved):
+        try:
+            faces = with_moved(faces, [moved])
+        except ValueError as error:
+            raise scenario.refused(("moved", i, "thing"), str(error)) from None
+        locale = next(face.locale for face in faces if is_of(face, moved))
+        corners = np.concatenate([face.polygon_world[:, :2] for face in faces if is_of(face, moved)])
+        if not all(inside_polygon(corner, world.outline(locale), STICKS_OUT_M) for corner in corners):
+            raise scenario.refused(("moved", i), f"expected {moved.thing} to stay within {locale}, got it moved out of"
+                                   f" it, by x {moved.x_m:g} m and y {moved.y_m:g} m")
+    return faces
+
+
+def check_room(
+    scenario: Scenario, world: World, start: Place, building: Building, on_floor: Callable[[float], Building]
+) -> None:
+    """Raises ScenarioError where the robot would be put down, at the start or by a fault, where it cannot stand."""
+    _check_place(scenario, ("goal",), "start", world, start, building)
+    for i, fault in enumerate(scenario.faults):
+        if isinstance(fault, Displacement) and fault.place is not None:
+            there = fault.place
+            storey = on_floor(world.floor_m(there.locale))
+            _check_place(scenario, ("faults", i, "to_locale"), "place", world, there, storey)
+
+
+def _check_place(
+    scenario: Scenario, key: tuple[str | int, ...], what: str, world: World, place: Place, building: Building
+) -> None:
+    locale = world.locale(place.locale)
+    if not locale.contains((place.x_m, place.y_m)):
+        (x0, y0), (x1, y1) = locale.outline.min(axis=0) / FOOT_M, locale.outline.max(axis=0) / FOOT_M
+        reach = f"which reaches from ({x0:.1f}, {y0:.1f}) to ({x1:.1f}, {y1:.1f}) ft"
+        got = f"({place.x_m / FOOT_M:g}, {place.y_m / FOOT_M:g}) ft"
+        raise scenario.refused(key, f"expected a {what} within {place.locale}, {reach}, got {got}")
+    room_m = ROBOT_RADIUS_M + building.obstacles.clearance_m(place.in_world(world))
+    if room_m < ROBOT_RADIUS_M:
+        raise scenario.refused(key, f"expected {ROBOT_RADIUS_M} m of room at the {what}, got {room_m:.2f} m")

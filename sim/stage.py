@@ -1,0 +1,150 @@
+"""From a scenario to a body in a building: the simulator loads the world with the details that the model lacks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sim.body.collision import Obstacles
+from sim.body.elevator import Elevators
+from sim.body.simulated_body import SimulatedBody
+from sim.body.truth import Score, Truth, score
+from sim.building import Building
+from sim.faults.faults import placed
+from sim.render.renderer import Renderer
+from sim.scenario import Scenario
+from sim.scenario_checks import check_names, check_room, faces_of, named_in
+from world_models.building.faces import Face
+from world_models.building.locales import Link
+from world_models.building.outlines import inside_polygon
+from world_models.building.world import World
+from world_models.entries.location import Place
+from world_models.files.store import WorldError, load_world
+from world_models.frames import Pose2
+from world_models.phrases import places_of
+
+SAME_FLOOR_M = 0.5
+"""Rooms whose floors differ by less are on one floor."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A scenario with its building: what every run of it shares.
+
+    Attributes:
+        scenario: as it was given.
+        world: the building with its details; not what the robot believes.
+        building: how it looks and what is solid.
+        start_world, goal_world: where the robot is meant to begin and to end, in the world frame.
+        goal_floor_m: height of the floor that the goal is on.
+    """
+
+    scenario: Scenario
+    world: World
+    building: Building
+    start_world: Pose2
+    goal_world: Pose2
+    goal_floor_m: float = 0.0
+
+    def body(self, seed: int) -> SimulatedBody:
+        """The robot, put down for a run with this seed."""
+        s = self.scenario
+        return SimulatedBody(
+            self.building, self.start_world, s.camera.camera, s.camera.mount,
+            seed=seed, actuator=s.actuator, sensor=s.sensor,
+            faults=tuple(placed(fault, self.world) for fault in s.faults),
+            put_down_sigma_m=s.start.put_down_sigma_m, put_down_sigma_rad=s.start.put_down_sigma_rad,
+        )
+
+    def score(self, track: tuple[Truth, ...]) -> Score:
+        """How a run with this true track ended; on another floor than the goal's it is that much further from it."""
+        found = score(track, self.start_world, self.goal_world, heading_matters=self.scenario.arrival.matters)
+        there = track[-1].locale
+        up_m = self.world.floor_m(there) - self.goal_floor_m if there in self.world.locales else 0.0
+        return replace(found, position_error_m=math.hypot(found.position_error_m, up_m)) if up_m else found
+
+
+def set_stage(scenario: Scenario) -> Stage:
+    """Load the scenario's world and building.
+
+    Raises:
+        ScenarioError: the world or details cannot be read, or what the scenario names, moves or puts somewhere does not
+            go with the building.
+    """
+    world = _world(scenario)
+    check_names(scenario, world)
+    start, goal = _ends(scenario, world)
+    around = _around(world, (start.locale, goal.locale, *named_in(scenario)))
+    faces = faces_of(scenario, world, world.faces_within(around))
+    elevators = Elevators.of_links(_links_in(world, around), world, scenario.rides)
+    on_floor = _storeys(world, around, faces, elevators, scenario.render.samples)
+    building = on_floor(world.floor_m(start.locale))
+    check_room(scenario, world, start, building, on_floor)
+    heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
+    start_world = replace(start, heading_rad=scenario.start.heading_rad).in_world(world)
+    goal_world = replace(goal, heading_rad=heading).in_world(world)
+    return Stage(scenario, world, building, start_world, goal_world, world.floor_m(goal.locale))
+
+
+def _world(scenario: Scenario) -> World:
+    """The building. Raises ScenarioError where it or its details cannot be read."""
+    try:
+        return load_world(scenario.world, details=scenario.details)
+    except WorldError as error:
+        of_details = str(error).startswith(tuple(map(str, scenario.details)))
+        raise scenario.refused(("details" if of_details else "world",), str(error)) from None
+
+
+def _ends(scenario: Scenario, world: World) -> tuple[Place, Place]:
+    """Where a scenario's mission begins and ends. Raises ScenarioError where the world has no such place."""
+    try:
+        return places_of(scenario.goal, world)
+    except ValueError as error:
+        raise scenario.refused(("goal",), str(error)) from None
+
+
+def _around(world: World, locales: Sequence[str]) -> str:
+    """The smallest locale with all that a scenario names in it, and more than one room: what need be built of it."""
+    around = world.common(*locales)
+    return world.locale(around).parent or around if world.is_room(around) else around
+
+
+def _storeys(
+    world: World, around: str, faces: Sequence[Face], elevators: Elevators, samples: int
+) -> Callable[[float], Building]:
+    """The building by the height of the floor that a body stands on; each storey is worked out once."""
+    renderer = Renderer.of_faces(faces, samples)
+    known: dict[float, Building] = {}
+
+    def on_floor(floor_m: float) -> Building:
+        storey = round(floor_m, 3)
+        if storey not in known:
+            known[storey] = Building(renderer, Obstacles.of_faces(faces, floor_m),
+                                     _locale_finder(world, around, floor_m), floor_m, elevators, on_floor)
+        return known[storey]
+
+    return on_floor
+
+
+def _links_in(world: World, around: str) -> tuple[Link, ...]:
+    """The elevators and stairs between rooms of a locale."""
+    found = {link.name: link for room in world.rooms_in(around) for link in world.links_of(room)}
+    return tuple(found.values())
+
+
+def _locale_finder(world: World, around: str, floor_m: float) -> Callable[[Pose2], str]:
+    """As ``world.locale_at``, but quick in the middle of a room: it is asked every two centimetres."""
+    rooms = [name for name in world.rooms_in(around) if abs(world.floor_m(name) - floor_m) < SAME_FLOOR_M]
+    outlines = [(name, world.outline(name)) for name in rooms]
+    boxes = np.array([[*outline.min(axis=0), *outline.max(axis=0)] for _, outline in outlines]).reshape(-1, 4)
+
+    def locale_at(pose: Pose2) -> str:
+        p = pose.position
+        near_rooms = np.flatnonzero(np.all((boxes[:, :2] <= p) & (p <= boxes[:, 2:]), axis=1))
+        inside = [outlines[i][0] for i in near_rooms if inside_polygon(p, outlines[i][1])]
+        return inside[0] if inside else world.locale_at([*p, floor_m]) or ""
+
+    return locale_at

@@ -1,0 +1,108 @@
+"""The agenda against a plain list that is sorted anew for every question."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from blackboard.activation import Activation
+from blackboard.agenda import Agenda
+from blackboard.change import Posted, Revised
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Servoing
+from strategies import Note, Scripted, ratings
+
+KNOWLEDGE_SOURCES = [Scripted(f"{level}_{number}", level=level) for level in Level for number in range(2)]
+experts = st.sampled_from(KNOWLEDGE_SOURCES)
+few_ratings = st.sampled_from((0.0, 0.3, 0.5, 1.0)) | ratings
+
+
+class AgendaMachine(RuleBasedStateMachine):
+    """Random bids on a few entries; ``model`` is every pending activation, in no order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.agenda = Agenda()
+        self.model: list[Activation] = []
+        self.number = 0
+
+    @rule(source=experts, id=st.integers(0, 6), revision=st.integers(0, 2), rating=few_ratings)
+    def add(self, source: Any, id: int, revision: int, rating: float) -> None:
+        self.number += 1
+        entry = Entry(f"Note-{id}", revision, Note("a"), "user", 0)
+        activation = Activation(self.number, source, (Revised if revision else Posted)(entry), rating, 1)
+        same = [a for a in self.model if a.source is source and a.trigger.entry.id == entry.id]
+        replaced = self.agenda.add(activation)
+        assert [replaced.activation] == same if replaced else same == []
+        self.model = [a for a in self.model if a not in same] + [activation]
+
+    @precondition(lambda self: self.model)
+    @rule(focus=st.sampled_from(Level))
+    def take_the_best(self, focus: Level) -> None:
+        best = self.agenda.best(Servoing().nearest(focus))
+        assert best is not None
+        self.agenda.take(best)
+        self.model.remove(best)
+
+    @precondition(lambda self: self.model)
+    @rule(pick=st.integers(0, 20))
+    def drop_any(self, pick: int) -> None:
+        dropped = self.model.pop(pick % len(self.model))
+        self.agenda.take(dropped)
+
+    @precondition(lambda self: self.model)
+    @rule(pick=st.integers(0, 20))
+    def take_and_put_back(self, pick: int) -> None:
+        """As the scheduler does with the chosen one when the next best raises."""
+        activation = self.model[pick % len(self.model)]
+        self.agenda.take(activation)
+        self.agenda.put_back(activation)
+
+    @invariant()
+    def the_best_is_what_sorting_finds(self) -> None:
+        """Nearest level, then best rated, then oldest (§2, Figure 2)."""
+        for focus in Level:
+            ranked = sorted(self.model, key=lambda a: (abs(a.source.level - focus), -a.rating, a.number))
+            assert self.agenda.best(Servoing().nearest(focus)) is (ranked[0] if ranked else None)
+
+    @invariant()
+    def nothing_is_lost_and_what_triggered_it_is_known(self) -> None:
+        assert list(self.agenda) == sorted(self.model, key=lambda a: a.number)
+        assert len(self.agenda) == len(self.model)
+        for id in range(7):
+            expected = sorted((a for a in self.model if a.trigger.entry.id == f"Note-{id}"), key=lambda a: a.number)
+            assert list(self.agenda.triggered_by(f"Note-{id}")) == expected
+
+    @invariant()
+    def what_was_taken_does_not_pile_up(self) -> None:
+        assert all(len(queues) <= 2 * len(self.model) + 40 for queues in self.agenda._levels)
+
+
+TestAgenda = AgendaMachine.TestCase
+TestAgenda.settings = settings(max_examples=30, stateful_step_count=40, deadline=None)
+
+
+def test_a_long_life_leaves_nothing_behind() -> None:
+    agenda = Agenda()
+    for number in range(1, 2000):
+        entry = Entry(f"Note-{number}", 0, Note("a"), "user", 0)
+        activation = Activation(number, KNOWLEDGE_SOURCES[number % 6], Posted(entry), 0.5, 1)
+        agenda.add(activation)
+        agenda.take(activation)
+    assert len(agenda) == 0 and not agenda._by_entry and sum(map(len, agenda._levels)) < 100
+
+
+def test_ratings_that_nobody_gives_any_more_leave_nothing_behind() -> None:
+    """One is better than all others, which come and go, each with a rating of its own."""
+    agenda = Agenda()
+    agenda.add(Activation(1, KNOWLEDGE_SOURCES[0], Posted(Entry("Note-1", 0, Note("a"), "user", 0)), 1.0, 1))
+    for number in range(2, 2000):
+        entry = Entry(f"Note-{number}", 0, Note("a"), "user", 0)
+        activation = Activation(number, KNOWLEDGE_SOURCES[0], Posted(entry), 1.0 / number, 1)
+        agenda.add(activation)
+        agenda.take(activation)
+    assert len(agenda) == 1 and sum(map(len, agenda._levels)) < 40

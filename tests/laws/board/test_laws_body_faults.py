@@ -1,0 +1,142 @@
+"""Whatever a body does wrong, and for however long: each request is answered, or the mission ends declared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, cast
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blackboard.board import View
+from blackboard.change import Change
+from blackboard.effect import Effect, Post
+from blackboard.journal import Decision
+from blackboard.scheduler import Scheduler
+from blackboard.servoing import Discrepancy
+from harvey.ports import BodyPort
+from knowledge_sources.action.fault_handler import FIRST_WAIT_S, LONGEST_WAIT_S, PATIENCE_S, STRIKES, FaultHandler
+from strategies import Note, Scripted
+from world_models.entries.body import STOP_KEY, BodyFault, Frame, Look, MotionReport, MotorCommand, Recovery
+from world_models.entries.task import Outcome
+from world_models.robot import RobotModel
+
+MOST_CYCLES = 2000
+
+
+class ScriptedBody:
+    """Answers as a script says, "" for well and else what is wrong; when that is at its end, as it says ever after."""
+
+    def __init__(self, script: list[str], ever_after: str) -> None:
+        self._script, self._ever_after = iter(script), ever_after
+        self.now_s = 0.0
+        self.waits: list[float] = []
+
+    def execute(self, command: MotorCommand) -> MotionReport | BodyFault:
+        return self._fault("base") or MotionReport(command.turn_rad, command.move_m, 1.0, self.now_s)
+
+    def claim(self) -> MotionReport | BodyFault:
+        return self._fault("base") or MotionReport(0.0, 0.1, 1.0, self.now_s)
+
+    def look(self, purpose: str) -> Frame | BodyFault:
+        return self._fault("camera") or Frame(b"", 0, self.now_s, purpose)
+
+    def wait(self, duration_s: float) -> float:
+        self.waits.append(duration_s)
+        self.now_s += duration_s
+        return self.now_s
+
+    def stop(self) -> None:
+        """It stands."""
+
+    def _fault(self, part: str) -> BodyFault | None:
+        what = next(self._script, self._ever_after)
+        return BodyFault(part, what, "scripted", "", self.now_s) if what else None
+
+
+def asking(_view: View, trigger: Change) -> Iterable[Effect]:
+    value = MotorCommand(0.1, 0.5) if trigger.entry.value.text == "move" else Look("track")
+    yield Post(value, (trigger.entry,))
+
+
+def driven(requests: list[str], body: ScriptedBody) -> tuple[Scheduler, list[Any]]:
+    """The fault_handler, and somebody who asks for the next request when the one before is answered; what was told."""
+    told: list[Any] = []
+
+    def listen(decision: Decision) -> None:
+        told.extend(change.entry for change in (*decision.observed, *decision.made))
+
+    scheduler = Scheduler(
+        [FaultHandler(cast(RobotModel, None)), Scripted("asker", Note, asking, writes=(MotorCommand, Look))],
+        ports=(BodyPort(body),), sinks=(listen,),
+    )
+    for request in requests:
+        scheduler.tell([Post(Note(request))], "user")
+        while scheduler.step() is not None:
+            assert scheduler.cycle < MOST_CYCLES
+        if scheduler.view.latest(Outcome) is not None:
+            break
+    return scheduler, told
+
+
+answers = st.sampled_from(["", "", "link lost", "frame late"])
+requests = st.lists(st.sampled_from(["move", "look"]), min_size=1, max_size=6)
+
+
+@given(requests, st.lists(answers, max_size=12), answers)
+def test_each_request_is_answered_once_or_the_mission_ends_declared(
+    asked: list[str], script: list[str], ever_after: str
+) -> None:
+    scheduler, told = driven(asked, ScriptedBody(script, ever_after))
+    view, outcome = scheduler.view, scheduler.view.latest(Outcome)
+    posted = [e for e in told if e.revision == 0 and isinstance(e.value, MotorCommand | Look)]
+    replies = [e for e in told if isinstance(e.value, MotionReport | Frame)]
+    assert len({r.because for r in replies}) == len(replies)
+    assert {r.because for r in replies} <= {(e.ref,) for e in posted}
+    if outcome is None:
+        assert len(replies) == len(posted) == len(asked)
+        assert not any(f.value.is_open for f in view.all(BodyFault))
+    else:
+        assert outcome.value.kind == "failed" and outcome.because
+
+
+@given(requests, st.lists(answers, max_size=12), answers)
+def test_waits_double_and_the_patience_is_the_stated_one(asked: list[str], script: list[str], ever_after: str) -> None:
+    body = ScriptedBody(script, ever_after)
+    scheduler, told = driven(asked, body)
+    assert all(FIRST_WAIT_S <= wait <= LONGEST_WAIT_S for wait in body.waits)
+    last: dict[str, float] = {}
+    for r in (e.value for e in told if isinstance(e.value, Recovery) and e.value.status == "asked"):
+        assert r.wait_s == min(2.0 * last.get(r.fault, FIRST_WAIT_S / 2.0), LONGEST_WAIT_S)
+        last[r.fault] = r.wait_s
+    for recovery in scheduler.view.all(Recovery):
+        assert recovery.value.waited_s < PATIENCE_S + LONGEST_WAIT_S
+
+
+@given(st.lists(st.sampled_from(["", "link lost"]), max_size=12))
+def test_a_broken_off_motion_and_only_that_puts_the_belief_in_doubt(script: list[str]) -> None:
+    scheduler, told = driven(["move"], ScriptedBody(script, ""))
+    doubts = scheduler.view.all(Discrepancy)
+    broken = [e for e in told if isinstance(e.value, BodyFault)]
+    assert len(tuple(doubts)) == (1 if broken else 0)
+
+
+def test_a_stop_key_ends_it_at_once_also_while_something_else_is_wrong() -> None:
+    for script in ([STOP_KEY], ["link lost", "link lost", STOP_KEY]):
+        body = ScriptedBody(script, STOP_KEY)
+        scheduler, _ = driven(["move", "move"], body)
+        outcome = scheduler.view.latest(Outcome)
+        assert outcome is not None and outcome.value.kind == "stopped"
+        assert len(body.waits) == len(script) - 1
+
+
+@pytest.mark.parametrize("whole", [0, STRIKES - 1])
+def test_a_base_that_breaks_off_every_motion_is_given_up(whole: int) -> None:
+    """Each fault passes at once, but so many in a row are too many; one whole motion starts the count anew."""
+    script = ["stalled", ""] * (STRIKES - 1) + [""] * bool(whole) + ["stalled", ""] * STRIKES
+    scheduler, told = driven(["move"] * 20, ScriptedBody(script, ""))
+    outcome = scheduler.view.latest(Outcome)
+    assert outcome is not None and f"{STRIKES} motions in a row" in outcome.value.reason
+    moves = [e for e in told if isinstance(e.value, MotorCommand)]
+    assert len(moves) == (2 * STRIKES if whole else STRIKES)

@@ -1,0 +1,133 @@
+"""Laws of the region segmenter and the photometric probe."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.features.regions import histogram_valleys, segment_regions
+from knowledge_sources.methods.photometry import agreement, measure_appearance
+
+few = settings(deadline=None, max_examples=20)
+seeds = st.integers(0, 10_000)
+sides = st.integers(20, 45)
+
+
+def boxes(seed: int, noise: float = 2.0) -> NDArray[np.uint8]:
+    """Rectangles of clearly different brightness on a plain ground."""
+    rng = np.random.default_rng(seed)
+    image = np.full((128, 160), 40.0)
+    for level in rng.permutation([90.0, 140.0, 190.0, 240.0]):
+        u, v = rng.integers(0, 120), rng.integers(0, 90)
+        image[v : v + rng.integers(15, 40), u : u + rng.integers(15, 40)] = level
+    return np.clip(np.rint(image + noise * rng.standard_normal(image.shape)), 0, 255).astype(np.uint8)
+
+
+@few
+@given(seeds)
+def test_regions_part_the_image_into_connected_pieces_with_true_statistics(seed: int) -> None:
+    image = boxes(seed)
+    regions = segment_regions(image)
+    assert regions.labels.shape == image.shape
+    assert regions.areas_px.sum() == image.size
+    assert np.array_equal(np.unique(regions.labels), np.arange(len(regions)))
+    for k in range(len(regions)):
+        mask = regions.labels == k
+        assert cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)[0] == 2
+        assert regions.areas_px[k] == mask.sum()
+        assert regions.means[k] == pytest.approx(image[mask].mean(), abs=1e-6)
+        assert regions.deviations[k] == pytest.approx(image[mask].std(), abs=1e-4)
+
+
+@few
+@given(seeds, st.integers(1, 300))
+def test_no_region_is_smaller_than_asked(seed: int, least: int) -> None:
+    regions = segment_regions(boxes(seed), min_area_px=least)
+    assert regions.areas_px.min() >= least or len(regions) == 1
+
+
+@few
+@given(st.tuples(st.integers(10, 80), st.integers(10, 60)), sides, sides, st.floats(0.0, 4.0), seeds)
+def test_a_box_on_a_plain_ground_is_one_region(
+    corner: tuple[int, int], width: int, height: int, noise: float, seed: int
+) -> None:
+    u, v = corner
+    truth = np.zeros((128, 160), bool)
+    truth[v : v + height, u : u + width] = True
+    image = np.where(truth, 170.0, 70.0) + noise * np.random.default_rng(seed).standard_normal(truth.shape)
+    regions = segment_regions(image)
+    inside = np.bincount(regions.labels[truth]).argmax()
+    both = np.sum((regions.labels == inside) & truth)
+    assert both / np.sum((regions.labels == inside) | truth) > 0.9
+
+
+@few
+@given(seeds, st.integers(-30, 15))
+def test_a_brighter_image_has_the_same_regions(seed: int, level: int) -> None:
+    image = boxes(seed, 0.0)
+    a = segment_regions(image)
+    b = segment_regions((image.astype(int) + level).astype(float))
+    # Bins are four levels wide, so the same regions up to their thin borders.
+    assert len(a) == len(b)
+    np.testing.assert_allclose(np.sort(b.means - level), np.sort(a.means), atol=1.0)
+
+
+@few
+@given(st.integers(20, 90), st.integers(60, 130), st.floats(2.0, 6.0), st.floats(0.2, 0.8), seeds)
+def test_two_modes_are_parted_between_them(low: int, gap: int, spread: float, share: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = int(4000 * share)
+    levels = np.concatenate([rng.normal(low, spread, count), rng.normal(low + gap, spread, 4000 - count)])
+    cuts = histogram_valleys(np.clip(np.rint(levels), 0, 255).astype(np.uint8).reshape(50, 80))
+    assert len(cuts) >= 1
+    assert np.any((cuts > low + 2 * spread - 4) & (cuts < low + gap - 2 * spread + 4))
+    assert len(histogram_valleys(np.full((50, 80), low, np.uint8))) == 0
+
+
+def stripes(period: int, dark: float, bright: float, size: int = 80) -> NDArray[np.float64]:
+    v, u = np.mgrid[0:size, 0:size]
+    return np.where((u // period + v // period) % 2 == 0, dark, bright).astype(float)
+
+
+QUAD = np.array([[10.0, 12.0], [66.0, 9.0], [70.0, 65.0], [14.0, 70.0]])
+
+
+@few
+@given(st.floats(0.6, 1.4), st.integers(4, 10))
+def test_the_light_may_be_brighter_or_darker_within_bounds(gain: float, period: int) -> None:
+    picture = stripes(period, 60.0, 120.0)
+    expected, seen = measure_appearance(picture, QUAD), measure_appearance(gain * picture, QUAD)
+    assert agreement(seen, expected).holds()
+    assert agreement(seen, expected).distance < 1.0
+    assert not agreement(measure_appearance(0.2 * picture, QUAD), expected).holds()
+
+
+@few
+@given(st.integers(4, 10), st.floats(0.0, 3.0), seeds)
+def test_a_plain_wall_is_not_a_poster(period: int, noise: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    poster = measure_appearance(stripes(period, 50.0, 150.0), QUAD)
+    wall = measure_appearance(100.0 + noise * rng.standard_normal((80, 80)), QUAD)
+    assert not agreement(wall, poster).holds()
+    assert not agreement(poster, wall).holds()
+
+
+@few
+@given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
+def test_shading_is_not_texture(a: float, b: float) -> None:
+    v, u = np.mgrid[0:80, 0:80]
+    shaded = measure_appearance(120.0 + a * u + b * v, QUAD)
+    assert shaded.contrast < 0.01
+
+
+@few
+@given(st.floats(0.6, 1.4))
+def test_another_colour_is_seen_under_any_light(gain: float) -> None:
+    red, blue = np.full((80, 80, 3), (150.0, 60.0, 60.0)), np.full((80, 80, 3), (60.0, 60.0, 150.0))
+    expected = measure_appearance(red, QUAD)
+    assert agreement(measure_appearance(gain * red, QUAD), expected).holds()
+    assert not agreement(measure_appearance(gain * blue, QUAD), expected).holds()

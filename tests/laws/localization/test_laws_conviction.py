@@ -1,0 +1,143 @@
+"""Laws of the judge's evidence: it is a set of lines and faces, and more of it never makes a pose less sure."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from knowledge_sources.methods.verification.color_check import NOTHING, Probe, expected_looks, imagined, probe
+from knowledge_sources.methods.verification.line_check import verify
+from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, TERMS, fitted, terms, unseen
+from knowledge_sources.methods.verification.pose_evidence import NAMES, PoseEvidence, evidence, wheels_px
+from knowledge_sources.plan.milestone_selector import expectation
+from sim.made_up.generated_floors import generated_floor
+from sim.render.renderer import Renderer
+from sim.scenario import CameraSettings
+from world_models.actuator import ActuatorModel
+from world_models.entries.task import Milestone
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+
+PARTS = st.floats(0.0, 1.0)
+COUNTS = st.floats(1.0, 6.0)
+EVIDENCE = st.builds(PoseEvidence, PARTS, PARTS, PARTS, PARTS, COUNTS, PARTS, PARTS, COUNTS)
+SPREAD = np.diag([0.01, 0.01, 0.005]) ** 2
+
+
+@cache
+def _robot() -> RobotModel:
+    settings_ = CameraSettings()
+    return RobotModel(generated_floor(4, 2).world, settings_.camera, settings_.mount, ActuatorModel())
+
+
+def _place() -> Pose2:
+    corners = _robot().world.outline("corridor-0")
+    x, y = corners.mean(axis=0)
+    return Pose2(float(x), float(y), 0.2)
+
+
+@cache
+def _lines() -> np.ndarray:
+    milestone = expectation(_robot(), _place(), Milestone("", 0, "", 0.2))
+    return np.array(milestone.expected)
+
+
+def _segments(pose: Pose2) -> np.ndarray:
+    robot = _robot()
+    return np.nan_to_num(robot.camera.project_segments(_lines(), robot.camera_from_world(pose))[0], nan=-99.0)
+
+
+def _told(lines: np.ndarray, segments: np.ndarray, pose: Pose2, faces: Probe = NOTHING) -> PoseEvidence:
+    robot = _robot()
+    return evidence(robot, lines, segments, pose, SPREAD, _place(), SPREAD, verify(robot, lines, segments, pose), faces)
+
+
+@given(EVIDENCE, st.sampled_from(NAMES), st.floats(0.0, 0.5))
+def test_more_evidence_never_makes_a_pose_less_sure(found: PoseEvidence, name: str, more: float) -> None:
+    values = dict(zip(NAMES, found.values.tolist(), strict=True))
+    values[name] += more
+    assert POSE_CONFIDENCE.p_false(PoseEvidence(**values)) <= POSE_CONFIDENCE.p_false(found) + 1e-15
+
+
+@given(EVIDENCE)
+def test_the_probability_is_one_and_the_limits_are_in_order(found: PoseEvidence) -> None:
+    assert 0.0 <= POSE_CONFIDENCE.p_false(found) <= 1.0
+    assert 0.0 < POSE_CONFIDENCE.accept < POSE_CONFIDENCE.refute < 1.0
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_the_order_of_lines_and_segments_does_not_matter(seed: int) -> None:
+    lines, segments, rng = _lines(), _segments(_place()), np.random.default_rng(seed)
+    there = Pose2(_place().x_m + 0.02, _place().y_m, _place().heading_rad)
+    mixed = _told(lines[rng.permutation(len(lines))], segments[rng.permutation(len(segments))], there)
+    assert mixed.values == pytest.approx(_told(lines, segments, there).values, abs=1e-9)
+
+
+def test_the_right_place_is_surer_than_those_about_it() -> None:
+    faces = Probe(8, 1.0, 0.2)
+    here = POSE_CONFIDENCE.p_false(_told(_lines(), _segments(_place()), _place(), faces))
+    for x, y, turn in ((0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.1), (-0.5, 0.2, 0.05)):
+        there = _place() @ Pose2(x, y, turn)
+        assert POSE_CONFIDENCE.p_false(_told(_lines(), _segments(_place()), there, faces)) > 10.0 * here
+
+
+def test_the_tolerance_grows_with_what_the_wheels_may_have_done() -> None:
+    small, large = (wheels_px(_robot(), _lines(), _place(), factor * SPREAD) for factor in (1.0, 9.0))
+    assert 0.0 < small < large
+    assert large == pytest.approx(3.0 * small)
+    assert wheels_px(_robot(), _lines()[:0], _place(), SPREAD) == 0.0
+
+
+def test_the_fit_finds_weights_that_part_right_from_wrong_and_none_is_negative() -> None:
+    rng = np.random.default_rng(0)
+    right = rng.random(400) < 0.5
+    found = rng.random((400, len(NAMES)))
+    found[:, 0] = np.clip(0.3 + 0.4 * right + rng.normal(0.0, 0.1, 400), 0.0, 1.0)
+    found[:, 1] = np.clip(0.7 - 0.4 * right + rng.normal(0.0, 0.1, 400), 0.0, 1.0)  # speaks against: must count nothing
+    weights = fitted(found, right)
+    assert len(weights.each) == len(TERMS) == terms(found).shape[1]
+    assert min(weights.each) >= 0.0 and weights.each[1] == 0.0
+    assert np.mean((weights.p_false(found) < 0.5) == right) > 0.9
+    assert not unseen(found)[:, [NAMES.index("faces"), NAMES.index("faces_tested")]].any()
+
+
+@cache
+def _picture() -> np.ndarray:
+    robot = _robot()
+    return Renderer.of_faces(robot.world.faces, 4).image(robot.camera, robot.camera_from_world(_place()))
+
+
+@pytest.mark.parametrize("gain", [(1.0, 1.0, 1.0), (0.4, 0.4, 0.4), (1.3, 1.15, 1.2)])
+def test_faces_have_the_models_colours_in_any_light(gain: tuple[float, float, float]) -> None:
+    robot, looks = _robot(), expected_looks(_robot(), _place())
+    lit = np.clip(_picture() * np.array(gain), 0.0, 255.0).astype(np.uint8)
+    found = probe(robot, _place(), lit, looks)
+    assert found.is_testable and found.agree >= 0.7 and found.agree > found.chance + 0.3
+
+
+def test_faces_of_other_colours_do_not_agree() -> None:
+    robot, looks = _robot(), expected_looks(_robot(), _place())
+    strange = [((blue, 1.0 - red, green), points) for (red, green, blue), points in looks]
+    assert probe(robot, _place(), _picture(), strange).agree < probe(robot, _place(), _picture(), looks).agree - 0.2
+
+
+def test_one_colour_everywhere_tells_nothing() -> None:
+    looks = expected_looks(_robot(), _place())
+    same = [((0.5, 0.5, 0.5), points) for _, points in looks]
+    assert not imagined(same).is_testable
+    assert imagined(looks).agree == 1.0 and imagined(looks).is_testable
+    assert not probe(_robot(), _place(), _picture(), []).is_testable
+
+
+def test_expected_points_are_in_sight_and_of_the_models_world() -> None:
+    robot = _robot()
+    points = np.array([p for _, some in expected_looks(robot, _place()) for p in some])
+    pixels = robot.camera.project(robot.camera_from_world(_place()).apply(points))
+    assert robot.camera.inside(pixels).all()
+    assert math.isfinite(float(points.sum())) and len(points) > 10

@@ -1,0 +1,118 @@
+"""Laws of telling a place from those at which its room repeats itself."""
+
+import math
+from random import Random
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.localization import aliasing as lookalikes
+from knowledge_sources.methods.localization.aliasing import (
+    GRID_M,
+    GRID_RAD,
+    anticipate,
+    hardest_to_tell,
+    looked_for,
+    view,
+    views_near,
+)
+from knowledge_sources.methods.verification.agreement import coverage
+from world_models.actuator import ActuatorModel
+from world_models.camera import Camera, CameraMount
+from world_models.files.store import WORLDS, load_world
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+
+Floats = NDArray[np.float64]
+
+WORLD = load_world(WORLDS / "research_center.toml", details=[])
+ROBOT = RobotModel(WORLD, Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1), ActuatorModel())
+NONE = np.zeros((0, 2, 2))
+few = settings(max_examples=40, deadline=None)
+
+
+def margin(one: Floats, other: Floats, seen: Floats) -> float:
+    """Of two views, by what was seen."""
+    return lookalikes.margin(looked_for(one, seen), looked_for(other, seen))
+
+
+@st.composite
+def segments(draw: st.DrawFn) -> Floats:
+    """(n, 2, 2) of 15 px and more."""
+    n = draw(st.integers(0, 12))
+    middles = draw(hnp.arrays(float, (n, 2), elements=st.floats(60.0, 450.0)))
+    angles = draw(hnp.arrays(float, n, elements=st.floats(0.0, math.pi)))
+    halves = draw(hnp.arrays(float, n, elements=st.floats(7.5, 50.0)))
+    along = halves[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.stack([middles - along, middles + along], axis=1)
+
+
+@few
+@given(segments(), segments(), segments())
+def test_what_speaks_for_one_speaks_against_the_other(one: Floats, other: Floats, seen: Floats) -> None:
+    assert margin(one, other, seen) == pytest.approx(-margin(other, one, seen), abs=1e-9)
+
+
+@few
+@given(segments(), segments(), segments(), st.randoms(use_true_random=False))
+def test_the_order_of_lines_and_segments_does_not_matter(
+    one: Floats, other: Floats, seen: Floats, random: Random
+) -> None:
+    def mixed(lines: Floats) -> Floats:
+        order = list(range(len(lines)))
+        random.shuffle(order)
+        return lines[order]
+
+    assert margin(mixed(one), mixed(other), mixed(seen)) == pytest.approx(margin(one, other, seen), abs=1e-9)
+
+
+@few
+@given(segments(), segments())
+def test_the_same_view_from_two_places_tells_nothing(one: Floats, seen: Floats) -> None:
+    assert margin(one, one, seen) == pytest.approx(0.0, abs=1e-9)
+
+
+@few
+@given(segments())
+def test_what_only_one_view_shows_speaks_for_it_where_it_is_seen_and_against_it_where_not(one: Floats) -> None:
+    half = 0.5 * float(np.sum(np.minimum(np.linalg.norm(one[:, 1] - one[:, 0], axis=1), 100.0) / 30.0))
+    assert margin(one, NONE, one) == pytest.approx(half, abs=1e-9)
+    assert margin(one, NONE, NONE) == pytest.approx(-half, abs=1e-9)
+
+
+def test_from_the_middle_of_the_hallway_the_other_way_round_is_told() -> None:
+    """What should be seen in one direction is not what should be seen from where the hallway repeats itself."""
+    here = Pose2(*WORLD.world_from_locale("hallway").apply([6.0, 1.2, 0.0])[:2], 0.0)
+    seen = view(ROBOT, here).segments_px
+    found = hardest_to_tell(ROBOT, seen, "hallway", here)
+    assert found is not None and found.margin > 1.0
+    from_there = hardest_to_tell(ROBOT, view(ROBOT, found.world_from_robot).segments_px, "hallway", here)
+    assert from_there is not None and from_there.margin < 0.0
+
+
+@few
+@given(st.integers(0, 2**32 - 1))
+def test_what_can_be_seen_from_near_is_projected_to_where_it_is_seen_from_the_pose(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, y = WORLD.world_from_locale("hallway").apply([rng.uniform(3.0, 18.0), 1.2, 0.0])[:2]
+    pose = Pose2(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
+    of_grid = Pose2(*(round(v / by) * by for v, by in zip(
+        (pose.x_m, pose.y_m, pose.heading_rad), (GRID_M, GRID_M, GRID_RAD), strict=True)))
+    assert views_near(ROBOT, [of_grid])[0] == pytest.approx(view(ROBOT, of_grid).segments_px, abs=1e-6)
+    (near,), exact = views_near(ROBOT, [pose]), view(ROBOT, pose).segments_px
+    length = np.linalg.norm(exact[:, 1] - exact[:, 0], axis=1)
+    covered = np.nan_to_num(coverage(exact, near, 0.5, 0.06))
+    assert np.sum(length * covered) >= 0.7 * np.sum(length)
+
+
+def test_to_have_thought_of_it_beforehand_changes_no_answer() -> None:
+    here = Pose2(*WORLD.world_from_locale("hallway").apply([7.31, 1.17, 0.0])[:2], 0.013)
+    seen = view(ROBOT, here).segments_px
+    world = load_world(WORLDS / "research_center.toml", details=[])
+    asked = RobotModel(world, ROBOT.camera, ROBOT.mount, ROBOT.actuator)
+    anticipate(asked, "hallway", here @ Pose2(0.02, -0.01, 0.004))
+    assert hardest_to_tell(asked, seen, "hallway", here) == hardest_to_tell(ROBOT, seen, "hallway", here)

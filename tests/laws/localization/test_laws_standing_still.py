@@ -1,0 +1,247 @@
+"""Laws of what stands before the camera: how it is known, and what is not expected behind it."""
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.localization.obstructions import (
+    MOST_AREA,
+    before_camera,
+    is_opaque,
+    obstruction_in,
+    twinned,
+)
+from knowledge_sources.methods.localization.refinement import expected_lines
+from knowledge_sources.methods.localization.views import Glance
+from knowledge_sources.methods.verification.color_check import expected_looks
+from world_models.actuator import ActuatorModel
+from world_models.camera import Camera, CameraMount
+from world_models.entries.obstruction import MOST_HIDDEN, Obstruction
+from world_models.files.store import WORLDS, load_world
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+from world_models.visibility.lines_and_points import visible_points
+
+Floats = NDArray[np.float64]
+WORLD = load_world(WORLDS / "research_center.toml", details=[])
+ROBOT = RobotModel(WORLD, Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1), ActuatorModel())
+CAMERA = ROBOT.camera
+LOOKS = 6
+seeds = st.integers(0, 2**32 - 1)
+few = settings(max_examples=40, deadline=None)
+
+
+def outline(rng: np.random.Generator) -> Obstruction:
+    """A rectangle that hides from a tenth to a third of the picture."""
+    width, height = rng.uniform(170, 290, 2)
+    left, top = rng.uniform(5, 505 - width), rng.uniform(5, 505 - height)
+    return Obstruction(((left, top), (left + width, top), (left + width, top + height), (left, top + height)))
+
+
+def somewhere(rng: np.random.Generator) -> Pose2:
+    """A place in a room, half a metre from its walls at the least."""
+    low, high = (lambda o: (o.min(axis=0) + 0.5, o.max(axis=0) - 0.5))(
+        WORLD.outline(str(rng.choice(["hallway", "robot-laboratory", "library"]))))
+    return Pose2(*rng.uniform(low, high), rng.uniform(-math.pi, math.pi))
+
+
+def seen(robot: RobotModel, pose: Pose2, before: Obstruction | None, rng: np.random.Generator) -> Floats:
+    """What a line finder would find: nine in ten of the model's lines, and the sides of what is before the camera."""
+    lines = expected_lines(robot, pose).segments_px
+    lines = lines[rng.random(len(lines)) > 0.1]
+    if before is None:
+        return lines
+    corners = np.array(before.outline_px)
+    sides = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    sides = sides[rng.random(4) > 0.15]  # what is as bright behind it as it is leaves no side
+    cut = rng.uniform(0.0, 0.2, (len(sides), 1)) * (sides[:, 1] - sides[:, 0])
+    sides = np.stack([sides[:, 0] + cut, sides[:, 1]], axis=1)
+    both = np.concatenate([lines[before.hidden_part(lines) == 0.0], sides])
+    return np.asarray(both + rng.normal(0.0, 0.2, both.shape))
+
+
+def looks(pose: Pose2, before: Obstruction | None, rng: np.random.Generator) -> list[Glance]:
+    turns = [Pose2(0.0, 0.0, k * 2.0 * math.pi / LOOKS) for k in range(LOOKS)]
+    return [Glance(seen(ROBOT, pose @ turn, before, rng), turn, np.zeros((3, 3))) for turn in turns]
+
+
+def driving(pose: Pose2, before: Obstruction | None, rng: np.random.Generator, number: int) -> list[Glance]:
+    """Looks for milestones: some from the same spot, some a little further on, and never all in one direction."""
+    taken, aside = [], rng.choice([30.0, -30.0, 60.0])
+    for k in range(number):
+        here = pose @ Pose2(0.0, 0.0, math.radians(float(rng.choice([0.0, aside])) if k != 1 else aside))
+        taken.append(Glance(seen(ROBOT, here, before, rng), Pose2(0.0, 0.0, here.heading_rad), np.zeros((3, 3))))
+        if rng.random() < 0.6:
+            pose = pose @ Pose2(rng.uniform(0.2, 0.6), 0.0, 0.0)
+    return taken
+
+
+# -- the part of the picture -----------------------------------------------------------------------------------------
+
+
+@few
+@given(seed=seeds)
+def test_points_are_covered_as_cv2_says(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    hull = cv2.convexHull(rng.uniform(0, 512, (9, 2)).astype(np.float32))
+    corners = hull.reshape(-1, 2).astype(float)
+    if rng.random() < 0.5:
+        corners = corners[::-1]
+    told = Obstruction(tuple((float(x), float(y)) for x, y in corners))
+    for x, y in rng.uniform(0, 512, (60, 2)):
+        depth = cv2.pointPolygonTest(hull, (float(x), float(y)), True)
+        assume(abs(depth) > 1e-3)
+        assert bool(told.covers([x, y])) is (depth > 0.0)
+
+
+@few
+@given(seed=seeds)
+def test_what_is_hidden_of_a_line_does_not_depend_on_its_direction(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    told, lines = outline(rng), rng.uniform(0, 512, (20, 2, 2))
+    part = told.hidden_part(lines)
+    assert told.hidden_part(lines[:, ::-1]) == pytest.approx(part)
+    assert np.all((part >= 0.0) & (part <= 1.0))
+    assert np.array_equal(told.shows(lines), part <= MOST_HIDDEN)
+
+
+# -- what is not expected --------------------------------------------------------------------------------------------
+
+
+@few
+@given(seed=seeds)
+def test_behind_something_the_robot_expects_what_it_did_but_for_what_is_hidden(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    told, pose = outline(rng), somewhere(rng)
+    robot = ROBOT.behind(told)
+    before, after = expected_lines(ROBOT, pose).segments_px, expected_lines(robot, pose).segments_px
+    assert np.array_equal(before[told.shows(before)], after)
+    points = visible_points(WORLD, robot.camera, robot.camera_from_world(pose)).points_px
+    assert not np.any(told.covers(points))
+    for _, at in expected_looks(robot, pose):
+        pixels = robot.camera.project(robot.camera_from_world(pose).apply(np.array(at)))
+        assert not np.any(told.covers(pixels))
+    assert robot.behind(None).camera.obstruction is None
+    assert robot.behind(told) is robot
+
+
+# -- how it is known -------------------------------------------------------------------------------------------------
+
+
+def test_what_hides_a_part_of_every_look_is_found_where_it_is() -> None:
+    """In nineteen of twenty cases: most of it, and little beside it (where a wall's edge goes on along its side)."""
+    grid = np.stack(np.meshgrid(np.arange(0, 512, 8.0), np.arange(0, 512, 8.0)), axis=-1)
+    right = 0
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        told = outline(rng)
+        found = obstruction_in(looks(somewhere(rng), told, rng), CAMERA)
+        if found is not None:
+            hidden, said = told.covers(grid), found.covers(grid, -4.0)
+            right += bool(np.sum(said & hidden) >= 0.4 * np.sum(hidden) and np.mean(said & ~hidden) <= 0.12)
+    assert right >= 190
+
+
+@few
+@given(seed=seeds)
+def test_where_nothing_is_before_the_camera_nothing_is_found(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    found = obstruction_in(looks(somewhere(rng), None, rng), CAMERA)
+    assert found is None
+
+
+def test_it_is_found_by_looks_for_milestones_too_and_hardly_ever_where_nothing_is() -> None:
+    """Six looks in two directions from places along the way: nine in ten. Of a hundred where nothing is at the
+    most three find a little something, which the next looks take back."""
+    grid = np.stack(np.meshgrid(np.arange(0, 512, 8.0), np.arange(0, 512, 8.0)), axis=-1)
+    right, wrong = 0, 0
+    for seed in range(100):
+        rng = np.random.default_rng([seed, 6])
+        told, pose = outline(rng), somewhere(rng)
+        found = obstruction_in(driving(pose, told, rng, 6), CAMERA)
+        if found is not None:
+            hidden, said = told.covers(grid), found.covers(grid, -4.0)
+            right += bool(np.sum(said & hidden) >= 0.4 * np.sum(hidden) and np.mean(said & ~hidden) <= 0.12)
+        nothing = obstruction_in(driving(pose, None, rng, 6), CAMERA)
+        if nothing is not None:
+            wrong += 1
+            assert np.mean(nothing.covers(grid)) <= 0.1
+    assert right >= 90 and wrong <= 3
+
+
+@few
+@given(seed=seeds)
+def test_a_robot_that_did_not_turn_though_its_wheels_say_so_has_nothing_before_its_camera(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    segments = seen(ROBOT, somewhere(rng), None, rng)
+    stuck = [Glance(segments, Pose2(0.0, 0.0, 0.5 * k), np.zeros((3, 3))) for k in range(LOOKS)]
+    found = obstruction_in(stuck, CAMERA)
+    assert found is None or _part(found) <= MOST_AREA
+
+
+def _part(found: Obstruction) -> float:
+    return float(cv2.contourArea(np.array(found.outline_px, np.float32))) / (CAMERA.width * CAMERA.height)
+
+
+@few
+@given(seed=seeds)
+def test_what_was_found_before_is_believed_until_something_is_seen_through_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    told, pose = outline(rng), somewhere(rng)
+    one = [Glance(seen(ROBOT, pose, told, rng), Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))]
+    assert before_camera(one, CAMERA, None) is None
+    assert before_camera(one, CAMERA, told) == told
+    (left, top), _, (right, bottom), _ = told.outline_px
+    across = np.array([[[left + 10, top + 10], [right - 10, bottom - 10]]])
+    assert before_camera([Glance(across, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))], CAMERA, told) is None
+
+
+@few
+@given(seed=seeds)
+def test_one_direction_tells_nothing(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    told, pose = outline(rng), somewhere(rng)
+    here = [Glance(seen(ROBOT, pose, told, rng), Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))) for _ in range(LOOKS)]
+    assert obstruction_in(here, CAMERA) is None
+
+
+@few
+@given(seed=seeds)
+def test_the_order_of_looks_and_segments_does_not_matter(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    there = looks(somewhere(rng), outline(rng), rng)
+    mixed = [Glance(rng.permutation(g.segments_px), g.now_from_then, g.spread)
+             for g in (there[k] for k in rng.permutation(LOOKS))]
+    one, other = obstruction_in(there, CAMERA), obstruction_in(mixed, CAMERA)
+    assert (one is None) is (other is None)
+    if one is not None and other is not None:
+        assert sorted(one.outline_px) == sorted(other.outline_px)
+
+
+@few
+@given(seed=seeds)
+def test_what_can_be_looked_through_is_not_opaque(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    told = outline(rng)
+    (left, top), _, (right, bottom), _ = told.outline_px
+    across = np.array([[[left + 10, top + 10], [right - 10, bottom - 10]]])
+    assert is_opaque(told, [np.zeros((0, 2, 2))])
+    assert not is_opaque(told, [across])
+
+
+@few
+@given(seed=seeds)
+def test_a_segment_is_its_own_twin_and_none_of_one_further_off(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    start, angle, length = rng.uniform(100, 400, (8, 2)), rng.uniform(0, math.pi, 8), rng.uniform(12, 90, 8)
+    along = np.column_stack([np.cos(angle), np.sin(angle)])
+    one = np.stack([start, start + length[:, None] * along], axis=1)
+    assert np.all(twinned(one, one[::-1, ::-1]))
+    away = one + 4.0 * np.column_stack([-along[:, 1], along[:, 0]])[:, None]
+    for a, b in zip(one, away, strict=True):
+        assert not twinned(a[None], b[None])[0]

@@ -1,0 +1,219 @@
+"""What the 2D matcher keeps to (§6.1), with brute force and the library's minimiser as oracles."""
+
+from __future__ import annotations
+
+from itertools import pairwise, product
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from knowledge_sources.methods.matching.fit import best_fits
+from knowledge_sources.methods.matching.hough import Peak
+from knowledge_sources.methods.matching.image_matching import Match, Similarity2, match_lines
+
+Array = NDArray[np.float64]
+
+seeds = st.integers(0, 2**32 - 1)
+objectives = st.sampled_from(["paper", "likelihood"])
+strategies = st.sampled_from(["first", "steepest"])
+quick = settings(max_examples=12, deadline=None, derandomize=True)
+
+
+def model_of(rng: np.random.Generator, count: int) -> Array:
+    """Lines of all directions, spread over the image (m, 2, 2)."""
+    middles = rng.uniform(120.0, 390.0, (count, 2))
+    angles = np.linspace(0.0, np.pi, count, endpoint=False) + rng.uniform(-0.1, 0.1, count)
+    half = 0.5 * rng.uniform(60.0, 160.0, count)[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return np.stack([middles - half, middles + half], axis=1)
+
+
+def data_of(model: Array, move: Similarity2, rng: np.random.Generator, clutter: int, noise_px: float = 0.3) -> Array:
+    """The moved model in two fragments a line, and clutter, shuffled (k, 2, 2)."""
+    moved = move.apply(model)
+    cuts = rng.uniform(0.45, 0.55, len(model))[:, None]
+    span = moved[:, 1] - moved[:, 0]
+    parts = [
+        np.stack([moved[:, 0], moved[:, 0] + (cuts - 0.05) * span], axis=1),
+        np.stack([moved[:, 0] + (cuts + 0.05) * span, moved[:, 1]], axis=1),
+    ]
+    start, angle = rng.uniform(0.0, 511.0, (clutter, 2)), rng.uniform(0.0, np.pi, clutter)
+    length = rng.uniform(10.0, 60.0, (clutter, 1))
+    parts.append(np.stack([start, start + length * np.stack([np.cos(angle), np.sin(angle)], axis=1)], axis=1))
+    data = np.concatenate(parts)
+    return rng.permutation(data + rng.normal(0.0, noise_px, data.shape))
+
+
+def a_move(rng: np.random.Generator, model: Array, shift_px: float = 20.0, turn_rad: float = 0.15) -> Similarity2:
+    centre = model.reshape(-1, 2).mean(axis=0)
+    shift = rng.uniform(-shift_px, shift_px, 2)
+    return Similarity2(rng.uniform(-turn_rad, turn_rad), (shift[0], shift[1]), 1.0, (centre[0], centre[1]))
+
+
+def scene(seed: int, lines: int = 10, clutter: int = 40) -> tuple[Array, Array, Similarity2, np.random.Generator]:
+    rng = np.random.default_rng(seed)
+    model = model_of(rng, lines)
+    move = a_move(rng, model)
+    return model, data_of(model, move, rng, clutter), move, rng
+
+
+def apart_px(found: Match, move: Similarity2, model: Array) -> float:
+    return float(np.abs(found.transform.apply(model) - move.apply(model)).max())
+
+
+@given(seed=seeds, objective=objectives, with_scale=st.booleans())
+@settings(max_examples=12, deadline=None, derandomize=True)
+def test_a_moved_model_is_found(seed: int, objective: Any, with_scale: bool) -> None:
+    model, data, move, _ = scene(seed)
+    found = match_lines(model, data, objective=objective, with_scale=with_scale)
+    assert apart_px(found, move, model) < 2.0
+    assert found.coverage.mean() > 0.8 and abs(found.transform.scale - 1.0) < 0.02
+
+
+@given(seed=seeds, objective=objectives, strategy=strategies, replace=st.booleans())
+@quick
+def test_the_match_error_falls_at_every_step(seed: int, objective: Any, strategy: Any, replace: bool) -> None:
+    model, data, _, _ = scene(seed, lines=6, clutter=80)
+    found = match_lines(model, data, objective=objective, strategy=strategy, replace=replace, pair_px=8.0, trace=True)
+    errors = [step.evaluation for step in found.trace]
+    assert all(after < before for before, after in pairwise(errors))
+    assert len(errors) == found.steps + 1
+    assert found.e_match == pytest.approx(errors[-1])
+    most = 3 if replace else 2
+    for before, after in pairwise(found.trace):
+        assert 1 <= len(set(before.pairs) ^ set(after.pairs)) <= most
+
+
+@given(seed=seeds, objective=objectives)
+@quick
+def test_each_data_line_goes_to_one_model_line(seed: int, objective: Any) -> None:
+    model, data, _, _ = scene(seed, clutter=100)
+    pairs = match_lines(model, data, objective=objective, pair_px=8.0).pairs
+    assert len(np.unique(pairs[:, 1])) == len(pairs)
+    assert [tuple(p) for p in pairs] == sorted(tuple(p) for p in pairs)
+
+
+@given(seed=seeds, objective=objectives)
+@quick
+def test_the_order_of_lines_does_not_matter(seed: int, objective: Any) -> None:
+    model, data, _, rng = scene(seed)
+    rows, columns = rng.permutation(len(model)), rng.permutation(len(data))
+    first = match_lines(model, data, objective=objective)
+    second = match_lines(model[rows], data[columns], objective=objective)
+    back = {(int(rows[m]), int(columns[d])) for m, d in second.pairs}
+    assert back == {(int(m), int(d)) for m, d in first.pairs}
+    assert second.e_match == pytest.approx(first.e_match, abs=1e-6)
+
+
+@given(seed=seeds, objective=objectives)
+@quick
+def test_which_end_comes_first_does_not_matter(seed: int, objective: Any) -> None:
+    model, data, _, rng = scene(seed)
+    a, b = rng.random(len(model)) < 0.5, rng.random(len(data)) < 0.5
+    turned, flipped = model.copy(), data.copy()
+    turned[a], flipped[b] = model[a][:, ::-1], data[b][:, ::-1]
+    first = match_lines(model, data, objective=objective)
+    second = match_lines(turned, flipped, objective=objective)
+    assert np.array_equal(first.pairs, second.pairs)
+    assert second.e_match == pytest.approx(first.e_match, abs=1e-6)
+
+
+@given(seed=seeds, objective=objectives, angle=st.floats(-3.0, 3.0))
+@quick
+def test_moving_model_and_data_together_changes_nothing(seed: int, objective: Any, angle: float) -> None:
+    """From one placement: the accumulator's axes are the image's, so it alone may prefer another peak."""
+    model, data, move, rng = scene(seed)
+    still = Peak(0.0, (0.0, 0.0), 1.0)
+    data = data_of(model, Similarity2(0.0, (0.0, 0.0), 1.0, move.centre_px), rng, 40)
+    common = Similarity2(angle, (37.0, -80.0), 1.0, (256.0, 256.0))
+    first = match_lines(model, data, objective=objective, start=still)
+    second = match_lines(common.apply(model), common.apply(data), objective=objective, start=still)
+    assert np.array_equal(first.pairs, second.pairs)
+    assert second.e_match == pytest.approx(first.e_match, rel=1e-6)
+
+
+@given(seed=seeds, objective=objectives)
+@settings(max_examples=5, deadline=None)
+def test_no_state_of_a_small_problem_is_better_than_brute_force_s_best(seed: int, objective: Any) -> None:
+    """Every state of a small space, each fitted by the library: the search ends at a local minimum, never below."""
+    rng = np.random.default_rng(seed)
+    model = model_of(rng, 2)
+    data = data_of(model, Similarity2(0.0, (1.0, -0.5), 1.0, (256.0, 256.0)), rng, 0)
+    data = np.concatenate([data, data[:1] + 2.0, data[-1:] - 2.0])
+    arguments: dict[str, Any] = {"objective": objective, "start": Peak(0.0, (0.0, 0.0), 1.0), "pair_px": 4.0}
+    found = match_lines(model, data, **arguments)
+    errors: dict[frozenset[tuple[int, int]], float] = {}
+    nearest = [int(np.argmin([_distance(line, segment) for line in model])) for segment in data]
+    for take in product([False, True], repeat=len(data)):
+        pairs = frozenset((nearest[k], k) for k in range(len(data)) if take[k])
+        errors[pairs] = _held(model, data, pairs, arguments)
+    state = frozenset((int(m), int(d)) for m, d in found.pairs)
+    assert found.e_match >= min(errors.values()) - 1e-9
+    assert found.e_match == pytest.approx(errors[state])
+    assert all(errors[other] >= found.e_match - 1e-9 for other in errors if len(other ^ state) == 1)
+
+
+def _distance(line: Array, segment: Array) -> float:
+    unit = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
+    across = (segment - line[0]) @ np.array([-unit[1], unit[0]])
+    beyond = (segment - line[0]) @ unit
+    gap = max(0.0, -float(beyond.max()), float(beyond.min()) - float(np.linalg.norm(line[1] - line[0])))
+    return float(np.abs(across).max()) + gap
+
+
+def _held(model: Array, data: Array, pairs: frozenset[tuple[int, int]], arguments: dict[str, Any]) -> float:
+    """E_match of one state: the first of a search's trace."""
+    return match_lines(model, data, first_pairs=pairs, trace=True, **arguments).trace[0].evaluation
+
+
+@given(seed=seeds, with_scale=st.booleans())
+@settings(max_examples=25, deadline=None)
+def test_the_closed_fit_is_the_library_s_minimum(seed: int, with_scale: bool) -> None:
+    """E_fit of random pairs over turn, shift and scale, near no motion."""
+    rng = np.random.default_rng(seed)
+    angles = rng.uniform(0.0, np.pi, 8)
+    normals = np.stack([-np.sin(angles), np.cos(angles)], axis=1)
+    ends = rng.uniform(-200.0, 200.0, (8, 2, 2))
+    offsets = np.sum(normals * ends.mean(axis=1), axis=1)
+    ends += -np.sum(normals[:, None] * (ends - ends.mean(axis=1, keepdims=True)), axis=-1)[..., None] * normals[:, None]
+    ends += rng.normal(0.0, 3.0, ends.shape)
+    weights = rng.uniform(0.1, 2.0, 8)
+    rows = np.empty((8, 2, 5))
+    rows[..., 0] = np.sum(normals[:, None] * ends, axis=-1)
+    rows[..., 1] = normals[:, None, 1] * ends[..., 0] - normals[:, None, 0] * ends[..., 1]
+    rows[..., 2:4], rows[..., 4] = normals[:, None], -offsets[:, None]
+    form = np.einsum("p,pea,peb->ab", weights, rows, rows)
+    still = np.array([1.0, 0.0, 0.0, 0.0, 1.0])
+    found = best_fits(form[None], with_scale, still)
+
+    def error(x: Any) -> float:
+        c, s = np.cos(x[0] / 100.0), np.sin(x[0] / 100.0)
+        scale = 1.0 + x[3] / 100.0 if with_scale else 1.0
+        moved = ends @ np.array([[c, s], [-s, c]]) + (x[1], x[2])
+        return float(np.sum(weights[:, None] * (np.sum(normals[:, None] * moved, -1) - scale * offsets[:, None]) ** 2))
+
+    oracle = minimize(error, np.zeros(4), method="BFGS", options={"gtol": 1e-8})
+    assert found.errors[0] == pytest.approx(oracle.fun, rel=1e-4, abs=1e-6)
+    c, s, u, v, scale = found.placements[0]
+    assert error((100.0 * np.arctan2(s, c), u, v, 100.0 * (scale - 1.0))) == pytest.approx(found.errors[0], abs=1e-6)
+
+
+@pytest.mark.parametrize("objective", ["paper", "likelihood"])
+def test_nothing_matches_nothing(objective: Any) -> None:
+    empty, line = np.zeros((0, 2, 2)), np.array([[[10.0, 10.0], [10.0, 90.0]]])
+    for model, data in ((line, empty), (empty, line), (empty, empty)):
+        found = match_lines(model, data, objective=objective)
+        assert found.pairs.shape == (0, 2) and not found.coverage.any()
+
+
+@pytest.mark.parametrize(
+    "more", [{"objective": "other"}, {"pair_px": 0.0}, {"pair_px": [1.0, 2.0, 3.0]}, {"strategy": "random"}]
+)
+def test_wrong_settings_are_named(more: dict[str, Any]) -> None:
+    line = np.array([[[10.0, 10.0], [10.0, 90.0]]])
+    with pytest.raises(ValueError, match="expected"):
+        match_lines(line, line, **more)

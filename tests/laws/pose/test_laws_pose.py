@@ -1,0 +1,230 @@
+"""What every pose solver keeps to, whatever the scene (§6.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, wrong_landmarks
+from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
+from knowledge_sources.methods.pose.line_set import line_set
+from knowledge_sources.methods.pose.numerics.finish import WEAK_INFORMATION
+from knowledge_sources.methods.pose.numerics.image_error import image_jacobian, in_front
+from knowledge_sources.methods.pose.numerics.plane_error import camera_ends, plane_distances_m, plane_jacobian
+from world_models.camera import Camera
+from world_models.frames import Pose
+
+SOLVERS = [r_then_t, r_and_t, r_and_t_ml, med_r_and_t, trunc_r_and_t]
+SCENES = [campus(), corridor()]
+SIGMA_PX = 0.4
+
+seeds = st.integers(0, 2**32 - 1)
+scenes = st.sampled_from([0, 1]).map(SCENES.__getitem__)
+quick = settings(max_examples=8, deadline=None)
+by_solver = pytest.mark.parametrize("solver", SOLVERS, ids=lambda f: f.__name__)
+Solver = Callable[..., PoseEstimate]
+
+
+def solve(solver: Solver, scene: PoseScene, segments: Any, prior: Pose, **more: Any) -> PoseEstimate:
+    more.setdefault("landmark_ids", scene.landmark_ids)
+    return solver(scene.lines_world, segments, scene.camera, prior, sigma_px=SIGMA_PX, **more)
+
+
+def away(found: Pose, truth: Pose) -> tuple[float, float]:
+    """Rotation [rad] and translation [m] between two poses."""
+    apart = found @ truth.inverse()
+    return float(np.linalg.norm(apart.rotation_vector)), float(np.linalg.norm(apart.translation))
+
+
+def same(found: Pose, other: Pose) -> bool:
+    turn, shift = away(found, other)
+    return turn < 1e-6 and shift < 1e-4
+
+
+def some(scene: PoseScene, rng: np.random.Generator, count: int = 14) -> PoseScene:
+    return scene.take(np.sort(rng.permutation(len(scene))[:count]))
+
+
+@by_solver
+@given(scene=scenes, seed=seeds)
+@quick
+def test_exact_lines_give_the_truth(solver: Solver, scene: PoseScene, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    prior = drawn_prior(scene.camera_from_world, 0.5, 0.05, rng)
+    found = solve(solver, scene, scene.segments_px, prior)
+    assert found.ok and same(found.camera_from_world, scene.camera_from_world)
+    assert found.inliers.all() and np.abs(found.residuals_px).max() < 1e-3
+
+
+@by_solver
+@given(scene=scenes, seed=seeds)
+@quick
+def test_the_order_of_the_lines_does_not_matter(solver: Solver, scene: PoseScene, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    scene = some(scene, rng)
+    segments = end_noise(scene.segments_px, SIGMA_PX, rng)
+    prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    order = rng.permutation(len(scene))
+    first = solve(solver, scene, segments, prior)
+    second = solve(solver, scene.take(order), segments[order], prior)
+    assert same(second.camera_from_world, first.camera_from_world)
+    assert np.array_equal(second.inliers, first.inliers[order])
+
+
+@by_solver
+@given(scene=scenes, seed=seeds)
+@quick
+def test_which_end_comes_first_does_not_matter(solver: Solver, scene: PoseScene, seed: int) -> None:
+    """Swapping the ends turns the sign of a normal, or of a direction: neither has a meaning."""
+    rng = np.random.default_rng(seed)
+    scene = some(scene, rng)
+    segments = end_noise(scene.segments_px, SIGMA_PX, rng)
+    prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    first = solve(solver, scene, segments, prior)
+    lines, flipped = scene.lines_world.copy(), segments.copy()
+    a, b = rng.random(len(scene)) < 0.5, rng.random(len(scene)) < 0.5
+    lines[a], flipped[b] = lines[a][:, ::-1], flipped[b][:, ::-1]
+    other = PoseScene(lines, flipped, scene.landmark_ids, scene.camera, scene.camera_from_world)
+    second = solve(solver, other, flipped, prior)
+    assert same(second.camera_from_world, first.camera_from_world)
+
+
+@by_solver
+@given(scene=scenes, seed=seeds)
+@quick
+def test_moving_the_world_moves_the_pose_with_it(solver: Solver, scene: PoseScene, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    scene = some(scene, rng)
+    segments = end_noise(scene.segments_px, SIGMA_PX, rng)
+    prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    moved_from_world = Pose.from_rotation_vector(rng.normal(0.0, 1.0, 3), rng.uniform(-30.0, 30.0, 3))
+    lines = moved_from_world.apply(scene.lines_world)
+    moved = PoseScene(lines, segments, scene.landmark_ids, scene.camera, scene.camera_from_world)
+    first = solve(solver, scene, segments, prior)
+    second = solve(solver, moved, segments, prior @ moved_from_world.inverse())
+    assert same(second.camera_from_world @ moved_from_world, first.camera_from_world)
+
+
+@pytest.mark.parametrize("solver", [med_r_and_t, trunc_r_and_t], ids=lambda f: f.__name__)
+@pytest.mark.parametrize("version", ["lines", "landmarks"])
+@given(scene=scenes, seed=seeds)
+@settings(max_examples=8, deadline=None, derandomize=True)
+def test_gross_outliers_do_not_move_a_robust_pose(
+    solver: Solver, version: str, scene: PoseScene, seed: int
+) -> None:
+    """40 % of the lines wrong, each by itself or by landmarks: the pose is as good as Table 3's, and they are named."""
+    rng = np.random.default_rng(seed)
+    segments = end_noise(scene.segments_px, SIGMA_PX, rng)
+    count = int(0.4 * len(scene))
+    more: dict[str, Any] = {}
+    if version == "lines":
+        segments[rng.permutation(len(scene))[:count]] = rng.uniform(0.0, 511.0, (count, 2, 2))
+        more = {"landmark_ids": None, "probability": 0.9999999, "rng": rng}
+    else:
+        segments, _ = wrong_landmarks(scene, segments, count, rng)
+    found = solve(solver, scene, segments, drawn_prior(scene.camera_from_world, 0.3, 0.03, rng), **more)
+    turn, shift = away(found.camera_from_world, scene.camera_from_world)
+    assert turn < 0.01 and shift < 0.33
+    gross = np.abs(found.residuals_px).max(axis=1) > 25.0 * SIGMA_PX
+    assert not np.any(found.inliers & gross)
+    assert all(found.rejected[i] for i in np.flatnonzero(gross))
+
+
+@by_solver
+@given(scene=scenes, seed=seeds)
+@quick
+def test_a_pose_behind_the_camera_is_never_returned(solver: Solver, scene: PoseScene, seed: int) -> None:
+    """From priors that look anywhere: what counts as found has its lines in front."""
+    rng = np.random.default_rng(seed)
+    scene = some(scene, rng)
+    prior = scene.camera_from_world.perturbed(rng.uniform(-3.1, 3.1, 3), rng.uniform(-5.0, 5.0, 3))
+    found = solve(solver, scene, scene.segments_px, prior)
+    lines = line_set(scene.lines_world, scene.segments_px, scene.camera, SIGMA_PX)
+    pose = found.camera_from_world
+    front = in_front(lines, pose.rotation, pose.translation)
+    assert not np.any(found.inliers & ~front)
+    assert not found.ok or 2 * front.sum() > len(scene) or 2 * found.inliers.sum() <= len(scene)
+    assert found.ok or found.reason
+
+
+@given(scene=scenes, count=st.integers(0, 3), seed=seeds)
+@settings(max_examples=25, deadline=None)
+def test_few_lines_never_make_a_prior_worse(scene: PoseScene, count: int, seed: int) -> None:
+    """Measured as a weak prior weighs errors; exact lines."""
+    rng = np.random.default_rng(seed)
+    scene = some(scene, rng, count)
+    truth = scene.camera_from_world
+    prior = drawn_prior(truth, 0.1, 0.01, rng)
+    for solver in (r_and_t_ml, med_r_and_t, trunc_r_and_t):
+        found = solve(solver, scene, scene.segments_px, prior)
+        assert weighed(found.camera_from_world, truth) <= weighed(prior, truth) * 1.02 + 1e-6
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+@given(scene=scenes, seed=seeds)
+@settings(max_examples=25, deadline=None, derandomize=True)
+def test_nor_do_few_noisy_lines(count: int, scene: PoseScene, seed: int) -> None:
+    """In directions of which they say little, their noise does not carry the pose away."""
+    rng = np.random.default_rng(seed)
+    scene = some(scene, rng, count)
+    truth, segments = scene.camera_from_world, end_noise(scene.segments_px, SIGMA_PX, rng)
+    prior = drawn_prior(truth, 0.1, 0.01, rng)
+    for solver in (r_and_t_ml, med_r_and_t, trunc_r_and_t):
+        found = solve(solver, scene, segments, prior)
+        assert weighed(found.camera_from_world, truth) <= weighed(prior, truth) * 1.02 + 1e-6
+
+
+@pytest.mark.parametrize("solver", [r_then_t, r_and_t], ids=lambda f: f.__name__)
+@given(scene=scenes, count=st.integers(0, 2), seed=seeds)
+@quick
+def test_the_paper_s_two_hand_back_the_prior_below_three_lines(
+    solver: Solver, scene: PoseScene, count: int, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    scene = some(scene, rng, count)
+    prior = drawn_prior(scene.camera_from_world, 0.1, 0.01, rng)
+    found = solve(solver, scene, scene.segments_px, prior)
+    assert same(found.camera_from_world, prior) and not found.ok
+
+
+def weighed(found: Pose, truth: Pose) -> float:
+    apart = found @ truth.inverse()
+    move = np.concatenate([apart.rotation_vector, apart.translation])
+    return float(np.sqrt(move @ WEAK_INFORMATION @ move))
+
+
+@given(scene=scenes, seed=seeds)
+@quick
+def test_derivatives_are_those_of_the_residuals(scene: PoseScene, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    lines = line_set(scene.lines_world, end_noise(scene.segments_px, 2.0, rng), scene.camera, 1.0)
+    pose = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    _, image = image_jacobian(lines, pose.rotation, pose.translation)
+    plane = plane_jacobian(lines, camera_ends(lines, pose.rotation, pose.translation))
+    for k in range(6):
+        step = np.zeros(6)
+        step[k] = 1e-6
+        sides = [pose.perturbed(sign * step[:3], sign * step[3:]) for sign in (1.0, -1.0)]
+        far, near = (image_jacobian(lines, p.rotation, p.translation)[0] for p in sides)
+        np.testing.assert_allclose((far - near) / 2e-6, image[..., k], rtol=1e-4, atol=1e-3)
+        far, near = (plane_distances_m(lines, camera_ends(lines, p.rotation, p.translation)) for p in sides)
+        np.testing.assert_allclose((far - near) / 2e-6, plane[..., k], rtol=1e-4, atol=1e-5)
+
+
+@by_solver
+@given(seed=seeds)
+@quick
+def test_lens_distortion_is_undone(solver: Solver, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    scene = corridor()
+    plain = scene.camera
+    bent = Camera(plain.fx, plain.fy, plain.cx, plain.cy, plain.width, plain.height, (-0.08, 0.02, 1e-3, -1e-3, 0.0))
+    through = bent.project(plain.rays(scene.segments_px))
+    seen = PoseScene(scene.lines_world, through, scene.landmark_ids, bent, scene.camera_from_world)
+    found = solve(solver, seen, through, drawn_prior(scene.camera_from_world, 0.3, 0.03, rng))
+    assert same(found.camera_from_world, scene.camera_from_world)

@@ -1,0 +1,107 @@
+"""What every solver says of its pose: residuals, reasons and a covariance, each of them true."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, wrong_landmarks
+from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
+from knowledge_sources.methods.pose.estimate import BEHIND, DISTANCE, NO_LENGTH, NO_OVERLAP
+from knowledge_sources.methods.pose.line_set import line_set
+from knowledge_sources.methods.pose.numerics.image_error import image_distances, in_front, overlapping
+
+SOLVERS = [r_then_t, r_and_t, r_and_t_ml, med_r_and_t, trunc_r_and_t]
+ROBUST = [med_r_and_t, trunc_r_and_t]
+SCENES = [campus(), corridor()]
+SIGMA_PX = 0.4
+Solver = Callable[..., PoseEstimate]
+
+seeds = st.integers(0, 2**32 - 1)
+scenes = st.sampled_from([0, 1]).map(SCENES.__getitem__)
+quick = settings(max_examples=8, deadline=None, derandomize=True)
+
+
+def named(solvers: list[Any]) -> Any:
+    return pytest.mark.parametrize("solver", solvers, ids=lambda f: f.__name__)
+
+
+def solve(solver: Solver, scene: PoseScene, segments: Any, rng: np.random.Generator) -> PoseEstimate:
+    prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    return solver(
+        scene.lines_world, segments, scene.camera, prior, landmark_ids=scene.landmark_ids, sigma_px=SIGMA_PX
+    )
+
+
+@named(SOLVERS)
+@given(scene=scenes, seed=seeds)
+@quick
+def test_residuals_are_those_of_the_pose(solver: Solver, scene: PoseScene, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    segments, _ = wrong_landmarks(scene, end_noise(scene.segments_px, SIGMA_PX, rng), 6, rng)
+    found = solve(solver, scene, segments, rng)
+    lines, pose = line_set(scene.lines_world, segments, scene.camera, SIGMA_PX), found.camera_from_world
+    expected = image_distances(lines, pose.rotation, pose.translation)
+    np.testing.assert_allclose(np.abs(found.residuals_px), np.abs(expected), atol=1e-6, rtol=1e-6)
+
+
+@named(ROBUST)
+@given(scene=scenes, seed=seeds)
+@quick
+def test_each_rejected_line_has_a_reason_that_is_true(solver: Solver, scene: PoseScene, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    segments, _ = wrong_landmarks(scene, end_noise(scene.segments_px, SIGMA_PX, rng), 6, rng)
+    segments[0, 1] = segments[0, 0]
+    along = segments[1, 1] - segments[1, 0]
+    segments[1] += 3.0 * along
+    found = solve(solver, scene, segments, rng)
+    lines, pose = line_set(scene.lines_world, segments, scene.camera, SIGMA_PX), found.camera_from_world
+    front = in_front(lines, pose.rotation, pose.translation)
+    over = overlapping(lines, pose.rotation, pose.translation)
+    far = np.sum((found.residuals_px / SIGMA_PX) ** 2, axis=1)
+    assert found.rejected[0] == NO_LENGTH and found.rejected[1] is not None
+    for i, reason in enumerate(found.rejected):
+        assert found.inliers[i] == (reason is None)
+        if reason is None:
+            assert front[i] and over[i]
+        elif reason == BEHIND:
+            assert not front[i]
+        elif reason == NO_OVERLAP:
+            assert not over[i]
+        elif reason == DISTANCE:
+            assert far[i] > 9.0
+        else:
+            assert reason == NO_LENGTH and np.ptp(segments[i], axis=0).max() == 0.0
+
+
+@named(SOLVERS)
+@given(scene=scenes, seed=seeds)
+@quick
+def test_the_covariance_says_how_far_off_the_pose_is(solver: Solver, scene: PoseScene, seed: int) -> None:
+    """40 is beyond chi-squared's 99.9999 % with six degrees of freedom."""
+    rng = np.random.default_rng(seed)
+    found = solve(solver, scene, end_noise(scene.segments_px, SIGMA_PX, rng), rng)
+    np.testing.assert_allclose(found.covariance, found.covariance.T)
+    assert np.linalg.eigvalsh(found.covariance)[0] > 0.0
+    apart = found.camera_from_world @ scene.camera_from_world.inverse()
+    error = np.concatenate([apart.rotation_vector, apart.translation])
+    assert error @ np.linalg.solve(found.covariance, error) < 40.0
+
+
+@named(SOLVERS)
+@given(scene=scenes, seed=seeds, factor=st.floats(1.5, 4.0))
+@quick
+def test_doubt_in_the_lines_is_doubt_in_the_pose(solver: Solver, scene: PoseScene, seed: int, factor: float) -> None:
+    """With exact lines and ``factor`` times the deviation, the covariance is ``factor`` squared times as large."""
+    rng = np.random.default_rng(seed)
+    prior = drawn_prior(scene.camera_from_world, 0.1, 0.01, rng)
+    first, second = (
+        solver(scene.lines_world, scene.segments_px, scene.camera, prior, landmark_ids=scene.landmark_ids, sigma_px=s)
+        for s in (SIGMA_PX, factor * SIGMA_PX)
+    )
+    np.testing.assert_allclose(second.covariance, factor**2 * first.covariance, rtol=1e-3, atol=1e-12)

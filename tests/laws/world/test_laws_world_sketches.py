@@ -1,0 +1,93 @@
+"""Laws of plan sketches in made-up houses: none passes a barrier, and refinement changes nothing that is verified."""
+
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blackboard.change import Quiescence
+from blackboard.effect import Post
+from blackboard.journal import Decision
+from blackboard.scheduler import Scheduler
+from experiments.paper.planning import TAKING_PART
+from experiments.perception.visibility import CAMERA, MOUNT, house
+from harvey.dry_run import Believer, PerfectWheels
+from harvey.wiring import knowledge_sources
+from world_models.actuator import ActuatorModel
+from world_models.building.world import World
+from world_models.entries.location import diagonal
+from world_models.entries.task import Command, Outcome, PlanSketch, Subgoal
+from world_models.files.store import read_world
+from world_models.files.toml.source import Source
+from world_models.robot import RobotModel
+from world_models.units import FOOT_M
+
+
+def planned(world: World) -> tuple[list[PlanSketch], Outcome]:
+    """Every revision of every sketch of a mission from the first room to the last, in order, and how it ended."""
+    sketches: list[PlanSketch] = []
+
+    def note(decision: Decision) -> None:
+        sketches.extend(c.entry.value for c in decision.made if isinstance(c.entry.value, PlanSketch))
+
+    robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel())
+    experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
+    scheduler = Scheduler([*experts, Believer()], ports=(PerfectWheels(),), sinks=(note,))
+    ends = [world.locale(name).outline.mean(axis=0) / FOOT_M * part
+            for name, part in ((world.rooms[0], 0.35), (world.rooms[-1], 0.35))]
+    first, last = (f"({room} ({x:.2f},{y:.2f},0))" for room, (x, y) in
+                   zip((world.rooms[0], world.rooms[-1]), ends, strict=True))
+    scheduler.tell([Post(Command(f"(ptrans {first} {last})", 0.5, None, diagonal(0.003, 0.001)))], "user")
+    while scheduler.view.latest(Outcome) is None and scheduler.cycle < 4_000:
+        if scheduler.step() is None:
+            scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
+    outcome = scheduler.view.latest(Outcome)
+    return sketches, outcome.value if outcome else Outcome("failed", "no end")
+
+
+def barriers(world: World) -> shapely.Geometry:
+    """The floor lines of all walls with the doorways taken out, and the footprints of what stands in the way."""
+    outlines = shapely.union_all([shapely.LinearRing(world.outline(room)) for room in world.rooms])
+    openings = [shapely.Polygon(np.concatenate([*d.thresholds_world])).convex_hull.buffer(1e-6) for d in world.doorways]
+    solid = [shapely.Polygon(f) for room in world.rooms for f in world.obstacles(room)]
+    return shapely.union_all([outlines.difference(shapely.union_all(openings)), *solid])
+
+
+def way(world: World, subgoal: Subgoal) -> shapely.LineString:
+    ends = [place.in_world(world).position for place in (subgoal.origin, subgoal.destination)]
+    return shapely.LineString(ends)
+
+
+@settings(deadline=None, max_examples=5)
+@given(st.integers(0, 100_000))
+def test_sketches_keep_clear_of_barriers_and_keep_what_is_verified(seed: int) -> None:
+    world = read_world(Source.parse(house(np.random.default_rng(seed)), "house.toml"))
+    sketches, outcome = planned(world)
+    assert outcome.kind in ("reached", "blocked"), outcome
+    solid = barriers(world)
+    for sketch in sketches:
+        for subgoal in sketch.subgoals:
+            if subgoal.primitive:
+                assert not way(world, subgoal).intersects(solid), f"{subgoal} passes a barrier"
+        for one, other in pairwise(sketch.subgoals):
+            assert one.destination.locale == other.origin.locale
+    for before, after in pairwise_of_same(sketches):
+        done = min(before.at, after.at)
+        assert before.subgoals[:done] == after.subgoals[:done]
+        assert after.at >= before.at or after.adjustments == before.adjustments + 1
+        assert before.status == "active"
+
+
+def pairwise_of_same(sketches: list[PlanSketch]) -> list[tuple[PlanSketch, PlanSketch]]:
+    """Successive revisions of the same sketch: the same place in the tree and the same number of subgoals."""
+    latest: dict[tuple[object, ...], PlanSketch] = {}
+    pairs = []
+    for sketch in sketches:
+        key = sketch.goal, sketch.path
+        before = latest.get(key)
+        if before is not None and before.is_active:
+            pairs.append((before, sketch))
+        latest[key] = sketch
+    return pairs

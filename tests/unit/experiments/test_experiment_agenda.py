@@ -1,0 +1,55 @@
+"""The loads of ``harvey experiment agenda``: what they wake, what they leave behind, and peers that are not there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from blackboard.effect import Post
+from blackboard.scheduler import Scheduler
+from experiments.scale import agenda, agenda_memory, agenda_peers
+from experiments.scale.agenda_load import ALL, AS_IN_MISSIONS, ONE, PART_CYCLES, Load, Task, measure
+
+
+@pytest.mark.parametrize("load", [ONE, AS_IN_MISSIONS, ALL], ids=lambda load: load.name)
+def test_a_load_wakes_as_many_as_it_says_and_each_comes_to_its_end(load: Load) -> None:
+    scheduler = Scheduler(load.sources())
+    draws = np.random.default_rng(1).integers(1 << 31, size=20)
+    scheduler.tell([Post(Task.of(int(draw))) for draw in draws], "user")
+    first = scheduler.step()
+    decisions = [scheduler.step() for _ in range(2000)]
+    activated = sum(len(d.activated) for d in decisions)
+    assert activated / len(decisions) == pytest.approx(load.a_cycle, rel=0.05)
+    ended = sum(1 for d in decisions if d.chosen) + sum(len(d.obviated) for d in decisions)
+    assert activated - ended == decisions[-1].pending - first.pending
+    assert all(d.chosen and not d.refused for d in decisions)
+    assert {o.reason.partition(":")[0] for d in decisions for o in d.obviated} <= {"stale trigger"}
+
+
+def test_a_measurement_fills_the_agenda_first() -> None:
+    few, more = measure(ONE, [10, 50], 2, 0)
+    assert (few.pending, more.pending) == (10, 50)
+    assert 0.0 < few.best_s <= few.usual_s < 1.0 and 0.0 < more.best_s <= more.usual_s < 1.0
+    assert PART_CYCLES >= 1000
+
+
+def test_with_forgetting_the_board_stays_small() -> None:
+    assert agenda_memory.long_run(500, agenda_memory.RETENTION).entries < 10
+    without = agenda_memory.long_run(500, ())
+    assert without.entries > 400 and without.posted > 400 and without.early_bytes > 0
+
+
+def test_a_peer_that_is_not_installed_leaves_its_column_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(agenda_peers, "has", lambda _peer: False)
+    assert agenda._clips(10) is None and agenda._py_trees(10, 5) is None
+    assert any("py_trees is not installed" in note for note in agenda._notes(1, ""))
+
+
+@pytest.mark.skipif(not agenda_peers.has("clips"), reason="clipspy is not installed: pip install '.[peers]'")
+def test_clips_fires_once_for_each_step() -> None:
+    assert 0.0 < agenda_peers.clips_s(10, 50) < 1.0
+
+
+@pytest.mark.skipif(not agenda_peers.has("py_trees"), reason="py_trees is not installed: pip install '.[peers]'")
+def test_py_trees_ticks() -> None:
+    assert 0.0 < agenda_peers.py_trees_s(10, 5) < 1.0

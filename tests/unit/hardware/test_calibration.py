@@ -1,0 +1,183 @@
+"""Calibration: rendered boards give their camera back, within what is told of it; useless pictures say why."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from harvey.cli import main
+from knowledge_sources.methods.calibration.chessboard import Pattern, find_corners
+from knowledge_sources.methods.calibration.intrinsics import BoardView, Calibration, calibrate
+from knowledge_sources.methods.calibration.mounting import mounting
+from knowledge_sources.methods.features.images import decode
+from sim.made_up.chessboard import chessboard_picture, chessboard_renderer, chessboard_view
+from sim.render.optics import Optics
+from sim.render.sensor import SensorParameters
+from world_models.camera import Camera, CameraMount
+from world_models.files.toml.camera_file import CameraFileError, camera_text, load_camera
+from world_models.frames import Pose
+
+PATTERN = Pattern(9, 6, 0.025)
+CAMERA = Camera(402.0, 405.0, 250.3, 259.1, 512, 512, (-0.2, 0.05, 0.001, -0.0005))
+TRUE = np.array([402.0, 405.0, 250.3, 259.1, -0.2, 0.05, 0.001, -0.0005])
+VIEWS = 10
+
+
+@pytest.fixture(scope="module")
+def pictures() -> list[bytes]:
+    renderer, optics, rng = chessboard_renderer(9, 6, 0.025), Optics.of(CAMERA), np.random.default_rng(2)
+    poses = [chessboard_view(CAMERA, 9, 6, 0.025, rng) for _ in range(VIEWS)]
+    return [chessboard_picture(renderer, optics, pose, SensorParameters(), rng) for pose in poses]
+
+
+@pytest.fixture(scope="module")
+def views(pictures: list[bytes]) -> list[BoardView]:
+    corners = [find_corners(decode(picture), PATTERN) for picture in pictures]
+    return [BoardView(str(i), c) for i, c in enumerate(corners) if not isinstance(c, str)]
+
+
+@pytest.fixture(scope="module")
+def calibration(views: list[BoardView]) -> Calibration:
+    return calibrate(views, PATTERN, (512, 512))
+
+
+def test_the_camera_comes_back_within_four_deviations(calibration: Calibration) -> None:
+    assert np.all(np.abs(calibration.values - TRUE) < 4.0 * calibration.deviations)
+    assert np.all(calibration.deviations[:4] < 0.6)
+    assert calibration.rms_px < 0.1
+
+
+def test_deviations_are_opencv_s(calibration: Calibration) -> None:
+    points = [PATTERN.points.astype(np.float32)] * len(calibration.views)
+    corners = [view.corners_px.astype(np.float32) for view in calibration.views]
+    theirs = cv2.calibrateCameraExtended(
+        points, corners, (512, 512), np.eye(3), np.zeros(5), flags=cv2.CALIB_FIX_K3
+    )[5]
+    np.testing.assert_allclose(calibration.deviations, np.ravel(theirs)[:8], rtol=0.01)
+
+
+def test_a_view_that_stands_out_is_left_out(views: list[BoardView]) -> None:
+    rng = np.random.default_rng(0)
+    spoilt = BoardView("spoilt", views[0].corners_px + rng.normal(0.0, 2.0, views[0].corners_px.shape))
+    found = calibrate([*views[1:], spoilt], PATTERN, (512, 512))
+    assert list(found.rejected) == ["spoilt"] and "are usual here" in found.rejected["spoilt"]
+
+
+def test_too_few_views_are_refused(views: list[BoardView]) -> None:
+    with pytest.raises(ValueError, match=r"expected at least 4 views .* got 3"):
+        calibrate(views[:3], PATTERN, (512, 512))
+
+
+def test_useless_pictures_say_why(pictures: list[bytes]) -> None:
+    board = decode(pictures[0])
+    assert find_corners(np.full((200, 200), 99, np.uint8), PATTERN) == "no board of 9 x 6 inner corners in it"
+    blurred = find_corners(cv2.GaussianBlur(board, (0, 0), 3.0), PATTERN)
+    assert isinstance(blurred, str) and ("blurred" in blurred or "no board" in blurred)
+
+
+def standing(height_m: float, tilt_rad: float, lowest_m: float, ahead_m: float) -> Pose:
+    """An upright board square before the robot: x to its right, y down."""
+    rotation = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    board = Pose(rotation, np.array([ahead_m, 4 * 0.025, lowest_m + 5 * 0.025]))
+    return CameraMount(height_m, 0.08, tilt_rad).camera_from_robot @ board
+
+
+def lying(height_m: float, tilt_rad: float, ahead_m: float) -> Pose:
+    """A board on the floor, square before the robot: x to its right, y towards it."""
+    rotation = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    board = Pose(rotation, np.array([ahead_m + 5 * 0.025, 4 * 0.025, 0.0]))
+    return CameraMount(height_m, 0.08, tilt_rad).camera_from_robot @ board
+
+
+@pytest.mark.parametrize("upright", [True, False])
+def test_the_mounting_comes_back(calibration: Calibration, upright: bool) -> None:
+    tilt = math.radians(4.0 if upright else 28.0)
+    pose = standing(0.22, tilt, 0.06, 0.5) if upright else lying(0.3, tilt, 0.5)
+    rng = np.random.default_rng(4)
+    picture = chessboard_picture(
+        chessboard_renderer(9, 6, 0.025), Optics.of(CAMERA), pose, SensorParameters(), rng
+    )
+    corners = find_corners(decode(picture), PATTERN)
+    assert not isinstance(corners, str)
+    found = mounting(calibration, corners, PATTERN, standing_at_m=0.06 if upright else None)
+    got = np.array([found.height_m, found.tilt_rad, found.roll_rad, found.to_board_m, found.yaw_rad])
+    want = np.array([0.22 if upright else 0.3, tilt, 0.0, 0.42, 0.0])
+    assert np.all(np.abs(got - want) < [0.002, 0.004, 0.002, 0.002, 0.004])
+    assert np.all(np.abs(got - want) < 4.5 * found.deviations)
+
+
+def test_a_board_nowhere_near_the_floor_is_refused(calibration: Calibration) -> None:
+    corners = CAMERA.project(standing(0.2, 0.0, 0.06, 0.5).apply(PATTERN.points))
+    with pytest.raises(ValueError, match="expected a board upright before the camera, got one that puts it -"):
+        mounting(calibration, corners, PATTERN, standing_at_m=-1.0)
+
+
+def test_a_camera_file_tells_the_same_numbers(tmp_path: Path) -> None:
+    mount = CameraMount(0.2, 0.08, math.radians(5.0))
+    (tmp_path / "camera.toml").write_text(camera_text(CAMERA, mount, ("a note",)))
+    camera, read = load_camera(tmp_path / "camera.toml")
+    assert (camera.fx, camera.fy, camera.cx, camera.cy) == (CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy)
+    np.testing.assert_array_equal(camera.distortion, CAMERA.distortion)
+    assert read is not None and read.height_m == 0.2 and read.tilt_rad == pytest.approx(mount.tilt_rad)
+    (tmp_path / "camera.toml").write_text(camera_text(Camera(1.0, 2.0, 3.0, 4.0, 50, 60), None))
+    assert load_camera(tmp_path / "camera.toml")[1] is None
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("fx_px = 402.0", "fx_px = -1"), r"camera.toml:4: camera.fx_px: expected a number from 1 to 1e\+06, got -1"),
+        (("width_px = 512", "width_px = 51.5"), "expected a whole number of pixels"),
+        (("[camera]", "[kamera]"), "expected the key 'camera'"),
+        (("fx_px", "fz_px"), "expected the key 'fx_px'"),
+        (("distortion = [", "distortion = [0.0, 0.0, "), "expected an array of 4 or 5 numbers"),
+        (("height_m = 0.2", "height_m = 'tall'"), "height_m: expected a number"),
+    ],
+)
+def test_a_camera_file_that_is_wrong_is_pointed_at(tmp_path: Path, change: tuple[str, str], told: str) -> None:
+    text = camera_text(CAMERA, CameraMount(0.2))
+    assert change[0] in text
+    path = tmp_path / "camera.toml"
+    path.write_text(text.replace(*change, 1))
+    with pytest.raises(CameraFileError, match=told):
+        load_camera(path)
+
+
+def test_the_command_writes_file_report_and_picture(
+    tmp_path: Path, pictures: list[bytes], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for number, picture in enumerate(pictures):
+        (tmp_path / f"{number:02d}.jpg").write_bytes(picture)
+    (tmp_path / "grey.jpg").write_bytes(cv2.imencode(".jpg", np.full((512, 512), 99, np.uint8))[1].tobytes())
+    out = tmp_path / "made" / "eye.toml"
+    assert main(["calibrate", str(tmp_path), "--out", str(out)]) == 0
+    camera, mount = load_camera(out)
+    assert camera.fx == pytest.approx(402.0, abs=1.0) and mount is None
+    report = out.with_suffix(".txt").read_text()
+    assert "grey.jpg: no board of 9 x 6" in report and report.strip() in capsys.readouterr().out
+    picture = cv2.imread(str(out.with_suffix(".png")))
+    assert picture is not None and picture.shape[1] > 1500
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ([], "expected pictures or --camera SOURCE, got neither"),
+        (["nowhere/*.jpg"], "got 'nowhere/*.jpg'"),
+        (["--camera", "none.avi"], "--camera none.avi: unplugged"),
+        (["x.jpg", "--pattern", "2x2"], "expected at least 3 x 3 inner corners"),
+        (["x.jpg", "--mount-board", "standing", "--mount-image", "y.jpg"], "--lowest-mm: expected it"),
+        (["x.jpg", "--forward-mm", "80"], "--mount-board: expected floor or standing"),
+        (["x.jpg", "--mount-board", "floor"], "--mount-image: expected a picture"),
+    ],
+)
+def test_wrong_options_are_told(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["calibrate", *words]) == 2
+    assert told in capsys.readouterr().err

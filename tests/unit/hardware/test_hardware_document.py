@@ -1,0 +1,71 @@
+"""docs/hardware.md is true: commands parse, links lead somewhere, its flat can be driven, its words are the board's."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from harvey.cli import main, parser
+from harvey.dry_run import rehearsed
+from harvey.hardware.body import BASE_WORDS, CAMERA_WORDS
+from harvey.hardware.mission import load_mission
+from harvey.wiring import robot_model
+from knowledge_sources.action.fault_handler import FIRST_WAIT_S, LONGEST_WAIT_S, PATIENCE_S, STRIKES
+from sim.scenario import load_scenario
+from world_models.actuator import ActuatorModel
+
+DOCS = Path(__file__).parents[3] / "docs"
+TEXT = (DOCS / "hardware.md").read_text(encoding="utf-8")
+FLAT = DOCS / "flat"
+
+
+def blocks(kind: str = "") -> list[str]:
+    return re.findall(rf"^```{kind}\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
+
+
+def commands() -> list[str]:
+    return [line for block in blocks() for line in block.splitlines() if line.startswith("harvey ")]
+
+
+def test_it_shows_commands_and_each_of_them_parses() -> None:
+    assert len(commands()) >= 8
+    for line in commands():
+        assert parser().parse_args(shlex.split(line)[1:]), line
+
+
+def test_links_lead_somewhere() -> None:
+    links = [link for link in re.findall(r"\]\(([^)#]+)\)", TEXT) if "://" not in link]
+    assert links and [link for link in links if not (DOCS / link).exists()] == []
+
+
+def test_its_flat_is_a_world_without_faults_and_its_mission_is_planned_with_every_milestone_clear() -> None:
+    assert main(["world", "check", str(FLAT / "flat.toml")]) == 0
+    mission, scenario = load_mission(FLAT / "mission.toml", {}), load_scenario(FLAT / "flat-sim.toml")
+    assert mission.goal == scenario.goal and mission.world == scenario.world
+    assert mission.start == scenario.start
+    prospects, outcome = rehearsed(robot_model(scenario), mission.command)
+    assert outcome.kind == "reached" and {p.verdict for p in prospects} == {"clear"}
+    assert f"{len(prospects)} milestones, 0 of them weak" in TEXT
+
+
+def test_what_goes_into_a_missions_file_may_stand_there(tmp_path: Path) -> None:
+    for block in blocks("toml"):
+        (tmp_path / "m.toml").write_text((FLAT / "mission.toml").read_text() + block)
+        mission = load_mission(tmp_path / "m.toml", {})
+        assert mission.actuator == ActuatorModel(**tomllib.loads(block)["actuator"])
+
+
+@pytest.mark.parametrize("word", [w for w in (*CAMERA_WORDS.values(), *BASE_WORDS.values())
+                                  if w not in ("stopped", "stopped by the watchdog")])
+def test_every_fault_has_advice(word: str) -> None:
+    assert f"`{word}`" in TEXT
+
+
+def test_its_figures_are_those_of_the_experts() -> None:
+    assert (FIRST_WAIT_S, LONGEST_WAIT_S, PATIENCE_S, STRIKES) == (0.25, 2.0, 30.0, 5)
+    assert "after 0.25, 0.5, 1, 2, 2, ... s, and after 30 s" in TEXT and "after five motions in a row" in TEXT
+    assert f"the default of {ActuatorModel().reach:.3f}" in TEXT

@@ -1,0 +1,45 @@
+"""Where a run on hardware stood when it was cut off, by its journal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from harvey.errors import BadInput
+from harvey.hardware.resume import stood_at
+from harvey.mission import run_mission
+from harvey.run_files.run_directory import RunDirectory
+from sim.stage import Stage
+
+
+def test_time_and_pictures_go_on_from_the_last_ones(short_run: RunDirectory) -> None:
+    last_s, pictures = stood_at(short_run)
+    assert last_s > 1.0 and pictures == short_run.read_result()["frames"]
+
+
+def test_a_run_without_a_decision_begins_at_nought(tmp_path: Path) -> None:
+    assert stood_at(RunDirectory(tmp_path)) == (0.0, 0)
+
+
+@pytest.mark.parametrize(("old", "new"), [
+    ('"number":1,"sim', '"number":"x","sim'), ('"sim_time_s":', '"sim_time_s":"x","was":')])
+def test_what_is_no_time_and_no_number_is_said(short_run: RunDirectory, tmp_path: Path, old: str, new: str) -> None:
+    told = short_run.journal.read_text(encoding="utf-8")
+    assert old in told
+    spoilt = RunDirectory(tmp_path)
+    spoilt.journal.write_text(told.replace(old, new), encoding="utf-8")
+    with pytest.raises(BadInput, match="expected when it was observed"):
+        stood_at(spoilt)
+
+
+@pytest.fixture(scope="module")
+def short_run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
+    from sim.made_up.short_missions import OFFICE
+    from sim.scenario import parse_scenario
+    from sim.stage import set_stage
+
+    out = tmp_path_factory.mktemp("run")
+    stage: Stage = set_stage(parse_scenario(OFFICE, "across-allens-office"))
+    run_mission(stage, 0, out=out)
+    return RunDirectory(out)

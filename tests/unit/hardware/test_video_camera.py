@@ -1,0 +1,226 @@
+"""VideoCamera: files and live cameras through a capture of our own, and what each fault is called."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from harvey.hardware.drivers.cameras.capture import open_capture, picture_of
+from harvey.hardware.drivers.cameras.newest_picture import Newest, _Pace
+from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
+from harvey.hardware.drivers.cameras.video_file import write_video
+
+SIZE = (64, 48)
+
+
+def jpeg(level: int, size: tuple[int, int] = SIZE) -> bytes:
+    image = np.full((size[1], size[0], 3), level, np.uint8)
+    return cv2.imencode(".jpg", image)[1].tobytes()
+
+
+class Clock:
+    """Time that passes when a picture is fetched, so that no machine is too slow for these tests."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+class FakeCapture:
+    """Delivers what it is given; with ``endless`` the last again and again, else nothing more."""
+
+    def __init__(self, pictures: list[Any], *, endless: bool = True, opened: bool = True) -> None:
+        self._left, self._endless, self._opened = deque(pictures), endless, opened
+        self._now: Any = None
+        self.clock = Clock()
+        self.grabs = 0
+        self.released = False
+
+    def isOpened(self) -> bool:
+        return self._opened
+
+    def grab(self) -> bool:
+        self.grabs += 1
+        if not self._left:
+            return False
+        self._now = self._left[0] if self._endless and len(self._left) == 1 else self._left.popleft()
+        return True
+
+    def retrieve(self) -> tuple[bool, Any]:
+        self.clock.now_s += 0.04
+        return self._now is not None, np.frombuffer(self._now, np.uint8) if isinstance(self._now, bytes) else self._now
+
+    def get(self, property: int, /) -> float:
+        return 40.0 * self.grabs if property == cv2.CAP_PROP_POS_MSEC else 0.0
+
+    def set(self, property: int, value: float, /) -> bool:
+        return True
+
+    def release(self) -> None:
+        self.released = True
+
+
+@pytest.fixture
+def live() -> Iterator[Callable[..., VideoCamera]]:
+    opened: list[VideoCamera] = []
+
+    def made(*captures: FakeCapture, **more: Any) -> VideoCamera:
+        ahead = iter(captures)
+        clock = Clock()
+        for capture in captures:
+            capture.clock = clock
+        options = {"clock": clock, "late_s": 0.5, "size": SIZE, **more}
+        opened.append(VideoCamera("0", capture=lambda _source: next(ahead), **options))
+        return opened[-1]
+
+    yield made
+    for camera in opened:
+        camera.close()
+
+
+def kind_of(camera: VideoCamera) -> str:
+    with pytest.raises(CameraFault) as fault:
+        camera.look("track")
+    return fault.value.kind
+
+
+def test_a_file_s_pictures_come_one_by_one_untouched(tmp_path: Path) -> None:
+    pictures = [jpeg(level) for level in (40, 90, 140)]
+    path = tmp_path / "camera.mjpeg"
+    path.write_bytes(b"".join(pictures))
+    with VideoCamera(str(path), SIZE, clock=lambda: 0.0) as camera:
+        frames = [camera.look("milestone") for _ in pictures]
+        assert [f.jpeg for f in frames] == pictures
+        assert [f.number for f in frames] == [0, 1, 2]
+        assert frames[0].purpose == "milestone"
+        assert frames[0].sim_time_s < frames[1].sim_time_s < frames[2].sim_time_s
+        assert kind_of(camera) == "unplugged"
+
+
+@pytest.mark.parametrize("codec", ["FFV1", "MJPG"])
+def test_what_is_written_as_a_video_is_read_again(tmp_path: Path, codec: str) -> None:
+    path, levels = tmp_path / "video.avi", (40, 90, 140)
+    assert write_video(path, [jpeg(level) for level in levels], codec=codec) == 3
+    with VideoCamera(str(path), SIZE, clock=lambda: 0.0) as camera:
+        for level in levels:
+            seen = cv2.imdecode(np.frombuffer(camera.look().jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)
+            assert seen is not None and abs(float(np.mean(seen)) - level) < 2.0
+
+
+def test_a_video_that_cannot_be_written_says_why(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="expected one of FFV1, MJPG, got 'H264'"):
+        write_video(tmp_path / "v.avi", [jpeg(9)], codec="H264")
+    with pytest.raises(ValueError, match="got none"):
+        write_video(tmp_path / "v.avi", [])
+    with pytest.raises(ValueError, match="one size"):
+        write_video(tmp_path / "v.avi", [jpeg(9), jpeg(9, (32, 32))])
+
+
+def test_a_source_that_does_not_open_is_unplugged(tmp_path: Path) -> None:
+    with pytest.raises(CameraFault, match=r"unplugged: expected .* that opens, got '.*none\.avi'"):
+        VideoCamera(str(tmp_path / "none.avi"), None, clock=lambda: 0.0)
+
+
+def test_a_live_camera_answers_with_a_picture_begun_after_the_call(live: Callable[..., VideoCamera]) -> None:
+    camera = live(FakeCapture([jpeg(99)]))
+    first, second = camera.look("track"), camera.look("track")
+    assert first.jpeg == jpeg(99)
+    assert 0.0 <= first.sim_time_s <= second.sim_time_s
+    assert (first.number, second.number) == (0, 1)
+
+
+def test_an_image_that_is_not_compressed_is_compressed(live: Callable[..., VideoCamera]) -> None:
+    image = np.full((48, 64, 3), 120, np.uint8)
+    assert live(FakeCapture([image])).look().jpeg.startswith(b"\xff\xd8")
+
+
+@pytest.mark.parametrize(
+    ("picture", "kind"),
+    [
+        (jpeg(99)[:-40], "dropped"),
+        (b"\x00" * 100, "dropped"),
+        (jpeg(0), "dark"),
+        (jpeg(99, (32, 32)), "wrong size"),
+    ],
+)
+def test_faults_of_pictures(live: Callable[..., VideoCamera], picture: bytes, kind: str) -> None:
+    assert kind_of(live(FakeCapture([picture]))) == kind
+
+
+def test_an_unplugged_camera_is_found_again(live: Callable[..., VideoCamera], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("harvey.hardware.drivers.cameras.newest_picture.REOPEN_S", 0.0)
+    gone = FakeCapture([jpeg(50), jpeg(50)], endless=False)
+    camera = live(gone, FakeCapture([], opened=False), FakeCapture([jpeg(77)]))
+    seen = b""
+    for _ in range(10_000):
+        try:
+            seen = camera.look().jpeg
+        except CameraFault as fault:
+            assert fault.kind in ("unplugged", "late")
+        if seen == jpeg(77):
+            break
+    assert seen == jpeg(77) and gone.released
+
+
+class Hanging(FakeCapture):
+    """Never comes back from a grab until it is let go."""
+
+    def __init__(self) -> None:
+        super().__init__([jpeg(9)])
+        self.let_go = threading.Event()
+
+    def grab(self) -> bool:
+        self.let_go.wait(10.0)
+        return False
+
+
+def test_a_camera_that_hangs_is_late() -> None:
+    hanging = Hanging()
+    ticks = itertools.count()
+    newest = Newest(hanging, lambda: hanging, lambda: 0.01 * next(ticks))
+    try:
+        with pytest.raises(CameraFault, match=r"late: no picture for 0\.10 s"):
+            newest.picture(0.0, 0.1)
+    finally:
+        hanging.let_go.set()
+        newest.close()
+
+
+def test_rate_lag_and_gaps_are_noticed() -> None:
+    pace = _Pace()
+    assert [pace.missing(0.1 * i, 100.0 + 0.1 * i) for i in range(10)] == [0] * 10
+    assert pace.rate_hz == pytest.approx(10.0)
+    assert pace.missing(1.3, 101.3) == 3
+    assert pace.lag_s == pytest.approx(0.0, abs=1e-9)
+    pace.missing(2.4, 101.4)
+    assert pace.lag_s == pytest.approx(1.0)
+
+
+def test_too_few_pictures_a_second_are_a_fault(live: Callable[..., VideoCamera]) -> None:
+    camera = live(FakeCapture([jpeg(99)]), rate_hz=30.0)  # the fake's pictures are 40 ms apart
+    kinds = set()
+    for _ in range(200):
+        try:
+            camera.look()
+        except CameraFault as fault:
+            kinds.add((fault.kind, fault.detail.split(",")[0]))
+            break
+    assert kinds == {("late", "30 pictures a second are needed")}
+
+
+
+
+def test_what_is_no_picture_is_none() -> None:
+    assert picture_of(np.zeros((3, 3), np.float64)) is None
+    assert picture_of(np.zeros(0, np.uint8)) is None
+    assert not open_capture("/nowhere/at/all.avi").isOpened()

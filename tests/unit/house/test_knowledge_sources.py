@@ -1,0 +1,152 @@
+"""What every knowledge source must be, whoever wrote it: found by looking into the folder."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import importlib
+import inspect
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from blackboard.board import View
+from blackboard.change import Change, Quiescence
+from blackboard.effect import Effect, Post, Retract
+from blackboard.entry import Entry, Ref
+from blackboard.journal import plain
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from harvey.mission import run_mission
+from harvey.wiring import knowledge_sources, robot_model
+from sim.scenario import load_scenario
+from sim.stage import set_stage
+from world_models.entries.body import Frame, MotionReport, RideReport
+from world_models.entries.task import Command
+from world_models.robot import RobotModel
+
+FOLDER = Path(__file__).parents[3] / "knowledge_sources"
+FILES = {path.stem: path for level in Level for path in sorted((FOLDER / str(level)).glob("[!_]*.py"))}
+TREES = {stem: ast.parse(path.read_text(encoding="utf-8")) for stem, path in FILES.items()}
+FROM_OUTSIDE = {Command, MotionReport, RideReport, Frame, Quiescence}
+"""What nobody on the board writes: the user, the body and the clock of the mission do."""
+
+
+def experts_in(stem: str) -> list[type[KnowledgeSource]]:
+    module = importlib.import_module(f"knowledge_sources.{FILES[stem].parent.name}.{stem}")
+    found = [c for _, c in inspect.getmembers(module, inspect.isclass) if c.__module__ == module.__name__]
+    return [c for c in found if issubclass(c, KnowledgeSource) and not inspect.isabstract(c)]
+
+
+KNOWLEDGE_SOURCES = {stem: found[0] for stem in FILES if (found := experts_in(stem))}
+each_expert = pytest.mark.parametrize("expert", KNOWLEDGE_SOURCES.values(), ids=KNOWLEDGE_SOURCES)
+
+
+def test_there_is_one_expert_a_file_and_the_file_has_its_name() -> None:
+    assert len(KNOWLEDGE_SOURCES) >= 10
+    assert [stem for stem in KNOWLEDGE_SOURCES if len(experts_in(stem)) > 1] == []
+    assert all(object.__new__(source).name == stem for stem, source in KNOWLEDGE_SOURCES.items())
+
+
+def test_it_stands_in_the_folder_of_its_level() -> None:
+    assert all(FILES[stem].parent.name == str(source.level) for stem, source in KNOWLEDGE_SOURCES.items())
+
+
+def test_every_expert_is_wired() -> None:
+    assert {type(source) for source in knowledge_sources(a_robot())} == set(KNOWLEDGE_SOURCES.values())
+
+
+@each_expert
+def test_it_says_at_which_level_it_works_what_it_watches_and_what_it_writes(expert: type[KnowledgeSource]) -> None:
+    assert isinstance(expert.level, Level) and (expert.closes is None or isinstance(expert.closes, Level))
+    assert expert.watches and expert.writes
+    for kind in (*(watch.value_type for watch in expert.watches), *expert.writes):
+        assert dataclasses.is_dataclass(kind) and kind.__dataclass_params__.frozen, kind
+
+
+@each_expert
+def test_it_says_what_it_is_and_where_the_method_comes_from(expert: type[KnowledgeSource]) -> None:
+    assert expert.__doc__ and "§" in (inspect.getmodule(expert).__doc__ or "") + expert.__doc__
+
+
+def test_what_is_watched_is_written_by_somebody() -> None:
+    written = {kind for expert in KNOWLEDGE_SOURCES.values() for kind in expert.writes} | FROM_OUTSIDE
+    watched = {watch.value_type for expert in KNOWLEDGE_SOURCES.values() for watch in expert.watches}
+    assert sorted(kind.__name__ for kind in watched - written) == []
+
+
+@each_expert
+def test_it_receives_the_robots_model_of_itself_and_nothing_else(expert: type[KnowledgeSource]) -> None:
+    """So no body and no truth can be handed to it."""
+    given = list(inspect.signature(expert).parameters.values())
+    assert [p.annotation for p in given] in ([], ["RobotModel"])
+
+
+@pytest.mark.parametrize("stem", KNOWLEDGE_SOURCES)
+def test_it_keeps_no_memory_but_the_board(stem: str) -> None:
+    """It assigns to itself nowhere but in __init__, and writes no log of its own."""
+    for function in (n for n in ast.walk(TREES[stem]) if isinstance(n, ast.FunctionDef) and n.name != "__init__"):
+        stored = [n for n in ast.walk(function) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)]
+        assert [ast.unparse(n) for n in stored] == []
+        decorators = {ast.unparse(d).split("(")[0].split(".")[-1] for d in function.decorator_list}
+        assert not decorators & {"cache", "lru_cache", "cached_property"}
+    called = {ast.unparse(n.func) for n in ast.walk(TREES[stem]) if isinstance(n, ast.Call)}
+    assert not called & {"print", "open", "setattr", "object.__setattr__", "logging.getLogger"}
+
+
+@pytest.mark.parametrize("stem", KNOWLEDGE_SOURCES)
+def test_it_knows_no_other_expert(stem: str) -> None:
+    modules = {n.module for n in ast.walk(TREES[stem]) if isinstance(n, ast.ImportFrom)}
+    assert not modules & {f"knowledge_sources.{other}" for other in KNOWLEDGE_SOURCES}
+
+
+def a_robot() -> RobotModel:
+    return robot_model(load_scenario("lab-to-allens-office"))
+
+
+def effect_record(effect: Effect) -> list[Any]:
+    """An effect as plain data: two effects that ask for the same have equal records."""
+    refs = [r.ref if isinstance(r, Entry) else r for r in effect.because]
+    reasons = [str(r) if isinstance(r, Ref) else "an earlier effect" for r in refs]
+    touched = "" if isinstance(effect, Post) else str(effect.entry.ref)
+    return [type(effect).__name__, touched, None if isinstance(effect, Retract) else plain(effect.value), reasons]
+
+
+def state(view: View) -> list[Ref]:
+    return [entry.ref for entry in view._board._current.values()]
+
+
+def asked_twice(source: KnowledgeSource, impure: list[str]) -> KnowledgeSource:
+    """The same expert, but every question is put to it twice, and a change of answer or board is noted."""
+    cls = type(source)
+
+    def twice(question: str, record: Any) -> Any:
+        def ask(self: KnowledgeSource, view: View, trigger: Change) -> Any:
+            before = state(view)
+            first, second = (getattr(cls, question)(self, view, trigger) for _ in range(2))
+            first, second = (tuple(x) if question == "act" else x for x in (first, second))
+            if record(first) != record(second) or state(view) != before:
+                impure.append(f"{cls.__name__}.{question} on {trigger.entry.ref}")
+            return first
+
+        return ask
+
+    questions = {
+        "rate": twice("rate", lambda x: x),
+        "still_valid": twice("still_valid", lambda x: x),
+        "act": twice("act", lambda effects: [effect_record(e) for e in effects]),
+    }
+    source.__class__ = type(cls.__name__, (cls,), questions)
+    return source
+
+
+def test_ratings_and_acts_are_pure() -> None:
+    """At the beginning of a real mission: asked again, everyone gives the same answer and changes nothing."""
+    scenario = load_scenario("lab-to-allens-office")
+    stage = set_stage(replace(scenario, limits=replace(scenario.limits, max_cycles=90)))
+    impure: list[str] = []
+    result = run_mission(stage, 1, sources=lambda robot: [asked_twice(s, impure) for s in knowledge_sources(robot)])
+    assert "90 cycles" in result.reason and result.frames > 2
+    assert impure == []

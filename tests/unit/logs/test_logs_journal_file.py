@@ -1,0 +1,140 @@
+"""The journal on disk: written before anything follows, read back line by line."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from blackboard.journal import Decision, decision_line, decision_record
+from logs import disk
+from logs.journal_file import HELD_LINES, JournalError, JournalFile, is_acted_on, read_journal
+from rehearsal import play
+from world_models.entries.body import Look, MotorCommand
+
+
+def played(path: Path, *, forced: bool = False) -> list[Decision]:
+    decisions: list[Decision] = []
+    journal = JournalFile(path, forced=lambda _decision: forced)
+    play([journal, decisions.append])
+    journal.close()
+    return decisions
+
+
+@pytest.mark.parametrize("forced", [False, True])
+def test_every_decision_comes_back(tmp_path: Path, forced: bool) -> None:
+    decisions = played(tmp_path / "journal.jsonl", forced=forced)
+    assert decisions
+    assert list(read_journal(tmp_path / "journal.jsonl")) == [decision_record(d) for d in decisions]
+
+
+def test_what_is_not_in_the_file_follows_from_what_is(tmp_path: Path) -> None:
+    """Held back are only decisions after the last that took up an observation, or on which a port acts."""
+    path = tmp_path / "journal.jsonl"
+    decisions: list[Decision] = []
+    held: list[int] = []
+
+    def sink(decision: Decision) -> None:
+        decisions.append(decision)
+        there = path.read_text().splitlines()
+        assert there == [decision_line(d) for d in decisions[: len(there)]]
+        late = decisions[len(there):]
+        assert not any(d.observed or is_acted_on(d) for d in late)
+        held.append(len(late))
+
+    play([JournalFile(path), sink])
+    assert 0 < max(held) < HELD_LINES and 0 in held
+
+
+def test_what_is_held_back_is_not_much(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    journal, decisions = JournalFile(path, forced=lambda _decision: False), []
+    play([decisions.append])
+    silent = decisions[0]._replace(observed=())
+    for number in range(1, 3 * HELD_LINES + 2):
+        journal(silent._replace(cycle=number))
+        assert len(path.read_bytes().splitlines()) == number // HELD_LINES * HELD_LINES
+    journal.close()
+    assert [d["cycle"] for d in read_journal(path)] == list(range(1, 3 * HELD_LINES + 2))
+
+
+def test_what_is_drawn_is_told_in_the_words_of_the_journal(tmp_path: Path) -> None:
+    """Whoever asks for a line gets it, and the file has the same lines in the same order."""
+    path = tmp_path / "journal.jsonl"
+    journal = JournalFile(path)
+    drawn: list[str] = []
+    play([journal, lambda decision: drawn.append(journal.line(decision))])
+    journal.close()
+    assert path.read_text().splitlines() == drawn
+
+
+def test_the_remembered_line_is_that_of_the_decision(tmp_path: Path) -> None:
+    journal = JournalFile(tmp_path / "journal.jsonl")
+    decisions: list[Decision] = []
+    play([decisions.append])
+    first, second = decisions[:2]
+    journal(first)
+    assert journal.line(second) == decision_line(second)
+    assert journal.line(first) == decision_line(first)
+
+
+def test_it_goes_on_behind_what_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    decisions = played(path)
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(lines[0] + lines[1][:9])
+    journal = JournalFile(path, keep=len(lines[0]))
+    for decision in decisions[1:]:
+        journal(decision)
+    journal.close()
+    assert path.read_bytes() == b"".join(lines)
+
+
+def test_what_a_port_will_act_on_is_on_the_disk_before_it_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    forced: list[int] = []
+    monkeypatch.setattr(disk.os, "fsync", forced.append)
+    journal = JournalFile(tmp_path / "journal.jsonl")
+    decisions: list[Decision] = []
+
+    def sink(decision: Decision) -> None:
+        before = len(forced)
+        journal(decision)
+        assert (len(forced) > before) == any(isinstance(c.entry.value, MotorCommand | Look) for c in decision.made)
+        decisions.append(decision)
+
+    play([sink])
+    journal.close()
+    assert 0 < len(forced) < len(decisions)
+
+
+def test_a_truncated_last_line_is_reported(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    count = len(played(path))
+    path.write_bytes(path.read_bytes()[:-7])
+    records = list(read_journal(path))
+    assert len(records) == count
+    assert records[-1] == {"truncated": count}
+
+
+@pytest.mark.parametrize("line", ["{", "[1]", '{"cycle": "one"}', "\\xff"])
+def test_a_malformed_line_is_named(tmp_path: Path, line: str) -> None:
+    path = tmp_path / "journal.jsonl"
+    path.write_text(json.dumps({"cycle": 1}) + "\n" + line + "\n" + json.dumps({"cycle": 2}) + "\n")
+    with pytest.raises(JournalError, match=r"journal\.jsonl:2: expected a"):
+        list(read_journal(path))
+
+
+def test_bytes_that_are_no_text_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    path.write_bytes(b"\xff\xfe\x00\n")
+    with pytest.raises(JournalError, match=r"journal\.jsonl:1: expected a decision"):
+        list(read_journal(path))
+
+
+def test_a_full_disk_is_told_with_the_name_of_the_file() -> None:
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("this system has no /dev/full")
+    with pytest.raises(OSError, match=r"cannot write the journal.*No space left.*/dev/full"):
+        play([JournalFile(full)])

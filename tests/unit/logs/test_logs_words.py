@@ -1,0 +1,149 @@
+"""What the recorder says in words: sentences, levels, the tree's labels and the story."""
+
+from blackboard.board import Blackboard
+from blackboard.effect import Post, Revise
+from blackboard.entry import Ref
+from blackboard.journal import Decision
+from harvey.wiring import knowledge_sources, robot_model
+from logs.recording.activity import activity
+from logs.recording.board_mirror import Mirror
+from logs.recording.deeds import TELLERS, Deeds
+from logs.recording.loggers.decisions import COLUMNS, log_level, row, sentence
+from logs.recording.loggers.sketch_tree import NO_SKETCH, outline
+from logs.recording.loggers.why import story
+from logs.recording.words import numerous
+from rehearsal import play
+from sim.scenario import load_scenario
+from world_models.entries.body import BodyFault, MotorCommand, Recovery
+from world_models.entries.location import Hypothesis
+from world_models.entries.task import Leg
+
+
+def played(until: str = "") -> tuple[list[Decision], Mirror]:
+    """The decisions and the mirror after the one that made the entry ``until``, or after all."""
+    decisions: list[Decision] = []
+    play([decisions.append])
+    mirror = Mirror()
+    for decision in decisions:
+        for change in (*decision.observed, *decision.made):
+            mirror.take(change)
+        if until in {str(change.entry.ref) for change in decision.made}:
+            break
+    return decisions, mirror
+
+
+def test_a_decision_is_told_in_a_sentence() -> None:
+    deeds = Deeds()
+    told = "\n".join(sentence(d, deeds) for d in played()[0])
+    assert "sketcher: sketches the way of the route: 2 parts; sketches the way through kitchen: 1 part" in told
+    assert "motor: begins a straight leg of 2.24 m; turn 22.9° left, drive 0.60 m" in told
+    assert "tracker: corrects his belief by 0.58 m and 22.9°; follows 1 of 3 landmark points; " in told
+    assert "[the wheels claim: turn 22.9° left, drive 0.60 m; picture 5; prompts tracker" not in told
+    assert "judge: verified: 2 of 2 lines; M0 through kitchen holds" in told
+    assert "clumsy: refused, RuntimeError: fell over its own feet" in told
+    assert "nobody had anything to do" in told
+
+
+def test_what_happened_several_times_in_a_row_is_told_once() -> None:
+    assert numerous(["a", "a", "b", "a"]) == ["a (2 times)", "b", "a"]
+
+
+def test_every_type_on_the_board_has_its_words() -> None:
+    """A new type of entry falls back on its name; those of the mission must not."""
+    deeds = Deeds()
+    kinds = {type(c.entry.value).__name__ for d in played()[0] for c in d.made}
+    assert "Hypothesis" in kinds and "PoseFix" in kinds
+    for decision in played()[0]:
+        for change in decision.made:
+            assert not deeds.tell(change).startswith(("posted ", "revised "))
+
+
+def test_whatever_an_expert_may_write_has_its_words() -> None:
+    robot = robot_model(load_scenario("lab-to-allens-office"))
+    written = {kind for expert in knowledge_sources(robot) for kind in expert.writes}
+    assert len(written) > 10 and written <= {*TELLERS, Hypothesis}
+
+
+def faulty(status: str) -> Mirror:
+    mirror, board = played("MotorCommand-1.0")[1], Blackboard()
+    fault = BodyFault("camera", "camera unplugged", "no picture for 2.0 s", "Look-3", 12.0, status=status)
+    for change in board.apply([Post(fault), Post(Recovery("BodyFault-1", "Look-3", 12.0, 0.5, tries=1))],
+                              author="body", cycle=20):
+        mirror.take(change)
+    return mirror
+
+
+def test_a_fault_of_the_body_is_the_headline() -> None:
+    told = story(faulty("open"))
+    assert told.startswith("### Trouble: camera unplugged")
+    assert "**Trouble:** camera: camera unplugged. no picture for 2.0 s; 1 try so far." in told
+    assert activity(faulty("open")).word == "is in trouble"
+    assert "Trouble" not in story(faulty("over"))
+
+
+def test_trouble_stands_out() -> None:
+    levels = {d.chosen.source.name: log_level(d) for d in played()[0] if d.chosen}
+    assert levels["clumsy"] == "ERROR"
+    assert levels["tracker"] == "WARN"
+    assert levels["motor"] == levels["sketcher"] == "INFO"
+
+
+def test_the_table_has_its_columns_in_every_cycle() -> None:
+    assert all(tuple(row(d)) == COLUMNS for d in played()[0])
+
+
+def test_the_tree_is_an_outline_with_the_sketch_under_its_subgoal() -> None:
+    nodes = outline(played("Certificate-1.0")[1])
+    assert [(n.depth, n.label) for n in nodes] == [
+        (0, "Goal-1: be in parlour (active)"),
+        (1, "· M0"),
+        (1, "to parlour by kitchen-door"),
+        (2, "✔ M0"),
+        (2, "straight to (3.0, 2.0) m"),
+        (2, "· M1"),
+        (1, "· M1"),
+        (1, "straight to (2.0, 2.0) m"),
+        (1, "· M2"),
+    ]
+
+
+def test_a_goal_without_a_sketch_says_so() -> None:
+    assert [n.label for n in outline(played("Goal-1.0")[1])] == ["Goal-1: be in parlour (active)", NO_SKETCH]
+
+
+def test_the_tree_of_nothing_is_empty() -> None:
+    assert outline(Mirror()) == []
+
+
+def test_the_story_says_what_he_wants_expects_sees_doubts_and_does() -> None:
+    told = story(played("PoseFix-1.0")[1])
+    assert told.startswith("### Looking for a milestone")
+    assert "**Harvey wants** to be in parlour (2.00, 2.00) m." in told
+    assert "**He believes** he is in kitchen at (1.00, 1.00) m, heading 0.0°, give or take 20 mm and 0.57°" in told
+    assert "**He expects** the door: 2 lines of kitchen-door." in told
+    assert "**He sees** 3 line segments, 2 matched, 1 of these agree on one pose." in told
+    assert "**He doubts:** nothing at the moment." in told
+
+
+def test_the_story_tells_of_a_discrepancy_and_of_being_lost() -> None:
+    told = story(played("Discrepancy-2.0")[1])
+    assert "the door is not where it was expected: not yet measured (at the plan level" in told
+    assert told.startswith("### In doubt: checking where he is before he goes on")
+    assert "He does:** has halted on a straight leg of 2.24 m" in told
+    assert "turn 22.9° left, drive 0.60 m, to follow Leg-1, as PlanSketch-2 has it for kitchen" in told
+    lost = story(played()[1])
+    assert lost.startswith("### The end: reached\n\n**The end:** reached: there.")
+    assert "he is lost" in lost
+
+
+def test_an_order_whose_reasons_go_round_in_a_circle_is_told() -> None:
+    """The mirror knows the newest revisions only, so the older of two may seem to rest on the newer."""
+    mirror, board = Mirror(), Blackboard()
+    leg = Leg("PlanSketch-1", 0, 0.0, 0.0, 1.0, 0.0, 0.1)
+    for effect in (Post(leg), Post(MotorCommand(0.1, 0.0), (Ref("Leg-1", 0),))):
+        for change in board.apply([effect], author="motor", cycle=1):
+            mirror.take(change)
+    again = Revise(board.view["Leg-1"], leg, (Ref("MotorCommand-1", 0),))
+    for change in board.apply([again], author="motor", cycle=2):
+        mirror.take(change)
+    assert "**His last order:** turn 5.7° left, to follow Leg-1." in story(mirror)

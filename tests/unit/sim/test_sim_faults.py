@@ -1,0 +1,88 @@
+"""Bumps, kidnaps and lights: once, at their moment, and never into a wall."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sim.body.simulated_body import SimulatedBody
+from sim.building import Building
+from sim.faults.faults import Ailment, Displacement, Fault, FaultWatch, LightsOff, Moment, free_displacement
+from sim.made_up.box_room import box_room
+from world_models.camera import Camera, CameraMount
+from world_models.entries.body import MotorCommand
+from world_models.frames import Pose2
+
+CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)
+
+
+def locale_at(pose: Pose2) -> str:
+    return "east" if pose.x_m > 2.0 else "west"
+
+
+BUILDING = Building.of_faces(box_room(), locale_at, samples=1)
+
+
+def body(*faults: Fault) -> SimulatedBody:
+    return SimulatedBody(BUILDING, Pose2(1.0, 2.0, 0.0), CAMERA, CameraMount(1.0), seed=4, faults=faults)
+
+
+def test_a_fault_in_a_locale_counts_from_the_first_entry_and_strikes_once() -> None:
+    bump = Displacement("bump", Moment("hall", after_m=1.0))
+    watch = FaultWatch.of((bump,)).advanced(9.0, 5.0, "lab").advanced(1.0, 0.6, "hall")
+    assert watch.struck("hall")[0] == ()
+    watch = watch.advanced(1.0, 0.6, "hall")
+    assert watch.struck("lab")[0] == ()
+    due, rest = watch.struck("hall")
+    assert due == (bump,) and rest.struck("hall")[0] == ()
+
+
+def test_a_bump_moves_the_robot_but_not_its_encoders() -> None:
+    plain, bumped = body(), body(Displacement("bump", Moment("east", after_m=0.2), left_m=0.3, turn_rad=0.2))
+    reports = [[robot.execute(MotorCommand(0.0, 0.5)) for _ in range(4)] for robot in (plain, bumped)]
+    assert reports[0] == reports[1]
+    a, b = plain.truth.world_from_robot, bumped.truth.world_from_robot
+    assert b.heading_rad - a.heading_rad == pytest.approx(0.2, abs=1e-9)
+    assert b.y_m - a.y_m > 0.3
+    assert plain.truth.path_m == pytest.approx(bumped.truth.path_m)
+
+
+def test_a_kidnap_ends_in_a_free_place_of_the_same_locale() -> None:
+    kidnap = Displacement("kidnap", distance_m=1.0, turn_rad=0.35)
+    free = [free_displacement(Pose2(1.0, 1.0, 0.0), kidnap, np.random.default_rng(seed),
+                              lambda p: p.x_m > 0.5 and p.y_m > 0.5) for seed in range(40)]
+    assert all(p.x_m > 0.5 and p.y_m > 0.5 for p in free)
+    assert {round(math.hypot(p.x_m - 1.0, p.y_m - 1.0), 6) for p in free} == {1.0}
+    assert {round(p.heading_rad, 6) for p in free} == {0.35, -0.35}
+
+
+def test_what_did_not_happen_as_it_was_asked_for_is_told() -> None:
+    robot = body(
+        Displacement("bump", forward_m=3.0), Displacement("bump", left_m=0.1), Displacement("kidnap", turn_rad=1.0),
+        LightsOff(Moment(after_s=1e6)), Ailment("stall", Moment("attic")),
+    )
+    robot.move(0.3)
+    blocked, *late = robot.amiss
+    assert blocked.startswith("bump: 0.") and blocked.endswith(" m of 3.00 m, for want of room")
+    assert late == ["lights_off: its moment did not come", "stall: its moment did not come"]
+
+
+def test_a_blocked_bump_goes_as_far_as_there_is_room() -> None:
+    bump = Displacement("bump", left_m=1.0)
+    there = free_displacement(Pose2(0.0, 0.0, 0.0), bump, np.random.default_rng(0), lambda p: p.y_m < 0.52)
+    assert there.y_m == pytest.approx(0.5)
+
+
+def test_lights_go_off_for_their_time() -> None:
+    robot = body(LightsOff(Moment(after_s=0.5), duration_s=1.0))
+    lit = [(robot.look(), robot.truth.lights_on)[1] for _ in range(20)]
+    assert lit.count(False) == 10 and lit[0] and lit[-1]
+
+
+def test_faults_do_not_change_the_noise() -> None:
+    sighted, blind = body(), body(LightsOff(Moment(after_s=0.05), duration_s=0.1))
+    for robot in (sighted, blind):
+        robot.look(), robot.look()
+    assert sighted.look().jpeg == blind.look().jpeg

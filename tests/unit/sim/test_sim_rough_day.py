@@ -1,0 +1,67 @@
+"""What hides the view, and what was moved: seen by the camera, felt by the robot, unknown to the model."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sim.body.simulated_body import SimulatedBody
+from sim.building import Building
+from sim.faults.faults import Fault, Moment, Occlusion
+from sim.made_up.box_room import box_room
+from sim.moved import Moved, with_moved
+from sim.render.occluder import Occluder
+from sim.scenario import SCENARIOS, ScenarioError, load_scenario, parse_scenario
+from sim.stage import set_stage
+from world_models.camera import Camera, CameraMount
+from world_models.files.store import load_world
+from world_models.frames import Pose2
+
+CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)
+BUILDING = Building.of_faces(box_room(), samples=1)
+ROUGH = (SCENARIOS / "rough-day.toml").read_text(encoding="utf-8")
+
+
+def body(*faults: Fault) -> SimulatedBody:
+    return SimulatedBody(BUILDING, Pose2(1.0, 2.0, 0.0), CAMERA, CameraMount(1.0), seed=4, faults=faults)
+
+
+@given(part=st.floats(0.01, 0.9), seed=st.integers(0, 1000))
+def test_an_occluder_hides_the_part_that_it_is_said_to_hide(part: float, seed: int) -> None:
+    occluder = Occluder.drawn(part, 1.0, np.random.default_rng(seed))
+    hidden = occluder.before(np.full((200, 200, 3), 2.0, np.float32)) < 1.0
+    assert hidden[..., 0].mean() == pytest.approx(part, abs=0.01)
+    rows, columns = np.nonzero(hidden[..., 0])
+    assert hidden[..., 0].sum() == (np.ptp(rows) + 1) * (np.ptp(columns) + 1)
+
+
+def test_an_occlusion_comes_and_goes_at_its_time_and_changes_no_other_noise() -> None:
+    plain, hidden = body(), body(Occlusion(Moment(after_s=0.05), duration_s=0.25, part=0.2))
+    same = [plain.look().jpeg == hidden.look().jpeg for _ in range(5)]
+    assert same == [False, False, False, True, True]
+
+
+def test_a_part_of_the_view_is_a_part() -> None:
+    with pytest.raises(ScenarioError, match=r"s\.toml:\d+: faults\.0\.part: expected a number above 0, .* got 1\.5"):
+        parse_scenario(ROUGH.replace("part = 0.2", "part = 1.5"), "s.toml")
+
+
+def test_what_was_moved_stands_elsewhere_with_all_that_is_on_it_and_nothing_else_does() -> None:
+    world = load_world(load_scenario("rough-day").world)
+    faces = world.faces_within("hallway")
+    moved = with_moved(faces, (Moved("hallway/fire-hose", 0.5, -0.25), Moved("hallway/fire-hose", 0.5)))
+    for before, after in zip(faces, moved, strict=True):
+        by_m = (1.0, -0.25, 0.0) if before.name.startswith("hallway/fire-hose/") else (0.0, 0.0, 0.0)
+        pairs = zip((before, *before.front, *before.back), (after, *after.front, *after.back), strict=True)
+        for one, other in pairs:
+            np.testing.assert_allclose(other.polygon_world, one.polygon_world + by_m)
+
+
+def test_a_thing_that_is_not_there_cannot_be_moved() -> None:
+    scenario = parse_scenario(ROUGH.replace("notices-by-students", "chandelier"), "rough.toml")
+    with pytest.raises(ScenarioError, match=r"moved\.\d\.thing: expected a thing .* got 'hallway/chandelier'"):
+        set_stage(scenario)

@@ -1,0 +1,1 @@
+"""The building model (§3.4): locales, faces, regions, landmarks, passages."""

@@ -1,0 +1,146 @@
+"""Locales (§3.4): parcels of space with their own frames in a contained-by hierarchy, and doorways between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.building.outlines import inside_polygon
+from world_models.frames import Pose, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class Locale:
+    """A parcel of space with its own frame (§3.4, Figure 5).
+
+    Attributes:
+        name: unique in the world.
+        kind: laboratory, hallway, office, floor, building, ...
+        parent: the locale that contains it; ``None`` for the root.
+        frame: parent_from_locale.
+        outline: (k, 2) its free extent on the floor, counter-clockwise, in its own frame [m].
+        height_m: of its ceiling in its own frame.
+        properties: what else the world file says of it.
+        source: file:line where it is described.
+        floor_m: height of its floor in its own frame; may differ from 0 only where it contains other locales.
+        survey_m, survey_rad: standard deviations of its frame's place and direction in its container.
+    """
+
+    name: str
+    kind: str
+    parent: str | None
+    frame: Pose
+    outline: NDArray[np.float64]
+    height_m: float
+    properties: Mapping[str, Any] = field(default_factory=dict)
+    source: str = ""
+    floor_m: float = 0.0
+    survey_m: float = 0.0
+    survey_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "outline", frozen(self.outline, (None, 2)))
+
+    def contains(self, point: Any, margin_m: float = 0.0) -> bool:
+        """Whether a point (2,) or (3,) of its own frame lies in it (its border belongs to it).
+
+        ``margin_m`` lets points count that lie at most so far outside.
+        """
+        p = np.asarray(point, float)
+        if p.size == 3 and not self.floor_m - margin_m - 1e-9 <= p[2] <= self.height_m + margin_m + 1e-9:
+            return False
+        return inside_polygon(p[:2], self.outline, margin_m)
+
+
+@dataclass(frozen=True, eq=False)
+class Doorway:
+    """An opening through the wall between two locales.
+
+    Attributes:
+        name: unique in the world.
+        between: the two locales.
+        thresholds_world: (2, 2, 2) [m]; ``thresholds_world[i]`` are the feet of the two jambs on the outline of
+            ``between[i]``, left jamb first as seen from inside that locale.
+        height_m: of the opening.
+        source: file:line where it is described.
+    """
+
+    name: str
+    between: tuple[str, str]
+    thresholds_world: NDArray[np.float64]
+    height_m: float
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "thresholds_world", frozen(self.thresholds_world, (2, 2, 2)))
+
+    @property
+    def width_m(self) -> float:
+        return float(np.linalg.norm(self.thresholds_world[0, 1] - self.thresholds_world[0, 0]))
+
+    @property
+    def depth_m(self) -> float:
+        """Thickness of the wall that it goes through."""
+        ends = self.thresholds_world.mean(axis=1)
+        return float(np.linalg.norm(ends[1] - ends[0]))
+
+    @property
+    def centre_world(self) -> NDArray[np.float64]:
+        """(2,) the middle of the opening, half-way through the wall [m]."""
+        return np.asarray(self.thresholds_world.mean(axis=(0, 1)))
+
+    def other(self, locale: str) -> str:
+        """The locale on the other side."""
+        return self.between[1 - self._side(locale)]
+
+    def threshold_of(self, locale: str) -> NDArray[np.float64]:
+        """(2, 2) the feet of its jambs on the outline of ``locale`` [m, world]."""
+        return np.asarray(self.thresholds_world[self._side(locale)])
+
+    def outward_from(self, locale: str) -> NDArray[np.float64]:
+        """(2,) unit direction on the floor that leaves ``locale`` through the doorway [world]."""
+        left, right = self.threshold_of(locale)
+        along = (right - left) / np.linalg.norm(right - left)
+        return np.array([-along[1], along[0]])
+
+    def _side(self, locale: str) -> int:
+        if locale not in self.between:
+            raise ValueError(f"expected one of {self.between}, got {locale!r}")
+        return self.between.index(locale)
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A passage between two locales that share no wall: an elevator from landing to landing, a flight of stairs.
+
+    Attributes:
+        name: unique in the world.
+        kind: elevator or stairs.
+        between: the two locales.
+        stops_world: (2, 3) where one stands in each of them to begin or to end the ride, and facing where [m, rad].
+        source: file:line where it is described.
+    """
+
+    name: str
+    kind: str
+    between: tuple[str, str]
+    stops_world: NDArray[np.float64]
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stops_world", frozen(self.stops_world, (2, 3)))
+
+    def other(self, locale: str) -> str:
+        """The locale at the other end."""
+        return self.between[1 - self.between.index(locale)]
+
+    def stop_of(self, locale: str) -> NDArray[np.float64]:
+        """(3,) x, y [m] and heading [rad] of the stop in one of the two, world frame."""
+        return np.asarray(self.stops_world[self.between.index(locale)])
+
+
+Passage = Doorway | Link

@@ -1,0 +1,172 @@
+"""Frames held in memory: the world of a TOML file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.building.faces import Face
+from world_models.building.frame_source import Arc, Packet
+from world_models.building.landmarks import Landmark
+from world_models.building.locales import Doorway, Link, Locale
+from world_models.building.passages import Network, network, passable
+from world_models.building.things import Fault, Thing
+from world_models.frames import Pose
+
+K = TypeVar("K")
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class MemoryFrames:
+    """All frames of a world; see :class:`world_models.building.frame_source.FrameSource` for the questions."""
+
+    name: str
+    locales: Mapping[str, Locale]
+    every_doorway: tuple[Doorway, ...]
+    every_face: tuple[Face, ...]
+    every_landmark: tuple[Landmark, ...]
+    every_thing: tuple[Thing, ...] = ()
+    every_link: tuple[Link, ...] = ()
+    building_faults: tuple[Fault, ...] = ()
+
+    def names(self) -> Sequence[str]:
+        return tuple(self.locales)
+
+    def locale(self, name: str) -> Locale | None:
+        return self.locales.get(name)
+
+    def children(self, name: str) -> tuple[str, ...]:
+        return self._children.get(name, ())
+
+    def is_room(self, name: str) -> bool:
+        return name in self.locales and name not in self._children
+
+    def near(self, x_m: float, y_m: float, margin_m: float) -> Sequence[str]:
+        names, low, high = self._boxes
+        p = np.array([x_m, y_m])
+        return [names[i] for i in np.flatnonzero(np.all((low - margin_m <= p) & (p <= high + margin_m), axis=1))]
+
+    def doorways(self, locale: str) -> tuple[Doorway, ...]:
+        return self._doorways.get(locale, ())
+
+    def links(self, locale: str) -> tuple[Link, ...]:
+        return tuple(link for link in self.every_link if locale in link.between)
+
+    def packets(self, locale: str) -> tuple[Packet, ...]:
+        return self._packets.get(locale, ())
+
+    def things(self, locale: str) -> tuple[Thing, ...]:
+        return self._things.get(locale, ())
+
+    def arcs(self, container: str) -> tuple[Arc, ...]:
+        return self._network.arcs.get(container, ())
+
+    def component(self, locale: str, component: int) -> int:
+        return self._network.components[locale, component]
+
+    def passage(self, name: str) -> Doorway | Link | None:
+        return self._passages.get(name)
+
+    def named(self, words: str) -> Sequence[str]:
+        wanted = words_of(words)
+        return [name for name, locale in self.locales.items() if wanted <= words_about(locale)]
+
+    def all_doorways(self) -> tuple[Doorway, ...]:
+        return self.every_doorway
+
+    def all_links(self) -> tuple[Link, ...]:
+        return self.every_link
+
+    def all_packets(self) -> Sequence[Packet]:
+        return self._all_packets
+
+    def all_things(self) -> tuple[Thing, ...]:
+        return self.every_thing
+
+    def counts(self) -> Mapping[str, int]:
+        return {"room": len(self.locales) - len(self._children), "open doorway": len(self.every_doorway),
+                "thing": len(self.every_thing), "face": len(self.every_face), "landmark": len(self.every_landmark)}
+
+    def faults(self) -> tuple[Fault, ...]:
+        return self.building_faults
+
+    # -- indices ---------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _children(self) -> dict[str, tuple[str, ...]]:
+        pairs = [(locale.parent, name) for name, locale in self.locales.items() if locale.parent is not None]
+        return _grouped(pairs)
+
+    @cached_property
+    def _doorways(self) -> dict[str, tuple[Doorway, ...]]:
+        return _grouped([(name, doorway) for doorway in self.every_doorway for name in doorway.between])
+
+    @cached_property
+    def _things(self) -> dict[str, tuple[Thing, ...]]:
+        return _grouped([(thing.locale, thing) for thing in self.every_thing])
+
+    @cached_property
+    def _passages(self) -> dict[str, Doorway | Link]:
+        passages: list[Doorway | Link] = [*self.every_link, *self.every_doorway]
+        return {passage.name: passage for passage in passages}
+
+    @cached_property
+    def _network(self) -> Network:
+        parents = {name: locale.parent for name, locale in self.locales.items()}
+        return network(parents, passable((*self.every_doorway, *self.every_link)))
+
+    @cached_property
+    def _all_packets(self) -> tuple[Packet, ...]:
+        faces = _grouped([((face.locale, face.neighbour), (i, face)) for i, face in enumerate(self.every_face)])
+        marks = _grouped([((mark.locale, mark.neighbour), (i, mark)) for i, mark in enumerate(self.every_landmark)])
+        keys = list(dict.fromkeys([*faces, *marks]))
+        return tuple(Packet(*key, faces.get(key, ()), marks.get(key, ())) for key in keys)
+
+    @cached_property
+    def _packets(self) -> dict[str, tuple[Packet, ...]]:
+        return _grouped([(name, packet) for packet in self._all_packets
+                         for name in dict.fromkeys((packet.locale, packet.neighbour)) if name is not None])
+
+    @cached_property
+    def _boxes(self) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64]]:
+        poses: dict[str, Pose] = {}
+
+        def pose_of(name: str) -> Pose:
+            if name not in poses:
+                parent, frame = self.locales[name].parent, self.locales[name].frame
+                poses[name] = frame if parent is None else pose_of(parent) @ frame
+            return poses[name]
+
+        boxes = np.array([extent_of(locale, pose_of(name)) for name, locale in self.locales.items()]).reshape(-1, 4)
+        return tuple(self.locales), boxes[:, :2], boxes[:, 2:]
+
+
+def extent_of(locale: Locale, world_from_locale: Pose) -> NDArray[np.float64]:
+    """(4,) the bounding rectangle on the plan, x0 y0 x1 y1, a little enlarged [m, world]."""
+    flat = world_from_locale.apply(np.column_stack([locale.outline, np.zeros(len(locale.outline))]))[:, :2]
+    return np.concatenate([flat.min(axis=0) - 1e-6, flat.max(axis=0) + 1e-6])
+
+
+def words_of(text: str) -> frozenset[str]:
+    """The words of a name or a phrase, in small letters; a possessive's s is no word."""
+    return frozenset(word for word in re.split(r"[^a-z0-9]+", text.lower().replace("'s", "")) if word)
+
+
+def words_about(locale: Locale) -> frozenset[str]:
+    """The words by which people may mean a locale: of its name, kind and properties."""
+    texts = [locale.name, locale.kind, *(value for value in locale.properties.values() if isinstance(value, str))]
+    return frozenset().union(*map(words_of, texts))
+
+
+def _grouped(pairs: Iterable[tuple[K, T]]) -> dict[K, tuple[T, ...]]:
+    out: dict[K, list[T]] = {}
+    for key, value in pairs:
+        out.setdefault(key, []).append(value)
+    return {key: tuple(values) for key, values in out.items()}

@@ -1,0 +1,159 @@
+"""A plan of the world as a drawing: rooms, doors, furniture and the names of locales, storey beside storey."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.building.faces import Face
+from world_models.building.things import STEP_M
+from world_models.building.world import World
+
+SCALE = 40.0
+"""Drawing units in a metre."""
+
+MARGIN_M = 0.6
+TITLE_M = 0.9
+SAME_STOREY_M = 0.5
+"""Rooms whose floors differ by less are drawn as one storey."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Something on the plan.
+
+    Attributes:
+        kind: outdoors, room, obstacle, board, paving, doorway, leaf, link, axis or name, title.
+        points: (k, 2) on the drawing [m], x to the right and y up.
+        text: what it is called.
+    """
+
+    kind: str
+    points: Floats
+    text: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A drawing ``size`` (2,) [m] of shapes, the lowest first."""
+
+    size: Floats
+    shapes: tuple[Shape, ...]
+
+
+def plan_of(world: World) -> Plan:
+    """All storeys as on a page, from the lowest; north is up."""
+    rooms_of = _storeys(world)
+    panels = [_panel(world, level_m, rooms, len(rooms_of) > 1) for level_m, rooms in rooms_of]
+    columns = math.ceil(math.sqrt(len(panels)))
+    rows = [panels[i : i + columns] for i in range(0, len(panels), columns)]
+    heights = [max(float(panel.size[1]) for panel in row) for row in rows]
+    shapes: list[Shape] = []
+    top = math.fsum(heights)
+    for row, height in zip(rows, heights, strict=True):
+        left = 0.0
+        for panel in row:
+            corner = np.array([left, top - panel.size[1]])
+            shapes += [Shape(s.kind, s.points + corner, s.text) for s in panel.shapes]
+            left += float(panel.size[0])
+        top -= height
+    width = max(math.fsum(float(panel.size[0]) for panel in row) for row in rows)
+    return Plan(np.array([width, math.fsum(heights)]), tuple(shapes))
+
+
+def _panel(world: World, level_m: float, rooms: list[str], titled: bool) -> Plan:
+    """One storey, its south-west corner at 0, 0."""
+    corners = np.concatenate([world.outline(name) for name in rooms])
+    low, high = corners.min(axis=0) - MARGIN_M, corners.max(axis=0) + MARGIN_M
+    width, height = high - low
+    shapes = [Shape(s.kind, s.points - low, s.text) for s in _storey(world, rooms)]
+    if titled:
+        text = f"{_title(world, rooms)}, floor at {level_m:.2f} m"
+        shapes.append(Shape("title", np.array([[width / 2, height + TITLE_M / 3]]), text))
+    return Plan(np.array([width, height + (TITLE_M if titled else 0.0)]), tuple(shapes))
+
+
+def _storeys(world: World) -> list[tuple[float, list[str]]]:
+    """Rooms by the height of their floors, in order."""
+    out: list[tuple[float, list[str]]] = []
+    for floor_m, name in sorted((world.floor_m(name), name) for name in world.rooms):
+        if not out or floor_m - out[-1][0] > SAME_STOREY_M:
+            out.append((floor_m, []))
+        out[-1][1].append(name)
+    return [(level_m, [name for name in world.rooms if name in rooms]) for level_m, rooms in out]
+
+
+def _title(world: World, rooms: list[str]) -> str:
+    """The floor that most of the rooms are in."""
+    parents = [world.locale(name).parent or world.root for name in rooms]
+    return max(dict.fromkeys(parents), key=parents.count)
+
+
+def _storey(world: World, rooms: list[str]) -> Iterator[Shape]:
+    for name in rooms:
+        kind = "outdoors" if world.locale(name).properties.get("sky") else "room"
+        yield Shape(kind, world.outline(name), name)
+    for name in rooms:
+        for thing in world.things_of(name):
+            flat = "paving" if thing.proud_m is None and thing.high_m <= STEP_M else "board"
+            yield Shape("obstacle" if thing.in_the_way else flat, thing.footprint_world, thing.name)
+    doorways = {doorway.name: doorway for name in rooms for doorway in world.doorways_of(name)}
+    for doorway in doorways.values():
+        yield Shape("doorway", doorway.thresholds_world.reshape(-1, 2), doorway.name)
+    for name in rooms:
+        for face in world.faces_of(name):
+            if face.name.endswith("/leaf"):
+                yield Shape("leaf", _footprint(face), face.name)
+        for link in world.links_of(name):
+            yield Shape("link", link.stop_of(name)[None, :2], f"{link.name} to {link.other(name)}")
+    for name in rooms:
+        yield Shape("axis", world.world_from_locale(name).apply([(0, 0, 0), (1, 0, 0)])[:, :2])
+        yield Shape("name", world.outline(name).mean(axis=0)[None], name)
+
+
+def _footprint(face: Face) -> Floats:
+    """The floor line (2, 2) of an upright polygon."""
+    xy = face.polygon_world[:, :2]
+    far = np.linalg.norm(xy - xy[0], axis=1).argmax()
+    return np.stack([xy[0], xy[far]])
+
+
+def plan_svg(world: World) -> str:
+    """The plan as an SVG text: one metre is 40 units."""
+    plan = plan_of(world)
+    width, height = plan.size * SCALE
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}">'
+    ground = f'<rect width="{width:.0f}" height="{height:.0f}" fill="{GROUND}"/>'
+    return "\n".join([head, _STYLE, ground, *(_element(shape, height) for shape in plan.shapes), "</svg>\n"])
+
+
+GROUND = "#777"
+_STYLE = """<style>
+.room { fill: #f7f4ea; stroke: #222; stroke-width: 2 } .outdoors { fill: #b9cf9d; stroke: #3c5a2c; stroke-width: 2 }
+.obstacle { fill: #c9a676; stroke: #5b4327 } .board { fill: #6d8fb3; stroke: #34516f }
+.paving { fill: #e3ded0; stroke: #8a8678 } .doorway { fill: #bfe3b4; stroke: #3c7a2c }
+.leaf { stroke: #8c1d1d; stroke-width: 5; fill: none }
+.link { fill: #7d4fa3; stroke: #3f2756 }
+.axis { stroke: #b03030; stroke-width: 2; fill: none } text { font: 16px sans-serif; text-anchor: middle; fill: #222 }
+text.title { font-size: 20px; font-weight: bold; fill: #fff }
+</style>"""
+
+
+def _element(shape: Shape, height: float) -> str:
+    xy = np.column_stack([shape.points[:, 0] * SCALE, height - shape.points[:, 1] * SCALE])
+    x, y = xy[0]
+    if shape.kind in ("name", "title"):
+        return f'<text class="{shape.kind}" x="{x:.1f}" y="{y:.1f}">{escape(shape.text)}</text>'
+    named = f"<title>{escape(shape.text)}</title>" if shape.text else ""
+    if shape.kind == "link":
+        return f'<circle class="link" cx="{x:.1f}" cy="{y:.1f}" r="9">{named}</circle>'
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in xy)
+    tag = "polyline" if shape.kind in ("axis", "leaf") else "polygon"
+    return f'<{tag} class="{shape.kind}" points="{points}">{named}</{tag}>'

@@ -1,0 +1,163 @@
+"""The world's model lines and surfaces laid out in arrays, as the visibility computation wants them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.building.faces import Face, area_vector
+from world_models.building.landmarks import Edges, Landmark
+from world_models.building.regions import Region
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """N model lines, C corners and M convex one-sided surfaces with up to K corners.
+
+    Attributes:
+        edges: all model lines.
+        line_landmark, line_index: (N,) which line of which landmark (its number in the world).
+        corners_world: (C, 3) landmark corners [m].
+        corner_landmark, corner_index: (C,) which corner of which landmark.
+        corner_lines: (C, L) the lines (numbers among all N) that meet in it; -1 pads.
+        polygons_world: (M, K, 3) counter-clockwise from the visible side; short ones repeat their last corner.
+        planes_world: (M, 4) unit normal towards the visible side, and offset.
+        surface_face: (M,) the face (its number in the world) that each is a region of.
+        line_locales, corner_locales, surface_locales: (.., 2) numbers in ``locales``, twice the same where only one.
+        locales: names, sorted.
+    """
+
+    edges: Edges
+    line_landmark: Ints
+    line_index: Ints
+    corners_world: Floats
+    corner_landmark: Ints
+    corner_index: Ints
+    corner_lines: Ints
+    polygons_world: Floats
+    planes_world: Floats
+    surface_face: Ints
+    line_locales: Ints
+    corner_locales: Ints
+    surface_locales: Ints
+    locales: tuple[str, ...]
+
+
+def build_scene(faces: Sequence[tuple[int, Face]], landmarks: Sequence[tuple[int, Landmark]]) -> Scene:
+    """Arrays of everything, in the order given; each face and landmark comes with its number in the world."""
+    owners = [face for _, face in faces], [mark for _, mark in landmarks]
+    names = sorted({name for group in owners for item in group for name in (item.locale, item.neighbour) if name})
+    place = {name: index for index, name in enumerate(names)}
+
+    def rooms(items: Sequence[Face | Landmark]) -> Ints:
+        return np.array([(place[i.locale], place[i.neighbour or i.locale]) for i in items], np.int64).reshape(-1, 2)
+
+    surfaces = [(number, face, region) for number, face in faces for region in (*face.front, *face.back)]
+    polygons = _padded([region for _, _, region in surfaces])
+    marks = owners[1]
+    lines, points = [len(mark.lines_world) for mark in marks], [len(mark.points_world) for mark in marks]
+    numbers, of_marks = np.array([number for number, _ in landmarks], np.int64), rooms(marks)
+    normals = np.array([_unit(area_vector(region.polygon_world)) for _, _, region in surfaces]).reshape(-1, 3)
+    return Scene(
+        edges=Edges.joined(mark.edges for mark in marks),
+        line_landmark=np.repeat(numbers, lines),
+        line_index=_counts_up(lines),
+        corners_world=np.concatenate([np.zeros((0, 3)), *(mark.points_world for mark in marks)]),
+        corner_landmark=np.repeat(numbers, points),
+        corner_index=_counts_up(points),
+        corner_lines=_meeting_lines(marks),
+        polygons_world=polygons,
+        planes_world=np.column_stack([normals, np.sum(normals * polygons[:, 0], axis=1)]),
+        surface_face=np.array([number for number, _, _ in surfaces], np.int64),
+        line_locales=np.repeat(of_marks, lines, axis=0),
+        corner_locales=np.repeat(of_marks, points, axis=0),
+        surface_locales=rooms([face for _, face, _ in surfaces]),
+        locales=tuple(names),
+    )
+
+
+def joined_scene(parts: Sequence[Scene]) -> Scene:
+    """All of them as one scene, in the order of the world whatever the order of the parts."""
+    if len(parts) == 1:
+        return parts[0]
+    names = tuple(sorted({name for part in parts for name in part.locales}))
+    place = {name: index for index, name in enumerate(names)}
+    renumbered = [np.array([place[name] for name in part.locales], np.int64) for part in parts]
+
+    def together(attribute: str) -> Any:
+        return np.concatenate([getattr(part, attribute) for part in parts])
+
+    def in_rooms(attribute: str) -> Any:
+        return np.concatenate([new[getattr(part, attribute)] for part, new in zip(parts, renumbered, strict=True)])
+
+    edges = Edges.joined(part.edges for part in parts)
+    lines = np.argsort(together("line_landmark"), kind="stable")
+    corners = np.argsort(together("corner_landmark"), kind="stable")
+    surfaces = np.argsort(together("surface_face"), kind="stable")
+    return Scene(
+        edges=Edges(edges.lines_world[lines], edges.normals_world[lines], edges.levels[lines]),
+        line_landmark=together("line_landmark")[lines],
+        line_index=together("line_index")[lines],
+        corners_world=together("corners_world")[corners],
+        corner_landmark=together("corner_landmark")[corners],
+        corner_index=together("corner_index")[corners],
+        corner_lines=_renumbered_lines(parts, lines)[corners],
+        polygons_world=_widened([part.polygons_world for part in parts])[surfaces],
+        planes_world=together("planes_world")[surfaces],
+        surface_face=together("surface_face")[surfaces],
+        line_locales=in_rooms("line_locales")[lines],
+        corner_locales=in_rooms("corner_locales")[corners],
+        surface_locales=in_rooms("surface_locales")[surfaces],
+        locales=names,
+    )
+
+
+def _renumbered_lines(parts: Sequence[Scene], order: Ints) -> Ints:
+    """(C, L) the lines that meet in each corner, by their numbers after sorting."""
+    after = np.empty(len(order) + 1, np.int64)
+    after[order], after[-1] = np.arange(len(order)), -1
+    widest = max(part.corner_lines.shape[1] for part in parts)
+    rows, before = [], 0
+    for part in parts:
+        known = part.corner_lines
+        shifted = np.where(known < 0, -1, known + before)
+        rows.append(np.column_stack([shifted, np.full((len(known), widest - known.shape[1]), -1)]))
+        before += len(part.line_landmark)
+    return np.asarray(after[np.concatenate(rows)])
+
+
+def _widened(polygons: Sequence[Floats]) -> Floats:
+    longest = max(p.shape[1] for p in polygons)
+    return np.concatenate([np.concatenate([p, np.repeat(p[:, -1:], longest - p.shape[1], axis=1)], axis=1)
+                           if p.shape[1] < longest else p for p in polygons])
+
+
+def _meeting_lines(landmarks: Sequence[Landmark]) -> Ints:
+    rows, before = [], 0
+    for mark in landmarks:
+        rows += [before + mark.corner_lines(point) for point in range(len(mark.points_world))]
+        before += len(mark.lines_world)
+    widest = max((len(row) for row in rows), default=2)
+    return np.array([np.pad(row, (0, widest - len(row)), constant_values=-1) for row in rows],
+                    np.int64).reshape(-1, widest)
+
+
+def _padded(regions: Sequence[Region]) -> Floats:
+    longest = max((len(region.polygon_world) for region in regions), default=4)
+    padded = [np.pad(r.polygon_world, ((0, longest - len(r.polygon_world)), (0, 0)), "edge") for r in regions]
+    return np.array(padded, float).reshape(-1, longest, 3)
+
+
+def _counts_up(counts: Sequence[int]) -> Ints:
+    return np.concatenate([np.zeros(0, np.int64), *(np.arange(count) for count in counts)])
+
+
+def _unit(vector: Floats) -> Floats:
+    return vector / np.linalg.norm(vector)

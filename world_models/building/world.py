@@ -1,0 +1,355 @@
+"""The world (§3.4): locales in a contained-by hierarchy, their doorways, faces and landmarks, and questions on them.
+
+A world takes its frames from a :class:`~world_models.building.frame_source.FrameSource`, one locale at a time and only
+when they are asked for, so that a robot in a room touches the room. The attributes that name everything (``faces``,
+``things``, ``scene``, ...) are for drawing and checking.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import Any, TypeVar
+
+import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.building import checks
+from world_models.building.faces import Face
+from world_models.building.frame_source import FrameSource, Packet
+from world_models.building.landmarks import Landmark
+from world_models.building.locales import Doorway, Link, Locale
+from world_models.building.passages import Route, find_route
+from world_models.building.scene import Scene, build_scene, joined_scene
+from world_models.building.things import Fault, Thing
+from world_models.frames import Pose, frozen
+
+__all__ = ["Fault", "Thing", "World"]
+
+T = TypeVar("T")
+
+NEAR_FLOOR_M = 0.5
+"""A camera so far above a room's ceiling, or below its floor, may still be in its doorway."""
+
+SCENES = 32
+"""How many joined scenes are kept."""
+
+
+class World:
+    """Everything that is known of the building; the root locale's frame is the world frame.
+
+    Attributes:
+        frames: where it comes from.
+        name: of the world and of its root locale.
+        memo: what others work out of it once, and keep with it.
+    """
+
+    def __init__(self, frames: FrameSource) -> None:
+        self.frames = frames
+        self.name = frames.name
+        self._poses: dict[str, tuple[Pose, Pose]] = {}
+        self._landmarks: dict[int, Landmark] = {}
+        self._scenes: dict[tuple[str, ...], Scene] = {}
+        self.memo: dict[str, Any] = {}
+
+    def remembered(self, what: str, most: int, key: Hashable, make: Callable[[], T]) -> T:
+        """What was made for a key, made now unless it is among the last ``most`` of its kind."""
+        known: dict[Hashable, T] = self.memo.setdefault(what, {})
+        if key not in known:
+            if len(known) >= most:
+                del known[next(iter(known))]
+            known[key] = make()
+        return known[key]
+
+    @property
+    def root(self) -> str:
+        """Name of the locale that contains all others."""
+        return self.name
+
+    # -- one locale ------------------------------------------------------------------------------------------------
+
+    def locale(self, name: str) -> Locale:
+        """Raises ValueError where no locale has this name."""
+        found = self.frames.locale(name)
+        if found is None:
+            names = self.frames.names()
+            shown = ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+            raise ValueError(f"expected a locale of {self.name} ({shown}), got {name!r}")
+        return found
+
+    def is_room(self, name: str) -> bool:
+        """Whether this is a locale that contains no other."""
+        return self.frames.is_room(name)
+
+    def children_of(self, name: str) -> tuple[str, ...]:
+        """The locales that this one directly contains."""
+        self.locale(name)
+        return self.frames.children(name)
+
+    def rooms_in(self, name: str) -> Iterator[str]:
+        """The locales within this one that contain no other; itself where it is such a one."""
+        if self.is_room(name):
+            yield name
+        for child in self.children_of(name):
+            yield from self.rooms_in(child)
+
+    def path_of(self, name: str) -> tuple[str, ...]:
+        """The locales that contain this one, from the root down to itself."""
+        path = [name]
+        while (parent := self.locale(path[-1]).parent) is not None:
+            path.append(parent)
+        return tuple(reversed(path))
+
+    def common(self, *names: str) -> str:
+        """The smallest locale that contains all of these."""
+        paths = [self.path_of(name) for name in names]
+        shared = self.root
+        for steps in zip(*paths, strict=False):
+            if len(set(steps)) == 1:
+                shared = steps[0]
+        return shared
+
+    def world_from_locale(self, name: str) -> Pose:
+        """The frame of a locale."""
+        return self._pose(name)[0]
+
+    def floor_m(self, name: str) -> float:
+        """Height of a locale's floor [m, world]."""
+        return float(self.world_from_locale(name).translation[2])
+
+    def _pose(self, name: str) -> tuple[Pose, Pose]:
+        """The frame of a locale, and its inverse."""
+        if name not in self._poses:
+            locale = self.locale(name)
+            above = self.world_from_locale(locale.parent) if locale.parent is not None else Pose.identity()
+            pose = above @ locale.frame
+            self._poses[name] = pose, pose.inverse()
+        return self._poses[name]
+
+    def doorways_of(self, locale: str) -> tuple[Doorway, ...]:
+        """The open doorways of a locale."""
+        self.locale(locale)
+        return self.frames.doorways(locale)
+
+    def links_of(self, locale: str) -> tuple[Link, ...]:
+        """The elevators and stairs that stop in a locale."""
+        self.locale(locale)
+        return self.frames.links(locale)
+
+    def things_of(self, locale: str) -> tuple[Thing, ...]:
+        """What stands in a locale."""
+        self.locale(locale)
+        return self.frames.things(locale)
+
+    def outline(self, locale: str) -> NDArray[np.float64]:
+        """(k, 2) the free extent of a locale on the floor, counter-clockwise [m, world]."""
+        own = self.locale(locale).outline
+        return frozen(self._pose(locale)[0].apply(np.column_stack([own, np.zeros(len(own))]))[:, :2])
+
+    def obstacles(self, locale: str) -> tuple[NDArray[np.float64], ...]:
+        """Footprints (4, 2) of what the robot could hit in a locale [m, world]."""
+        return tuple(t.footprint_world for t in self.things_of(locale) if t.in_the_way)
+
+    # -- places and ways -------------------------------------------------------------------------------------------
+
+    def locale_at(self, point_world: Any) -> str | None:
+        """The deepest locale that contains a point (2,) on the floor or (3,) [m, world]."""
+        p = np.asarray(point_world, float)
+        if p.shape not in ((2,), (3,)):
+            raise ValueError(f"expected a point (2,) or (3,), got shape {p.shape}")
+        best: tuple[int, str] | None = None
+        for name in self.frames.near(float(p[0]), float(p[1]), 0.0):
+            world_from_locale, locale_from_world = self._pose(name)
+            lifted = p if p.size == 3 else np.array([*p, world_from_locale.translation[2]])
+            depth = len(self.path_of(name))
+            if (best is None or depth > best[0]) and self.locale(name).contains(locale_from_world.apply(lifted)):
+                best = depth, name
+        return best[1] if best else None
+
+    def rooms_near(self, point_world: Any, margin_m: float) -> tuple[str, ...]:
+        """The rooms whose rectangle on the plan is at most so far from a point (2,) or (3,) [m, world]."""
+        x, y, *z = (float(value) for value in np.asarray(point_world, float))
+        rooms = (name for name in self.frames.near(x, y, margin_m) if self.is_room(name))
+        return tuple(name for name in rooms if not z or self._reaches(name, z[0]))
+
+    def _reaches(self, name: str, z_m: float) -> bool:
+        """Whether a height is between floor and ceiling of a locale, or not far from there."""
+        base = self.floor_m(name)
+        return base - NEAR_FLOOR_M <= z_m <= base + self.locale(name).height_m + NEAR_FLOOR_M
+
+    def route(self, origin: str, destination: str) -> Route | None:
+        """The way from room to room, at the highest level at which they differ; None where there is none."""
+        for name in (origin, destination):
+            self.locale(name)
+        return find_route(self.frames, origin, destination)
+
+    def walk(self, origin: str, destination: str) -> list[str] | None:
+        """The rooms of the way with the fewest passages for people, who can use stairs too; None where there is none.
+
+        It looks at the passages of the whole world.
+        """
+        passages: tuple[Doorway | Link, ...] = (*self.doorways, *self.links)
+        ways: nx.Graph = nx.Graph(passage.between for passage in passages)
+        try:
+            way: list[str] = nx.shortest_path(ways, origin, destination)
+        except (nx.NetworkXNoPath, nx.NodeNotFound):
+            return None
+        return way
+
+    def passage(self, name: str) -> Doorway | Link:
+        """Raises ValueError where no doorway or link has this name."""
+        found = self.frames.passage(name)
+        if found is None:
+            raise ValueError(f"expected a passage of {self.name}, got {name!r}")
+        return found
+
+    # -- what is seen ----------------------------------------------------------------------------------------------
+
+    def scene_of(self, locales: Iterable[str]) -> Scene:
+        """Model lines and surfaces of these locales, with what they share with neighbours, in arrays."""
+        names = tuple(sorted(locales))
+        if names not in self._scenes:
+            if len(self._scenes) >= SCENES:
+                del self._scenes[next(iter(self._scenes))]
+            self._scenes[names] = self._joined(names)
+        return self._scenes[names]
+
+    def _joined(self, locales: Sequence[str]) -> Scene:
+        packets = {(p.locale, p.neighbour): p for name in locales for p in self.frames.packets(name)}
+        parts = [self._part(packets[key]) for key in sorted(packets, key=str)]
+        return joined_scene(parts) if parts else build_scene((), ())
+
+    def _part(self, packet: Packet) -> Scene:
+        self._landmarks.update(packet.landmarks)
+        return packet.scene
+
+    @cached_property
+    def landmarks(self) -> Sequence[Landmark]:
+        """What can be recognised, by number; those of locales that were looked at are at hand."""
+        return _Landmarks(self)
+
+    def landmark(self, name: str) -> Landmark:
+        """Raises ValueError where no landmark has this name."""
+        found = [mark for mark in self.landmarks if mark.name == name]
+        if not found:
+            raise ValueError(f"expected the name of a landmark of {self.name}, got {name!r}")
+        return found[0]
+
+    # -- everything ------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def locales(self) -> Mapping[str, Locale]:
+        """All by name, root first, then in the order of the file; a locale is loaded when it is asked for."""
+        return _Locales(self.frames)
+
+    @cached_property
+    def rooms(self) -> tuple[str, ...]:
+        """The locales that contain no other, in order."""
+        return tuple(name for name in self.frames.names() if self.is_room(name))
+
+    @property
+    def doorways(self) -> tuple[Doorway, ...]:
+        """The open ones, through which one can pass."""
+        return self.frames.all_doorways()
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """All elevators and stairs."""
+        return self.frames.all_links()
+
+    @property
+    def things(self) -> tuple[Thing, ...]:
+        """What stands in the rooms."""
+        return self.frames.all_things()
+
+    @cached_property
+    def faces(self) -> tuple[Face, ...]:
+        """Barriers and doorways; what is drawn are their regions."""
+        numbered = sorted((pair for p in self.frames.all_packets() for pair in p.faces), key=lambda pair: pair[0])
+        return tuple(face for _, face in numbered)
+
+    def faces_within(self, name: str) -> tuple[Face, ...]:
+        """The faces of all rooms in a locale and of the next rooms beyond its doorways, in order."""
+        inside = tuple(self.rooms_in(name))
+        beyond = [doorway.other(room) for room in inside for doorway in self.frames.doorways(room)]
+        packets = {(p.locale, p.neighbour): p for room in dict.fromkeys((*inside, *beyond))
+                   for p in self.frames.packets(room)}
+        numbered = sorted((pair for p in packets.values() for pair in p.faces), key=lambda pair: pair[0])
+        return tuple(face for _, face in numbered)
+
+    def faces_of(self, name: str) -> tuple[Face, ...]:
+        """The faces of a locale, without those that belong to its neighbours."""
+        return tuple(face for p in self.frames.packets(name) if p.locale == name for _, face in p.faces)
+
+    @cached_property
+    def scene(self) -> Scene:
+        """Model lines and surfaces of the whole world."""
+        return joined_scene([self._part(packet) for packet in self.frames.all_packets()] or [build_scene((), ())])
+
+    @cached_property
+    def passages(self) -> nx.Graph:
+        """Rooms joined by open doorways; each edge carries ``doorways`` (tuple of Doorway)."""
+        graph = nx.Graph()
+        graph.add_nodes_from(self.rooms)
+        for doorway in self.doorways:
+            a, b = doorway.between
+            known = graph.edges[a, b]["doorways"] if graph.has_edge(a, b) else ()
+            graph.add_edge(a, b, doorways=(*known, doorway))
+        return graph
+
+    def counts(self) -> Mapping[str, int]:
+        """How many rooms, open doorways, things, faces and landmarks there are."""
+        return self.frames.counts()
+
+    @property
+    def building_faults(self) -> tuple[Fault, ...]:
+        """What could not be built."""
+        return self.frames.faults()
+
+    def check(self) -> list[Fault]:
+        """What is wrong with this world, in the order of the file; empty for a sound one."""
+        return [*self.building_faults, *(Fault(source, what) for source, what in checks.faults_of(self))]
+
+
+class _Locales(Mapping[str, Locale]):
+    """Locales by name, each loaded when it is asked for."""
+
+    def __init__(self, frames: FrameSource) -> None:
+        self._frames = frames
+
+    def __getitem__(self, name: str) -> Locale:
+        found = self._frames.locale(name)
+        if found is None:
+            raise KeyError(name)
+        return found
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and self._frames.locale(name) is not None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._frames.names())
+
+    def __len__(self) -> int:
+        return len(self._frames.names())
+
+
+class _Landmarks(Sequence[Landmark]):
+    """Landmarks by number; those of locales that were not looked at yet make it read all."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+
+    def __getitem__(self, number: Any) -> Any:
+        if isinstance(number, slice):
+            return [self[i] for i in range(*number.indices(len(self)))]
+        known = self._world._landmarks
+        if number not in known:
+            for packet in self._world.frames.all_packets():
+                known.update(packet.landmarks)
+        if number not in known:
+            raise IndexError(f"expected the number of one of {len(self)} landmarks, got {number}")
+        return known[number]
+
+    def __len__(self) -> int:
+        return self._world.counts()["landmark"]

@@ -1,0 +1,1 @@
+"""What lies on the blackboard: requests, observations and inferences."""

@@ -1,0 +1,232 @@
+"""The task model (§3.3): commands, goals in conceptual-dependency form, plan sketches, milestones and how it ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from world_models.entries.location import Covariance, Place
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What the user asks for, and how the robot was put down.
+
+    Attributes:
+        text: ``(ptrans (locale (x,y,z)) (locale (x,y,z)))``, feet in each locale's own frame.
+        start_heading_rad: heading in the first locale's frame.
+        arrival_heading_rad: heading wanted at the end, in the last locale's frame; None for any.
+        start_covariance: how well it was put down, in the first locale's frame.
+    """
+
+    text: str
+    start_heading_rad: float
+    arrival_heading_rad: float | None
+    start_covariance: Covariance
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """A top-level goal: ptrans from one place to another.
+
+    Attributes:
+        status: active, reached or abandoned (a new one stands for it, §2).
+    """
+
+    origin: Place
+    destination: Place
+    status: str = "active"
+
+    @property
+    def is_active(self) -> bool:
+        return self.status == "active"
+
+
+@dataclass(frozen=True, slots=True)
+class Subgoal:
+    """(ptrans a b) within a plan sketch.
+
+    Attributes:
+        primitive: an unobstructed straight line, executed without further reasoning (§5).
+        passage: the doorway that it goes through, or "".
+        tolerance_m: how near to ``destination`` is near enough.
+    """
+
+    origin: Place
+    destination: Place
+    primitive: bool
+    passage: str = ""
+    tolerance_m: float = 0.1
+
+    @property
+    def is_ride(self) -> bool:
+        """Whether it is carried out by an elevator: it has a passage, and there is nothing to drive or to refine."""
+        return bool(self.passage) and not self.primitive
+
+    def __str__(self) -> str:
+        return f"(ptrans {self.origin} {self.destination})"
+
+
+@dataclass(frozen=True, slots=True)
+class PlanSketch:
+    """(M0 (ptrans a b) M1 (ptrans b c) ... Mg), approximate, abstract and tentative (§3.3).
+
+    Attributes:
+        goal: id of the goal entry that it serves.
+        path: where it hangs in the tree of Figure 3: () for the first level, (1,) refines its subgoal 1.
+        locale: the locale that it crosses, or "" for the first level, which goes from locale to locale.
+        subgoals: n of them; milestone k stands before subgoal k, milestone n at the end.
+        at: the subgoal that is next or under way; n at the end.
+        verified: whether milestone ``at`` holds.
+        status: active, done or superseded.
+        adjustments: how often plan-level servoing changed it.
+    """
+
+    goal: str
+    path: tuple[int, ...]
+    locale: str
+    subgoals: tuple[Subgoal, ...]
+    at: int = 0
+    verified: bool = False
+    status: str = "active"
+    adjustments: int = 0
+
+    @property
+    def is_active(self) -> bool:
+        return self.status == "active"
+
+    @property
+    def at_end(self) -> bool:
+        return self.at == len(self.subgoals)
+
+    @property
+    def current(self) -> Subgoal | None:
+        """The subgoal that is next or under way; None at the end."""
+        return None if self.at_end else self.subgoals[self.at]
+
+    def advanced(self) -> PlanSketch:
+        """The current subgoal is done; its milestone is yet to be verified."""
+        return replace(self, at=self.at + 1, verified=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A primitive subgoal under execution: a straight line in the world frame.
+
+    Attributes:
+        sketch: id of the sketch entry; index: which of its subgoals.
+        x0_m, y0_m, x1_m, y1_m: from where to where [m, world].
+        tolerance_m: how near is near enough.
+        heading_rad: the heading wanted at the end [rad, world]; None for any.
+        increments: motor commands so far.
+        status: moving, arrived or halted.
+        to_go_m, left_m: what was left along the line, and how far to the left of it the robot was believed to be, when
+            the last increment was decided; None before the first.
+        aim_rad: how far to the left of its heading the point lay that it then steered at [rad].
+    """
+
+    sketch: str
+    index: int
+    x0_m: float
+    y0_m: float
+    x1_m: float
+    y1_m: float
+    tolerance_m: float
+    heading_rad: float | None = None
+    increments: int = 0
+    status: str = "moving"
+    to_go_m: float | None = None
+    left_m: float | None = None
+    aim_rad: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Milestone:
+    """A perceptual event that should be seen at a place (§3.3, §4), and what has become of it.
+
+    Attributes:
+        sketch: id of the sketch entry, or "" for a check in between.
+        index: milestone number in the sketch.
+        what: in words.
+        look_heading_rad: in which direction its landmarks are seen [rad, world].
+        landmarks: names of the landmarks that are expected.
+        expected: the visible model lines, ((x0, y0, z0), (x1, y1, z1)) [m, world].
+        expected_px: their expected projection, ((u0, v0), (u1, v1)).
+        landmark_of: for each line, its index in ``landmarks``.
+        looks: the faces that should be seen, each as its colour (red, green, blue; 0..1) and points of it [m, world].
+        tried: headings from which it was looked for before, and could not be told [rad, world].
+        status: turning (not yet looking there), expected, verified, refuted or not testable.
+    """
+
+    sketch: str
+    index: int
+    what: str
+    look_heading_rad: float
+    landmarks: tuple[str, ...] = ()
+    expected: tuple[tuple[tuple[float, ...], ...], ...] = ()
+    expected_px: tuple[tuple[tuple[float, ...], ...], ...] = ()
+    landmark_of: tuple[int, ...] = ()
+    looks: tuple[tuple[tuple[float, ...], tuple[tuple[float, ...], ...]], ...] = ()
+    tried: tuple[float, ...] = ()
+    status: str = "turning"
+
+    @property
+    def is_open(self) -> bool:
+        return self.status in ("turning", "expected")
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """The verdict on a milestone, with its evidence.
+
+    Attributes:
+        milestone: id of the milestone entry.
+        fix: id of the pose fix that it rests on, or "".
+        verdict: verified, refuted or not testable.
+        reason: in words.
+        expected, matched, inliers: numbers of model lines.
+        coverage: part of the expected line length that was found, 0..1.
+        residual_px: RMS distance of the inliers.
+        deviation_m, deviation_rad, deviation_px: from the belief that predicted it.
+        tolerance_px: up to where the wheels may have put it (§3.2) and the plan may adjust it (§6.1.4's window).
+        p_false: probability that the pose is wrong, as counted on rendered floors where half of the places are.
+        faces, faces_alike: how many faces' colours were compared, and the part of them that is as the model says.
+    """
+
+    milestone: str
+    fix: str
+    verdict: str
+    reason: str
+    expected: int
+    matched: int
+    inliers: int
+    coverage: float
+    residual_px: float
+    deviation_m: float
+    deviation_rad: float
+    deviation_px: float
+    tolerance_px: float
+    p_false: float
+    faces: int = 0
+    faces_alike: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How the mission ended: reached, lost, blocked, failed or stopped (somebody wanted it to), and why."""
+
+    kind: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Resumed:
+    """A run that was cut off goes on; the robot was stopped in between.
+
+    Attributes:
+        after_cycle: the last cycle that was written down.
+        interrupted: motor commands (refs as ``MotorCommand-3.0``) that were written down, but of which nobody heard how
+            far they were carried out; they are not carried out again, the wheels are asked instead.
+    """
+
+    after_cycle: int
+    interrupted: tuple[str, ...] = ()

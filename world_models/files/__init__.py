@@ -1,0 +1,1 @@
+"""Building models as files: read, compiled and imported."""

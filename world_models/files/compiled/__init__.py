@@ -1,0 +1,1 @@
+"""Compiled worlds: one SQLite file, read one locale at a time."""

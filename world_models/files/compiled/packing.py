@@ -1,0 +1,84 @@
+"""Frames as bytes: what a compiled world keeps of faces, landmarks and arrays. Numbers are kept to the last bit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.building.faces import Face
+from world_models.building.frame_source import Packet
+from world_models.building.landmarks import Edges, Landmark
+from world_models.building.regions import Region
+from world_models.frames import frozen
+
+Floats = NDArray[np.float64]
+
+
+def packed_array(array: Any) -> bytes:
+    """Little-endian float64."""
+    return np.ascontiguousarray(array, "<f8").tobytes()
+
+
+def unpacked_array(data: bytes, shape: tuple[int, ...]) -> Floats:
+    """Raises ValueError where the bytes are not so many numbers."""
+    return frozen(np.frombuffer(data, "<f8").reshape(shape))
+
+
+def packed(packet: Packet) -> tuple[str, bytes]:
+    """The words of a packet as JSON, and its numbers."""
+    faces = [[number, f.name, f.kind, f.parent, dict(f.properties), len(f.polygon_world),
+              [_words(r) for r in f.front], [_words(r) for r in f.back]] for number, f in packet.faces]
+    marks = [[number, m.name, m.kind, m.source, len(m.edges)] for number, m in packet.landmarks]
+    arrays: list[Floats] = []
+    for _, face in packet.faces:
+        arrays += [face.polygon_world, *(r.polygon_world for r in (*face.front, *face.back))]
+    for _, mark in packet.landmarks:
+        arrays += [mark.edges.lines_world, mark.edges.normals_world, mark.edges.levels]
+    flat = np.concatenate([np.zeros(0), *(array.ravel() for array in arrays)])
+    return json.dumps([faces, marks], separators=(",", ":")), packed_array(flat)
+
+
+def _words(r: Region) -> list[Any]:
+    return [r.name, len(r.polygon_world), list(r.colour), r.texture, r.texture_scale_m, r.seed]
+
+
+def unpacked(locale: str, neighbour: str | None, rows: Iterable[tuple[str, bytes]]) -> Packet:
+    """One packet of one or several rows: the model's, and those of details that were compiled with it.
+
+    Raises ValueError, TypeError or LookupError where the bytes are not what was packed.
+    """
+    faces: list[tuple[int, Face]] = []
+    marks: list[tuple[int, Landmark]] = []
+    for words, numbers in rows:
+        face_rows, mark_rows = json.loads(words)
+        reader = _Reader(np.frombuffer(numbers, "<f8").astype(np.float64))
+        for number, name, kind, parent, properties, corners, front, back in face_rows:
+            polygon = reader.take(corners, 3)
+            sides = [tuple(_region(row, reader) for row in side) for side in (front, back)]
+            faces.append((number, Face(name, locale, polygon, kind, neighbour, parent, sides[0], sides[1], properties)))
+        for number, name, kind, source, lines in mark_rows:
+            edges = Edges(reader.take(lines, 2, 3), reader.take(lines, 2, 3), reader.take(lines, 3))
+            marks.append((number, Landmark(name, locale, kind, edges, neighbour, source)))
+    return Packet(locale, neighbour, tuple(faces), tuple(marks))
+
+
+def _region(row: list[Any], reader: _Reader) -> Region:
+    name, corners, (red, green, blue), texture, scale_m, seed = row
+    return Region(name, frozen(reader.take(corners, 3)), (red, green, blue), texture, scale_m, seed)
+
+
+class _Reader:
+    """Takes arrays from a row of numbers, one after the other."""
+
+    def __init__(self, numbers: Floats) -> None:
+        self._numbers, self._at = numbers, 0
+
+    def take(self, *shape: int) -> Floats:
+        size = int(np.prod(shape))
+        part = self._numbers[self._at : self._at + size]
+        self._at += size
+        return part.reshape(shape)

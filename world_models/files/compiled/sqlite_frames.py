@@ -1,0 +1,238 @@
+"""Frames in a compiled world: one SQLite file, read a locale at a time, each when it is first asked for."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+
+from world_models.building.frame_source import Arc, Packet
+from world_models.building.locales import Doorway, Link, Locale
+from world_models.building.memory_frames import words_of
+from world_models.building.things import Fault, Thing
+from world_models.files.compiled.packing import unpacked, unpacked_array
+from world_models.files.compiled.schema import FORMAT
+from world_models.files.toml.source import WorldError
+from world_models.frames import Pose
+
+T = TypeVar("T")
+
+DOORWAY = "select d.name, la.name, lb.name, thresholds, d.height_m, d.source from doorway d" \
+          " join locale la on la.id = d.a join locale lb on lb.id = d.b"
+LINK = "select k.name, k.kind, la.name, lb.name, stops, k.source from link k" \
+       " join locale la on la.id = k.a join locale lb on lb.id = k.b"
+PACKET = "select la.name, lb.name, words, numbers from packet p" \
+         " join locale la on la.id = p.locale left join locale lb on lb.id = p.neighbour"
+THING = "select t.name, la.name, t.kind, footprint, low_m, high_m, proud_m, t.source from thing t" \
+        " join locale la on la.id = t.locale"
+
+
+class SqliteFrames:
+    """The frames of a compiled world; see :class:`world_models.building.frame_source.FrameSource` for the questions.
+
+    Attributes:
+        name: of the world.
+        touched: what was loaded so far, (kind, name of the locale), in that order.
+    """
+
+    def __init__(self, path: Path, details: Sequence[str] = ()) -> None:
+        """Raises WorldError where this is no compiled world, or one without these details."""
+        self._path = path
+        self.touched: list[tuple[str, str]] = []
+        self._kept: dict[tuple[str, Any], Any] = {}
+        try:
+            path.stat()
+            self._file = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, check_same_thread=False)
+            meta = dict(self._file.execute("select key, value from meta"))
+        except OSError as error:
+            raise WorldError(f"{path}: expected a readable file, got: {error.strerror}") from None
+        except (sqlite3.Error, ValueError) as error:
+            raise WorldError(f"{path.name}: expected a compiled world, got: {error}") from None
+        if meta.get("format") != FORMAT:
+            raise WorldError(f"{path.name}: expected {FORMAT!r}, got {meta.get('format')!r}: compile it anew")
+        with self._sound():
+            self.name = str(meta["name"])
+            known = json.loads(meta["details"])
+            if details and list(details) != known:
+                raise WorldError(f"{path.name}: expected the details that it was compiled with "
+                                 f"({', '.join(known) or 'none'}), got {', '.join(details)}")
+            self._layer = len(details)
+            self._counts: Mapping[str, int] = json.loads(meta[f"counts {self._layer}"])
+
+    @contextmanager
+    def _sound(self) -> Iterator[None]:
+        """Whatever is wrong with the file is told as a WorldError."""
+        try:
+            yield
+        except WorldError:
+            raise
+        except (sqlite3.Error, ValueError, TypeError, LookupError) as error:
+            raise WorldError(f"{self._path.name}: expected a sound compiled world, got: {error!r}") from None
+
+    def _rows(self, query: str, *values: Any) -> list[tuple[Any, ...]]:
+        return self._file.execute(query, values).fetchall()
+
+    def _once(self, kind: str, name: Any, load: Callable[[], T]) -> T:
+        """What was loaded before, or what is loaded now and noted."""
+        key = kind, name
+        if key not in self._kept:
+            with self._sound():
+                self._kept[key] = load()
+            self.touched.append((kind, str(name)))
+        found: T = self._kept[key]
+        return found
+
+    # -- questions ---------------------------------------------------------------------------------------------------
+
+    def names(self) -> Sequence[str]:
+        return self._every_name
+
+    @cached_property
+    def _every_name(self) -> tuple[str, ...]:
+        with self._sound():
+            return tuple(str(row[0]) for row in self._rows("select name from locale order by id"))
+
+    def locale(self, name: str) -> Locale | None:
+        return self._once("locale", name, lambda: self._locale(name))
+
+    def _locale(self, name: str) -> Locale | None:
+        rows = self._rows(
+            "select l.kind, p.name, l.frame, l.outline, l.height_m, l.floor_m, l.properties, l.source,"
+            " l.survey_m, l.survey_rad from locale l"
+            " left join locale p on p.id = l.parent where l.name = ?", name)
+        if not rows:
+            if name in self._every_name:
+                raise WorldError(f"{self._path.name}: expected a sound world, got one whose index lacks {name!r}")
+            return None
+        kind, parent, frame, outline, height_m, floor_m, properties, source, survey_m, survey_rad = rows[0]
+        matrix = unpacked_array(frame, (3, 4))
+        return Locale(name, kind, parent, Pose(matrix[:, :3], matrix[:, 3]), unpacked_array(outline, (-1, 2)),
+                      height_m, json.loads(properties), source, floor_m, survey_m, survey_rad)
+
+    def children(self, name: str) -> tuple[str, ...]:
+        return self._once("children", name, lambda: tuple(row[0] for row in self._rows(
+            "select c.name from locale c join locale p on c.parent = p.id where p.name = ? order by c.id", name)))
+
+    def is_room(self, name: str) -> bool:
+        return self._once("is room", name, lambda: bool(self._rows(
+            "select 1 from locale where name = ? and leaf", name)))
+
+    def near(self, x_m: float, y_m: float, margin_m: float) -> Sequence[str]:
+        with self._sound():
+            return [row[0] for row in self._rows(
+                "select l.name from extent e join locale l on l.id = e.id"
+                " where x0 <= ? and x1 >= ? and y0 <= ? and y1 >= ? order by e.id",
+                x_m + margin_m, x_m - margin_m, y_m + margin_m, y_m - margin_m)]
+
+    def doorways(self, locale: str) -> tuple[Doorway, ...]:
+        return self._once("doorways", locale, lambda: tuple(_doorway(row) for row in self._rows(
+            f"{DOORWAY} where d.a = (select id from locale where name = ?1)"
+            " or d.b = (select id from locale where name = ?1) order by d.id", locale)))
+
+    def links(self, locale: str) -> tuple[Link, ...]:
+        return self._once("links", locale, lambda: tuple(_link(row) for row in self._rows(
+            f"{LINK} where k.a = (select id from locale where name = ?1)"
+            " or k.b = (select id from locale where name = ?1) order by k.id", locale)))
+
+    def packets(self, locale: str) -> tuple[Packet, ...]:
+        return self._once("faces", locale, lambda: self._packets(
+            f"{PACKET} where (p.locale = (select id from locale where name = ?1)"
+            " or p.neighbour = (select id from locale where name = ?1)) and layer <= ?2 order by p.id",
+            locale, self._layer))
+
+    def _packets(self, query: str, *values: Any) -> tuple[Packet, ...]:
+        rows: dict[tuple[str, str | None], list[tuple[str, bytes]]] = {}
+        for locale, neighbour, words, numbers in self._rows(query, *values):
+            rows.setdefault((locale, neighbour), []).append((words, numbers))
+        return tuple(unpacked(*key, several) for key, several in rows.items())
+
+    def things(self, locale: str) -> tuple[Thing, ...]:
+        return self._once("things", locale, lambda: tuple(_thing(row) for row in self._rows(
+            f"{THING} where t.locale = (select id from locale where name = ?) and layer <= ? order by t.id",
+            locale, self._layer)))
+
+    def arcs(self, container: str) -> tuple[Arc, ...]:
+        return self._once("passages", container, lambda: tuple(
+            Arc(passage, ((a, a_part), (b, b_part))) for passage, a, a_part, b, b_part in self._rows(
+                "select passage, la.name, a_part, lb.name, b_part from arc join locale la on la.id = a"
+                " join locale lb on lb.id = b where container = (select id from locale where name = ?) order by arc.id",
+                container)))
+
+    def component(self, locale: str, component: int) -> int:
+        def load() -> int:
+            rows = self._rows("select above from component where number = ? and"
+                              " locale = (select id from locale where name = ?)", component, locale)
+            return int(rows[0][0]) if rows else 0
+
+        return self._once("component", (locale, component), load)
+
+    def passage(self, name: str) -> Doorway | Link | None:
+        def load() -> Doorway | Link | None:
+            rows = self._rows(f"{DOORWAY} where d.name = ?", name)
+            links = self._rows(f"{LINK} where k.name = ?", name) if not rows else []
+            return _doorway(rows[0]) if rows else _link(links[0]) if links else None
+
+        return self._once("passage", name, load)
+
+    def named(self, words: str) -> Sequence[str]:
+        wanted = sorted(words_of(words))
+        if not wanted:
+            return []
+        with self._sound():
+            marks = ", ".join("?" * len(wanted))
+            return [row[0] for row in self._rows(
+                f"select l.name from locale l join word w on w.locale = l.id where word in ({marks})"
+                " group by l.id having count(*) = ? order by l.id", *wanted, len(wanted))]
+
+    def all_doorways(self) -> tuple[Doorway, ...]:
+        with self._sound():
+            return tuple(_doorway(row) for row in self._rows(f"{DOORWAY} order by d.id"))
+
+    def all_links(self) -> tuple[Link, ...]:
+        with self._sound():
+            return tuple(_link(row) for row in self._rows(f"{LINK} order by k.id"))
+
+    def all_packets(self) -> tuple[Packet, ...]:
+        with self._sound():
+            return self._packets(f"{PACKET} where layer <= ? order by p.id", self._layer)
+
+    def all_things(self) -> tuple[Thing, ...]:
+        with self._sound():
+            return tuple(_thing(row) for row in self._rows(f"{THING} where layer <= ? order by t.id", self._layer))
+
+    def counts(self) -> Mapping[str, int]:
+        return self._counts
+
+    def last_room(self) -> str:
+        """The room that was written last."""
+        with self._sound():
+            return str(self._rows("select name from locale where leaf order by id desc limit 1")[0][0])
+
+    @property
+    def sha256(self) -> str:
+        """Of what was compiled; it stands in the file, so that a large one need not be read for it."""
+        with self._sound():
+            return str(self._rows("select value from meta where key = 'sha256'")[0][0])
+
+    def faults(self) -> tuple[Fault, ...]:
+        with self._sound():
+            return tuple(Fault(source, what) for source, what in self._rows("select source, what from fault"))
+
+
+def _doorway(row: tuple[Any, ...]) -> Doorway:
+    name, a, b, thresholds, height_m, source = row
+    return Doorway(name, (a, b), unpacked_array(thresholds, (2, 2, 2)), height_m, source)
+
+
+def _link(row: tuple[Any, ...]) -> Link:
+    name, kind, a, b, stops, source = row
+    return Link(name, kind, (a, b), unpacked_array(stops, (2, 3)), source)
+
+
+def _thing(row: tuple[Any, ...]) -> Thing:
+    name, locale, kind, footprint, low_m, high_m, proud_m, source = row
+    return Thing(name, locale, kind, unpacked_array(footprint, (-1, 2)), low_m, high_m, proud_m, source)

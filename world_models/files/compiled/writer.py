@@ -1,0 +1,166 @@
+"""Compiling a world: frames go into one SQLite file, from which they are loaded one locale at a time."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sqlite3
+from collections.abc import Iterable, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from world_models.building.frame_source import Packet
+from world_models.building.locales import Doorway, Link, Locale
+from world_models.building.memory_frames import extent_of, words_about
+from world_models.building.passages import network, passable
+from world_models.building.things import Fault, Thing
+from world_models.building.world import World
+from world_models.files.compiled.packing import packed, packed_array
+from world_models.files.compiled.schema import FORMAT, INDICES, SCHEMA
+from world_models.files.toml.source import WorldError
+from world_models.frames import Pose
+
+
+def compile_world(layers: Sequence[World], out: Path, details: Sequence[str] = ()) -> None:
+    """Write a world to a file.
+
+    Args:
+        layers: the world as the robot knows it, then with one file of details after the other.
+        out: written anew.
+        details: names of the files of details, in that order.
+
+    Raises:
+        WorldError: the file cannot be written.
+    """
+    partial = out.with_name(out.name + ".partial")
+    try:
+        partial.unlink(missing_ok=True)
+        with closing(sqlite3.connect(partial)) as file:
+            writer = StoreWriter(file, layers[0].name, details)
+            _write(writer, layers)
+        os.replace(partial, out)
+    except (OSError, sqlite3.Error) as error:
+        raise WorldError(f"{out}: expected a file that a world can be compiled to, got: {error}") from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _write(writer: StoreWriter, layers: Sequence[World]) -> None:
+    world = layers[-1]
+    for name in dict.fromkeys(step for each in world.frames.names() for step in world.path_of(each)):
+        writer.add_locale(world.locale(name))
+    for doorway in world.doorways:
+        writer.add_doorway(doorway)
+    for link in world.links:
+        writer.add_link(link)
+    known = 0, 0, 0
+    for layer, built in enumerate(layers):
+        for packet in built.frames.all_packets():
+            writer.add_packet(_beyond(packet, known[0], known[1]), layer)
+        for thing in built.things[known[2] :]:
+            writer.add_thing(thing, layer)
+        counts = built.counts()
+        writer.count(layer, counts)
+        known = counts["face"], counts["landmark"], counts["thing"]
+    writer.finish(layers[-1].building_faults)
+
+
+def _beyond(packet: Packet, faces: int, landmarks: int) -> Packet:
+    """What a packet has that is not in an earlier layer."""
+    return Packet(packet.locale, packet.neighbour, tuple(pair for pair in packet.faces if pair[0] >= faces),
+                  tuple(pair for pair in packet.landmarks if pair[0] >= landmarks))
+
+
+class StoreWriter:
+    """Writes frames as they come; containers before what they contain."""
+
+    def __init__(self, file: sqlite3.Connection, name: str, details: Sequence[str] = ()) -> None:
+        self._file = file
+        self._ids: dict[str, int] = {}
+        self._parents: dict[str, str | None] = {}
+        self._poses: dict[str, Pose] = {}
+        self._passages: list[tuple[str, str, str]] = []
+        self._words: list[tuple[str, int]] = []
+        self._digest = hashlib.sha256()
+        file.executescript("pragma journal_mode = off; pragma synchronous = off; pragma page_size = 4096;" + SCHEMA)
+        self._meta("format", FORMAT)
+        self._meta("name", name)
+        self._meta("details", json.dumps(list(details)))
+
+    def _insert(self, statement: str, row: tuple[Any, ...]) -> None:
+        self._digest.update(repr(row).encode())
+        self._file.execute(statement, row)
+
+    def _meta(self, key: str, value: str) -> None:
+        self._file.execute("insert into meta values (?, ?)", (key, value))
+
+    def add_locale(self, locale: Locale) -> None:
+        """A locale whose container was added before."""
+        number = self._ids[locale.name] = len(self._ids)
+        parent = locale.parent
+        pose = locale.frame if parent is None else self._poses[parent] @ locale.frame
+        self._poses[locale.name], self._parents[locale.name] = pose, parent
+        x0, y0, x1, y1 = (float(v) for v in extent_of(locale, pose))
+        frame = packed_array(np.column_stack([locale.frame.rotation, locale.frame.translation]))
+        self._insert("insert into locale values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 1)", (
+            number, locale.name, locale.kind, None if parent is None else self._ids[parent], frame,
+            packed_array(locale.outline), locale.height_m, locale.floor_m, json.dumps(dict(locale.properties)),
+            locale.survey_m, locale.survey_rad, locale.source))
+        self._file.execute("insert into extent values (?, ?, ?, ?, ?)", (number, x0, x1, y0, y1))
+        self._words += [(word, number) for word in sorted(words_about(locale))]
+
+    def add_doorway(self, doorway: Doorway) -> None:
+        """An open doorway between locales that were added before."""
+        a, b = (self._ids[name] for name in doorway.between)
+        self._passages += passable([doorway])
+        self._insert("insert into doorway (name, a, b, thresholds, height_m, source) values (?, ?, ?, ?, ?, ?)", (
+            doorway.name, a, b, packed_array(doorway.thresholds_world), doorway.height_m, doorway.source))
+
+    def add_link(self, link: Link) -> None:
+        """An elevator or a flight of stairs between locales that were added before."""
+        a, b = (self._ids[name] for name in link.between)
+        self._passages += passable([link])
+        self._insert("insert into link (name, kind, a, b, stops, source) values (?, ?, ?, ?, ?, ?)", (
+            link.name, link.kind, a, b, packed_array(link.stops_world), link.source))
+
+    def add_packet(self, packet: Packet, layer: int = 0) -> None:
+        """Faces and landmarks; empty ones are left out."""
+        if packet.faces or packet.landmarks:
+            self.add_packed(packet.locale, packet.neighbour, *packed(packet), layer)
+
+    def add_packed(self, locale: str, neighbour: str | None, words: str, numbers: bytes, layer: int = 0) -> None:
+        """A packet that is packed already."""
+        self._insert("insert into packet (locale, neighbour, layer, words, numbers) values (?, ?, ?, ?, ?)", (
+            self._ids[locale], None if neighbour is None else self._ids.get(neighbour), layer, words, numbers))
+
+    def add_thing(self, thing: Thing, layer: int = 0) -> None:
+        self._insert(
+            "insert into thing (locale, layer, name, kind, footprint, low_m, high_m, proud_m, source)"
+            " values (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            (self._ids[thing.locale], layer, thing.name, thing.kind, packed_array(thing.footprint_world), thing.low_m,
+             thing.high_m, thing.proud_m, thing.source))
+
+    def count(self, layer: int, counts: object) -> None:
+        """How many of everything there are with so many layers."""
+        self._meta(f"counts {layer}", json.dumps(counts))
+
+    def finish(self, faults: Iterable[Fault] = ()) -> None:
+        """Find the passages of every container, index everything and write it out."""
+        ids = self._ids
+        found = network(self._parents, self._passages)
+        arcs = ((ids[container], arc.passage, *(v for name, part in arc.between for v in (ids[name], part)))
+                for container, several in found.arcs.items() for arc in several)
+        self._file.executemany("insert into arc (container, passage, a, a_part, b, b_part) values (?, ?, ?, ?, ?, ?)",
+                               arcs)
+        self._file.executemany("insert into component values (?, ?, ?)",
+                               ((ids[name], part, above) for (name, part), above in found.components.items() if above))
+        self._file.executemany("insert into word values (?, ?)", self._words)
+        self._meta("sha256", self._digest.hexdigest())
+        self._file.executemany("insert into fault values (?, ?)", ((fault.source, fault.what) for fault in faults))
+        self._file.execute("update locale set leaf = 0 where id in (select parent from locale)")
+        self._file.commit()
+        self._file.executescript(INDICES)

@@ -1,0 +1,1 @@
+"""From what a world file says to surfaces and model lines."""

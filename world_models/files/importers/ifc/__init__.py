@@ -1,0 +1,1 @@
+"""IFC (ISO 16739) building files."""

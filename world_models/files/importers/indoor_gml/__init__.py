@@ -1,0 +1,1 @@
+"""IndoorGML (OGC 14-005) building files."""

@@ -1,0 +1,59 @@
+"""Reading a world: TOML that a person writes (``worlds/research_center.toml`` is annotated), or a compiled file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+from world_models.building.world import World
+from world_models.files.compiled.schema import SUFFIXES
+from world_models.files.compiled.sqlite_frames import SqliteFrames
+from world_models.files.compiled.writer import compile_world
+from world_models.files.construction.builder import build_world
+from world_models.files.toml.drafting import Draft
+from world_models.files.toml.includes import WORLDS, digest_of
+from world_models.files.toml.source import Source, WorldError
+
+__all__ = ["SUFFIXES", "WORLDS", "WorldError", "compile_file", "fingerprint", "load_world", "read_world"]
+
+
+def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[str]] = ()) -> World:
+    """The world described by a TOML file, or in a compiled one, whose frames are then loaded as they are asked for.
+
+    Args:
+        path: the world file.
+        details: further files that add parts, finishes and things (no rooms or doors). A compiled world has them in
+            itself: they must be those that it was compiled with, and only their names matter.
+
+    Raises:
+        WorldError: a file cannot be read or does not describe a world; names file, line, what was expected and came.
+    """
+    path = Path(path)
+    if path.suffix in SUFFIXES:
+        return World(SqliteFrames(path, [Path(detail).stem for detail in details]))
+    return read_world(Source.read(path), [Source.read(Path(detail)) for detail in details])
+
+
+def fingerprint(path: str | PathLike[str]) -> str:
+    """SHA-256 of a world file, or of what a compiled one was made of. Raises OSError or WorldError."""
+    path = Path(path)
+    return SqliteFrames(path).sha256 if path.suffix in SUFFIXES else digest_of(path)
+
+
+def compile_file(path: str | PathLike[str], out: str | PathLike[str],
+                 details: Sequence[str | PathLike[str]] = ()) -> World:
+    """Compile a TOML world with its details; returns the world as it was compiled. Raises WorldError."""
+    base, added = Source.read(Path(path)), [Source.read(Path(detail)) for detail in details]
+    layers = [read_world(base, added[:count]) for count in range(len(added) + 1)]
+    compile_world(layers, Path(out), [Path(detail).stem for detail in details])
+    return layers[-1]
+
+
+def read_world(base: Source, details: Sequence[Source] = ()) -> World:
+    """As :func:`load_world`, from texts already read."""
+    draft = Draft(base)
+    draft.read_base()
+    for source in details:
+        draft.read_details(source)
+    return build_world(draft.blueprint())

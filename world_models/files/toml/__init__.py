@@ -1,0 +1,1 @@
+"""World files and other TOML, with file and line for every fault."""

@@ -1,0 +1,70 @@
+"""The camera file: what ``harvey calibrate`` found out about a camera, as TOML that people may edit."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from world_models.camera import Camera, CameraMount
+from world_models.files.toml.source import Node, Source, WorldError
+
+PINHOLE = ("fx_px", "fy_px", "cx_px", "cy_px")
+SIZE = ("width_px", "height_px")
+
+
+class CameraFileError(WorldError):
+    """A camera file that cannot be read: names the file, the line, what was expected and what came."""
+
+
+def load_camera(path: Path) -> tuple[Camera, CameraMount | None]:
+    """The camera, and how it is mounted where the file says.
+
+    Raises:
+        CameraFileError: the file is missing or malformed.
+    """
+    try:
+        root = Source.read(path).root.table(("camera",), ("mount", "deviation"))
+        mount = root.get("mount")
+        return _camera(root["camera"]), None if mount is None else _mount(mount)
+    except WorldError as error:
+        raise CameraFileError(str(error)) from None
+
+
+def camera_text(camera: Camera, mount: CameraMount | None, notes: tuple[str, ...] = ()) -> str:
+    """The text of a camera file; :func:`load_camera` reads the same numbers back."""
+    values = (camera.fx, camera.fy, camera.cx, camera.cy)
+    lines = [*(f"# {note}".rstrip() for note in notes), "", "[camera]",
+             f"width_px = {camera.width}", f"height_px = {camera.height}",
+             *(f"{key} = {float(value)!r}" for key, value in zip(PINHOLE, values, strict=True))]
+    if camera.distortion is not None:
+        terms = ", ".join(repr(float(k)) for k in camera.distortion)
+        lines.append(f"distortion = [{terms}]  # k1, k2, p1, p2, k3, as OpenCV has them")
+    if mount is not None:
+        lines += ["", "[mount]", f"height_m = {float(mount.height_m)!r}  # optical centre above the floor",
+                  f"forward_m = {float(mount.forward_m)!r}  # ahead of the axis that the robot turns about",
+                  f"tilt_deg = {math.degrees(mount.tilt_rad)!r}  # downward"]
+    return "\n".join(lines).lstrip("\n") + "\n"
+
+
+def _camera(node: Node) -> Camera:
+    node.table((*SIZE, *PINHOLE), ("distortion",))
+    width, height = (_whole(node[key]) for key in SIZE)
+    fx, fy = (node[key].number(1.0, 1e6) for key in PINHOLE[:2])
+    cx, cy = (node[key].number(-1e5, 1e5) for key in PINHOLE[2:])
+    distortion = node.get("distortion")
+    terms = None if distortion is None else distortion.numbers((4, 5), -1e3, 1e3)
+    return Camera(fx, fy, cx, cy, width, height, terms)
+
+
+def _mount(node: Node) -> CameraMount:
+    node.table(("height_m",), ("forward_m", "tilt_deg"))
+    forward = node["forward_m"].number(-10.0, 10.0) if "forward_m" in node else 0.0
+    tilt = node["tilt_deg"].number(-89.0, 89.0) if "tilt_deg" in node else 0.0
+    return CameraMount(node["height_m"].number(0.01, 10.0), forward, math.radians(tilt))
+
+
+def _whole(node: Node) -> int:
+    value = node.number(2, 16384)
+    if value != int(value):
+        raise node.fail("a whole number of pixels")
+    return int(value)

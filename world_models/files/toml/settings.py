@@ -1,0 +1,109 @@
+"""Typed settings: tables of a scenario file read into frozen dataclasses, with units in the keys.
+
+A field ``height_m`` may be written ``height_m``, ``height_ft`` or ``height_in``; ``tilt_rad`` also ``tilt_deg``.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from typing import Any, TypeVar, get_type_hints
+
+from world_models.bounds import OutOfBoundsError
+from world_models.files.toml.source import Node, WorldError
+from world_models.units import FOOT_M, INCH_M
+
+T = TypeVar("T")
+MOST = 10**9
+"""No setting is larger."""
+
+
+def spellings(field: str) -> dict[str, float]:
+    """The keys under which a field may be written, each with the factor to SI."""
+    out = {field: 1.0}
+    if "_rad" in field:
+        out[field.replace("_rad", "_deg")] = math.pi / 180.0
+    if field.endswith("_m") and not field.endswith("_per_m"):
+        out |= {field[:-1] + "ft": FOOT_M, field[:-1] + "in": INCH_M}
+    return out
+
+
+def known_keys(kind: type[Any]) -> dict[str, tuple[str, float]]:
+    """Every key that a settings class understands: its field and the factor to SI."""
+    return {key: (f.name, factor) for f in fields(kind) for key, factor in spellings(f.name).items()}
+
+
+def read_settings(node: Node, kind: type[T]) -> T:
+    """A table as a settings object; what is not written keeps its default.
+
+    Raises:
+        WorldError: unknown key, wrong type, or values that do not go together.
+    """
+    known = known_keys(kind)
+    hints = get_type_hints(kind)
+    values: dict[str, Any] = {}
+    written: dict[str, str] = {}
+    for key, item in node.entries():
+        if key not in known:
+            raise item.fail(f"{near(key, known)}", f"the key {key!r}")
+        name, factor = known[key]
+        if name in values:
+            raise item.fail(f"only one of {written[name]} and {key}", "both")
+        values[name], written[name] = _value(item, hints[name], factor), key
+    try:
+        return kind(**values)
+    except WorldError:
+        raise
+    except OutOfBoundsError as error:
+        key = written[error.key]
+        number = "a whole number" if hints[error.key] is int else "a number"
+        raise node[key].fail(f"{number} {error.bounds.words(known[key][1])}") from None
+    except (TypeError, ValueError) as error:
+        raise WorldError(f"{node.where}: {'.'.join(map(str, node.key))}: {error}") from None
+
+
+def _value(item: Node, hint: Any, factor: float) -> Any:
+    if hint is bool:
+        return item.flag()
+    if hint is str:
+        return item.text()
+    if hint is int:
+        if isinstance(item.value, bool) or not isinstance(item.value, int):
+            raise item.fail("a whole number")
+        if abs(item.value) > MOST:
+            raise item.fail(f"a whole number from {-MOST} to {MOST}")
+        return item.value
+    if hint == tuple[float, ...]:
+        return tuple(number.number(-MOST, MOST) for number in item.items())
+    return item.number(-MOST, MOST) * factor
+
+
+FEW = 12
+"""So many keys are named where none is similar."""
+
+
+def near(key: str, known: Iterable[str]) -> str:
+    """What to say was expected instead of an unknown key: the most similar ones, or all, or how many there are."""
+    names = list(known)
+    alike = difflib.get_close_matches(key, names, n=4, cutoff=0.5) or names[:FEW]
+    return "one of " + ", ".join(alike) + (f" ... ({len(names)} in all)" if len(names) > len(alike) == FEW else "")
+
+
+def parsed(text: str) -> Any:
+    """The value of a ``--set key=value``: on/off, a TOML value, or else the text itself."""
+    if text.lower() in ("on", "off"):
+        return text.lower() == "on"
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        return text
+
+
+def merged(data: Mapping[str, Any], path: tuple[str, ...], value: Any) -> dict[str, Any]:
+    """A copy of nested tables with the value at ``path`` replaced or added."""
+    head, rest = path[0], path[1:]
+    inner = data.get(head, {})
+    return {**data, head: merged(inner if isinstance(inner, Mapping) else {}, rest, value) if rest else value}

@@ -1,0 +1,1 @@
+"""What of the building a camera sees."""

@@ -1,0 +1,261 @@
+"""Which model lines and corners a camera sees: exact hidden-line removal by shadow volumes.
+
+Seen from the optical centre, a convex one-sided surface hides what lies in its shadow: beyond its plane and within the
+pyramid of its sides. Each of these bounds is linear in a point, so that the hidden part of a segment is an interval,
+computed for all pairs of lines and surfaces at once (:mod:`world_models.visibility.shadows`). Locales that no chain of
+doorways opens to the camera are left out beforehand (§3.4: the locale network as a focusing mechanism).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.building.scene import Scene
+from world_models.camera import NEAR_M, Camera
+from world_models.frames import Pose
+from world_models.visibility.portals import Window, image_window, windows_of
+from world_models.visibility.shadows import (
+    SHORTEST_PIECE,
+    Shadows,
+    clipped_spans,
+    hidden_points,
+    lengths_px,
+    overlap,
+    pieces,
+    rectangles,
+    shadows_of,
+    visible_spans,
+)
+
+if TYPE_CHECKING:
+    from world_models.building.world import World
+
+Floats = NDArray[np.float64]
+
+KEPT_VIEWS = 16
+"""How many views are kept: as many as a sketch has milestones, or a milestone directions."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class VisibleLines:
+    """The visible pieces of model lines.
+
+    Attributes:
+        segments_px: (n, 2, 2) where they are seen.
+        lines_world: (n, 2, 3) the pieces that are seen [m].
+        landmark, line: (n,) which line (``world.landmarks[landmark].lines_world[line]``).
+        contrast: (n,) the brightness step across it that the model expects, 0..1.
+    """
+
+    segments_px: Floats
+    lines_world: Floats
+    landmark: NDArray[np.int64]
+    line: NDArray[np.int64]
+    contrast: Floats
+
+    def __len__(self) -> int:
+        return len(self.segments_px)
+
+    def __getitem__(self, keep: Any) -> VisibleLines:
+        """Some of them, by mask or index array."""
+        return VisibleLines(self.segments_px[keep], self.lines_world[keep], self.landmark[keep], self.line[keep],
+                            self.contrast[keep])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class VisiblePoints:
+    """The visible corners of landmarks.
+
+    Attributes:
+        points_px: (n, 2) where they are seen.
+        points_world: (n, 3) [m].
+        landmark, point: (n,) which corner (``world.landmarks[landmark].points_world[point]``).
+        contrast: (n,) the second strongest brightness step among the lines that meet there, 0..1.
+    """
+
+    points_px: Floats
+    points_world: Floats
+    landmark: NDArray[np.int64]
+    point: NDArray[np.int64]
+    contrast: Floats
+
+    def __len__(self) -> int:
+        return len(self.points_px)
+
+    def __getitem__(self, keep: Any) -> VisiblePoints:
+        """Some of them, by mask or index array."""
+        return VisiblePoints(self.points_px[keep], self.points_world[keep], self.landmark[keep], self.point[keep],
+                             self.contrast[keep])
+
+
+def visible_lines(
+    world: World,
+    camera: Camera,
+    camera_from_world: Pose,
+    *,
+    locales: Collection[str] | None = None,
+    min_length_px: float = 6.0,
+    min_contrast: float = 0.02,
+    min_separation_px: float = 2.0,
+    max_distance_m: float = 40.0,
+) -> VisibleLines:
+    """The pieces of model lines that the camera sees, hidden lines removed, clipped to the image.
+
+    Args:
+        locales: only lines of landmarks in these (all: ``None``); things elsewhere still hide them.
+        min_length_px: shorter pieces are left out.
+        min_contrast: fainter lines are left out.
+        min_separation_px: of lines that fall together within this in the image only the strongest is kept
+            (0: keep all).
+        max_distance_m: pieces that begin further away are left out.
+
+    The same question, asked again soon, has its answer at hand: a view is judged before it is chosen, and chosen again
+    for the sketch above.
+    """
+    wanted = None if locales is None else tuple(sorted(locales))
+    key = (camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes(), wanted,
+           min_length_px, min_contrast, min_separation_px, max_distance_m)
+    return world.remembered(
+        "visible lines", KEPT_VIEWS, key,
+        lambda: _visible_lines(world, camera, camera_from_world, locales, min_length_px, min_contrast,
+                               min_separation_px, max_distance_m))
+
+
+def _visible_lines(
+    world: World, camera: Camera, camera_from_world: Pose, locales: Collection[str] | None, min_length_px: float,
+    min_contrast: float, min_separation_px: float, max_distance_m: float,
+) -> VisibleLines:
+    view = _View(world, camera, camera_from_world)
+    scene = view.scene
+    contrast = scene.edges.contrasts(camera_from_world.inverse().translation)
+    index = np.flatnonzero(_named(scene, scene.line_locales, locales) & (contrast >= min_contrast))
+    lines = camera_from_world.apply(scene.edges.lines_world[index]).reshape(-1, 2, 3)
+    span = clipped_spans(lines, view.window)
+    ahead = np.flatnonzero(span[:, 1] - span[:, 0] > SHORTEST_PIECE)
+    index, lines = index[ahead], pieces(lines[ahead], span[ahead])
+    keep = lengths_px(camera.project(lines)) >= min_length_px
+    keep[keep] &= np.linalg.norm(lines[keep], axis=2).min(axis=1) < max_distance_m
+    keep[keep] &= overlap(rectangles(lines[keep]), view.windows_for(scene.line_locales[index[keep]]))
+    index, lines = index[keep], lines[keep]
+    owner, span = visible_spans(lines, view.shadows())
+    index, lines = index[owner], pieces(lines[owner], span)
+    segments = camera.project(lines)
+    found = VisibleLines(segments, camera_from_world.inverse().apply(lines), scene.line_landmark[index],
+                         scene.line_index[index], contrast[index])
+    found = found[lengths_px(segments) >= min_length_px]
+    if min_separation_px > 0:
+        found = found[_distinct(found, min_separation_px)]
+    return found if camera.obstruction is None else found[camera.obstruction.shows(found.segments_px)]
+
+
+def visible_points(
+    world: World,
+    camera: Camera,
+    camera_from_world: Pose,
+    *,
+    locales: Collection[str] | None = None,
+    min_contrast: float = 0.02,
+    margin_px: float = 0.0,
+    max_distance_m: float = 40.0,
+) -> VisiblePoints:
+    """The landmark corners that the camera sees, at least ``margin_px`` from the border of the image.
+
+    A corner shows where at least two model lines with ``min_contrast`` meet; see :func:`visible_lines` for the rest.
+    """
+    view = _View(world, camera, camera_from_world)
+    scene = view.scene
+    centre = camera_from_world.inverse().translation
+    steps = np.append(scene.edges.contrasts(centre), 0.0)[scene.corner_lines]
+    contrast = np.sort(steps, axis=1)[:, -2]
+    near = np.linalg.norm(scene.corners_world - centre, axis=1) < max_distance_m
+    index = np.flatnonzero(_named(scene, scene.corner_locales, locales) & near & (contrast >= min_contrast))
+    points = camera_from_world.apply(scene.corners_world[index]).reshape(-1, 3)
+    ahead = points[:, 2] > NEAR_M
+    index, points = index[ahead], points[ahead]
+    pixels = camera.project(points)
+    keep = camera.inside(pixels, margin_px)
+    keep[keep] &= ~hidden_points(points[keep], view.shadows())
+    if camera.obstruction is not None:
+        keep[keep] &= ~camera.obstruction.covers(pixels[keep])
+    index = index[keep]
+    return VisiblePoints(pixels[keep], scene.corners_world[index], scene.corner_landmark[index],
+                         scene.corner_index[index], contrast[index])
+
+
+def hidden(world: World, camera: Camera, camera_from_world: Pose, points_world: Any) -> NDArray[np.bool_]:
+    """(n,) which of the points (n, 3) before the camera lie behind something, as the model has it."""
+    return hidden_points(camera_from_world.apply(points_world), _View(world, camera, camera_from_world).shadows())
+
+
+class _View:
+    """What one camera pose opens to the eye."""
+
+    def __init__(self, world: World, camera: Camera, camera_from_world: Pose) -> None:
+        self.camera_from_world = camera_from_world
+        self.window = _image_window(world, camera)
+        seen = windows_of(world, self.window, camera_from_world)
+        self.scene: Scene = world.scene_of(seen)
+        nowhere: Window = (np.inf, np.inf, -np.inf, -np.inf)
+        self.windows = np.array([seen.get(name, nowhere) for name in self.scene.locales]).reshape(-1, 4)
+
+    def windows_for(self, locales: NDArray[np.int64]) -> Floats:
+        """(n, 4) the rectangle through which each element, in one or the other of two locales, can be seen."""
+        one, other = self.windows[locales[:, 0]], self.windows[locales[:, 1]]
+        return np.concatenate([np.minimum(one[:, :2], other[:, :2]), np.maximum(one[:, 2:], other[:, 2:])], axis=1)
+
+    def shadows(self) -> Shadows:
+        scene, pose = self.scene, self.camera_from_world
+        centre = pose.inverse().translation
+        facing = scene.planes_world[:, :3] @ centre - scene.planes_world[:, 3] > 1e-6
+        index = np.flatnonzero(facing)
+        depths = scene.polygons_world[index] @ pose.rotation[2]
+        index = index[depths.max(axis=1, initial=-np.inf) + pose.translation[2] > NEAR_M]
+        polygons = pose.apply(scene.polygons_world[index])
+        windows = rectangles(polygons)
+        keep = overlap(windows, self.windows_for(scene.surface_locales[index]))
+        index, polygons, windows = index[keep], polygons[keep], windows[keep]
+        planes = np.column_stack([scene.planes_world[index, :3] @ pose.rotation.T, scene.planes_world[index, 3]])
+        planes[:, 3] += planes[:, :3] @ pose.translation
+        return shadows_of(polygons, planes, windows)
+
+
+def _image_window(world: World, camera: Camera) -> Window:
+    """As :func:`image_window`, worked out once for a world and camera."""
+    known: list[tuple[Camera, Window]] = world.memo.setdefault("image windows", [])
+    for other, window in known:
+        if other is camera:
+            return window
+    known[:] = [(camera, image_window(camera)), *known[:3]]
+    return known[0][1]
+
+
+def _named(scene: Scene, rooms: NDArray[np.int64], locales: Collection[str] | None) -> Any:
+    """(n,) whether one of the two locales (n, 2) of each element is among those asked for."""
+    if locales is None:
+        return True
+    return np.array([name in locales for name in scene.locales], bool)[rooms].any(axis=1)
+
+
+def _distinct(lines: VisibleLines, separation_px: float) -> NDArray[np.int64]:
+    """Which lines to keep, in order: none that lies for half its length within the separation of a stronger one."""
+    (ax, ay), (bx, by) = lines.segments_px[:, 0].T, lines.segments_px[:, 1].T
+    length = np.hypot(bx - ax, by - ay)
+    ux, uy = ((bx - ax) / length)[:, None], ((by - ay) / length)[:, None]
+    along, off = [], []
+    for x, y in ((ax, ay), (bx, by)):
+        dx, dy = x - ax[:, None], y - ay[:, None]
+        along.append(dx * ux + dy * uy)
+        off.append(np.abs(dx * uy - dy * ux))
+    shared = np.minimum(np.maximum(*along), length[:, None]) - np.maximum(np.minimum(*along), 0.0)
+    covers = (np.maximum(*off) < separation_px) & (shared > 0.5 * length)
+    kept, covered = [], np.zeros(len(lines), bool)
+    for i in np.argsort(-lines.contrast, kind="stable").tolist():
+        if not covered[i]:
+            kept.append(i)
+            covered |= covers[i]
+    return np.array(sorted(kept), np.int64)
