@@ -1,6 +1,6 @@
 """One number of a method: its default, its unit, what it is and where it comes from.
 
-Each room has a ``settings.py`` with one frozen dataclass of such numbers. ``harvey settings`` prints them all, and
+Each room has one frozen dataclass of such numbers in this folder. ``harvey settings`` prints them all, and
 ``--set ROOM.NAME=VALUE`` replaces one.
 """
 
