@@ -5,7 +5,7 @@ A function takes the settings of its own room, or :class:`Settings` where it als
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from knowledge_sources.settings.action import ActionSettings
 from knowledge_sources.settings.calibration import CalibrationSettings
@@ -24,17 +24,17 @@ from knowledge_sources.settings.verification import VerificationSettings
 class Settings:
     """The settings of all rooms."""
 
-    features: FeaturesSettings = FeaturesSettings()
-    pose: PoseSettings = PoseSettings()
-    matching: MatchingSettings = MatchingSettings()
-    verification: VerificationSettings = VerificationSettings()
-    localization: LocalizationSettings = LocalizationSettings()
-    tracking: TrackingSettings = TrackingSettings()
-    motion: MotionSettings = MotionSettings()
-    calibration: CalibrationSettings = CalibrationSettings()
-    action: ActionSettings = ActionSettings()
-    plan: PlanSettings = PlanSettings()
-    goal: GoalSettings = GoalSettings()
+    features: FeaturesSettings = field(default_factory=FeaturesSettings)
+    pose: PoseSettings = field(default_factory=PoseSettings)
+    matching: MatchingSettings = field(default_factory=MatchingSettings)
+    verification: VerificationSettings = field(default_factory=VerificationSettings)
+    localization: LocalizationSettings = field(default_factory=LocalizationSettings)
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
+    motion: MotionSettings = field(default_factory=MotionSettings)
+    calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
+    action: ActionSettings = field(default_factory=ActionSettings)
+    plan: PlanSettings = field(default_factory=PlanSettings)
+    goal: GoalSettings = field(default_factory=GoalSettings)
 
 
 DEFAULT = Settings()
