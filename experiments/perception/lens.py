@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from experiments.report import Cell, Report
 from knowledge_sources.methods.features.images import decode
 from knowledge_sources.methods.features.lines import find_lines
-from knowledge_sources.methods.features.rectification import Rectified
+from knowledge_sources.methods.features.rectification import Rectifier
 from sim.made_up.box_room import Patch, PatchFace
 from sim.render.optics import Optics
 from sim.render.renderer import Renderer
@@ -67,14 +67,14 @@ def run(quick: bool, seed: int) -> Report:
 def _measured(lens: Camera, way: str, rng: np.random.Generator, cards: int) -> Floats:
     """Part of the edges found, pieces an edge, RMS error [px]."""
     optics, pinhole = Optics.of(lens), lens.pinhole
-    rectified = Rectified(lens, pinhole)
+    rectified = Rectifier(lens, pinhole)
     covered, length, pieces = 0.0, 0.0, 0
     errors: list[Floats] = []
     for _ in range(cards):
         renderer, corners = _card(rng)
         radiance = optics.radiance(renderer, Pose.identity())
         raw = decode(compressed(exposed(radiance, SensorParameters(), rng), 92))
-        segments = find_lines(raw if way == "ends" else rectified.image(raw)).segments_px
+        segments = find_lines(raw if way == "ends" else rectified.rectify(raw)).segments_px
         if way == "ends":
             segments = pinhole.project(lens.rays(segments))
         for edge in range(4):

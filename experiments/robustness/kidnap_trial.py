@@ -21,7 +21,7 @@ from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.goal.relocalizer import Relocalizer
 from knowledge_sources.methods.localization.visibility_map import vantage_of
-from knowledge_sources.methods.motion.routes import free_space
+from knowledge_sources.methods.motion.routes import compute_free_space
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.tolerances import PLAN_PX
 from sim.body.faulty_body import FaultyBody
@@ -182,7 +182,7 @@ def _drawn(trial: Kidnap, floor: Floor) -> tuple[str, Pose2, Place]:
 
 def _anywhere(world: World, rooms: tuple[str, ...], rng: np.random.Generator) -> tuple[str, Pose2]:
     """A free place, every square metre being as likely as any other, with any heading."""
-    free = [free_space(world.outline(name), world.obstacles(name), ROOM_M) for name in rooms]
+    free = [compute_free_space(world.outline(name), world.obstacles(name), ROOM_M) for name in rooms]
     areas = np.array([space.area for space in free])
     number = int(rng.choice(len(rooms), p=areas / areas.sum()))
     x0, y0, x1, y1 = (float(v) for v in free[number].bounds)

@@ -65,7 +65,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     from harvey.hardware.calibration import boards_in, calibrated, grey_of, mounted, report
     from knowledge_sources.methods.calibration.chessboard import Pattern
-    from knowledge_sources.methods.calibration.picture import calibration_picture
+    from knowledge_sources.methods.calibration.picture import draw_calibration
     from world_models.files.toml.camera_file import camera_text
 
     board = _checked(args)
@@ -83,7 +83,7 @@ def _run(args: Namespace) -> int:
         found, mount = mounted(calibration, place, pattern, board)
     lines = report(calibration, boards, found, board)
     _write(args.out, camera_text(calibration.camera, mount, _notes(calibration, args)), lines,
-           calibration_picture(calibration, boards.shown))
+           draw_calibration(calibration, boards.shown))
     print("\n".join(lines))
     return 0
 

@@ -15,7 +15,7 @@ from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamer
 from harvey.units import count
 from knowledge_sources.methods.calibration.chessboard import Pattern, find_corners
 from knowledge_sources.methods.calibration.intrinsics import PARAMETERS, BoardView, Calibration, calibrate
-from knowledge_sources.methods.calibration.mounting import Mounting, mounting
+from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
 from knowledge_sources.methods.features.images import decode
 from world_models.camera import CameraMount
 
@@ -133,7 +133,7 @@ def mounted(calibration: Calibration, grey: Grey, pattern: Pattern, board: Mount
         raise BadInput(f"the picture of the mounting: expected {camera.width} x {camera.height} px, as the others, got "
                        f"{grey.shape[1]} x {grey.shape[0]}")
     try:
-        found = mounting(calibration, corners, pattern, standing_at_m=board.standing_at_m)
+        found = estimate_mounting(calibration, corners, pattern, standing_at_m=board.standing_at_m)
     except ValueError as error:
         raise BadInput(f"the picture of the mounting: {error}") from None
     forward = board.camera_ahead_m or 0.0

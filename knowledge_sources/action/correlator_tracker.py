@@ -22,9 +22,17 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.features.correlation import Template, extract_template
-from knowledge_sources.methods.features.rectification import Rectified
-from knowledge_sources.methods.tracking.edge_alignment import aligned
-from knowledge_sources.methods.tracking.tracking import HALF_PX, TRACKS, Followed, Image, begin, correct, follow
+from knowledge_sources.methods.features.rectification import Rectifier
+from knowledge_sources.methods.tracking.edge_alignment import align_to_edges
+from knowledge_sources.methods.tracking.template_tracking import (
+    HALF_PX,
+    TRACKS,
+    Image,
+    TrackUpdate,
+    correct_pose,
+    follow_landmarks,
+    select_landmarks,
+)
 from knowledge_sources.questions import held, open_discrepancy, standing_in, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.tolerances import PLAN_PX, action_px
@@ -81,7 +89,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
 
     def __init__(self, robot: RobotModel) -> None:
         super().__init__(robot)
-        self._picture = Rectified(robot.lens, robot.camera)
+        self._picture = Rectifier(robot.lens, robot.camera)
         self._template = lru_cache(maxsize=4 * TRACKS)(self._cut)
 
     def rate(self, view: View, trigger: Change) -> float | None:
@@ -151,11 +159,11 @@ class CorrelatorTracker(RobotKnowledgeSource):
         told = drift.value.learnt(self._robot.actuator, heading, math.sqrt(2.0) * belief.sigma_rad)
         yield Revise(drift, told, (drift, correction))
 
-    def _followed(self, view: View, tracks: Tracks | None, image: Image, belief: Hypothesis) -> list[Followed]:
+    def _followed(self, view: View, tracks: Tracks | None, image: Image, belief: Hypothesis) -> list[TrackUpdate]:
         if tracks is None:
             return []
         world = self._robot.world
-        return follow(standing_in(view, self._robot, belief.locale), tracks.items,
+        return follow_landmarks(standing_in(view, self._robot, belief.locale), tracks.items,
                       lambda track: self._template(view[track.template_frame].value.jpeg, track.template_px), image,
                       belief.world_from_robot(world), belief.covariance_world(world))
 
@@ -166,7 +174,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
     def _corrected(self, belief: Hypothesis, seen: list[Track], anchors: tuple[Anchor, ...]) -> Corrected:
         """The belief after the landmarks were found."""
         world = self._robot.world
-        pose, covariance, agreeing = correct(
+        pose, covariance, agreeing = correct_pose(
             self._robot.standing_in(belief.locale), seen, anchors, belief.world_from_robot(world),
             belief.covariance_world(world),
         )
@@ -186,11 +194,11 @@ class CorrelatorTracker(RobotKnowledgeSource):
             world, robot.camera, robot.camera_from_world(pose), min_length_px=LENGTH_PX, min_contrast=CONTRAST,
             max_distance_m=15.0,
         )
-        found = aligned(robot, image, lines.lines_world, pose, belief.covariance_world(world))
+        found = align_to_edges(robot, image, lines.lines_world, pose, belief.covariance_world(world))
         if found is not None:
             pose = found.world_from_robot
             belief = Hypothesis.of_world(world, belief.locale, pose, found.covariance, "tracks", motion=belief.motion)
-        items = (*kept, *begin(robot, kept, frame.id, image, pose))
+        items = (*kept, *select_landmarks(robot, kept, frame.id, image, pose))
         return Renewed(self._anchored(items, anchors, frame, belief, len(items)), belief)
 
     def _near(self, anchors: tuple[Anchor, ...], belief: Hypothesis) -> frozenset[str]:

@@ -12,7 +12,13 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.methods.motion.pure_pursuit import aim, as_seen, bearing, chord_turn, progress
+from knowledge_sources.methods.motion.pure_pursuit import (
+    compute_bearing,
+    compute_chord_turn,
+    find_aim_point,
+    measure_progress,
+    update_leg,
+)
 from knowledge_sources.questions import (
     deepest_sketch,
     held,
@@ -114,7 +120,7 @@ class Motor(RobotKnowledgeSource):
         here = belief.value.world_from_robot(self._robot.world)
         drift = view.latest(Drift)
         command = self._next(leg.value, here, 0.0 if drift is None else drift.value.curvature_per_m)
-        seen = as_seen(leg.value, here, _aim(leg.value, here))
+        seen = update_leg(leg.value, here, _aim(leg.value, here))
         discrepancy = open_discrepancy(view, Level.ACTION)
         corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
         yield from corrected
@@ -127,16 +133,16 @@ class Motor(RobotKnowledgeSource):
 
     def _next(self, leg: Leg, here: Pose2, curvature_per_m: float) -> MotorCommand | None:
         """The next increment; None on arrival. It is an arc, whose chord is to lie in the direction to be gone."""
-        along, left = progress(leg, here)
+        along, left = measure_progress(leg, here)
         away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
         if away <= leg.tolerance_m * 0.8 or (along <= 0.0 and abs(left) <= leg.tolerance_m * 0.8):
             return self._final_turn(leg, here)
-        turn = bearing(_aim(leg, here), here)
+        turn = compute_bearing(_aim(leg, here), here)
         if abs(turn) > FACING_RAD:
             return MotorCommand(self._bounded(turn), 0.0)
         actuator = self._robot.actuator
         distance = min(actuator.increment_m, actuator.commanded_m(away))
-        turn = chord_turn(turn, curvature_per_m, actuator.reach * distance)
+        turn = compute_chord_turn(turn, curvature_per_m, actuator.reach * distance)
         return MotorCommand(turn if abs(turn) > AIM_RAD / 10 else 0.0, distance)
 
     def _final_turn(self, leg: Leg, here: Pose2) -> MotorCommand | None:
@@ -168,5 +174,5 @@ def _leg_wanted(view: View) -> Entry[PlanSketch] | None:
 
 def _aim(leg: Leg, here: Pose2) -> tuple[float, float]:
     """The point of the line to steer at [m, world]: its end, once that is near."""
-    along, _ = progress(leg, here)
-    return (leg.x1_m, leg.y1_m) if along < CREEP_M else aim(leg, along, LOOKAHEAD_M)
+    along, _ = measure_progress(leg, here)
+    return (leg.x1_m, leg.y1_m) if along < CREEP_M else find_aim_point(leg, along, LOOKAHEAD_M)

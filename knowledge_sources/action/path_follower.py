@@ -12,7 +12,13 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.methods.motion.pure_pursuit import aim, as_seen, bearing, curvature_to, progress
+from knowledge_sources.methods.motion.pure_pursuit import (
+    compute_bearing,
+    compute_curvature_to,
+    find_aim_point,
+    measure_progress,
+    update_leg,
+)
 from knowledge_sources.questions import (
     held,
     is_heard,
@@ -81,15 +87,15 @@ class PathFollower(RobotKnowledgeSource):
     ) -> Iterable[Effect]:
         """The arc to the point of the line ahead, less what the wheels bend it by themselves."""
         here, drift = belief.value.world_from_robot(self._robot.world), view.latest(Drift)
-        along, _ = progress(leg.value, here)
-        point = aim(leg.value, along, LOOKAHEAD_M)
+        along, _ = measure_progress(leg.value, here)
+        point = find_aim_point(leg.value, along, LOOKAHEAD_M)
         discrepancy = open_discrepancy(view, Level.ACTION)
         corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
         yield from corrected
-        seen = as_seen(leg.value, here, point)
+        seen = update_leg(leg.value, here, point)
         step = Revise(leg, replace(seen, increments=seen.increments + (course is None)), (leg, belief, *corrected))
         yield step
-        wanted = curvature_to(point, here) - (0.0 if drift is None else drift.value.curvature_per_m)
+        wanted = compute_curvature_to(point, here) - (0.0 if drift is None else drift.value.curvature_per_m)
         curvature = min(max(wanted, -SHARPEST_PER_M), SHARPEST_PER_M)
         told = Course(leg.id, self._robot.actuator.speed_m_per_s, curvature)
         because = (step, belief, *(() if drift is None else (drift,)))
@@ -114,12 +120,12 @@ class PathFollower(RobotKnowledgeSource):
 
     def _is_worth_it(self, leg: Leg, here: Pose2) -> bool:
         """Whether there is way enough to come to a stand before the end of the leg."""
-        return progress(leg, here)[0] > self._robot.actuator.stopping_m() + ROLL_M
+        return measure_progress(leg, here)[0] > self._robot.actuator.stopping_m() + ROLL_M
 
 
 def _off(leg: Leg, here: Pose2) -> float:
     """How far to the left of the robot's heading the point lies that it steers at [rad]."""
-    return bearing(aim(leg, progress(leg, here)[0], LOOKAHEAD_M), here)
+    return compute_bearing(find_aim_point(leg, measure_progress(leg, here)[0], LOOKAHEAD_M), here)
 
 
 def _reasons(view: View) -> tuple[Entry[Discrepancy], ...]:

@@ -8,9 +8,9 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
-from knowledge_sources.methods.features.images import mean_and_spread
+from knowledge_sources.methods.features.images import compute_mean_and_deviation
 from knowledge_sources.methods.features.lines import find_lines
-from knowledge_sources.methods.features.rectification import Rectified
+from knowledge_sources.methods.features.rectification import Rectifier
 from knowledge_sources.questions import open_milestone
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Frame
@@ -34,7 +34,7 @@ class LineFinder(RobotKnowledgeSource):
 
     def __init__(self, robot: RobotModel) -> None:
         super().__init__(robot)
-        self._picture = Rectified(robot.lens, robot.camera)
+        self._picture = Rectifier(robot.lens, robot.camera)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         return 0.8
@@ -43,7 +43,7 @@ class LineFinder(RobotKnowledgeSource):
         frame = trigger.entry
         image = self._picture(frame.value.jpeg)
         found = find_lines(image, min_length_px=LEAST_LENGTH_PX)
-        brightness, contrast = mean_and_spread(image)
+        brightness, contrast = compute_mean_and_deviation(image)
         waiting = open_milestone(view) if frame.value.purpose == "milestone" else None
         yield Post(
             Segments(

@@ -16,8 +16,13 @@ from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.methods.motion.clearance import thing_distance_m, wall_distance_m
-from knowledge_sources.methods.motion.routes import free_space, is_clear, shortest_route
+from knowledge_sources.methods.motion.routes import (
+    compute_free_space,
+    find_shortest_route,
+    is_clear,
+    measure_thing_distance_m,
+    measure_wall_distance_m,
+)
 from knowledge_sources.questions import held
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.locales import Link, Passage
@@ -133,8 +138,9 @@ class Sketcher(RobotKnowledgeSource):
             return f"is not within {name}"
         point = there.in_world(world).position
         openings = [np.concatenate(doorway.thresholds_world) for doorway in world.doorways_of(name)]
-        near = [(wall_distance_m(world.outline(name), openings, point), "a wall")]
-        near += [(thing_distance_m(t.footprint_world, point), t.name) for t in world.things_of(name) if t.in_the_way]
+        near = [(measure_wall_distance_m(world.outline(name), openings, point), "a wall")]
+        near += [(measure_thing_distance_m(t.footprint_world, point), t.name)
+                 for t in world.things_of(name) if t.in_the_way]
         distance_m, what = min(near)
         radius_m, margin_m = self._robot.radius_m, CLEARANCES_M[-1]
         if distance_m >= radius_m + margin_m:
@@ -251,7 +257,7 @@ class Sketcher(RobotKnowledgeSource):
             return self._free(locale, -self._robot.radius_m)
 
         for clearance in CLEARANCES_M:
-            route = shortest_route(self._free(locale, clearance), here.position, there.position, floor)
+            route = find_shortest_route(self._free(locale, clearance), here.position, there.position, floor)
             if route is not None:
                 break
         else:
@@ -267,7 +273,7 @@ class Sketcher(RobotKnowledgeSource):
     def _free(self, locale: str, margin_m: float) -> Geometry:
         if (locale, margin_m) not in self._frees:
             clearance = self._robot.radius_m + margin_m
-            self._frees[locale, margin_m] = free_space(
+            self._frees[locale, margin_m] = compute_free_space(
                 self._world.outline(locale), self._world.obstacles(locale), clearance)
         return self._frees[locale, margin_m]
 

@@ -47,7 +47,7 @@ class Mounting:
         return np.sqrt(np.diag(self.covariance))
 
 
-def mounting(
+def estimate_mounting(
     calibration: Calibration, corners_px: Floats, pattern: Pattern, *, standing_at_m: float | None = None
 ) -> Mounting:
     """The mounting, from one view of a board.

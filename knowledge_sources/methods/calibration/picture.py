@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.calibration.intrinsics import Calibration
-from knowledge_sources.methods.features.rectification import Rectified
+from knowledge_sources.methods.features.rectification import Rectifier
 
 SIDE_PX = 560
 """Width of each of the three parts."""
@@ -20,10 +20,10 @@ INK, GRID, SEEN, OFF = (40, 40, 40), (225, 225, 225), (160, 120, 40), (40, 40, 2
 Image = NDArray[np.uint8]
 
 
-def calibration_picture(calibration: Calibration, grey: NDArray[np.uint8]) -> bytes:
+def draw_calibration(calibration: Calibration, grey: NDArray[np.uint8]) -> bytes:
     """PNG bytes: corners of all views with their errors; one view (h, w) as it came; the same one straightened."""
     camera = calibration.camera
-    straight = Rectified(camera, camera.pinhole).image(np.ascontiguousarray(grey))
+    straight = Rectifier(camera, camera.pinhole).rectify(np.ascontiguousarray(grey))
     rms, views = calibration.rms_px, len(calibration.views)
     scale = RESIDUAL_PX / max(rms, 1e-6)
     parts = (

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.features import correlation_kernels as kernels
 from knowledge_sources.methods.features.correlation_peak import LOBE_PX, located, second_best
-from knowledge_sources.methods.features.images import checked_grey, noise_sigma
+from knowledge_sources.methods.features.images import estimate_noise_sigma, require_grey
 
 _MARGIN_PX = 4
 
@@ -84,17 +84,17 @@ def extract_template(image: Any, centre_px: Any, half_px: int = 12) -> Template:
         ValueError: the patch does not lie in the image, or half_px < 2.
     """
     window, centre = _cut_out(image, centre_px, half_px)
-    return Template(window, centre, int(half_px), noise_sigma(window))
+    return Template(window, centre, int(half_px), estimate_noise_sigma(window))
 
 
 def _cut_out(image: Any, centre_px: Any, half_px: int) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
     """The pixels round a patch, enough for it to shrink to half, and its centre among them."""
-    pixels = checked_grey(image)
+    pixels = require_grey(image)
     centre = np.asarray(centre_px, float).reshape(-1)
     height, width = pixels.shape
     if half_px < 2 or centre.shape != (2,):
         raise ValueError(f"expected a centre (u, v) and half_px >= 2, got {centre_px!r} and {half_px}")
-    if not fits(pixels.shape, centre, half_px):
+    if not lies_inside(pixels.shape, centre, half_px):
         raise ValueError(f"expected a patch of half-width {half_px} inside {width} x {height} px, got centre {centre}")
     reach = 2 * half_px + _MARGIN_PX
     u, v = (math.floor(c) for c in centre)
@@ -102,7 +102,7 @@ def _cut_out(image: Any, centre_px: Any, half_px: int) -> tuple[NDArray[np.float
     return np.array(pixels[top : v + reach + 2, left : u + reach + 2], np.float32, order="C"), centre - (left, top)
 
 
-def fits(shape: tuple[int, ...], centre_px: Any, half_px: float) -> bool:
+def lies_inside(shape: tuple[int, ...], centre_px: Any, half_px: float) -> bool:
     """Whether a patch of that half-width round a centre (u, v) lies inside an image of that shape (h, w)."""
     u, v = map(float, centre_px)
     return bool(half_px <= u <= shape[1] - 1 - half_px and half_px <= v <= shape[0] - 1 - half_px)
@@ -152,7 +152,7 @@ def corner_strengths(image: Any, centres_px: Any, half_px: int = 12) -> NDArray[
     Raises:
         ValueError: a patch does not lie in the image.
     """
-    pixels = checked_grey(image)
+    pixels = require_grey(image)
     centres = np.rint(np.asarray(centres_px, float).reshape(-1, 2)).astype(np.int64)
     last = np.array(pixels.shape[::-1]) - 1 - half_px
     if np.any((centres < half_px) | (centres > last)):
@@ -161,7 +161,7 @@ def corner_strengths(image: Any, centres_px: Any, half_px: int = 12) -> NDArray[
     return strengths
 
 
-def rival(image: Any, centre_px: Any, half_px: int, search_px: float) -> float:
+def compute_second_peak(image: Any, centre_px: Any, half_px: int, search_px: float) -> float:
     """How well, -1 to 1, the patch round a centre (u, v), to the next pixel, correlates with the best other place.
 
     The quick form of :func:`self_correlation` for choosing landmarks.
@@ -169,9 +169,9 @@ def rival(image: Any, centre_px: Any, half_px: int, search_px: float) -> float:
     Raises:
         ValueError: the patch does not lie in the image.
     """
-    pixels, centre = checked_grey(image), np.rint(np.asarray(centre_px, float))
+    pixels, centre = require_grey(image), np.rint(np.asarray(centre_px, float))
     window = _window(pixels.shape, centre, search_px, half_px)
-    if window is None or not fits(pixels.shape, centre, half_px):
+    if window is None or not lies_inside(pixels.shape, centre, half_px):
         raise ValueError(f"expected a patch of half-width {half_px} inside the image, got centre {centre_px!r}")
     u0, u1, v0, v1 = window
     view = np.ascontiguousarray(pixels[v0 - half_px : v1 + half_px + 1, u0 - half_px : u1 + half_px + 1], np.float32)

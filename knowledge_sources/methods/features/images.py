@@ -35,30 +35,30 @@ def decode_colour(jpeg: bytes) -> NDArray[np.uint8]:
     return np.ascontiguousarray(_decoded(jpeg, cv2.IMREAD_COLOR)[:, :, ::-1])
 
 
-def grey_float(image: Any) -> NDArray[np.float32]:
+def to_grey_float(image: Any) -> NDArray[np.float32]:
     """An image (h, w) of any number type as float32, checked; no copy where none is needed.
 
     Raises:
         ValueError: not two-dimensional, or with a side under 2 px.
     """
-    return np.ascontiguousarray(checked_grey(image), np.float32)
+    return np.ascontiguousarray(require_grey(image), np.float32)
 
 
-def checked_grey(image: Any) -> NDArray[Any]:
-    """An image (h, w) of any number type, as it is. Raises ValueError as :func:`grey_float`."""
+def require_grey(image: Any) -> NDArray[Any]:
+    """An image (h, w) of any number type, as it is. Raises ValueError as :func:`to_grey_float`."""
     array = np.asarray(image)
     if array.ndim != 2 or min(array.shape) < 2:
         raise ValueError(f"expected a grey image of shape (h, w), at least 2 x 2, got shape {array.shape}")
     return array
 
 
-def mean_and_spread(image: NDArray[np.uint8]) -> tuple[float, float]:
+def compute_mean_and_deviation(image: NDArray[np.uint8]) -> tuple[float, float]:
     """Mean and standard deviation of the grey levels of an image (h, w)."""
     mean, spread = cv2.meanStdDev(image)
     return float(mean[0, 0]), float(spread[0, 0])
 
 
-def noise_sigma(image: NDArray[np.float32]) -> float:
+def estimate_noise_sigma(image: NDArray[np.float32]) -> float:
     """Standard deviation of the pixel noise [grey levels], at least that of rounding to whole grey levels.
 
     The median response to a mask that is blind to plain, linear and straight-edge structure, on at most about 64 rows.

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.features.images import grey_float, noise_sigma
+from knowledge_sources.methods.features.images import estimate_noise_sigma, to_grey_float
 from knowledge_sources.methods.features.line_bands import find_in_bands
 from knowledge_sources.methods.features.line_refinement import NOISE_GAIN, Refined, refine, smoothed
 from knowledge_sources.methods.features.line_regions import line_regions
@@ -77,7 +77,7 @@ class LineSegments:
         )
 
 
-def distinct(found: LineSegments, within_px: float = 0.7) -> LineSegments:
+def remove_duplicates(found: LineSegments, within_px: float = 0.7) -> LineSegments:
     """The same segments without repeats, longest first: an edge that lies in two predictions' bands is found twice.
 
     A segment is a repeat of a longer one if both its ends lie on it, within `within_px` across and 3 px along, and its
@@ -126,10 +126,10 @@ def find_lines(
 
     Source: §1.2 [21, 6], §6.1.4.
     """
-    pixels = grey_float(image)
+    pixels = to_grey_float(image)
     if not (band_px > 0 and min_length_px > 0):
         raise ValueError(f"expected positive band_px and min_length_px, got {band_px} and {min_length_px}")
-    noise, smooth = noise_sigma(pixels), smoothed(pixels)
+    noise, smooth = estimate_noise_sigma(pixels), smoothed(pixels)
     if predicted_px is None:
         least = max(LEAST_GRADIENT, _SIGNIFICANT * NOISE_GAIN * noise)
         rough = line_regions(smooth, least, min_length_px)

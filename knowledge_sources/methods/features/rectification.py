@@ -16,7 +16,7 @@ from knowledge_sources.methods.features.images import decode
 from world_models.camera import Camera
 
 
-class Rectified:
+class Rectifier:
     """Decodes pictures of a camera with lens distortion as those of one without.
 
     As :func:`decode` it remembers the last few: landmarks' templates lie in earlier pictures.
@@ -35,11 +35,11 @@ class Rectified:
         return decode(jpeg) if self._places is None else self._straightened(jpeg)
 
     def _straighten(self, jpeg: bytes) -> NDArray[np.uint8]:
-        image = self.image(decode(jpeg))
+        image = self.rectify(decode(jpeg))
         image.setflags(write=False)
         return image
 
-    def image(self, raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def rectify(self, raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """A picture (h, w[, 3]) uint8 of the camera, without its distortion. Raises ValueError for one of another size.
         """
         if self._places is None:

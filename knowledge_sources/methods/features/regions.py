@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.features.images import grey_float
+from knowledge_sources.methods.features.images import to_grey_float
 
 _BINS = 64
 _BIN_WIDTH = 256.0 / _BINS
@@ -54,7 +54,7 @@ def segment_regions(
     Raises:
         ValueError: not a grey image, or a limit is not positive.
     """
-    pixels = grey_float(image)
+    pixels = to_grey_float(image)
     if sector_px < 8 or min_area_px < 1 or join_levels <= 0:
         got = f"{sector_px}, {min_area_px}, {join_levels}"
         raise ValueError(f"expected sector_px >= 8, min_area_px >= 1, join_levels > 0, got {got}")
@@ -67,7 +67,7 @@ def segment_regions(
     return Regions(labels, areas, means, deviations)
 
 
-def histogram_valleys(levels: NDArray[np.uint8], least_share: float = 0.02) -> NDArray[np.float64]:
+def find_histogram_valleys(levels: NDArray[np.uint8], least_share: float = 0.02) -> NDArray[np.float64]:
     """Grey levels that part the modes of a histogram; empty where there is one mode.
 
     A valley counts where it is under 0.6 of the lower of its two peaks and each side holds `least_share` of the pixels.
@@ -103,7 +103,7 @@ def _sector_labels(levels: NDArray[np.uint8], side: int) -> NDArray[np.int32]:
         for left in range(0, width, side):
             sector = levels[top : top + side, left : left + side]
             around = levels[max(top - margin, 0) : top + side + margin, max(left - margin, 0) : left + side + margin]
-            modes = np.digitize(sector, histogram_valleys(around))
+            modes = np.digitize(sector, find_histogram_valleys(around))
             for mode in range(int(modes.max()) + 1):
                 count, parts = cv2.connectedComponents((modes == mode).astype(np.uint8), connectivity=4)
                 block = labels[top : top + side, left : left + side]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.localization.refinement import expected_lines
-from knowledge_sources.methods.motion.routes import free_space, is_clear
+from knowledge_sources.methods.motion.routes import compute_free_space, is_clear
 from knowledge_sources.methods.verification.agreement import coverage
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
@@ -137,7 +137,7 @@ def is_safe_in(robot: RobotModel) -> Callable[[Place, Probe], bool]:
     def is_safe(place: Place, probe: Probe) -> bool:
         if place.room not in known:
             world = robot.world
-            known[place.room] = free_space(world.outline(place.room), world.obstacles(place.room),
+            known[place.room] = compute_free_space(world.outline(place.room), world.obstacles(place.room),
                                            robot.radius_m + MARGIN_M)
         pose = place.world_from_robot
         return is_clear(known[place.room], pose.position, probe.then(pose).position)

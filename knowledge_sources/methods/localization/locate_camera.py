@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX, LineSegments, distinct, find_lines
+from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX, LineSegments, find_lines, remove_duplicates
 from knowledge_sources.methods.matching.space_matching import match_in_space
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, trunc_r_and_t
 from knowledge_sources.methods.verification.agreement import Agreement, agreement
@@ -155,7 +155,7 @@ def _in_view(model: Floats, camera: Camera, pose: Pose) -> NDArray[np.intp]:
 def _sought(model: Floats, image: Any, camera: Camera, pose: Pose) -> Floats:
     """(k, 2, 2) edges in bands round the model lines as seen from a pose."""
     shown = camera.project_segments(model[_in_view(model, camera, pose)], pose)[0]
-    return distinct(find_lines(image, shown, band_px=BAND_PX)).segments_px
+    return remove_duplicates(find_lines(image, shown, band_px=BAND_PX)).segments_px
 
 
 def _solved(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.features.manhattan import RIGHT, level_direction
+from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
 from knowledge_sources.methods.localization.chamfer import ChamferMaps, chamfer_maps, chamfer_scores
 from knowledge_sources.methods.localization.views import Glance
 from knowledge_sources.methods.localization.visibility_map import Vantage, vantage_of
@@ -82,7 +82,7 @@ class _Search:
     def of(robot: RobotModel, glances: Sequence[Glance]) -> _Search | None:
         mount = robot.mount.camera_from_robot
         richest = sorted(glances, key=lambda g: -_length(g.segments_px))
-        found = [(g, d) for g in richest if (d := level_direction(g.segments_px, robot.camera, mount)) is not None]
+        found = [(g, d) for g in richest if (d := find_level_direction(g.segments_px, robot.camera, mount)) is not None]
         if not found:
             return None
         glance, direction = found[0]
@@ -91,7 +91,7 @@ class _Search:
 
     def grid(self, view: Vantage) -> Floats:
         """(4 n, 3) the places of a room, with each of the four headings that its walls leave."""
-        headings = [view.axis_rad - self.direction_rad + k * RIGHT for k in range(4)]
+        headings = [view.axis_rad - self.direction_rad + k * RIGHT_ANGLE_RAD for k in range(4)]
         return np.concatenate([np.column_stack([view.places, np.full(len(view.places), h)]) for h in headings])
 
     def scores(self, view: Vantage, poses: Floats, cells: Ints, stride: int = 1) -> Floats:

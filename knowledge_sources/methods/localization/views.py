@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.features.manhattan import level_direction
+from knowledge_sources.methods.features.manhattan import find_level_direction
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 
@@ -67,7 +67,7 @@ def squared(glances: Sequence[Glance], camera: Camera, camera_from_robot: Pose) 
 
 def _told(glances: Sequence[Glance], camera: Camera, camera_from_robot: Pose) -> dict[int, float]:
     """By the number of each glance that shows level lines: their direction from now, modulo a right angle [rad]."""
-    seen = [level_direction(g.segments_px, camera, camera_from_robot) for g in glances]
+    seen = [find_level_direction(g.segments_px, camera, camera_from_robot) for g in glances]
     return {k: d + g.now_from_then.heading_rad for k, (g, d) in enumerate(zip(glances, seen, strict=True))
             if d is not None}
 

@@ -13,7 +13,7 @@ import shapely
 from numba import njit
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.motion.routes import free_space
+from knowledge_sources.methods.motion.routes import compute_free_space
 from world_models.building.world import World
 
 Floats = NDArray[np.float64]
@@ -108,7 +108,7 @@ def _places(world: World, room: str) -> Floats:
     """(n, 2) points of a grid in the room's free space, and of its open doorways as far as their middle [m, world]."""
     sills = [d.thresholds_world.mean(axis=1)[:: 1 if d.between[0] == room else -1] for d in world.doorways_of(room)]
     in_doorways = np.array([point for own, other in sills for point in (own, 0.5 * (own + other))]).reshape(-1, 2)
-    free = free_space(world.outline(room), world.obstacles(room), ROOM_M)
+    free = compute_free_space(world.outline(room), world.obstacles(room), ROOM_M)
     if free.is_empty:
         return in_doorways
     x0, y0, x1, y1 = (float(v) for v in free.bounds)

@@ -29,7 +29,7 @@ from world_models.entries.task import Leg
 from world_models.frames import Pose2, wrap_angle
 
 
-def progress(leg: Leg, here: Pose2) -> tuple[float, float]:
+def measure_progress(leg: Leg, here: Pose2) -> tuple[float, float]:
     """What is left along the leg, and how far to the left of it the robot is [m]."""
     dx, dy = leg.x1_m - leg.x0_m, leg.y1_m - leg.y0_m
     length = math.hypot(dx, dy) or 1.0
@@ -37,38 +37,39 @@ def progress(leg: Leg, here: Pose2) -> tuple[float, float]:
     return (rx * dx + ry * dy) / length, (rx * dy - ry * dx) / length
 
 
-def bearing(point: tuple[float, float], here: Pose2) -> float:
+def compute_bearing(point: tuple[float, float], here: Pose2) -> float:
     """How far to the left of the robot's heading a point lies [rad]."""
     return wrap_angle(math.atan2(point[1] - here.y_m, point[0] - here.x_m) - here.heading_rad)
 
 
-def aim(leg: Leg, along_m: float, lookahead_m: float) -> tuple[float, float]:
+def find_aim_point(leg: Leg, along_m: float, lookahead_m: float) -> tuple[float, float]:
     """The point of the line to steer at [m, world], where ``along_m`` are left of the leg."""
     length = math.hypot(leg.x1_m - leg.x0_m, leg.y1_m - leg.y0_m)
     part = min(1.0, max(0.0, (length - along_m + lookahead_m) / max(length, 1e-9)))
     return leg.x0_m + part * (leg.x1_m - leg.x0_m), leg.y0_m + part * (leg.y1_m - leg.y0_m)
 
 
-def as_seen(leg: Leg, here: Pose2, point: tuple[float, float]) -> Leg:
+def update_leg(leg: Leg, here: Pose2, point: tuple[float, float]) -> Leg:
     """The leg with where the robot is beside it and where the point lies that it steers at: what a motion follows from.
     """
-    along, left = progress(leg, here)
-    return replace(leg, to_go_m=along, left_m=left, aim_rad=bearing(point, here))
+    along, left = measure_progress(leg, here)
+    return replace(leg, to_go_m=along, left_m=left, aim_rad=compute_bearing(point, here))
 
 
-def chord_turn(turn_rad: float, curvature_per_m: float, length_m: float) -> float:
+def compute_chord_turn(turn_rad: float, curvature_per_m: float, length_m: float) -> float:
     """What to turn so that the chord of the arc that follows, and not its tangent, lies in a direction [rad]."""
     return turn_rad - 0.5 * curvature_per_m * length_m
 
 
-def curvature_to(point: tuple[float, float], here: Pose2) -> float:
+def compute_curvature_to(point: tuple[float, float], here: Pose2) -> float:
     """Of the arc, tangent to the robot's heading, that leads through a point ahead [1/m]."""
     away = math.hypot(point[0] - here.x_m, point[1] - here.y_m)
-    return 2.0 * math.sin(bearing(point, here)) / max(away, 1e-6)
+    return 2.0 * math.sin(compute_bearing(point, here)) / max(away, 1e-6)
 
 
-def bound_m(*, increment_m: float, lookahead_m: float, place_m: float, heading_rad: float, curvature_per_m: float,
-            ) -> float:
+def compute_error_bound_m(
+    *, increment_m: float, lookahead_m: float, place_m: float, heading_rad: float, curvature_per_m: float
+) -> float:
     """Y of the law above: beyond which no error of position grows, at the ends of increments [m].
 
     Args:

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 SLACK_M = 1e-6
 
 
-def free_space(outline: Any, obstacles: Sequence[Any], clearance_m: float) -> shapely.Geometry:
+def compute_free_space(outline: Any, obstacles: Sequence[Any], clearance_m: float) -> shapely.Geometry:
     """Where the robot's centre may be: the room's polygon (k, 2) shrunk, less the obstacles' (k, 2) grown [m]."""
     room = shapely.Polygon(np.asarray(outline, float)).buffer(-clearance_m, join_style="mitre")
     if not len(obstacles):
@@ -33,7 +33,7 @@ def is_clear(free: shapely.Geometry, a: Any, b: Any) -> bool:
     return bool(free.covers(line) or free.buffer(SLACK_M).covers(line))
 
 
-def shortest_route(
+def find_shortest_route(
     free: shapely.Geometry, start: Any, goal: Any, floor: Callable[[], shapely.Geometry]
 ) -> list[Floats] | None:
     """Way points [(2,), ...] from start to goal, both included; None where there is no way.
@@ -103,3 +103,23 @@ def _without_repeats(points: list[Floats]) -> list[Floats]:
         if np.linalg.norm(point - kept[-1]) > 1e-6:
             kept.append(point)
     return kept
+
+
+def measure_wall_distance_m(outline: Any, openings: Sequence[Any], point: Any) -> float:
+    """How far a point (2,) is from the sides of a room (k, 2), less its openings, each the corners (n, 2) of its floor.
+
+    In an open doorway one stands far from walls, though at the border of the room.
+    """
+    walls = shapely.LinearRing(np.asarray(outline, float))
+    if len(openings):
+        walls = walls.difference(shapely.union_all([_hull(opening) for opening in openings]))
+    return float(walls.distance(shapely.Point(point)))
+
+
+def measure_thing_distance_m(footprint: Any, point: Any) -> float:
+    """How far a point (2,) is from what stands on a footprint (k, 2); 0 within it."""
+    return float(shapely.Polygon(np.asarray(footprint, float)).distance(shapely.Point(point)))
+
+
+def _hull(opening: Any) -> shapely.Geometry:
+    return shapely.MultiPoint(np.asarray(opening, float)).convex_hull.buffer(1e-6)

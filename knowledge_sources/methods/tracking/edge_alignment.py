@@ -49,7 +49,7 @@ MOST_LINES = 75.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Aligned:
+class EdgeAlignment:
     """A pose that model lines tell, its covariance (3, 3), world, and how many lines agree with it."""
 
     world_from_robot: Pose2
@@ -57,9 +57,9 @@ class Aligned:
     lines: int
 
 
-def aligned(
+def align_to_edges(
     robot: RobotModel, image: Image, lines_world: Floats, world_from_robot: Pose2, covariance: Floats
-) -> Aligned | None:
+) -> EdgeAlignment | None:
     """The pose that moves model lines onto the edges of a picture; None where too few of them are found.
 
     It is None too where the belief is so loose that the nearest edge need not be a line's own; where that is so of some
@@ -169,7 +169,7 @@ def _steepest(
     return offset, np.asarray(inside & is_peak & (np.count_nonzero(peaks, axis=1) <= 1))
 
 
-def _solved(edges: _Edges, at: Pose2, prior: Pose2, covariance: Floats) -> Aligned | None:
+def _solved(edges: _Edges, at: Pose2, prior: Pose2, covariance: Floats) -> EdgeAlignment | None:
     """Least squares with a cut-off, from a robust start, with what was believed as one more measurement."""
     information = np.linalg.inv(covariance + np.diag([DOUBT_M**2, DOUBT_M**2, DOUBT_RAD**2]))
     away = np.array([at.x_m - prior.x_m, at.y_m - prior.y_m, wrap_angle(at.heading_rad - prior.heading_rad)])
@@ -186,4 +186,4 @@ def _solved(edges: _Edges, at: Pose2, prior: Pose2, covariance: Floats) -> Align
     if lines < max(LEAST_LINES, LEAST_PART * len(np.unique(edges.line))):
         return None
     pose = Pose2(at.x_m + float(step[0]), at.y_m + float(step[1]), wrap_angle(at.heading_rad + float(step[2])))
-    return Aligned(pose, np.linalg.inv(hessian), lines)
+    return EdgeAlignment(pose, np.linalg.inv(hessian), lines)

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.features.correlation import (
+    compute_second_peak,
     corner_strengths,
     correlate,
     extract_template,
-    rival,
     self_correlation,
 )
 
@@ -197,18 +197,19 @@ def test_a_blank_wall_is_known_nowhere(search: float) -> None:
 
 @few
 @given(seeds, st.integers(-20, 20), st.integers(-20, 20))
-def test_the_rival_of_a_patch_is_the_second_peak_of_its_own_correlation(seed: int, du: int, dv: int) -> None:
+def test_the_quick_second_peak_of_a_patch_is_that_of_its_own_correlation(seed: int, du: int, dv: int) -> None:
     image, place = pattern(seed), middle((du, dv))
-    assert rival(image, place, 8, 12.0) == pytest.approx(self_correlation(image, place, 8, 12.0).second_peak, abs=1e-3)
+    expected = self_correlation(image, place, 8, 12.0).second_peak
+    assert compute_second_peak(image, place, 8, 12.0) == pytest.approx(expected, abs=1e-3)
 
 
 @few
 @given(st.integers(6, 12), st.floats(0.0, 5.0))
-def test_a_repeated_pattern_has_a_rival_once_its_period_is_in_the_window(period: int, phase: float) -> None:
+def test_a_repeated_pattern_has_a_second_peak_once_its_period_is_in_the_window(period: int, phase: float) -> None:
     v, u = np.mgrid[0:SIZE, 0:SIZE]
     image = 128.0 + 50.0 * np.cos(2 * np.pi * (u + phase) / period) * np.cos(2 * np.pi * v / 17.0)
-    assert rival(image, middle(), 10, period + 2.0) > 0.95
-    assert rival(image, middle(), 10, period / 2.0 - 0.6) < 0.95
+    assert compute_second_peak(image, middle(), 10, period + 2.0) > 0.95
+    assert compute_second_peak(image, middle(), 10, period / 2.0 - 0.6) < 0.95
 
 
 @few
@@ -222,8 +223,8 @@ def test_corner_strength_is_the_same_turned_mirrored_and_negated(seed: int) -> N
         np.testing.assert_allclose(other, expected, rtol=1e-9)
 
 
-def test_corner_strength_and_rival_ask_for_patches_inside_the_image() -> None:
+def test_corner_strength_and_second_peak_need_patches_inside_the_image() -> None:
     with pytest.raises(ValueError, match="expected a patch of half-width 10 inside the image"):
-        rival(pattern(0), [5.0, 40.0], 10, 12.0)
+        compute_second_peak(pattern(0), [5.0, 40.0], 10, 12.0)
     with pytest.raises(ValueError, match="expected patches of half-width 10 inside the image"):
         corner_strengths(pattern(0), [[5.0, 40.0]], 10)

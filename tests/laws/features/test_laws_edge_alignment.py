@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from harvey.wiring import robot_model
 from knowledge_sources.methods.features.images import decode
-from knowledge_sources.methods.motion.routes import free_space
-from knowledge_sources.methods.tracking.edge_alignment import Aligned, aligned
+from knowledge_sources.methods.motion.routes import compute_free_space
+from knowledge_sources.methods.tracking.edge_alignment import EdgeAlignment, align_to_edges
 from sim.render.optics import Optics
 from sim.render.sensor import compressed, exposed
 from sim.scenario import load_scenario
@@ -43,7 +43,7 @@ def robot() -> RobotModel:
 def somewhere(rng: np.random.Generator) -> Pose2:
     """Where a robot may stand, in some room."""
     world, room = robot().world, str(rng.choice(ROOMS))
-    free = free_space(world.outline(room), world.obstacles(room), robot().radius_m)
+    free = compute_free_space(world.outline(room), world.obstacles(room), robot().radius_m)
     low, high = np.array(free.bounds).reshape(2, 2)
     while not free.covers(shapely.Point(at := rng.uniform(low, high))):
         pass
@@ -69,10 +69,10 @@ def drawn(pose: Pose2, sigmas: tuple[float, float, float], rng: np.random.Genera
     return Pose2(pose.x_m + away[0], pose.y_m + away[1], wrap_angle(pose.heading_rad + away[2])), covariance
 
 
-def told(belief: Pose2, covariance: Floats, image: NDArray[np.uint8]) -> Aligned | None:
+def told(belief: Pose2, covariance: Floats, image: NDArray[np.uint8]) -> EdgeAlignment | None:
     lines = visible_lines(robot().world, robot().camera, robot().camera_from_world(belief), min_length_px=16.0,
                           min_contrast=0.05, max_distance_m=15.0)
-    return aligned(robot(), image, lines.lines_world, belief, covariance)
+    return align_to_edges(robot(), image, lines.lines_world, belief, covariance)
 
 
 def off(one: Pose2, other: Pose2) -> Floats:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.features.rectification import Rectified
+from knowledge_sources.methods.features.rectification import Rectifier
 from sim.made_up.box_room import box_room
 from sim.render.optics import Optics, bent, straightened
 from sim.render.renderer import Renderer
@@ -83,7 +83,7 @@ def test_a_bent_picture_straightened_is_the_plain_one(distortion: tuple[float, .
     renderer = Renderer.of_faces(box_room())
     ideal = renderer.radiance(lens.pinhole, pose)[..., 1]
     raw = Optics.of(lens).radiance(renderer, pose)
-    seen = Rectified(lens, lens.pinhole).image(np.ascontiguousarray((raw * 255.0 + 0.5).astype(np.uint8)))[..., 1]
+    seen = Rectifier(lens, lens.pinhole).rectify(np.ascontiguousarray((raw * 255.0 + 0.5).astype(np.uint8)))[..., 1]
     inner = np.s_[8:-8, 8:-8]
     (dx, dy), response = cv2.phaseCorrelate(ideal[inner].astype(np.float64), seen[inner].astype(np.float64))
     assert abs(dx) < 0.05 and abs(dy) < 0.05 and response > 0.9
@@ -115,7 +115,7 @@ def test_a_lens_that_folds_the_picture_is_refused() -> None:
 def test_a_picture_of_another_size_is_refused() -> None:
     lens = replace(PLAIN, distortion=(-0.2, 0.0, 0.0, 0.0))
     with pytest.raises(ValueError, match="expected a picture of 512 x 512 px"):
-        Rectified(lens, lens.pinhole).image(np.zeros((480, 640), np.uint8))
+        Rectifier(lens, lens.pinhole).rectify(np.zeros((480, 640), np.uint8))
 
 
 def test_a_scenario_may_have_a_lens() -> None:

@@ -11,7 +11,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.features.manhattan import RIGHT, level_direction
+from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
 from knowledge_sources.methods.localization.hypotheses import (
     Place,
     Probe,
@@ -187,9 +187,9 @@ def test_level_lines_tell_the_heading_but_for_right_angles(seed: int) -> None:
     ends = lines.lines_world[..., 2]
     level = (np.ptp(ends, axis=1) < 0.01) & (np.abs(ends[:, 0] - 1.0) > 0.3)  # at the eye's height none tells
     assume(np.count_nonzero(level) >= 12)
-    told = level_direction(lines.segments_px, CAMERA, MOUNT.camera_from_robot)
+    told = find_level_direction(lines.segments_px, CAMERA, MOUNT.camera_from_robot)
     assert told is not None
-    assert abs(math.remainder(told + pose.heading_rad, RIGHT)) < math.radians(1.0)
+    assert abs(math.remainder(told + pose.heading_rad, RIGHT_ANGLE_RAD)) < math.radians(1.0)
 
 
 def test_turns_between_looks_are_corrected_by_what_is_seen() -> None:
@@ -206,7 +206,7 @@ def test_marks_on_a_bare_wall_tell_no_heading() -> None:
         middle, angle = rng.uniform(20, 490, (6, 2)), rng.uniform(0, math.pi, 6)
         half = 25.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         marks = np.stack([middle - half, middle + half], axis=1)
-        told += level_direction(marks, CAMERA, MOUNT.camera_from_robot) is not None
+        told += find_level_direction(marks, CAMERA, MOUNT.camera_from_robot) is not None
     assert told <= 2
 
 
@@ -229,7 +229,7 @@ def test_a_turn_that_is_corrected_takes_the_way_after_it_along(error: float, tur
     true = Pose2(0.0, 0.0, turn) @ Pose2(move, 0.0, 0.0)
     now = start @ true
     lines = [seen_from(CENTRE, start, rng), seen_from(CENTRE, now, rng)]
-    assume(all(level_direction(seen, CAMERA, MOUNT.camera_from_robot) is not None for seen in lines))
+    assume(all(find_level_direction(seen, CAMERA, MOUNT.camera_from_robot) is not None for seen in lines))
     claimed = Pose2(0.0, 0.0, turn + error) @ Pose2(move, 0.0, 0.0)
     spread = np.diag([1e-3, 1e-3, 1e-2])
     straight = squared([Glance(lines[0], claimed.inverse(), spread), Glance(lines[1], HERE, spread)], CAMERA,

@@ -9,7 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_sources.action.motor import LOOKAHEAD_M
-from knowledge_sources.methods.motion.pure_pursuit import aim, bearing, bound_m, chord_turn, curvature_to, progress
+from knowledge_sources.methods.motion.pure_pursuit import (
+    compute_bearing,
+    compute_chord_turn,
+    compute_curvature_to,
+    compute_error_bound_m,
+    find_aim_point,
+    measure_progress,
+)
 from world_models.actuator import ActuatorModel, Drift, arc
 from world_models.entries.task import Leg
 from world_models.frames import Pose2
@@ -37,12 +44,12 @@ def test_correcting_the_heading_alone_keeps_the_position_error_bounded_along_a_s
 ) -> None:
     """|y_n| <= (1 - d/L)^n |y_0| + Y, however long the segment is; ``steering`` derives it."""
     leg, here = line(2.0 * STEP_M * len(errors)), Pose2(0.0, start_m, start_rad)
-    bound = bound_m(increment_m=STEP_M, lookahead_m=LOOKAHEAD_M, place_m=place_m, heading_rad=2.0 * heading_rad,
-                    curvature_per_m=curvature)
+    bound = compute_error_bound_m(increment_m=STEP_M, lookahead_m=LOOKAHEAD_M, place_m=place_m,
+                                  heading_rad=2.0 * heading_rad, curvature_per_m=curvature)
     for n, (b, h, t, k) in enumerate(errors, 1):
         believed = Pose2(here.x_m, here.y_m + b * place_m, here.heading_rad + h * heading_rad)
-        along, _ = progress(leg, believed)
-        turn = chord_turn(bearing(aim(leg, along, LOOKAHEAD_M), believed), drift, STEP_M)
+        along, _ = measure_progress(leg, believed)
+        turn = compute_chord_turn(compute_bearing(find_aim_point(leg, along, LOOKAHEAD_M), believed), drift, STEP_M)
         here = here @ Pose2(0.0, 0.0, turn + t * heading_rad) @ arc(STEP_M, drift + k * curvature)
         assert abs(here.y_m) <= SLACK * ((1.0 - STEP_M / LOOKAHEAD_M) ** n * abs(start_m) + bound) + 1e-4
 
@@ -55,20 +62,20 @@ def test_without_the_turns_the_error_grows_with_the_square_of_the_way(drift: flo
         here = here @ arc(STEP_M, drift)
         places.append(here.y_m)
     assert places[9] > 0.05 and places[19] > 3.5 * places[9]
-    assert places[19] > bound_m(increment_m=STEP_M, lookahead_m=LOOKAHEAD_M, place_m=0.0, heading_rad=0.0,
-                                curvature_per_m=drift)
+    assert places[19] > compute_error_bound_m(increment_m=STEP_M, lookahead_m=LOOKAHEAD_M, place_m=0.0, heading_rad=0.0,
+                                               curvature_per_m=drift)
 
 
 def test_a_look_ahead_shorter_than_the_increment_has_no_bound() -> None:
     with pytest.raises(ValueError, match="look-ahead of at least the increment"):
-        bound_m(increment_m=0.6, lookahead_m=0.5, place_m=0.0, heading_rad=0.0, curvature_per_m=0.0)
+        compute_error_bound_m(increment_m=0.6, lookahead_m=0.5, place_m=0.0, heading_rad=0.0, curvature_per_m=0.0)
 
 
 @given(x=st.floats(0.5, 3.0), y=st.floats(-0.3, 0.3), heading=st.floats(-0.3, 0.3))
 def test_the_arc_that_is_steered_on_the_move_leads_through_its_point(x: float, y: float, heading: float) -> None:
     here = Pose2(0.3, -0.2, heading)
     point = here @ Pose2(x, y, 0.0)
-    curvature = curvature_to((point.x_m, point.y_m), here)
+    curvature = compute_curvature_to((point.x_m, point.y_m), here)
     angle = 2.0 * math.atan2(y, x)
     length = math.hypot(x, y) if abs(curvature) < 1e-9 else angle / curvature
     there = here @ arc(length, curvature)

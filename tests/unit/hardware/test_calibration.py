@@ -12,7 +12,7 @@ import pytest
 from harvey.cli import main
 from knowledge_sources.methods.calibration.chessboard import Pattern, find_corners
 from knowledge_sources.methods.calibration.intrinsics import BoardView, Calibration, calibrate
-from knowledge_sources.methods.calibration.mounting import mounting
+from knowledge_sources.methods.calibration.mounting import estimate_mounting
 from knowledge_sources.methods.features.images import decode
 from sim.made_up.chessboard import chessboard_picture, chessboard_renderer, chessboard_view
 from sim.render.optics import Optics
@@ -103,7 +103,7 @@ def test_the_mounting_comes_back(calibration: Calibration, upright: bool) -> Non
     )
     corners = find_corners(decode(picture), PATTERN)
     assert not isinstance(corners, str)
-    found = mounting(calibration, corners, PATTERN, standing_at_m=0.06 if upright else None)
+    found = estimate_mounting(calibration, corners, PATTERN, standing_at_m=0.06 if upright else None)
     got = np.array([found.height_m, found.tilt_rad, found.roll_rad, found.to_board_m, found.yaw_rad])
     want = np.array([0.22 if upright else 0.3, tilt, 0.0, 0.42, 0.0])
     assert np.all(np.abs(got - want) < [0.002, 0.004, 0.002, 0.002, 0.004])
@@ -113,7 +113,7 @@ def test_the_mounting_comes_back(calibration: Calibration, upright: bool) -> Non
 def test_a_board_nowhere_near_the_floor_is_refused(calibration: Calibration) -> None:
     corners = CAMERA.project(standing(0.2, 0.0, 0.06, 0.5).apply(PATTERN.points))
     with pytest.raises(ValueError, match="expected a board upright before the camera, got one that puts it -"):
-        mounting(calibration, corners, PATTERN, standing_at_m=-1.0)
+        estimate_mounting(calibration, corners, PATTERN, standing_at_m=-1.0)
 
 
 def test_a_camera_file_tells_the_same_numbers(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from knowledge_sources.methods.features.lines import distinct, find_lines
+from knowledge_sources.methods.features.lines import find_lines, remove_duplicates
 
 
 def square() -> np.ndarray:
@@ -75,7 +75,7 @@ def test_an_edge_in_two_bands_is_found_twice_and_is_one_distinct_edge() -> None:
     predicted = np.array([[[20.0, 18.0], [59.0, 18.0]], [[59.0, 13.0], [20.0, 13.0]]])
     found = find_lines(square(), predicted, min_length_px=20.0)
     assert sorted(found.predicted.tolist()) == [0, 1]
-    once = distinct(found)
+    once = remove_duplicates(found)
     assert len(once) == 1
     assert once.lengths_px[0] == found.lengths_px.max()
 
@@ -84,11 +84,11 @@ def test_both_edges_of_a_thin_stripe_are_distinct() -> None:
     image = np.full((64, 64), 180, np.uint8)
     image[:, 30:34] = 60
     found = find_lines(image, [[[33.0, 60.0], [33.0, 4.0]]])
-    assert len(distinct(found, within_px=6.0)) == 2
+    assert len(remove_duplicates(found, within_px=6.0)) == 2
 
 
 def test_no_lines_are_no_distinct_lines() -> None:
-    assert len(distinct(find_lines(np.zeros((30, 30), np.uint8)))) == 0
+    assert len(remove_duplicates(find_lines(np.zeros((30, 30), np.uint8)))) == 0
 
 
 def test_take_keeps_every_field_together() -> None:

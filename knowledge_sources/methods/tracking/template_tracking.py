@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from knowledge_sources.methods.features.correlation import (
     Correlation,
     Template,
+    compute_second_peak,
     corner_strengths,
     correlate,
-    fits,
-    rival,
+    lies_inside,
 )
 from knowledge_sources.methods.pose.planar import point_jacobian
 from knowledge_sources.methods.pose.planar_from_points import planar_from_points
@@ -49,14 +49,14 @@ SCALES = (0.55, 1.8)
 """How much larger or smaller than its template a landmark may have become."""
 
 
-class Followed(NamedTuple):
+class TrackUpdate(NamedTuple):
     """One track in the newest frame, and whether it should have been seen there."""
 
     track: Track
     expected: bool
 
 
-class Correction(NamedTuple):
+class PoseCorrection(NamedTuple):
     """The pose that the landmarks tell, its covariance (3, 3), world, and how many of them agree with it."""
 
     world_from_robot: Pose2
@@ -64,10 +64,10 @@ class Correction(NamedTuple):
     agreeing: int
 
 
-def follow(
+def follow_landmarks(
     robot: RobotModel, tracks: tuple[Track, ...], template_of: Callable[[Track], Template], image: Image, pose: Pose2,
     covariance: Floats,
-) -> list[Followed]:
+) -> list[TrackUpdate]:
     """Predict each landmark from the believed pose, and find it in the window that the belief leaves open.
 
     Args:
@@ -83,19 +83,19 @@ def follow(
     for track, z, at, sigma, is_hidden in zip(
             tracks, depth.tolist(), predicted, spread.tolist(), hidden.tolist(), strict=True):
         scale = track.template_depth_m / max(z, NEAR_M)
-        in_view = z > NEAR_M and not is_hidden and fits(image.shape, at, HALF_PX + 2)
+        in_view = z > NEAR_M and not is_hidden and lies_inside(image.shape, at, HALF_PX + 2)
         expected = in_view and SCALES[0] <= scale <= SCALES[1]
         found = None
         if expected:
             search = min(max(SIGMAS * sigma + 2.0, SEARCH_PX[0]), SEARCH_PX[1])
             found = correlate(template_of(track), image, at, search, scale=scale)
-        out.append(Followed(_updated(track, at, found, expected), expected))
+        out.append(TrackUpdate(_updated(track, at, found, expected), expected))
     return out
 
 
-def correct(
+def correct_pose(
     robot: RobotModel, seen: list[Track], anchors: tuple[Anchor, ...], pose: Pose2, covariance: Floats
-) -> Correction:
+) -> PoseCorrection:
     """The pose from landmarks that were found; no surer than the beliefs from which their templates were cut."""
     estimate = planar_from_points(
         np.array([t.point_world for t in seen]),
@@ -108,10 +108,12 @@ def correct(
     )
     after = estimate.world_from_robot
     spread = np.asarray(estimate.covariance + _inherited(after, seen, anchors))
-    return Correction(after, spread, int(np.count_nonzero(estimate.inliers)))
+    return PoseCorrection(after, spread, int(np.count_nonzero(estimate.inliers)))
 
 
-def begin(robot: RobotModel, kept: tuple[Track, ...], frame: str, image: Image, pose: Pose2) -> tuple[Track, ...]:
+def select_landmarks(
+    robot: RobotModel, kept: tuple[Track, ...], frame: str, image: Image, pose: Pose2
+) -> tuple[Track, ...]:
     """New tracks beside those that are kept: corners of the model that are visible, distinctive, and well apart."""
     camera_from_world = robot.camera_from_world(pose)
     points = visible_points(
@@ -124,7 +126,7 @@ def begin(robot: RobotModel, kept: tuple[Track, ...], frame: str, image: Image, 
         px, point = points.points_px[i], points.points_world[i]
         if len(kept) + len(new) >= TRACKS:
             break
-        if free[i] and rival(image, px, HALF_PX, UNIQUE_PX) < UNIQUE:
+        if free[i] and compute_second_peak(image, px, HALF_PX, UNIQUE_PX) < UNIQUE:
             free &= _apart(points.points_px, px)
             name = robot.world.landmarks[points.landmark[i]].name
             new.append(_begun(point, px, float(camera_from_world.apply(point)[2]), name, frame))
