@@ -8,8 +8,8 @@ from typing import Any
 
 from blackboard.journal import Decision
 from sim.body.simulated_body import SimulatedBody
-from sim.body.truth import cross_track_m
 from sim.stage import Stage
+from sim.truth import cross_track_m
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch

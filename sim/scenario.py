@@ -12,7 +12,7 @@ from sim.body.actuator import ActuatorParameters
 from sim.body.elevator import Helper
 from sim.faults.fault_table import read_fault
 from sim.faults.faults import Fault
-from sim.moved import Moved
+from sim.moved_things import Moved
 from sim.render.optics import check_lens
 from sim.render.rasterizer import sample_offsets
 from sim.render.sensor import SensorParameters

@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from sim.body.building import Building
 from sim.body.collision import ROBOT_RADIUS_M
-from sim.building import Building
 from sim.faults.faults import Displacement, Fault
-from sim.moved import is_of, with_moved
+from sim.moved_things import is_of, with_moved
 from sim.scenario import Scenario
 from world_models.building.faces import Face
 from world_models.building.outlines import inside_polygon

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sim.body.building import Building
 from sim.body.collision import Obstacles
 from sim.body.elevator import Elevators
 from sim.body.simulated_body import SimulatedBody
-from sim.body.truth import Score, Truth, score
-from sim.building import Building
 from sim.faults.faults import placed
 from sim.render.renderer import Renderer
 from sim.scenario import Scenario
 from sim.scenario_checks import check_names, check_room, faces_of, named_in
+from sim.truth import Score, Truth, score
 from world_models.building.faces import Face
 from world_models.building.locales import Link
 from world_models.building.outlines import inside_polygon

@@ -19,8 +19,8 @@ from harvey.mission import Mission, head_of
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_recorder import RunRecorder
 from harvey.units import INCH_M
-from sim.body.truth import Truth
 from sim.stage import Stage
+from sim.truth import Truth
 from world_models.entries.body import MotionReport, MotorCommand
 from world_models.units import FOOT_M
 

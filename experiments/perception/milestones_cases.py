@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.plan.milestone_selector import GLANCES_RAD, best_heading, expectation
-from sim.building import Building
+from sim.body.building import Building
 from sim.made_up.generated_floors import Floor, generated_floor
 from sim.render.occluder import Occluder
 from sim.render.sensor import SensorParameters, compressed, exposed

@@ -24,9 +24,9 @@ from knowledge_sources.methods.localization.visibility_map import vantage_of
 from knowledge_sources.methods.motion.routes import compute_free_space
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.tolerances import PLAN_PX
+from sim.body.building import Building
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
-from sim.building import Building
 from sim.made_up.generated_floors import Floor, generated_floor
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from sim.body.truth import Truth
+from sim.truth import Truth
 from world_models.bounds import Bounds, check_bounds
 from world_models.building.locales import Link
 from world_models.entries.body import Ride

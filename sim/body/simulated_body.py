@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.body.actuator import STEP_M, ActuatorParameters, Slip, Wheels, arc_displacement, arc_steps
+from sim.body.building import Building
 from sim.body.rolling import Roll
-from sim.body.truth import Truth
-from sim.building import Building
 from sim.faults.faults import Ailment, Displacement, Fault, FaultWatch, LightsOff, Occlusion, free_displacement, kind_of
 from sim.render.occluder import Occluder
 from sim.render.optics import Optics
 from sim.render.sensor import SensorParameters, compressed, exposed, pass_over
+from sim.truth import Truth
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Odometry, Ride, RideReport
 from world_models.frames import Pose, Pose2

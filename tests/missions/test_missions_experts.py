@@ -18,8 +18,8 @@ from blackboard.level import Level
 from harvey.mission import run_mission
 from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources, robot_model
 from sim.body.simulated_body import SimulatedBody
-from sim.body.truth import Truth
 from sim.stage import Stage
+from sim.truth import Truth
 from world_models.entries.body import MotionReport
 from world_models.robot import RobotModel
 

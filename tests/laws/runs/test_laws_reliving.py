@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from harvey.replay.body_replay import part_of
 from sim.body.actuator import ActuatorParameters
+from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.building import Building
 from sim.made_up.box_room import box_room
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import Frame, MotorCommand

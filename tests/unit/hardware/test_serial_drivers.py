@@ -21,8 +21,8 @@ from harvey.hardware.drivers.bases.guard import Guard
 from harvey.hardware.drivers.bases.link import SerialLink
 from harvey.hardware.drivers.bases.p2os import P2osBase
 from harvey.hardware.drivers.bases.p2os_wire import encode
+from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.building import Building
 from sim.emulators.create2 import PASSIVE, Create2Emulator
 from sim.emulators.denning import DenningEmulator
 from sim.emulators.denning_motion import AtOnce, Rolling

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from sim.body.collision import Obstacles
-from sim.body.truth import Truth, cross_track_m, score
 from sim.made_up.box_room import Patch, PatchFace, box_faces
+from sim.truth import Truth, cross_track_m, score
 from world_models.frames import Pose2
 
 

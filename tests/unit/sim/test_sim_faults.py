@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.building import Building
 from sim.faults.faults import Ailment, Displacement, Fault, FaultWatch, LightsOff, Moment, free_displacement
 from sim.made_up.box_room import box_room
 from world_models.camera import Camera, CameraMount

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.building import Building
 from sim.faults.faults import Fault, Moment, Occlusion
 from sim.made_up.box_room import box_room
-from sim.moved import Moved, with_moved
+from sim.moved_things import Moved, with_moved
 from sim.render.occluder import Occluder
 from sim.scenario import SCENARIOS, ScenarioError, load_scenario, parse_scenario
 from sim.stage import set_stage
