@@ -20,9 +20,9 @@ from blackboard.scheduler import RAISED, Scheduler
 from harvey.wiring import command, knowledge_sources, robot_model
 from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.verification.line_check import LEAST_ACCOUNTED
-from knowledge_sources.methods.verification.milestone_preview import least_p_false, lookalike
+from knowledge_sources.methods.verification.milestone_preview import find_alias, predict_p_false
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
-from knowledge_sources.methods.verification.view_quality import view_quality
+from knowledge_sources.methods.verification.view_quality import compute_view_quality
 from knowledge_sources.plan.milestone_selector import GOOD_PART, GOOD_RAD, LEAST_LINES
 from knowledge_sources.questions import held
 from sim.scenario import Scenario
@@ -133,12 +133,12 @@ def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Mile
     lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
     pose = belief.world_from_robot(robot.world)
     mount = robot.standing_in(belief.locale).mount
-    quality = view_quality(lines, robot.camera, mount.camera_from_robot, pose, SIGMA_ACROSS_PX)
+    quality = compute_view_quality(lines, robot.camera, mount.camera_from_robot, pose, SIGMA_ACROSS_PX)
     sharp = quality.sigma_m <= GOOD_PART * _tolerance_m(view, milestone) and quality.sigma_rad <= GOOD_RAD
     standing = robot.standing_in(belief.locale)
     seen = len(lines) >= LEAST_ACCOUNTED
-    p_false = least_p_false(standing, pose, lines, np.array(diagonal(SEEN_M, SEEN_RAD))) if seen else 1.0
-    other = lookalike(standing, belief.locale, pose, lines) if seen else None
+    p_false = predict_p_false(standing, pose, lines, np.array(diagonal(SEEN_M, SEEN_RAD))) if seen else 1.0
+    other = find_alias(standing, belief.locale, pose, lines) if seen else None
     clear = sharp and len(lines) >= LEAST_LINES and p_false <= POSE_CONFIDENCE.accept
     return Prospect(
         milestone.what, belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m,

@@ -25,7 +25,7 @@ from experiments.report import Cell, Report
 from experiments.trials import campaign_folder, found_by_all
 from knowledge_sources.methods.features.lines import find_lines
 from knowledge_sources.methods.localization.locate_camera import LEAST_LENGTH_PX
-from knowledge_sources.methods.verification.agreement import coverage
+from knowledge_sources.methods.verification.agreement import compute_coverage
 
 Array = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ def _coverages(data: Corridor) -> dict[str, float]:
 
 def _covered(model: Array, segments: Array) -> float:
     lengths = np.linalg.norm(model[:, 1] - model[:, 0], axis=1)
-    return float(np.sum(coverage(model, segments, COVER_PX, COVER_RAD) * lengths) / np.sum(lengths))
+    return float(np.sum(compute_coverage(model, segments, COVER_PX, COVER_RAD) * lengths) / np.sum(lengths))
 
 
 def _rows(test: Disturbance, trials: Sequence[Trial]) -> list[tuple[Cell, ...]]:

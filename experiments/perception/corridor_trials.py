@@ -13,7 +13,7 @@ from experiments.paper.pose_peer import Peer
 from experiments.perception.corridor_data import SHOWN, Corridor, CorridorFrame, load_corridor
 from harvey.errors import BadInput
 from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX, LineSegments, find_lines
-from knowledge_sources.methods.localization.locate_camera import LEAST_LENGTH_PX, Location, Verdict, locate
+from knowledge_sources.methods.localization.locate_camera import LEAST_LENGTH_PX, CameraFix, PoseVerdict, locate_camera
 from knowledge_sources.methods.matching.image_matching import match_lines
 from knowledge_sources.methods.pose import med_r_and_t
 from world_models.frames import Pose
@@ -50,7 +50,7 @@ class Trial:
     """What came of it: who came back, and what ours said of itself.
 
     Attributes:
-        shift_steps, turn_rad: how far off ours is. verdict: ours of itself, the value of a :class:`Verdict`.
+        shift_steps, turn_rad: how far off ours is. verdict: ours of itself, the value of a :class:`PoseVerdict`.
     """
 
     back: bool
@@ -63,7 +63,7 @@ class Trial:
     @property
     def is_verified(self) -> bool:
         """Whether it said that it was right."""
-        return self.verdict == Verdict.VERIFIED.value
+        return self.verdict == PoseVerdict.VERIFIED.value
 
     @property
     def is_silent(self) -> bool:
@@ -80,7 +80,7 @@ def tried(attempt: Attempt) -> Trial:
     peer = Peer.found()
     return Trial(
         back=shift <= BACK_STEPS and turn <= BACK_RAD,
-        verdict=(Verdict.NOT_TESTABLE if ours is None else ours.verdict).value,
+        verdict=(PoseVerdict.NOT_TESTABLE if ours is None else ours.verdict).value,
         peer_back=peer is not None and ours is not None
         and _is_back(_peers(peer, data, frame, ours, prior), frame, data.step),
         paper_back=_is_back(_papers(data, frame, segments, prior, rng), frame, data.step),
@@ -99,11 +99,11 @@ def disturbed(attempt: Attempt) -> tuple[Pose, np.random.Generator]:
     return pose.perturbed(TURN_RAD * sizes[0] * axes[0], SHIFT_STEPS * data.step * sizes[1] * axes[1]), rng
 
 
-def found_from(number: int, prior: Pose, rng: np.random.Generator) -> Location | None:
+def found_from(number: int, prior: Pose, rng: np.random.Generator) -> CameraFix | None:
     """Ours, from a pose believed to 0.5 step and 3 degrees: 2 deviations."""
     data = _corridor()
     frame = data.frames[number]
-    return locate(
+    return locate_camera(
         data.model_lines, frame.image, frame.camera, prior, _spread(data.step), tolerance_m=BACK_STEPS * data.step,
         tolerance_rad=BACK_RAD, rng=rng, segments=segments_of(number),
     )
@@ -148,7 +148,7 @@ def _papers(
     ).camera_from_world
 
 
-def _peers(peer: Peer, data: Corridor, frame: CorridorFrame, ours: Location, prior: Pose) -> Pose:
+def _peers(peer: Peer, data: Corridor, frame: CorridorFrame, ours: CameraFix, prior: Pose) -> Pose:
     """PoseLib's LO-RANSAC on the pairs that we matched."""
     i, k = ours.pairs.T
     return peer.ransac(data.model_lines[i], ours.segments_px[k], frame.camera, prior, limit_px=PEER_LIMIT_PX)

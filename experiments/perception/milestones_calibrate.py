@@ -41,7 +41,7 @@ def run(quick: bool, seed: int) -> Report:
     floors, each = (QUICK_FLOORS, QUICK_EACH) if quick else (FLOORS, EACH)
     first = FIRST_FLOOR + 100 * seed
     told = [j for j in judged_on(first, floors, each, folder) if not j.is_same and not j.doubted]
-    found = conviction_of(told)
+    found = fit_confidence(told)
     how = (f"{len(told)} cases of {floors} floors from {first} on: harvey experiment milestones-calibrate"
            f"{' --quick' if quick else ''} --seed {seed}")
     (folder / "confidence.toml").write_text(as_toml(found, how), encoding="utf-8")
@@ -61,7 +61,7 @@ def run(quick: bool, seed: int) -> Report:
     )
 
 
-def conviction_of(told: Sequence[Judged]) -> PoseConfidence:
+def fit_confidence(told: Sequence[Judged]) -> PoseConfidence:
     """The weights for what was judged, and the limits."""
     evidence, right = np.array([j.evidence for j in told]), np.array([not j.is_wrong for j in told])
     seeing, blind = fitted(evidence, right), fitted(unseen(evidence), right)

@@ -12,9 +12,9 @@ from blackboard.board import View
 from blackboard.effect import Effect, Post
 from blackboard.scheduler import Scheduler
 from experiments.perception.milestones_cases import SAME, Case, cases, site
-from knowledge_sources.methods.verification.color_check import probe, small_colour
-from knowledge_sources.methods.verification.line_check import verify
-from knowledge_sources.methods.verification.pose_evidence import evidence
+from knowledge_sources.methods.verification.color_check import check_colors, decode_small_color
+from knowledge_sources.methods.verification.line_check import check_lines
+from knowledge_sources.methods.verification.pose_evidence import compute_evidence
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.plan.matcher import Matcher
 from knowledge_sources.plan.med_r_and_t import MedRAndT
@@ -101,10 +101,10 @@ def _judged(robot: RobotModel, floor: int, number: int, case: Case) -> Judged:
     assert certificate is not None and fix is not None and segments is not None
     c, pose, covariance = certificate.value, fix.value.world_from_robot, np.asarray(fix.value.covariance)
     lines = np.array(case.milestone.expected, float).reshape(-1, 2, 3)
-    told = evidence(
+    told = compute_evidence(
         robot, lines, segments.value.segments_px, pose, covariance, case.belief.world_from_robot(robot.world),
-        case.belief.covariance_world(robot.world), verify(robot, lines, segments.value.segments_px, pose),
-        probe(robot, pose, small_colour(case.jpeg), case.milestone.looks),
+        case.belief.covariance_world(robot.world), check_lines(robot, lines, segments.value.segments_px, pose),
+        check_colors(robot, pose, decode_small_color(case.jpeg), case.milestone.looks),
     )
     sigma_m, sigma_rad = (math.sqrt(float(v)) for v in (np.linalg.eigvalsh(covariance[:2, :2])[-1], covariance[2, 2]))
     error_m = math.inf if case.is_elsewhere else pose.distance_to(case.true)

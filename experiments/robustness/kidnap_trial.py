@@ -20,7 +20,7 @@ from harvey.retention import RETENTION
 from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.goal.relocalizer import Relocalizer
-from knowledge_sources.methods.localization.visibility_map import vantage_of
+from knowledge_sources.methods.localization.visibility_map import get_visibility_map
 from knowledge_sources.methods.motion.routes import compute_free_space
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.tolerances import PLAN_PX
@@ -111,7 +111,7 @@ def _scene(floor: Floor) -> Scene:
     real = floor.building
     building = Building.of_faces(real.faces, lambda pose: real.locale_at(pose.position) or "", 8)
     for room in robot.world.rooms:
-        vantage_of(robot.world, room, robot.mount.height_m)
+        get_visibility_map(robot.world, room, robot.mount.height_m)
     return Scene(floor, robot, building)
 
 

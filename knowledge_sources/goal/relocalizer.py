@@ -14,9 +14,14 @@ from blackboard.effect import Effect, Post, Retract, Revise, to_say
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.methods.localization.obstructions import before_camera
-from knowledge_sources.methods.localization.relocation import Candidate, Finding, Verdict, finding
-from knowledge_sources.methods.localization.views import Glance, moved
+from knowledge_sources.methods.localization.obstructions import update_obstruction
+from knowledge_sources.methods.localization.relocation import (
+    Candidate,
+    LocalizationResult,
+    LocalizationStatus,
+    localize,
+)
+from knowledge_sources.methods.localization.views import CameraView, propagate_pose
 from knowledge_sources.questions import active_goal, held, is_over, is_settled, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Look, MotionReport, MotorCommand
@@ -82,7 +87,7 @@ class Relocalizer(RobotKnowledgeSource):
         before = _panorama_since(view, lost)
         glimpses = self._glimpses(view, segments, before)
         looks, hidden = [_glance(view, g) for g in glimpses], view.latest(Obstruction)
-        obstruction = before_camera(looks, self._robot.camera, None if hidden is None else hidden.value)
+        obstruction = update_obstruction(looks, self._robot.camera, None if hidden is None else hidden.value)
         if obstruction is not None:
             looks = [replace(g, segments_px=obstruction.without_its_own(g.segments_px)) for g in looks]
         because: tuple[object, ...] = (segments, lost)
@@ -91,32 +96,32 @@ class Relocalizer(RobotKnowledgeSource):
         if obstruction is not None:
             because = (segments, lost, hidden if change is None else change)
         robot = self._robot.behind(obstruction).standing_in(belief.value.locale)
-        result = finding(robot, looks, self._rooms(belief.value))
-        if result.verdict is Verdict.AMBIGUOUS or result.probe is None or len(glimpses) >= PROBES:
+        result = localize(robot, looks, self._rooms(belief.value))
+        if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or len(glimpses) >= PROBES:
             result = self._within_reach(result, belief.value.locale)
         for old in view.where(Hypothesis, lambda h: h.status == "candidate"):
             yield Retract(old, (segments,))
         told = Panorama(glimpses, _in_words(result))
         seen = Post(told, because) if before is None else Revise(before, told, (*because, before))
         yield seen
-        if result.verdict is Verdict.FOUND:
+        if result.status is LocalizationStatus.FOUND:
             yield from self._found(view, (segments, seen), lost, belief, result.candidates[0])
             return
         for c in result.candidates:
             yield Post(self._hypothesis(c, belief.value, "candidate", c.weight), (segments, seen, belief))
-        if result.verdict is Verdict.PROBE and result.probe is not None and len(glimpses) < PROBES:
-            yield Post(MotorCommand(result.probe.turn_rad, result.probe.move_m), (segments, lost, seen))
+        if result.status is LocalizationStatus.PROBE and result.next_action is not None and len(glimpses) < PROBES:
+            yield Post(MotorCommand(result.next_action.turn_rad, result.next_action.move_m), (segments, lost, seen))
 
-    def _within_reach(self, result: Finding, locale: str) -> Finding:
+    def _within_reach(self, result: LocalizationResult, locale: str) -> LocalizationResult:
         """Of places that nothing more can tell apart the only one to which wheels lead from where the robot was.
 
         Carried to another place of where it can drive to, it may look the same there: that stays ambiguous. But being
         carried through a wall or up the stairs, to a place that looks just like one within reach, is not believed.
         """
         near = [c for c in result.candidates if self._robot.world.route(locale, c.room) is not None]
-        if result.verdict is Verdict.FOUND or len(near) != 1 or not near[0].stands:
+        if result.status is LocalizationStatus.FOUND or len(near) != 1 or not near[0].is_accepted:
             return result
-        return Finding(Verdict.FOUND, (replace(near[0], weight=1.0),))
+        return LocalizationResult(LocalizationStatus.FOUND, (replace(near[0], weight=1.0),))
 
     def _glimpses(
         self, view: View, segments: Entry[Segments], before: Entry[Panorama] | None
@@ -131,7 +136,7 @@ class Relocalizer(RobotKnowledgeSource):
     def _moved(self, glimpse: Glimpse, report: MotionReport) -> Glimpse:
         actuator, claim = self._robot.actuator, (report.turn_rad, report.move_m)
         step, spread = actuator.expected(*claim), actuator.spread(*claim)
-        pose, covariance = moved(glimpse.now_from_then, np.array(glimpse.covariance), step, spread)
+        pose, covariance = propagate_pose(glimpse.now_from_then, np.array(glimpse.covariance), step, spread)
         return replace(glimpse, now_from_then=pose, covariance=covariance_tuple(covariance))
 
     def _rooms(self, belief: Hypothesis) -> list[str]:
@@ -179,21 +184,21 @@ def _has_just_ridden(view: View) -> bool:
                        and s.subgoals[s.at - 1].is_ride) is not None
 
 
-def _in_words(result: Finding) -> str:
+def _in_words(result: LocalizationResult) -> str:
     places = " or ".join(f"{c.room} ({c.weight:.0%})" for c in result.candidates)
-    if result.verdict is Verdict.FOUND:
+    if result.status is LocalizationStatus.FOUND:
         return f"it is {places}, which stands alone"
-    if result.verdict is Verdict.AMBIGUOUS:
+    if result.status is LocalizationStatus.AMBIGUOUS:
         return f"ambiguous: {places}, which look alike from wherever could be looked"
-    if result.probe is None:
+    if result.next_action is None:
         return f"perhaps {places}; nothing new could be seen from here"
-    move = f" and a move of {result.probe.move_m:.1f} m" if result.probe.move_m else ""
-    probe = f"a turn by {math.degrees(result.probe.turn_rad):.0f} degrees{move}"
+    move = f" and a move of {result.next_action.move_m:.1f} m" if result.next_action.move_m else ""
+    probe = f"a turn by {math.degrees(result.next_action.turn_rad):.0f} degrees{move}"
     return f"perhaps {places}; {probe} tells most" if places else f"no place bears it out; {probe} shows something new"
 
 
-def _glance(view: View, glimpse: Glimpse) -> Glance:
-    return Glance(view[glimpse.segments].value.segments_px, glimpse.now_from_then, np.array(glimpse.covariance))
+def _glance(view: View, glimpse: Glimpse) -> CameraView:
+    return CameraView(view[glimpse.segments].value.segments_px, glimpse.now_from_then, np.array(glimpse.covariance))
 
 
 def _distance(outline: object, here: Pose2) -> float:

@@ -15,11 +15,12 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.methods.localization import aliasing as lookalikes
-from knowledge_sources.methods.verification.color_check import Probe, probe, small_colour
-from knowledge_sources.methods.verification.line_check import LEAST_ACCOUNTED, Verification, verify
+from knowledge_sources.methods.localization.aliasing import find_strongest_alias
+from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors, decode_small_color
+from knowledge_sources.methods.verification.line_check import LEAST_ACCOUNTED, LineCheck, check_lines
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
-from knowledge_sources.methods.verification.pose_evidence import evidence, wheels_px
+from knowledge_sources.methods.verification.pose_evidence import compute_evidence, compute_motion_tolerance_px
+from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from knowledge_sources.questions import has_followed, held, open_discrepancy, standing_in
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.tolerances import FLOOR_PX, PLAN_PX
@@ -92,12 +93,13 @@ class MilestoneJudge(RobotKnowledgeSource):
         before = pose if belief is None else belief.value.world_from_robot(robot.world)
         spread = fix.value.covariance if belief is None else belief.value.covariance_world(robot.world)
         lines = np.array(m.expected, float).reshape(-1, 2, 3)
-        agreed = verify(robot, lines, segments.segments_px, pose)
+        agreed = check_lines(robot, lines, segments.segments_px, pose)
         frame: Frame = view[segments.frame].value
-        faces = probe(robot, pose, small_colour(frame.jpeg), m.looks)
-        told = evidence(robot, lines, segments.segments_px, pose, fix.value.covariance, before, spread, agreed, faces)
+        faces = check_colors(robot, pose, decode_small_color(frame.jpeg), m.looks)
+        told = compute_evidence(
+            robot, lines, segments.segments_px, pose, fix.value.covariance, before, spread, agreed, faces)
         p_false = POSE_CONFIDENCE.p_false(told)
-        tolerance_px = FLOOR_PX + wheels_px(robot, lines, before, spread + fix.value.covariance)
+        tolerance_px = FLOOR_PX + compute_motion_tolerance_px(robot, lines, before, spread + fix.value.covariance)
         in_doubt, followed = open_discrepancy(view, Level.PLAN) is not None, has_followed(view)
         sure = POSE_CONFIDENCE.accepts(p_false)  # so much agrees only at the right place, whatever the wheels did
         if sure or in_doubt or tolerance_px > PLAN_PX:
@@ -133,8 +135,8 @@ class MilestoneJudge(RobotKnowledgeSource):
             deviation_px=shift_px,
             tolerance_px=tolerance_px,
             p_false=p_false,
-            faces=faces.faces,
-            faces_alike=faces.agree,
+            faces=faces.count,
+            faces_alike=faces.agreeing,
         )
 
 
@@ -150,7 +152,7 @@ def _milestone_of(view: View, fix: PoseFix) -> Entry[Milestone] | None:
 
 
 def _verdict(
-    expected: int, contrast: float, agreed: Verification, faces: Probe, p_false: float, is_enough: bool,
+    expected: int, contrast: float, agreed: LineCheck, faces: ColorCheck, p_false: float, is_enough: bool,
     shift_px: float, tolerance_px: float,
 ) -> tuple[str, str]:
     a = agreed.agreement
@@ -158,12 +160,12 @@ def _verdict(
         return "not testable", f"the frame is dark (contrast {contrast:.1f} of 255)"
     if expected < LEAST_ACCOUNTED:
         return "not testable", f"only {expected} lines are expected in this view"
-    colours = f" and {round(faces.agree * faces.faces)} of {faces.faces} faces' colours" if faces.is_testable else ""
-    found = f"{a.accounted} of {a.seen} lines, {agreed.coverage:.0%} of their length,{colours} accounted for"
+    colours = f" and {round(faces.agreeing * faces.count)} of {faces.count} faces' colours" if faces.is_testable else ""
+    found = f"{a.matched} of {a.visible} lines, {agreed.coverage:.0%} of their length,{colours} accounted for"
     if p_false >= POSE_CONFIDENCE.refute:
         return "refuted", f"{found}; at a wrong place {a.chance:.0%} are by chance"
     where = f"{found}, {shift_px:.1f} px from where expected"
-    if not is_enough or a.accounted < LEAST_ACCOUNTED:
+    if not is_enough or a.matched < LEAST_ACCOUNTED:
         return "not testable", f"{where}: not enough to tell the place by"
     if shift_px > tolerance_px:
         return "refuted", f"{where}: more than the {tolerance_px:.0f} px that the plan may be adjusted by"
@@ -171,21 +173,21 @@ def _verdict(
 
 
 def _as_likely(
-    view: View, robot: RobotModel, before: Pose2, pose: Pose2, segments: Segments, agreed: Verification
+    view: View, robot: RobotModel, before: Pose2, pose: Pose2, segments: Segments, agreed: LineCheck
 ) -> Entry[Hypothesis] | None:
     """Another hypothesis with which the picture agrees as well, once corrected as the belief is from ``before``."""
     correction = before.inverse() @ pose
     for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
         there = other.value.world_from_robot(robot.world) @ correction
-        lines = lookalikes.view(robot, there).lines_world
-        if verify(robot, lines, segments.segments_px, there).coverage >= AS_MUCH * agreed.coverage:
+        lines = predict_lines(robot, there).lines_world
+        if check_lines(robot, lines, segments.segments_px, there).coverage >= AS_MUCH * agreed.coverage:
             return other
     return None
 
 
 def _may_be_elsewhere(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, p_false: float) -> bool:
     """Whether what was seen may be seen, just as well, from elsewhere in the room."""
-    other = lookalikes.hardest_to_tell(robot, segments_px, room, pose, search=p_false > CLEAR)
+    other = find_strongest_alias(robot, segments_px, room, pose, search=p_false > CLEAR)
     return other is not None and other.margin < LEAST_MARGIN
 
 

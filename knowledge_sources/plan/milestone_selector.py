@@ -17,9 +17,9 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
-from knowledge_sources.methods.localization.aliasing import anticipate
-from knowledge_sources.methods.verification.color_check import expected_looks
-from knowledge_sources.methods.verification.view_quality import ViewQuality, view_quality
+from knowledge_sources.methods.localization.aliasing import precompute_views
+from knowledge_sources.methods.verification.color_check import predict_face_colors
+from knowledge_sources.methods.verification.view_quality import ViewQuality, compute_view_quality
 from knowledge_sources.questions import (
     deepest_sketch,
     has_followed,
@@ -159,7 +159,7 @@ class MilestoneSelector(RobotKnowledgeSource):
         hidden, (robot, pose) = view.latest(Obstruction), self._standing(view, belief.value)
         expected = expectation(robot, pose, milestone, car)
         if not has_followed(view) or open_discrepancy(view, Level.PLAN) is not None:
-            anticipate(robot, belief.value.locale, pose)  # the judge will ask whether it is another door
+            precompute_views(robot, belief.value.locale, pose)  # the judge will ask whether it is another door
         because = (task, belief) if hidden is None else (task, belief, hidden)
         wish = Post(expected, because) if old is None else Revise(old, expected, because)
         yield wish
@@ -249,13 +249,13 @@ def expectation(robot: RobotModel, pose: Pose2, milestone: Milestone, car: str =
         expected=_nested(lines.lines_world),
         expected_px=_nested(lines.segments_px),
         landmark_of=tuple(marks.index(int(i)) for i in lines.landmark),
-        looks=expected_looks(robot, pose),
+        looks=predict_face_colors(robot, pose),
         status="expected",
     )
 
 
 def _quality(robot: RobotModel, pose: Pose2, car: str) -> ViewQuality:
-    return view_quality(
+    return compute_view_quality(
         _seen_from(robot, pose, car).lines_world, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_ACROSS_PX
     )
 

@@ -12,8 +12,8 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, to_say
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.methods.localization.obstructions import before_camera
-from knowledge_sources.methods.localization.views import Glance
+from knowledge_sources.methods.localization.obstructions import update_obstruction
+from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.questions import active_goal, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.camera import Camera
@@ -54,7 +54,7 @@ class ObstructionFinder(RobotKnowledgeSource):
     def _news(self, view: View) -> Effect | None:
         """What the last looks say that the board does not."""
         looks, known = _looks(view), view.latest(Obstruction)
-        glances = [Glance(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
+        glances = [CameraView(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
                    for s, heading_rad in looks]
         if len(glances) < LEAST_LOOKS:
             return None
@@ -63,11 +63,11 @@ class ObstructionFinder(RobotKnowledgeSource):
 
 
 def _seen_by_the_last(
-    glances: Sequence[Glance], camera: Camera, known: Obstruction | None
+    glances: Sequence[CameraView], camera: Camera, known: Obstruction | None
 ) -> Obstruction | None:
     """What all looks show, the last first; else what fewer of them do, as it was not there in the earlier ones."""
     for number in range(len(glances), LEAST_LOOKS - 1, -1):
-        found = before_camera(glances[:number], camera, known, LEAST_AREA)
+        found = update_obstruction(glances[:number], camera, known, LEAST_AREA)
         if found is not None:
             return found
     return None

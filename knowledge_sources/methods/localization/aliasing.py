@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.localization.hypotheses import ALIKE_PX, ALIKE_RAD
-from knowledge_sources.methods.localization.pose_candidates import are_apart, proposals
-from knowledge_sources.methods.localization.refinement import settled
-from knowledge_sources.methods.localization.repetition import repetitions
-from knowledge_sources.methods.localization.views import Glance
-from knowledge_sources.methods.verification.agreement import coverage
+from knowledge_sources.methods.localization.pose_candidates import are_distinct, find_pose_candidates
+from knowledge_sources.methods.localization.refinement import refine_pose
+from knowledge_sources.methods.localization.repetition import find_repetitions
+from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.methods.verification.agreement import compute_coverage
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import VisibleLines, visible_lines
@@ -48,7 +48,7 @@ class Alias(NamedTuple):
     margin: float
 
 
-def hardest_to_tell(
+def find_strongest_alias(
     robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, *, search: bool = False
 ) -> Alias | None:
     """Of other places of a room, the one that segments (k, 2, 2) speak least against; None: there is none.
@@ -59,7 +59,7 @@ def hardest_to_tell(
     others = [*places(robot, room, pose), *(fitting(robot, segments_px, room, pose) if search else ())]
     if not others:
         return None
-    own, *there = (looked_for(lines_px, segments_px) for lines_px in views_near(robot, (pose, *others)))
+    own, *there = (score_view(lines_px, segments_px) for lines_px in predict_views_on_grid(robot, (pose, *others)))
     margins = [margin(own, other) for other in there]
     least = int(np.argmin(margins))
     return Alias(others[least], margins[least])
@@ -69,23 +69,24 @@ def places(robot: RobotModel, room: str, pose: Pose2) -> list[Pose2]:
     """The other places within a room at which it repeats itself."""
     outline = robot.world.outline(room)
     low, high = outline.min(axis=0), outline.max(axis=0)
-    return [other for _, other in repetitions(robot.world, room, pose, (room,))
+    return [other for _, other in find_repetitions(robot.world, room, pose, (room,))
             if np.all((low <= other.position) & (other.position <= high))]
 
 
 def fitting(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> list[Pose2]:
     """The places of a room, apart from a pose, at which segments (k, 2, 2) fit best."""
-    look = (Glance(segments_px, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))),)
-    found = (settled(robot, look, p.world_from_robot)[0] for p in proposals(robot, look, (room,), MOST_FITTING))
-    return [place for place in found if are_apart(place, pose)]
+    look = (CameraView(segments_px, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))),)
+    candidates = find_pose_candidates(robot, look, (room,), MOST_FITTING)
+    found = (refine_pose(robot, look, c.world_from_robot)[0] for c in candidates)
+    return [place for place in found if are_distinct(place, pose)]
 
 
-def anticipate(robot: RobotModel, room: str, pose: Pose2) -> None:
+def precompute_views(robot: RobotModel, room: str, pose: Pose2) -> None:
     """Think of what would be seen there, and at the places that may look alike: the answers are at hand then."""
-    views_near(robot, (pose, *places(robot, room, pose)))
+    predict_views_on_grid(robot, (pose, *places(robot, room, pose)))
 
 
-def views_near(robot: RobotModel, poses: Sequence[Pose2]) -> list[Floats]:
+def predict_views_on_grid(robot: RobotModel, poses: Sequence[Pose2]) -> list[Floats]:
     """(n, 2, 2) for each pose: where the lines lie that should be seen from it, as they can be from the next of a grid.
     """
     lines = [robot.camera_from_world(pose).apply(_seen_near(robot, pose)) for pose in poses]
@@ -109,33 +110,33 @@ def view(robot: RobotModel, pose: Pose2) -> VisibleLines:
                          min_contrast=CONTRAST, max_distance_m=SIGHT_M)
 
 
-class LookedFor(NamedTuple):
+class ScoredView(NamedTuple):
     """Lines (n, 2, 2) that a place shows, and what each of them says (n,) if no other place shows it."""
 
     lines_px: Floats
     says: Floats
 
 
-def looked_for(lines_px: Floats, segments_px: Floats) -> LookedFor:
+def score_view(lines_px: Floats, segments_px: Floats) -> ScoredView:
     """A view (n, 2, 2) held against segments (k, 2, 2): of each line, what is accounted for beyond a half speaks for
     its view, what is missing beyond a half against it.
     """
     lines = np.minimum(np.linalg.norm(lines_px[:, 1] - lines_px[:, 0], axis=1), LONG_PX) / LINE_PX
-    return LookedFor(lines_px, lines * (_covered(lines_px, segments_px, TOLERANCE_PX, TOLERANCE_RAD) - 0.5))
+    return ScoredView(lines_px, lines * (_covered(lines_px, segments_px, TOLERANCE_PX, TOLERANCE_RAD) - 0.5))
 
 
-def margin(one: LookedFor, other: LookedFor) -> float:
+def margin(one: ScoredView, other: ScoredView) -> float:
     """By how many lines the same segments speak rather for one view than for another: only lines count that the other
     view lacks.
     """
     return _told(one, other) - _told(other, one)
 
 
-def _told(view: LookedFor, other: LookedFor) -> float:
+def _told(view: ScoredView, other: ScoredView) -> float:
     return float(np.sum(view.says * (1.0 - _covered(view.lines_px, other.lines_px, ALIKE_PX, ALIKE_RAD))))
 
 
 def _covered(lines_px: Floats, by_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
     if not len(lines_px) or not len(by_px):
         return np.zeros(len(lines_px))
-    return np.nan_to_num(coverage(lines_px, by_px, tolerance_px, tolerance_rad))
+    return np.nan_to_num(compute_coverage(lines_px, by_px, tolerance_px, tolerance_rad))

@@ -44,7 +44,7 @@ class ChamferMaps:
     chance: NDArray[np.float32]
 
 
-def chamfer_maps(segments_px: Any, camera: Camera) -> ChamferMaps:
+def compute_chamfer_maps(segments_px: Any, camera: Camera) -> ChamferMaps:
     """Maps of segments (n, 2, 2); each is drawn under its own direction and the two next to it."""
     size = -(-camera.height // SHRUNK), -(-camera.width // SHRUNK)
     empty = np.full((DIRECTIONS, *size), 255, np.uint8)
@@ -59,7 +59,7 @@ def chamfer_maps(segments_px: Any, camera: Camera) -> ChamferMaps:
     return ChamferMaps(near, near.mean(axis=(1, 2)))
 
 
-def chamfer_scores(
+def compute_chamfer_scores(
     maps: ChamferMaps, camera: Camera, camera_from_robot: Pose, poses: Floats, points_world: Floats,
     directions_world: Floats, first: Ints, seen: Ints, view: Ints, stride: int = 1,
 ) -> Floats:

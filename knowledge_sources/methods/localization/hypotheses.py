@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization.refinement import expected_lines
+from knowledge_sources.methods.localization.refinement import predict_lines
 from knowledge_sources.methods.motion.routes import compute_free_space, is_clear
-from knowledge_sources.methods.verification.agreement import coverage
+from knowledge_sources.methods.verification.agreement import compute_coverage
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
@@ -39,7 +39,7 @@ NEW_RAD = math.radians(30.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PoseHypothesis:
     """A pose in a room, with its weight among others."""
 
     room: str
@@ -48,23 +48,25 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Probe:
-    """Turn, move, and look; ``tells``: how well that is expected to part the places (lines in which views differ)."""
+class SensingAction:
+    """Turn, move, and look; ``expected_separation`` of the hypotheses by the new view [lines]."""
 
     turn_rad: float
     move_m: float
-    tells: float
+    expected_separation: float
 
-    def then(self, pose: Pose2) -> Pose2:
+    def apply_to(self, pose: Pose2) -> Pose2:
         """Where it leads."""
         return pose @ Pose2(0.0, 0.0, self.turn_rad) @ Pose2(self.move_m, 0.0, 0.0)
 
 
 View = Callable[[Pose2], Floats]
 """The lines (n, 2, 2) [px] that should be seen from a pose."""
+IsSafe = Callable[[PoseHypothesis, SensingAction], bool]
+"""Whether the move of an action keeps free of everything from a hypothesis."""
 
 
-def weights_of(likelihoods: Sequence[float]) -> tuple[float, ...]:
+def normalize_log_likelihoods(likelihoods: Sequence[float]) -> tuple[float, ...]:
     """Shares, summing to one, of places from the logarithms of their likelihoods."""
     if not likelihoods:
         return ()
@@ -74,32 +76,32 @@ def weights_of(likelihoods: Sequence[float]) -> tuple[float, ...]:
     return tuple(part / total for part in parts)
 
 
-def view_of(robot: RobotModel) -> View:
+def make_view_predictor(robot: RobotModel) -> View:
     """What a robot's model says is to be seen from a pose: long and clear lines."""
     def seen(pose: Pose2) -> Floats:
-        lines = expected_lines(robot, pose).segments_px
+        lines = predict_lines(robot, pose).segments_px
         return np.asarray(lines[np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1) >= LONG_PX])
 
     return seen
 
 
-def difference(one: Floats, other: Floats) -> float:
+def compute_view_difference(one: Floats, other: Floats) -> float:
     """In how many lines two views (n, 2, 2) and (m, 2, 2) differ: those of either that are not in the other as well."""
     return math.fsum(_lacking(a, b) for a, b in ((one, other), (other, one)))
 
 
-def separation(views: Sequence[Floats], weights: Sequence[float]) -> float:
-    """What a look tells that shows these views from these places: pairs by their weights, and each against nowhere."""
+def compute_separation(views: Sequence[Floats], weights: Sequence[float]) -> float:
+    """Lines by which views separate their hypotheses: pairs by their weights, and each against no known pose."""
     terms = []
     for i, one in enumerate(views):
         terms.append(weights[i] * NOWHERE * min(len(one), MANY))
-        terms += [weights[i] * weights[j] * min(difference(one, views[j]), MANY) for j in range(i)]
+        terms += [weights[i] * weights[j] * min(compute_view_difference(one, views[j]), MANY) for j in range(i)]
     return math.fsum(terms)
 
 
-def best_probe(
-    places: Sequence[Place], looked: Sequence[Pose2], seen: View, is_safe: Callable[[Place, Probe], bool]
-) -> Probe | None:
+def choose_sensing_action(
+    places: Sequence[PoseHypothesis], looked: Sequence[Pose2], seen: View, is_safe: IsSafe
+) -> SensingAction | None:
     """The probe that is expected to part the places best, of the turns and short moves that show something new.
 
     Args:
@@ -110,42 +112,43 @@ def best_probe(
     weights = [place.weight for place in places]
     tried = []
     for p in options:
-        views = [seen(p.then(place.world_from_robot)) for place in places]
-        tried.append(Probe(p.turn_rad, p.move_m, separation(views, weights)))
-    return max(tried, key=lambda p: p.tells, default=None)  # of equals the first
+        views = [seen(p.apply_to(place.world_from_robot)) for place in places]
+        tried.append(SensingAction(p.turn_rad, p.move_m, compute_separation(views, weights)))
+    return max(tried, key=lambda p: p.expected_separation, default=None)  # of equals the first
 
 
-def tell_apart(ones: Sequence[Floats], others: Sequence[Floats]) -> bool:
+def are_distinguishable(ones: Sequence[Floats], others: Sequence[Floats]) -> bool:
     """Whether the views from one place, taken together, differ clearly from those from another."""
     lines = sum(len(view) for view in (*ones, *others))
-    differ = math.fsum(difference(one, other) for one, other in zip(ones, others, strict=True))
+    differ = math.fsum(compute_view_difference(one, other) for one, other in zip(ones, others, strict=True))
     return differ >= max(TELLING, TELLING_PART * lines)
 
 
-def can_part(one: Place, other: Place, looked: Sequence[Pose2], seen: View, is_safe: Callable[[Place, Probe], bool]
-             ) -> bool:
+def can_distinguish(
+    one: PoseHypothesis, other: PoseHypothesis, looked: Sequence[Pose2], seen: View, is_safe: IsSafe
+) -> bool:
     """Whether any look within reach, or one that was taken, would show two places to be different."""
     a, b = one.world_from_robot, other.world_from_robot
-    reach = [p.then(HERE) for p in _options(()) if p.move_m == 0.0 or (is_safe(one, p) and is_safe(other, p))]
-    return any(tell_apart([seen(a @ step)], [seen(b @ step)]) for step in (*looked, *reach))
+    reach = [p.apply_to(HERE) for p in _options(()) if p.move_m == 0.0 or (is_safe(one, p) and is_safe(other, p))]
+    return any(are_distinguishable([seen(a @ step)], [seen(b @ step)]) for step in (*looked, *reach))
 
 
-def is_safe_in(robot: RobotModel) -> Callable[[Place, Probe], bool]:
+def make_safety_check(robot: RobotModel) -> IsSafe:
     """The question whether a probe's move keeps free of all walls and things of a place's room, as the model has it."""
     known: dict[str, Any] = {}
 
-    def is_safe(place: Place, probe: Probe) -> bool:
+    def is_safe(place: PoseHypothesis, probe: SensingAction) -> bool:
         if place.room not in known:
             world = robot.world
             known[place.room] = compute_free_space(world.outline(place.room), world.obstacles(place.room),
                                            robot.radius_m + MARGIN_M)
         pose = place.world_from_robot
-        return is_clear(known[place.room], pose.position, probe.then(pose).position)
+        return is_clear(known[place.room], pose.position, probe.apply_to(pose).position)
 
     return is_safe
 
 
-def widest_gap(looked: Sequence[Pose2]) -> float:
+def find_widest_gap(looked: Sequence[Pose2]) -> float:
     """The turn to the middle of the widest sector that was not looked at from here [rad]."""
     angles = sorted(wrap_angle(look.heading_rad) for look in looked)
     if not angles:
@@ -155,11 +158,12 @@ def widest_gap(looked: Sequence[Pose2]) -> float:
     return wrap_angle(start + 0.5 * width)
 
 
-def _options(looked: Sequence[Pose2]) -> list[Probe]:
+def _options(looked: Sequence[Pose2]) -> list[SensingAction]:
     """Turns that show something new from here, and moves."""
     here = [look.heading_rad for look in looked if math.hypot(look.x_m, look.y_m) < 0.5 * MOVE_M]
     turns = [turn for turn in TURNS_RAD if all(abs(wrap_angle(turn - h)) >= NEW_RAD for h in here)]
-    return [*(Probe(turn, 0.0, 0.0) for turn in turns), *(Probe(turn, MOVE_M, 0.0) for turn in MOVES_RAD)]
+    moves = [SensingAction(turn, MOVE_M, 0.0) for turn in MOVES_RAD]
+    return [*(SensingAction(turn, 0.0, 0.0) for turn in turns), *moves]
 
 
 def _lacking(one: Floats, other: Floats) -> float:
@@ -168,4 +172,4 @@ def _lacking(one: Floats, other: Floats) -> float:
         return 0.0
     if not len(other):
         return float(len(one))
-    return float(np.sum(1.0 - np.nan_to_num(coverage(one, other, ALIKE_PX, ALIKE_RAD))))
+    return float(np.sum(1.0 - np.nan_to_num(compute_coverage(one, other, ALIKE_PX, ALIKE_RAD))))

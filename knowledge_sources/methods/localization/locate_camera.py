@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX, LineSegments, find_lines, remove_duplicates
 from knowledge_sources.methods.matching.space_matching import match_in_space
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, trunc_r_and_t
-from knowledge_sources.methods.verification.agreement import Agreement, agreement
+from knowledge_sources.methods.verification.agreement import Agreement, compute_agreement
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -47,7 +47,7 @@ CHALLENGES = 3
 """So often a pose gives way to a better one that is found from it; what has not come to rest then is not verified."""
 
 
-class Verdict(Enum):
+class PoseVerdict(Enum):
     """What a picture says of a pose."""
 
     VERIFIED = "verified"
@@ -56,7 +56,7 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Location:
+class CameraFix:
     """A camera pose and how far it is to be trusted.
 
     Attributes:
@@ -74,7 +74,7 @@ class Location:
     segments_px: Floats
     evidence: Agreement
     coverage: float
-    verdict: Verdict
+    verdict: PoseVerdict
 
     @property
     def camera_from_world(self) -> Pose:
@@ -82,7 +82,7 @@ class Location:
         return self.estimate.camera_from_world
 
 
-def locate(
+def locate_camera(
     model_lines_world: Any,
     image: Any,
     camera: Camera,
@@ -93,7 +93,7 @@ def locate(
     tolerance_rad: float,
     rng: np.random.Generator,
     segments: LineSegments | None = None,
-) -> Location | None:
+) -> CameraFix | None:
     """The pose near the prior that the picture shows, ``None`` if too little matches to tell any.
 
     A pose that was found stands only if, sought again from there with the whole doubt of the prior, no other place
@@ -109,7 +109,7 @@ def locate(
     model, spread = np.asarray(model_lines_world, float), np.asarray(prior_covariance, float)
     everything = (find_lines(image) if segments is None else segments).segments_px
 
-    def located(start: Pose) -> Location | None:
+    def located(start: Pose) -> CameraFix | None:
         return _located(model, image, camera, start, spread, everything, tolerance_m, tolerance_rad, rng)
 
     best = located(prior)
@@ -120,14 +120,14 @@ def locate(
         if _same_place(rival.camera_from_world, best.camera_from_world, tolerance_m, tolerance_rad):
             return rival
         best = rival
-    unsettled = best is not None and best.verdict is Verdict.VERIFIED
-    return replace(best, verdict=Verdict.NOT_TESTABLE) if best is not None and unsettled else best
+    unsettled = best is not None and best.verdict is PoseVerdict.VERIFIED
+    return replace(best, verdict=PoseVerdict.NOT_TESTABLE) if best is not None and unsettled else best
 
 
 def _located(
     model: Floats, image: Any, camera: Camera, prior: Pose, spread: Floats, everything: Floats, tolerance_m: float,
     tolerance_rad: float, rng: np.random.Generator,
-) -> Location | None:
+) -> CameraFix | None:
     """The pose that the picture shows within the prior's reach, judged by itself."""
     rough = _solved(model, everything, camera, prior, spread, FAR_PX, trunc_r_and_t, rng)
     if rough is None:
@@ -184,22 +184,22 @@ def _solved(
 def _judged(
     model: Floats, camera: Camera, fine: PoseEstimate, pairs: NDArray[np.intp], near: Floats, everything: Floats,
     spread: Floats, tolerance_m: float, tolerance_rad: float,
-) -> Location:
+) -> CameraFix:
     """With the evidence: agreement is counted with the whole image's segments, which were not sought at this pose."""
     wrong = _wrong_poses(fine.camera_from_world, spread)
     displaced = np.array([camera.project_segments(model, pose)[0] for pose in wrong])
     here = camera.project_segments(model, fine.camera_from_world)[0]
     lengths = np.linalg.norm(here[:, 1] - here[:, 0], axis=1)
     here[~(np.nan_to_num(lengths) >= LEAST_LENGTH_PX)] = np.nan
-    found = agreement(here, everything, displaced)
+    found = compute_agreement(here, everything, displaced)
     coverage = found.total(lengths)
-    if found.accounted < LEAST_ACCOUNTED or found.p_false > MOST_P_FALSE:
-        verdict = Verdict.REFUTED
+    if found.matched < LEAST_ACCOUNTED or found.p_false > MOST_P_FALSE:
+        verdict = PoseVerdict.REFUTED
     elif fine.ok and coverage >= LEAST_COVERAGE and _is_sharp(_as_seen(fine), tolerance_m, tolerance_rad):
-        verdict = Verdict.VERIFIED
+        verdict = PoseVerdict.VERIFIED
     else:
-        verdict = Verdict.NOT_TESTABLE
-    return Location(fine, pairs, near, found, coverage, verdict)
+        verdict = PoseVerdict.NOT_TESTABLE
+    return CameraFix(fine, pairs, near, found, coverage, verdict)
 
 
 def _as_seen(fine: PoseEstimate) -> Floats:

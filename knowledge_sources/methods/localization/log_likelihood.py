@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization.refinement import expected_lines
-from knowledge_sources.methods.localization.views import Glance
-from knowledge_sources.methods.verification.agreement import agreement, coverage
+from knowledge_sources.methods.localization.refinement import predict_lines
+from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.methods.verification.agreement import compute_agreement, compute_coverage
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_lines
@@ -33,7 +33,7 @@ SHIFTS_M, TURNS_RAD = (0.35, 0.7), (-0.1, 0.1)
 
 
 @dataclass(frozen=True, slots=True)
-class Support:
+class PoseLikelihood:
     """What speaks for a pose.
 
     Attributes:
@@ -54,22 +54,23 @@ class Support:
                 f" and {self.explained:.0%} of what is seen is in the model")
 
 
-def support_of(robot: RobotModel, glances: Sequence[Glance], world_from_now: Pose2) -> Support:
+def compute_pose_likelihood(robot: RobotModel, glances: Sequence[CameraView], world_from_now: Pose2) -> PoseLikelihood:
     """What all glances say of the pose that the robot has now."""
     seen = accounted = 0
     likelihood, weakest, lengths, explained = [0.0], 1.0, 0.0, 0.0
     for glance in glances:
         then = glance.then(world_from_now)
-        lines = expected_lines(robot, then).lines_world
+        lines = predict_lines(robot, then).lines_world
         views = _projected(robot, lines, [then, *_wrong_poses(then)])
-        found = agreement(views[0], glance.segments_px, views[1:])
-        seen, accounted = seen + found.seen, accounted + found.accounted
-        likelihood.append(log_likelihood(found.accounted, found.seen, found.chance))
-        if found.seen >= ENOUGH:
-            weakest = min(weakest, found.accounted / found.seen)
+        found = compute_agreement(views[0], glance.segments_px, views[1:])
+        seen, accounted = seen + found.visible, accounted + found.matched
+        likelihood.append(log_likelihood(found.matched, found.visible, found.chance))
+        if found.visible >= ENOUGH:
+            weakest = min(weakest, found.matched / found.visible)
         length, part = _explained(robot, glance, then)
         lengths, explained = lengths + length, explained + part
-    return Support(seen, accounted, math.fsum(likelihood), explained / lengths if lengths > 0.0 else 0.0, weakest)
+    part = explained / lengths if lengths > 0.0 else 0.0
+    return PoseLikelihood(seen, accounted, math.fsum(likelihood), part, weakest)
 
 
 def log_likelihood(accounted: int, seen: int, chance: float) -> float:
@@ -91,7 +92,7 @@ def _wrong_poses(pose: Pose2) -> list[Pose2]:
     return [pose @ Pose2(x, y, turn) for x, y in shifts for turn in TURNS_RAD]
 
 
-def _explained(robot: RobotModel, glance: Glance, then: Pose2) -> tuple[float, float]:
+def _explained(robot: RobotModel, glance: CameraView, then: Pose2) -> tuple[float, float]:
     """Length of the long segments, and of the part that lies on what the model shows, even faint lines [px]."""
     length = np.linalg.norm(glance.segments_px[:, 1] - glance.segments_px[:, 0], axis=1)
     long = length >= LONG_PX
@@ -99,5 +100,5 @@ def _explained(robot: RobotModel, glance: Glance, then: Pose2) -> tuple[float, f
         return 0.0, 0.0
     shown = visible_lines(robot.world, robot.camera, robot.camera_from_world(then), min_length_px=4.0,
                           min_contrast=0.01, min_separation_px=0.0)
-    covered = coverage(glance.segments_px[long], shown.segments_px, 3.0, 0.06)
+    covered = compute_coverage(glance.segments_px[long], shown.segments_px, 3.0, 0.06)
     return float(np.sum(length[long])), float(np.sum(length[long] * covered))

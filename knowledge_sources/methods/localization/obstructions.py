@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from knowledge_sources.methods.localization.views import Glance
+from knowledge_sources.methods.localization.views import CameraView
 from world_models.camera import Camera
 from world_models.entries.obstruction import Obstruction
 from world_models.frames import wrap_angle
@@ -37,7 +37,9 @@ INSIDE_PX, MOST_INSIDE = 8.0, 0.1
 """Within the outline, further in than so, nothing of the building is seen: no more than such a part of its length."""
 
 
-def obstruction_in(glances: Sequence[Glance], camera: Camera, least_area: float = LEAST_AREA) -> Obstruction | None:
+def find_obstruction(
+    glances: Sequence[CameraView], camera: Camera, least_area: float = LEAST_AREA
+) -> Obstruction | None:
     """What hides the same part of all looks; None where nothing does, or looks in too few directions were taken.
 
     Its outline is round what stands still. Were it not opaque, other segments would be seen within. Then one thing that
@@ -59,11 +61,11 @@ def obstruction_in(glances: Sequence[Glance], camera: Camera, least_area: float 
     return None
 
 
-def before_camera(
-    glances: Sequence[Glance], camera: Camera, known: Obstruction | None, least_area: float = LEAST_AREA
+def update_obstruction(
+    glances: Sequence[CameraView], camera: Camera, known: Obstruction | None, least_area: float = LEAST_AREA
 ) -> Obstruction | None:
     """What stands before the camera, by these looks; else what was found before, unless it is not opaque now."""
-    found = obstruction_in(glances, camera, least_area)
+    found = find_obstruction(glances, camera, least_area)
     if found is None and known is not None and is_opaque(known, [g.segments_px for g in glances]):
         return known
     return found
@@ -136,17 +138,17 @@ def _without_worst(
     return [*sides[:worst], *sides[worst + 1 :]], seen
 
 
-def _twins(glances: Sequence[Glance], which: int) -> tuple[NDArray[np.int64], int]:
+def _twins(glances: Sequence[CameraView], which: int) -> tuple[NDArray[np.int64], int]:
     """(n,) in how many looks in other directions each segment of one look has a twin, and how many of those there are.
     """
     one = glances[which]
     others = [g for g in glances
               if abs(wrap_angle(g.now_from_then.heading_rad - one.now_from_then.heading_rad)) > TURNED_RAD]
-    twins = [twinned(one.segments_px, other.segments_px) for other in others]
+    twins = [has_counterpart(one.segments_px, other.segments_px) for other in others]
     return np.sum([np.zeros(len(one.segments_px), np.int64), *twins], axis=0), len(others)
 
 
-def twinned(one_px: Floats, other_px: Floats) -> NDArray[np.bool_]:
+def has_counterpart(one_px: Floats, other_px: Floats) -> NDArray[np.bool_]:
     """(n,) which segments (n, 2, 2) lie on, and beside, one of others (m, 2, 2)."""
     return np.asarray(np.any(_lie_on(one_px, other_px), axis=1))
 

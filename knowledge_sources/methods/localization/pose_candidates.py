@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
-from knowledge_sources.methods.localization.chamfer import ChamferMaps, chamfer_maps, chamfer_scores
-from knowledge_sources.methods.localization.views import Glance
-from knowledge_sources.methods.localization.visibility_map import Vantage, vantage_of
+from knowledge_sources.methods.localization.chamfer import ChamferMaps, compute_chamfer_maps, compute_chamfer_scores
+from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.methods.localization.visibility_map import VisibilityMap, get_visibility_map
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
@@ -36,7 +36,7 @@ CLIMB = ((0.1, math.radians(0.8)), (0.05, math.radians(0.5)))
 
 
 @dataclass(frozen=True, slots=True)
-class Proposal:
+class PoseCandidate:
     """A pose that is worth a closer look: where the robot is now, in which room, and how well it fits (at most 1)."""
 
     room: str
@@ -44,7 +44,9 @@ class Proposal:
     score: float
 
 
-def proposals(robot: RobotModel, glances: Sequence[Glance], rooms: Sequence[str], most: int) -> tuple[Proposal, ...]:
+def find_pose_candidates(
+    robot: RobotModel, glances: Sequence[CameraView], rooms: Sequence[str], most: int
+) -> tuple[PoseCandidate, ...]:
     """The places and headings in these rooms that fit all glances best, the best first, distinct from each other.
 
     Empty where no glance shows a level line.
@@ -53,9 +55,9 @@ def proposals(robot: RobotModel, glances: Sequence[Glance], rooms: Sequence[str]
     if search is None:
         return ()
     poses, owners, scores = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros(0)]
-    views = [vantage_of(robot.world, room, robot.mount.height_m) for room in rooms]
+    views = [get_visibility_map(robot.world, room, robot.mount.height_m) for room in rooms]
     for number, view in enumerate(views):
-        if len(view.places):
+        if len(view.positions):
             poses.append(search.grid(view))
             owners.append(np.full(len(poses[-1]), number))
             scores.append(search.scores(view, poses[-1], np.tile(view.cell, 4), STRIDE))
@@ -65,7 +67,7 @@ def proposals(robot: RobotModel, glances: Sequence[Glance], rooms: Sequence[str]
     ends = np.array([pose for pose, _ in climbed]).reshape(-1, 3)
     fits = np.array([fit for _, fit in climbed])
     least = WORTH * float(np.max(fits, initial=0.0))
-    return tuple(Proposal(rooms[owner[first[i]]], Pose2(*ends[i]), float(fits[i]))
+    return tuple(PoseCandidate(rooms[owner[first[i]]], Pose2(*ends[i]), float(fits[i]))
                  for i in _distinct(ends, fits, most) if fits[i] >= least)
 
 
@@ -74,27 +76,27 @@ class _Search:
     """What poses are scored by."""
 
     robot: RobotModel
-    glances: tuple[Glance, ...]
+    glances: tuple[CameraView, ...]
     maps: tuple[ChamferMaps, ...]
     direction_rad: float
 
     @staticmethod
-    def of(robot: RobotModel, glances: Sequence[Glance]) -> _Search | None:
+    def of(robot: RobotModel, glances: Sequence[CameraView]) -> _Search | None:
         mount = robot.mount.camera_from_robot
         richest = sorted(glances, key=lambda g: -_length(g.segments_px))
         found = [(g, d) for g in richest if (d := find_level_direction(g.segments_px, robot.camera, mount)) is not None]
         if not found:
             return None
         glance, direction = found[0]
-        maps = tuple(chamfer_maps(g.segments_px, robot.camera) for g in glances)
+        maps = tuple(compute_chamfer_maps(g.segments_px, robot.camera) for g in glances)
         return _Search(robot, tuple(glances), maps, direction + glance.now_from_then.heading_rad)
 
-    def grid(self, view: Vantage) -> Floats:
+    def grid(self, view: VisibilityMap) -> Floats:
         """(4 n, 3) the places of a room, with each of the four headings that its walls leave."""
         headings = [view.axis_rad - self.direction_rad + k * RIGHT_ANGLE_RAD for k in range(4)]
-        return np.concatenate([np.column_stack([view.places, np.full(len(view.places), h)]) for h in headings])
+        return np.concatenate([np.column_stack([view.positions, np.full(len(view.positions), h)]) for h in headings])
 
-    def scores(self, view: Vantage, poses: Floats, cells: Ints, stride: int = 1) -> Floats:
+    def scores(self, view: VisibilityMap, poses: Floats, cells: Ints, stride: int = 1) -> Floats:
         """(n,) how much better than chance the lines in sight agree with all glances."""
         total = np.zeros((len(poses), 3))
         for glance, maps in zip(self.glances, self.maps, strict=True):
@@ -102,13 +104,14 @@ class _Search:
             c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
             then = np.column_stack([poses[:, 0] + c * g.x_m - s * g.y_m, poses[:, 1] + s * g.x_m + c * g.y_m,
                                     poses[:, 2] + g.heading_rad])
-            total += chamfer_scores(maps, self.robot.camera, self.robot.mount.camera_from_robot, then, view.points,
-                                    view.directions, view.first, view.seen, cells, stride)
+            total += compute_chamfer_scores(
+                maps, self.robot.camera, self.robot.mount.camera_from_robot, then, view.points, view.directions,
+                view.first, view.visible, cells, stride)
         return np.asarray((total[:, 0] - total[:, 1]) / (total[:, 2] + DOUBT / stride))
 
-    def climbed(self, view: Vantage, pose: Floats) -> tuple[Floats, float]:
+    def climbed(self, view: VisibilityMap, pose: Floats) -> tuple[Floats, float]:
         """The pose moved to where it fits best, and how well."""
-        cell, score = int(np.argmin(np.sum((view.places - pose[:2]) ** 2, axis=1))), 0.0
+        cell, score = int(np.argmin(np.sum((view.positions - pose[:2]) ** 2, axis=1))), 0.0
         for step_m, step_rad in CLIMB:
             near = pose + _AROUND * (step_m, step_m, step_rad)
             fits = self.scores(view, near, np.full(len(near), view.cell[cell]))
@@ -142,6 +145,6 @@ def _distinct(poses: Floats, scores: Floats, most: int) -> list[int]:
     return kept
 
 
-def are_apart(a: Pose2, b: Pose2) -> bool:
-    """Whether two poses are two proposals."""
+def are_distinct(a: Pose2, b: Pose2) -> bool:
+    """Whether two poses are two candidates."""
     return a.distance_to(b) > APART_M or abs(wrap_angle(a.heading_rad - b.heading_rad)) > APART_RAD

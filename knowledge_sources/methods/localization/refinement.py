@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
-from knowledge_sources.methods.localization.views import Glance
+from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.pose import planar_from_lines
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
@@ -33,26 +33,28 @@ TURN_RAD, TURNS_SIGMA = math.radians(1.5), 2.5
 """Turns that are known less well are tried in such steps, as far as so many of their standard deviations."""
 
 
-def expected_lines(robot: RobotModel, world_from_robot: Pose2) -> VisibleLines:
+def predict_lines(robot: RobotModel, world_from_robot: Pose2) -> VisibleLines:
     """The model lines that are worth looking for from there."""
     return visible_lines(robot.world, robot.camera, robot.camera_from_world(world_from_robot), min_length_px=12.0,
                          min_contrast=0.05, max_distance_m=15.0)
 
 
-def settled(robot: RobotModel, glances: Sequence[Glance], pose: Pose2) -> tuple[Pose2, Floats]:
+def refine_pose(robot: RobotModel, glances: Sequence[CameraView], pose: Pose2) -> tuple[Pose2, Floats]:
     """The pose now, with its covariance (3, 3), that the glances show together near a rough one.
 
     The glance of which the model has most comes first, of those whose turn is known: what another shows of things that
     the model lacks, or aside of where it is looked for, misleads nobody any more when the pose is known from it.
     """
     covariance = np.array(ROUGH)
-    rich = [len(expected_lines(robot, glance.then(pose))) for glance in glances]
+    rich = [len(predict_lines(robot, glance.then(pose))) for glance in glances]
     for _, glance in sorted(zip(rich, glances, strict=True), key=lambda pair: (_is_unsure(pair[1]), -pair[0])):
         pose, covariance = _with(robot, glance, pose, covariance)
     return pose, covariance
 
 
-def refined(robot: RobotModel, glances: Sequence[Glance], pose: Pose2, covariance: Floats) -> tuple[Glance, ...]:
+def refine_view_motions(
+    robot: RobotModel, glances: Sequence[CameraView], pose: Pose2, covariance: Floats
+) -> tuple[CameraView, ...]:
     """The glances with the motions between them as they must have been if the robot is at a pose (covariance (3, 3)).
 
     Only of motions whose turn level lines have not told: a turn that is known but to a few degrees would else count
@@ -68,21 +70,21 @@ def refined(robot: RobotModel, glances: Sequence[Glance], pose: Pose2, covarianc
     return tuple(out)
 
 
-def _is_unsure(glance: Glance) -> bool:
-    return bool(glance.spread[2, 2] > MOST_KNOWN_RAD**2)
+def _is_unsure(glance: CameraView) -> bool:
+    return bool(glance.covariance[2, 2] > MOST_KNOWN_RAD**2)
 
 
-def _best_turn(robot: RobotModel, glance: Glance, pose: Pose2) -> Pose2:
+def _best_turn(robot: RobotModel, glance: CameraView, pose: Pose2) -> Pose2:
     """Of the headings a glance may have had, the one at which most of what it shows lies on lines; then the nearest."""
-    most = int(TURNS_SIGMA * math.sqrt(float(glance.spread[2, 2])) / TURN_RAD)
+    most = int(TURNS_SIGMA * math.sqrt(float(glance.covariance[2, 2])) / TURN_RAD)
     turns = sorted((k * TURN_RAD for k in range(-most, most + 1)), key=abs)
     tried = [glance.then(pose) @ Pose2(0.0, 0.0, turn) for turn in turns]
-    pairs = [_pairs(expected_lines(robot, then).segments_px, glance.segments_px, GATES_PX[0], math.sin(GATE_RAD))
+    pairs = [_pairs(predict_lines(robot, then).segments_px, glance.segments_px, GATES_PX[0], math.sin(GATE_RAD))
              for then in tried]
     return tried[int(np.argmax([len(p) for p in pairs]))]
 
 
-def _with(robot: RobotModel, glance: Glance, pose: Pose2, covariance: Floats) -> tuple[Pose2, Floats]:
+def _with(robot: RobotModel, glance: CameraView, pose: Pose2, covariance: Floats) -> tuple[Pose2, Floats]:
     """What is known after one more glance: of what it corrects, the motion since then has its part, as it is unsure."""
     then = glance.then(pose)
     prior, lever = _prior(pose, covariance, glance)
@@ -93,19 +95,19 @@ def _with(robot: RobotModel, glance: Glance, pose: Pose2, covariance: Floats) ->
     return now, np.asarray(covariance - gain @ (prior - spread) @ gain.T)
 
 
-def _prior(pose: Pose2, covariance: Floats, glance: Glance) -> tuple[Floats, Floats]:
+def _prior(pose: Pose2, covariance: Floats, glance: CameraView) -> tuple[Floats, Floats]:
     """(3, 3) covariance of where a glance was taken, world, and the lever from the pose now to it."""
     lever, turn = _lever(pose, glance.now_from_then), np.eye(3)
     c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     turn[:2, :2] = ((c, -s), (s, c))
-    return lever @ covariance @ lever.T + turn @ glance.spread @ turn.T, lever
+    return lever @ covariance @ lever.T + turn @ glance.covariance @ turn.T, lever
 
 
-def _fix(robot: RobotModel, glance: Glance, then: Pose2, prior: Floats, start: Pose2) -> tuple[Pose2, Floats]:
+def _fix(robot: RobotModel, glance: CameraView, then: Pose2, prior: Floats, start: Pose2) -> tuple[Pose2, Floats]:
     """Where a glance was taken, from about where it starts, with the covariance; as before where too little is seen."""
     solved, spread = start, prior
     for gate_px in GATES_PX:
-        lines = expected_lines(robot, solved)
+        lines = predict_lines(robot, solved)
         pairs = _pairs(lines.segments_px, glance.segments_px, gate_px, math.sin(GATE_RAD))
         if len(pairs) < LEAST_PAIRS:
             break

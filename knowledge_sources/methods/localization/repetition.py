@@ -17,7 +17,7 @@ SAME_M = 0.1
 """Rooms whose sides differ by no more may be alike."""
 
 
-def repetitions(world: World, room: str, pose: Pose2, rooms: Sequence[str]) -> Iterator[tuple[str, Pose2]]:
+def find_repetitions(world: World, room: str, pose: Pose2, rooms: Sequence[str]) -> Iterator[tuple[str, Pose2]]:
     """Room and pose of every place, of these rooms, that could look like a pose in a room if walls and doors alone did.
 
     Rooms of the same size are laid on each other in all ways that turn them by right angles, a room on itself too, and

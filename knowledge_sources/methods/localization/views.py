@@ -22,7 +22,7 @@ MOST_OFF_RAD = math.radians(20.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Glance:
+class CameraView:
     """One look.
 
     Attributes:
@@ -33,14 +33,14 @@ class Glance:
 
     segments_px: Floats
     now_from_then: Pose2
-    spread: Floats
+    covariance: Floats
 
     def then(self, world_from_now: Pose2) -> Pose2:
         """Where the robot was, if it is there now."""
         return world_from_now @ self.now_from_then
 
 
-def squared(glances: Sequence[Glance], camera: Camera, camera_from_robot: Pose) -> tuple[Glance, ...]:
+def align_headings(glances: Sequence[CameraView], camera: Camera, camera_from_robot: Pose) -> tuple[CameraView, ...]:
     """The glances, in the order they were taken, with the turns between them corrected by the level lines they show.
 
     Wheels err by a fortieth of a turn; but lines at right angles are seen to a tenth of a degree, and it is known from
@@ -51,12 +51,12 @@ def squared(glances: Sequence[Glance], camera: Camera, camera_from_robot: Pose) 
     if len(told) < 2:
         return tuple(glances)
     surest = max(told)
-    axis, spread = told[surest], float(glances[surest].spread[2, 2]) + SEEN_RAD**2
+    axis, spread = told[surest], float(glances[surest].covariance[2, 2]) + SEEN_RAD**2
     out, off_later = [glances[-1]], 0.0
     for k in range(len(glances) - 2, -1, -1):
         glance, off = glances[k], math.remainder(axis - told[k], RIGHT) if k in told else math.inf
         if abs(off) < MOST_OFF_RAD and k != surest:
-            glance = replace(glance, spread=_known_turn(glance.spread, spread))
+            glance = replace(glance, covariance=_known_turn(glance.covariance, spread))
         else:
             off = off_later
         pose = _before(glance, glances[k + 1], out[-1].now_from_then, off_later - off)
@@ -65,14 +65,14 @@ def squared(glances: Sequence[Glance], camera: Camera, camera_from_robot: Pose) 
     return tuple(reversed(out))
 
 
-def _told(glances: Sequence[Glance], camera: Camera, camera_from_robot: Pose) -> dict[int, float]:
+def _told(glances: Sequence[CameraView], camera: Camera, camera_from_robot: Pose) -> dict[int, float]:
     """By the number of each glance that shows level lines: their direction from now, modulo a right angle [rad]."""
     seen = [find_level_direction(g.segments_px, camera, camera_from_robot) for g in glances]
     return {k: d + g.now_from_then.heading_rad for k, (g, d) in enumerate(zip(glances, seen, strict=True))
             if d is not None}
 
 
-def _before(glance: Glance, later: Glance, now_from_later: Pose2, more_rad: float) -> Pose2:
+def _before(glance: CameraView, later: CameraView, now_from_later: Pose2, more_rad: float) -> Pose2:
     """Where a glance was taken if the robot turned by so much more before it went on to the later one."""
     step = Pose2(0.0, 0.0, more_rad) @ glance.now_from_then.inverse() @ later.now_from_then
     return now_from_later @ step.inverse()
@@ -85,7 +85,7 @@ def _known_turn(spread: Floats, seen: float) -> Floats:
     return out
 
 
-def moved(now_from_then: Pose2, covariance: Floats, step: Pose2, spread: Floats) -> tuple[Pose2, Floats]:
+def propagate_pose(now_from_then: Pose2, covariance: Floats, step: Pose2, spread: Floats) -> tuple[Pose2, Floats]:
     """Where the robot was, and its covariance (3, 3), from where it is after one more step with its spread (3, 3)."""
     after = step.inverse() @ now_from_then
     c, s = math.cos(step.heading_rad), math.sin(step.heading_rad)

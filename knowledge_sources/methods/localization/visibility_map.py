@@ -35,7 +35,7 @@ ROOM_M = 0.2
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Vantage:
+class VisibilityMap:
     """A room, as seen from its places.
 
     Attributes:
@@ -46,19 +46,19 @@ class Vantage:
         axis_rad: the direction of most of its walls, modulo a right angle.
     """
 
-    places: Floats
+    positions: Floats
     cell: Ints
     eyes: Floats
     points: Floats
     directions: Floats
     first: Ints
-    seen: Ints
+    visible: Ints
     axis_rad: float
 
 
-def vantage_of(world: World, room: str, eye_m: float) -> Vantage:
+def get_visibility_map(world: World, room: str, eye_m: float) -> VisibilityMap:
     """What is in sight from a room's places for an eye at so high above the world's zero. Kept with the world."""
-    known: dict[tuple[str, float], Vantage] = world.memo.setdefault("vantages", {})
+    known: dict[tuple[str, float], VisibilityMap] = world.memo.setdefault("vantages", {})
     key = room, eye_m
     if key not in known:
         known[key] = _vantage(world, room, eye_m)
@@ -78,7 +78,7 @@ def sample_lines(lines_world: Floats, spacing_m: float = SPACING_M) -> tuple[Flo
     return lines[owner, 0] + t[:, None] * along[owner], unit[owner], owner
 
 
-def _vantage(world: World, room: str, eye_m: float) -> Vantage:
+def _vantage(world: World, room: str, eye_m: float) -> VisibilityMap:
     places = _places(world, room)
     squares, cell = np.unique(np.floor(places / CELL_M).astype(np.int64), axis=0, return_inverse=True)
     eyes = _eyes(places, cell.reshape(-1), squares)
@@ -91,7 +91,7 @@ def _vantage(world: World, room: str, eye_m: float) -> Vantage:
         asked = np.flatnonzero(showing & near)
         seen.append(asked[_in_sight(eye, points[asked], scene.planes_world, scene.polygons_world)])
         first.append(first[-1] + len(seen[-1]))
-    return Vantage(
+    return VisibilityMap(
         places, cell.reshape(-1).astype(np.int64), eyes, points, directions, np.array(first, np.int64),
         np.concatenate([np.zeros(0, np.int64), *seen]), _axis(scene.edges.lines_world),
     )

@@ -1,7 +1,7 @@
 """Does the picture agree with a pose, and how easily would it agree with a wrong one?
 
-Agreement is counted a contrario: how many of the expected lines are accounted for at the pose, against how many are at
-displaced poses, where they are accounted for by chance. The binomial tail is the probability that as much agrees at a
+Agreement is counted a contrario: how many of the expected lines are matched for at the pose, against how many are at
+displaced poses, where they are matched for by chance. The binomial tail is the probability that as much agrees at a
 wrong place (Desolneux, Moisan, Morel: From Gestalt Theory to Image Analysis, 2008, ch. 3).
 """
 
@@ -24,12 +24,12 @@ PLACES = 1e3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Agreement:
-    """What of the expected lines is accounted for.
+    """What of the expected lines is matched for.
 
     Attributes:
         coverage: (m,) part of each line that some segment lies on, NaN where the line is not in view.
-        chance: probability that a line is accounted for at a wrong pose.
-        p_false: probability that as many lines are accounted for at a wrong pose.
+        chance: probability that a line is matched for at a wrong pose.
+        p_false: probability that as many lines are matched for at a wrong pose.
     """
 
     coverage: Floats
@@ -37,23 +37,23 @@ class Agreement:
     p_false: float
 
     @property
-    def seen(self) -> int:
+    def visible(self) -> int:
         """How many lines are in view."""
         return int(np.count_nonzero(~np.isnan(self.coverage)))
 
     @property
-    def accounted(self) -> int:
-        """How many lines are accounted for, by half their length or more."""
+    def matched(self) -> int:
+        """How many lines are matched for, by half their length or more."""
         return int(np.count_nonzero(np.nan_to_num(self.coverage) >= 0.5))
 
     def total(self, lengths_px: Floats) -> float:
-        """Part of the length in view that is accounted for, 0..1."""
+        """Part of the length in view that is matched for, 0..1."""
         here = ~np.isnan(self.coverage)
         length = float(np.sum(lengths_px[here]))
         return float(np.sum(self.coverage[here] * lengths_px[here])) / length if length > 0 else 0.0
 
 
-def coverage(lines_px: Floats, segments_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
+def compute_coverage(lines_px: Floats, segments_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
     """(m,) part of each line (m, 2, 2) that lies under segments (k, 2, 2) within the tolerances."""
     lines, segments = np.array(lines_px, float, order="C"), np.array(segments_px, float, order="C")
     covered: Floats = _covered(lines, segments, tolerance_px, math.sin(tolerance_rad))
@@ -95,7 +95,7 @@ def _covered(lines: Any, segments: Any, tolerance_px: float, sine: float) -> Any
     return out
 
 
-def agreement(
+def compute_agreement(
     lines_px: Floats,
     segments_px: Floats,
     displaced_px: Floats,
@@ -107,12 +107,12 @@ def agreement(
 
     ``displaced_px`` (p, m, 2, 2) are the same lines at p wrong poses nearby.
     """
-    here = coverage(lines_px, segments_px, tolerance_px, tolerance_rad)
-    there = coverage(displaced_px.reshape(-1, 2, 2), segments_px, tolerance_px, tolerance_rad)
+    here = compute_coverage(lines_px, segments_px, tolerance_px, tolerance_rad)
+    there = compute_coverage(displaced_px.reshape(-1, 2, 2), segments_px, tolerance_px, tolerance_rad)
     each = there.reshape(displaced_px.shape[:2])
     seen = np.count_nonzero(~np.isnan(each), axis=1)
     by_chance = np.count_nonzero(each >= 0.5, axis=1)[seen > 0] / seen[seen > 0]
     chance = min(0.95, max(0.02, float(np.mean(by_chance)) if len(by_chance) else 1.0))
     found = Agreement(here, chance, 1.0)
-    p = PLACES * float(binom.sf(found.accounted - 1, found.seen, chance)) if found.seen else 1.0
+    p = PLACES * float(binom.sf(found.matched - 1, found.visible, chance)) if found.visible else 1.0
     return Agreement(here, chance, min(1.0, p))

@@ -1,4 +1,4 @@
-"""The region probe: have the faces that should be seen the colours that the model says, relative to each other? (§1.2)
+"""Have the faces that should be seen the colours that the model says, relative to each other? (§1.2)
 
 Light is not modelled, so nothing absolute is compared. The model says which faces are seen and in what colour; the
 picture is cut into regions (:mod:`knowledge_sources.methods.features.regions`), and of each face the region that holds
@@ -52,7 +52,7 @@ WHITE = Finish((1.0, 1.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
-class Probe:
+class ColorCheck:
     """What a picture says of the faces that should be seen.
 
     Attributes:
@@ -61,21 +61,21 @@ class Probe:
         chance: part of them that would if the colours were dealt out otherwise.
     """
 
-    faces: int
-    agree: float
+    count: int
+    agreeing: float
     chance: float
 
     @property
     def is_testable(self) -> bool:
         """Whether there was enough to compare, and of different colours."""
-        return self.faces >= LEAST_FACES and self.chance <= MOST_CHANCE
+        return self.count >= LEAST_FACES and self.chance <= MOST_CHANCE
 
 
-NOTHING = Probe(0, 0.0, 0.0)
+NOT_TESTED = ColorCheck(0, 0.0, 0.0)
 """Too few faces to compare."""
 
 
-def expected_looks(robot: RobotModel, pose: Pose2) -> tuple[Look, ...]:
+def predict_face_colors(robot: RobotModel, pose: Pose2) -> tuple[Look, ...]:
     """The faces in view from a pose, those first of which most is seen; asked again soon, the answer is at hand."""
     camera, camera_from_world = robot.camera, robot.camera_from_world(pose)
     key = camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes()
@@ -126,7 +126,7 @@ def _rays(camera: Camera) -> tuple[Floats, Floats, Window]:
     return rays, np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)]), image_window(camera)
 
 
-def small_colour(jpeg: bytes) -> NDArray[np.uint8]:
+def decode_small_color(jpeg: bytes) -> NDArray[np.uint8]:
     """A quarter of the picture's size in colour (h, w, 3), red first; far quicker than all of it."""
     image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_REDUCED_COLOR_4)
     if image is None:
@@ -134,17 +134,17 @@ def small_colour(jpeg: bytes) -> NDArray[np.uint8]:
     return np.asarray(image[:, :, ::-1], np.uint8)
 
 
-def probe(robot: RobotModel, pose: Pose2, image: NDArray[np.uint8], looks: Sequence[Look]) -> Probe:
+def check_colors(robot: RobotModel, pose: Pose2, image: NDArray[np.uint8], looks: Sequence[Look]) -> ColorCheck:
     """Compare the picture (h, w, 3), as the lens made it and maybe smaller, with the looks expected from the pose."""
     if not looks:
-        return NOTHING
+        return NOT_TESTED
     face = np.repeat(np.arange(len(looks)), [len(points) for _, points in looks])
     points = robot.camera_from_world(pose).apply(np.array([p for _, points in looks for p in points]))
     ahead = points[:, 2] > NEAR_M
     pixels = robot.lens.project(np.where(ahead[:, None], points, (0.0, 0.0, 1.0)))
     inside = ahead & robot.lens.inside(pixels, MARGIN_PX)
     if not inside.any():
-        return NOTHING
+        return NOT_TESTED
     parts = (pixels[inside] + 0.5) / (robot.lens.width, robot.lens.height)
     tiny = cv2.resize(image, (REGIONS_PX, REGIONS_PX), interpolation=cv2.INTER_AREA).mean(axis=2)
     labels = segment_regions(tiny, sector_px=REGIONS_PX, min_area_px=LEAST_AREA_PX).labels
@@ -159,18 +159,18 @@ def _at(image: NDArray[Any], parts: Floats) -> NDArray[Any]:
     return np.asarray(image[row, column])
 
 
-def imagined(looks: Sequence[Look]) -> Probe:
-    """The probe of a picture in which all is as the model says."""
+def predict_color_check(looks: Sequence[Look]) -> ColorCheck:
+    """The check of a picture in which all is as the model says."""
     if len(looks) < LEAST_FACES:
-        return NOTHING
+        return NOT_TESTED
     return _told(meant := _logs(np.array([colour for colour, _ in looks])), meant)
 
 
-def _compared(seen: Floats, labels: NDArray[np.int32], face: NDArray[np.int64], colours: Floats) -> Probe:
+def _compared(seen: Floats, labels: NDArray[np.int32], face: NDArray[np.int64], colours: Floats) -> ColorCheck:
     """From the colours (n, 3) and regions (n,) seen at points of faces (n,) that have these colours (f, 3)."""
     tested = [f for f in range(len(colours)) if np.count_nonzero(face == f) >= 2]
     if len(tested) < LEAST_FACES:
-        return NOTHING
+        return NOT_TESTED
     own = []
     for f in tested:
         mine = np.flatnonzero(face == f)
@@ -184,11 +184,11 @@ def _logs(colours: Floats) -> Floats:
     return np.asarray(np.log(255.0 * colours + DARK))
 
 
-def _told(had: Floats, meant: Floats) -> Probe:
+def _told(had: Floats, meant: Floats) -> ColorCheck:
     """From the logarithms of the colours (f, 3) that faces had, and that they should have."""
     dealt = np.stack([np.roll(meant, shift, axis=0) for shift in range(len(meant))])
     alike = _alike(had - dealt)
-    return Probe(len(meant), float(alike[0]), float(np.mean(alike[1:])))
+    return ColorCheck(len(meant), float(alike[0]), float(np.mean(alike[1:])))
 
 
 def _alike(ratios: Floats) -> Floats:

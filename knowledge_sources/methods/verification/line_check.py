@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.pose.planar import camera_states
-from knowledge_sources.methods.verification.agreement import Agreement, agreement
+from knowledge_sources.methods.verification.agreement import Agreement, compute_agreement
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 
@@ -21,7 +21,7 @@ MOST_P_FALSE = 1e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Verification:
+class LineCheck:
     """The evidence for a pose.
 
     Attributes:
@@ -38,16 +38,16 @@ class Verification:
     def holds(self) -> bool:
         """Whether enough is accounted for, and could not well be by chance."""
         a = self.agreement
-        return a.accounted >= LEAST_ACCOUNTED and self.coverage >= LEAST_COVERAGE and a.p_false <= MOST_P_FALSE
+        return a.matched >= LEAST_ACCOUNTED and self.coverage >= LEAST_COVERAGE and a.p_false <= MOST_P_FALSE
 
 
-def verify(robot: RobotModel, lines_world: Floats, segments_px: Floats, world_from_robot: Pose2) -> Verification:
+def check_lines(robot: RobotModel, lines_world: Floats, segments_px: Floats, world_from_robot: Pose2) -> LineCheck:
     """Compare model lines (m, 2, 3), visible from there, with segments (k, 2, 2) found in the image."""
     state = np.array([world_from_robot.x_m, world_from_robot.y_m, world_from_robot.heading_rad])
     here, displaced = np.split(_projected(robot, lines_world, np.concatenate([state[None], _wrong(state)])), [1])
-    found = agreement(here[0], segments_px, displaced)
+    found = compute_agreement(here[0], segments_px, displaced)
     lengths = np.linalg.norm(here[0, :, 1] - here[0, :, 0], axis=1)
-    return Verification(found, found.total(lengths), here[0])
+    return LineCheck(found, found.total(lengths), here[0])
 
 
 def _projected(robot: RobotModel, lines_world: Floats, states: Floats) -> Floats:

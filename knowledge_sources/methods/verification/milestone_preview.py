@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.verification.color_check import expected_looks, imagined
-from knowledge_sources.methods.verification.line_check import verify
+from knowledge_sources.methods.verification.color_check import predict_color_check, predict_face_colors
+from knowledge_sources.methods.verification.line_check import check_lines
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
-from knowledge_sources.methods.verification.pose_evidence import evidence
+from knowledge_sources.methods.verification.pose_evidence import compute_evidence
 from world_models.building.locales import Doorway
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
@@ -25,22 +25,23 @@ COLOURS, SAME_COLOUR = 0.8, 0.08
 """And this part of the colours, which are the same where they differ by no more, 0..1."""
 
 
-def least_p_false(robot: RobotModel, pose: Pose2, lines_world: Floats, covariance: Floats) -> float:
+def predict_p_false(robot: RobotModel, pose: Pose2, lines_world: Floats, covariance: Floats) -> float:
     """The probability of a wrong pose that would be stated if everything were seen where it is expected."""
     shown = robot.camera.project_segments(lines_world, robot.camera_from_world(pose))[0]
     shown = shown[np.isfinite(shown).all(axis=(1, 2))]
-    agreed = verify(robot, lines_world, shown, pose)
-    return POSE_CONFIDENCE.p_false(evidence(robot, lines_world, shown, pose, covariance, pose, covariance, agreed,
-                                       imagined(expected_looks(robot, pose))))
+    agreed = check_lines(robot, lines_world, shown, pose)
+    colors = predict_color_check(predict_face_colors(robot, pose))
+    return POSE_CONFIDENCE.p_false(
+        compute_evidence(robot, lines_world, shown, pose, covariance, pose, covariance, agreed, colors))
 
 
-def lookalike(robot: RobotModel, locale: str, pose: Pose2, lines_world: Floats) -> Pose2 | None:
+def find_alias(robot: RobotModel, locale: str, pose: Pose2, lines_world: Floats) -> Pose2 | None:
     """Another place of the same locale from which the model looks as it does from here; None where there is none."""
     colours = _colours(robot, pose)
     for there in _alike(robot, locale, pose):
         seen = visible_lines(robot.world, robot.camera, robot.camera_from_world(there), min_length_px=LENGTH_PX,
                              min_contrast=CONTRAST, max_distance_m=SIGHT_M).segments_px
-        if verify(robot, lines_world, seen, pose).coverage >= AS_MUCH:
+        if check_lines(robot, lines_world, seen, pose).coverage >= AS_MUCH:
             apart = np.abs(colours[:, None] - _colours(robot, there)[None]).max(axis=2).min(axis=1, initial=1.0)
             if np.mean(apart <= SAME_COLOUR) >= COLOURS:
                 return there
@@ -49,7 +50,7 @@ def lookalike(robot: RobotModel, locale: str, pose: Pose2, lines_world: Floats) 
 
 def _colours(robot: RobotModel, pose: Pose2) -> Floats:
     """(n, 3) of the faces in view."""
-    return np.array([colour for colour, _ in expected_looks(robot, pose)]).reshape(-1, 3)
+    return np.array([colour for colour, _ in predict_face_colors(robot, pose)]).reshape(-1, 3)
 
 
 def _alike(robot: RobotModel, locale: str, pose: Pose2) -> Iterator[Pose2]:

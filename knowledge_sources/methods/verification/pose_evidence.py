@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.pose.planar import point_jacobian
-from knowledge_sources.methods.verification.agreement import coverage
-from knowledge_sources.methods.verification.color_check import Probe
-from knowledge_sources.methods.verification.line_check import Verification
+from knowledge_sources.methods.verification.agreement import compute_coverage
+from knowledge_sources.methods.verification.color_check import ColorCheck
+from knowledge_sources.methods.verification.line_check import LineCheck
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
@@ -67,19 +67,19 @@ class PoseEvidence:
 NAMES = tuple(field.name for field in fields(PoseEvidence))
 
 
-def evidence(
+def compute_evidence(
     robot: RobotModel, lines_world: Floats, segments_px: Floats, pose: Pose2, covariance: Floats, belief: Pose2,
-    belief_covariance: Floats, lines: Verification, faces: Probe,
+    belief_covariance: Floats, lines: LineCheck, faces: ColorCheck,
 ) -> PoseEvidence:
     """Of expected lines (m, 2, 3), segments (k, 2, 2), a fix and the belief that it was sought from (3, 3), all world.
 
-    ``lines`` is what :func:`~knowledge_sources.methods.verification.line_check.verify` found, ``faces`` what the
-    region probe did.
+    ``lines`` is what :func:`~knowledge_sources.methods.verification.line_check.check_lines` found, ``faces`` what the
+    color check did.
     """
     found = np.nan_to_num(lines.agreement.coverage)
     span = np.linalg.norm(lines.projected_px[:, 1] - lines.projected_px[:, 0], axis=1)
     length = np.minimum(np.nan_to_num(span), LONG_PX)
-    strict = np.nan_to_num(coverage(lines.projected_px, segments_px, STRICT_PX, 0.06))
+    strict = np.nan_to_num(compute_coverage(lines.projected_px, segments_px, STRICT_PX, 0.06))
     told = length[:, None] * _told(robot, lines_world, pose)
     agreed = lines.agreement
     return PoseEvidence(
@@ -87,10 +87,10 @@ def evidence(
         weakest=float(min((_part(told[:, k] * found, told[:, k]) for k in range(len(STEPS))), default=0.0)),
         sharp=_part(length * strict, length * found),
         beyond_chance=math.log10(max(agreed.p_false, LEAST_PROBABILITY)) / math.log10(LEAST_PROBABILITY),
-        lines=math.log2(1.0 + agreed.accounted),
+        lines=math.log2(1.0 + agreed.matched),
         near=1.0 - min(_sigmas(pose, belief, covariance + belief_covariance), MOST_SIGMAS) / MOST_SIGMAS,
-        faces=max(faces.agree - faces.chance, 0.0) if faces.is_testable else 0.0,
-        faces_tested=math.log2(1.0 + faces.faces) if faces.is_testable else 0.0,
+        faces=max(faces.agreeing - faces.chance, 0.0) if faces.is_testable else 0.0,
+        faces_tested=math.log2(1.0 + faces.count) if faces.is_testable else 0.0,
     )
 
 
@@ -99,7 +99,7 @@ def _part(of: Floats, all_of_it: Floats) -> float:
     return float(np.sum(of)) / whole if whole > 1e-9 else 0.0
 
 
-def wheels_px(robot: RobotModel, lines_world: Floats, pose: Pose2, covariance: Floats) -> float:
+def compute_motion_tolerance_px(robot: RobotModel, lines_world: Floats, pose: Pose2, covariance: Floats) -> float:
     """How far the lines (m, 2, 3) may lie from where they were expected, by the covariance (3, 3) of the place: the
     median over them of :data:`REACH` deviations across each [px]."""
     if not len(lines_world):

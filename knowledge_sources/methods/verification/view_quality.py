@@ -31,7 +31,7 @@ class ViewQuality:
     lines: int
 
 
-def view_quality(
+def compute_view_quality(
     lines_world: NDArray[np.float64], camera: Camera, camera_from_robot: Pose, world_from_robot: Pose2, sigma_px: float
 ) -> ViewQuality:
     """From the Fisher information of visible model lines (n, 2, 3), their ends seen with ``sigma_px`` across them."""

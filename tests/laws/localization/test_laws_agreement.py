@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization.chamfer import chamfer_maps, chamfer_scores
+from knowledge_sources.methods.localization.chamfer import compute_chamfer_maps, compute_chamfer_scores
 from knowledge_sources.methods.localization.visibility_map import sample_lines
-from knowledge_sources.methods.verification.agreement import agreement, coverage
-from knowledge_sources.methods.verification.view_quality import view_quality
+from knowledge_sources.methods.verification.agreement import compute_agreement, compute_coverage
+from knowledge_sources.methods.verification.view_quality import compute_view_quality
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 
@@ -45,9 +45,9 @@ def projected(lines: Floats, pose: Pose2) -> Floats:
 @given(seed=seeds, count=st.integers(1, 25))
 def test_lines_account_for_themselves_and_not_for_what_is_far(seed: int, count: int) -> None:
     lines = some_lines(seed, count)
-    assert np.all(coverage(lines, lines, 2.0, 0.05) == 1.0)
-    assert np.all(coverage(lines, lines + np.array([2000.0, 0.0]), 2.0, 0.05) == 0.0)
-    assert np.all(coverage(lines, np.zeros((0, 2, 2)), 2.0, 0.05) == 0.0)
+    assert np.all(compute_coverage(lines, lines, 2.0, 0.05) == 1.0)
+    assert np.all(compute_coverage(lines, lines + np.array([2000.0, 0.0]), 2.0, 0.05) == 0.0)
+    assert np.all(compute_coverage(lines, np.zeros((0, 2, 2)), 2.0, 0.05) == 0.0)
 
 
 @settings(deadline=None, max_examples=40)
@@ -56,14 +56,14 @@ def test_coverage_knows_no_order_of_segments_or_of_their_ends(seed: int, count: 
     lines, data = some_lines(seed, count), some_lines(seed + 1, 3 * count)
     rng = np.random.default_rng(seed)
     shuffled = data[rng.permutation(len(data))][:, :: int(rng.choice([-1, 1]))]
-    assert np.array_equal(coverage(lines, data, 4.0, 0.2), coverage(lines, shuffled, 4.0, 0.2))
+    assert np.array_equal(compute_coverage(lines, data, 4.0, 0.2), compute_coverage(lines, shuffled, 4.0, 0.2))
 
 
 @settings(deadline=None, max_examples=30)
 @given(seed=seeds)
 def test_more_segments_never_account_for_less(seed: int) -> None:
     lines, data = some_lines(seed, 10), some_lines(seed + 1, 30)
-    assert np.all(coverage(lines, data, 4.0, 0.2) >= coverage(lines, data[:15], 4.0, 0.2))
+    assert np.all(compute_coverage(lines, data, 4.0, 0.2) >= compute_coverage(lines, data[:15], 4.0, 0.2))
 
 
 @settings(deadline=None, max_examples=30)
@@ -72,9 +72,9 @@ def test_the_right_pose_is_unlikely_by_chance_and_clutter_is_not(seed: int) -> N
     rng = np.random.default_rng(seed)
     lines, clutter = some_lines(seed, 20), some_lines(seed + 1, 60)
     displaced = np.array([lines + rng.uniform(20, 60, 2) for _ in range(12)])
-    right = agreement(lines, np.concatenate([lines, clutter]), displaced)
-    wrong = agreement(lines, clutter, displaced)
-    assert right.accounted == 20 and right.p_false < 1e-6
+    right = compute_agreement(lines, np.concatenate([lines, clutter]), displaced)
+    wrong = compute_agreement(lines, clutter, displaced)
+    assert right.matched == 20 and right.p_false < 1e-6
     assert wrong.p_false > 1e-3
     assert 0.0 <= right.p_false <= wrong.p_false <= 1.0
 
@@ -84,13 +84,13 @@ def test_the_right_pose_is_unlikely_by_chance_and_clutter_is_not(seed: int) -> N
 def test_the_true_pose_scores_best_by_chamfer(seed: int, turn: float) -> None:
     lines, here = model_lines(seed), Pose2(0.0, 0.0, 0.0)
     seen = projected(lines, here)
-    maps = chamfer_maps(seen[~np.isnan(seen).any(axis=(1, 2))], CAMERA)
+    maps = compute_chamfer_maps(seen[~np.isnan(seen).any(axis=(1, 2))], CAMERA)
     points, directions, _ = sample_lines(lines)
     everything = np.array([0, len(points)]), np.arange(len(points)), np.zeros(1, np.int64)
 
     def score(pose: Pose2) -> float:
         at = np.array([[pose.x_m, pose.y_m, pose.heading_rad]])
-        near, chance, count = chamfer_scores(
+        near, chance, count = compute_chamfer_scores(
             maps, CAMERA, MOUNT.camera_from_robot, at, points, directions, *everything)[0]
         return float((near - chance) / (count + 10.0))
 
@@ -105,8 +105,9 @@ def test_the_true_pose_scores_best_by_chamfer(seed: int, turn: float) -> None:
 @given(seed=seeds, count=st.integers(3, 25))
 def test_more_lines_never_tell_less(seed: int, count: int) -> None:
     lines = model_lines(seed)
-    few = view_quality(lines[:count], CAMERA, MOUNT.camera_from_robot, Pose2(0.0, 0.0, 0.0), 0.7)
-    all_of_them = view_quality(lines, CAMERA, MOUNT.camera_from_robot, Pose2(0.0, 0.0, 0.0), 0.7)
+    few = compute_view_quality(lines[:count], CAMERA, MOUNT.camera_from_robot, Pose2(0.0, 0.0, 0.0), 0.7)
+    all_of_them = compute_view_quality(lines, CAMERA, MOUNT.camera_from_robot, Pose2(0.0, 0.0, 0.0), 0.7)
     assert all_of_them.sigma_m <= few.sigma_m * (1.0 + 1e-9)
     assert all_of_them.sigma_rad <= few.sigma_rad * (1.0 + 1e-9)
-    assert view_quality(lines[:0], CAMERA, MOUNT.camera_from_robot, Pose2(0.0, 0.0, 0.0), 0.7).sigma_m == math.inf
+    none = compute_view_quality(lines[:0], CAMERA, MOUNT.camera_from_robot, Pose2(0.0, 0.0, 0.0), 0.7)
+    assert none.sigma_m == math.inf

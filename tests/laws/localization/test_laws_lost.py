@@ -13,20 +13,20 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
 from knowledge_sources.methods.localization.hypotheses import (
-    Place,
-    Probe,
-    best_probe,
-    difference,
-    is_safe_in,
-    separation,
-    weights_of,
-    widest_gap,
+    PoseHypothesis,
+    SensingAction,
+    choose_sensing_action,
+    compute_separation,
+    compute_view_difference,
+    find_widest_gap,
+    make_safety_check,
+    normalize_log_likelihoods,
 )
-from knowledge_sources.methods.localization.log_likelihood import Support
-from knowledge_sources.methods.localization.refinement import expected_lines, refined, settled
-from knowledge_sources.methods.localization.relocation import Candidate, Verdict, finding, twins
-from knowledge_sources.methods.localization.views import Glance, moved, squared
-from knowledge_sources.methods.localization.visibility_map import vantage_of
+from knowledge_sources.methods.localization.log_likelihood import PoseLikelihood
+from knowledge_sources.methods.localization.refinement import predict_lines, refine_pose, refine_view_motions
+from knowledge_sources.methods.localization.relocation import Candidate, LocalizationStatus, find_aliases, localize
+from knowledge_sources.methods.localization.views import CameraView, align_headings, propagate_pose
+from knowledge_sources.methods.localization.visibility_map import get_visibility_map
 from sim.made_up.generated_floors import generated_floor
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
@@ -54,7 +54,7 @@ TWIN = RobotModel(SYMMETRIC.world, CAMERA, MOUNT, ActuatorModel())
 
 def seen_from(robot: RobotModel, pose: Pose2, rng: np.random.Generator) -> Floats:
     """Segments as a line finder would tell them: a tenth missing, ends cut, a third of a pixel off, and clutter."""
-    lines = expected_lines(robot, pose).segments_px
+    lines = predict_lines(robot, pose).segments_px
     kept = lines[rng.random(len(lines)) > 0.1]
     cut = rng.uniform(0.0, 0.15, (len(kept), 2, 1))
     along = kept[:, 1] - kept[:, 0]
@@ -69,10 +69,10 @@ def seen_from(robot: RobotModel, pose: Pose2, rng: np.random.Generator) -> Float
 
 @given(values=st.lists(st.floats(-200, 200), min_size=1, max_size=12), seed=seeds)
 def test_weights_sum_to_one_and_do_not_depend_on_the_order(values: list[float], seed: int) -> None:
-    weights = weights_of(values)
+    weights = normalize_log_likelihoods(values)
     assert math.fsum(weights) == pytest.approx(1.0)
     order = np.random.default_rng(seed).permutation(len(values))
-    assert weights_of([values[i] for i in order]) == pytest.approx([weights[i] for i in order])
+    assert normalize_log_likelihoods([values[i] for i in order]) == pytest.approx([weights[i] for i in order])
     likeliest = max(range(len(values)), key=values.__getitem__)
     assert weights[likeliest] == max(weights)
 
@@ -91,14 +91,14 @@ def made_up_view(pose: Pose2) -> Floats:
 @settings(deadline=None, max_examples=25)
 @given(where=st.lists(poses, min_size=1, max_size=4), looked=st.lists(angles, max_size=3), odd=st.booleans())
 def test_the_probe_is_the_one_that_parts_the_places_best(where: list[Pose2], looked: list[float], odd: bool) -> None:
-    places = [Place("room", pose, 1.0 / len(where)) for pose in where]
+    places = [PoseHypothesis("room", pose, 1.0 / len(where)) for pose in where]
     looks = [HERE, *(Pose2(0.0, 0.0, a) for a in looked)]
 
-    def is_safe(place: Place, probe: Probe) -> bool:
+    def is_safe(place: PoseHypothesis, probe: SensingAction) -> bool:
         return (place.world_from_robot.x_m > 0.0) is odd
 
-    best = best_probe(places, looks, made_up_view, is_safe)
-    assume(best is not None and best.tells > 0.0)
+    best = choose_sensing_action(places, looks, made_up_view, is_safe)
+    assume(best is not None and best.expected_separation > 0.0)
     assert best is not None
     told = []
     for degrees in (180, 90, -90, 135, -135, 45, -45):
@@ -107,17 +107,17 @@ def test_the_probe_is_the_one_that_parts_the_places_best(where: list[Pose2], loo
             told.append(oracle(places, turn, 0.0))
     if all(is_safe(place, best) for place in places):
         told += [oracle(places, math.radians(degrees), 0.6) for degrees in (0, 90, -90, 180)]
-    assert best.tells == pytest.approx(max(told))
-    assert best.tells == pytest.approx(oracle(places, best.turn_rad, best.move_m))
+    assert best.expected_separation == pytest.approx(max(told))
+    assert best.expected_separation == pytest.approx(oracle(places, best.turn_rad, best.move_m))
 
 
-def oracle(places: list[Place], turn_rad: float, move_m: float) -> float:
+def oracle(places: list[PoseHypothesis], turn_rad: float, move_m: float) -> float:
     views = [made_up_view(p.world_from_robot @ Pose2(0.0, 0.0, turn_rad) @ Pose2(move_m, 0.0, 0.0)) for p in places]
     total = 0.0
     for i, one in enumerate(places):
         total += one.weight * 0.1 * min(20, len(views[i]))
         for j, other in enumerate(places[:i]):
-            total += one.weight * other.weight * min(20.0, difference(views[i], views[j]))
+            total += one.weight * other.weight * min(20.0, compute_view_difference(views[i], views[j]))
     return total
 
 
@@ -125,9 +125,9 @@ def oracle(places: list[Place], turn_rad: float, move_m: float) -> float:
 def test_views_that_are_one_do_not_part(seed: int) -> None:
     pose = Pose2(*np.random.default_rng(seed).uniform(-3, 3, 3))
     view = made_up_view(pose)
-    assert difference(view, view) == pytest.approx(0.0)
-    assert difference(view, np.zeros((0, 2, 2))) == len(view)
-    assert separation([view, view], [0.5, 0.5]) == pytest.approx(0.1 * min(len(view), 20))
+    assert compute_view_difference(view, view) == pytest.approx(0.0)
+    assert compute_view_difference(view, np.zeros((0, 2, 2))) == len(view)
+    assert compute_separation([view, view], [0.5, 0.5]) == pytest.approx(0.1 * min(len(view), 20))
 
 
 @given(looked=st.lists(angles, min_size=1, max_size=6))
@@ -135,7 +135,7 @@ def test_the_widest_gap_is_as_far_as_can_be_from_every_look(looked: list[float])
     def nearest(turn: float) -> float:
         return min(abs(wrap_angle(turn - a)) for a in looked)
 
-    chosen = nearest(widest_gap([Pose2(0.0, 0.0, a) for a in looked]))
+    chosen = nearest(find_widest_gap([Pose2(0.0, 0.0, a) for a in looked]))
     assert all(nearest(turn) <= chosen + 1e-9 for turn in np.linspace(-math.pi, math.pi, 73))
 
 
@@ -145,15 +145,15 @@ def test_a_probing_move_stays_free_from_every_place_that_is_kept(seed: int) -> N
     rng = np.random.default_rng(seed)
     places = []
     for room in rng.choice(CENTRE.world.rooms, 2):
-        spots = vantage_of(CENTRE.world, str(room), 1.0).places
+        spots = get_visibility_map(CENTRE.world, str(room), 1.0).positions
         x, y = spots[int(rng.integers(len(spots)))]
-        places.append(Place(str(room), Pose2(x, y, float(rng.uniform(-3, 3))), 0.5))
+        places.append(PoseHypothesis(str(room), Pose2(x, y, float(rng.uniform(-3, 3))), 0.5))
     looks = [Pose2(0.0, 0.0, a) for a in np.radians([0, 60, 120, 180, -60, -120])]  # no turn is left
-    probe = best_probe(places, looks, made_up_view, is_safe_in(CENTRE))
+    probe = choose_sensing_action(places, looks, made_up_view, make_safety_check(CENTRE))
     for place in places if probe is not None else ():
         assert probe.move_m > 0.0
         pose = place.world_from_robot
-        way = shapely.LineString([pose.position, probe.then(pose).position]).buffer(CENTRE.radius_m)
+        way = shapely.LineString([pose.position, probe.apply_to(pose).position]).buffer(CENTRE.radius_m)
         assert shapely.Polygon(CENTRE.world.outline(place.room)).covers(way)
         assert not any(shapely.Polygon(o).intersects(way) for o in CENTRE.world.obstacles(place.room))
 
@@ -169,7 +169,7 @@ def test_looks_are_composed_as_the_robot_moved(steps: list[tuple[float, float]],
         step = actuator.expected(turn, way)
         now = now @ step
         before = np.trace(spread)
-        then, spread = moved(then, spread, step, actuator.spread(turn, way))
+        then, spread = propagate_pose(then, spread, step, actuator.spread(turn, way))
         assert np.linalg.eigvalsh(spread)[0] >= -1e-12 and np.trace(spread) >= before - 1e-9
     back = now @ then
     assert back.distance_to(start) < 1e-9
@@ -180,10 +180,10 @@ def test_looks_are_composed_as_the_robot_moved(steps: list[tuple[float, float]],
 @given(seed=seeds)
 def test_level_lines_tell_the_heading_but_for_right_angles(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    spots = vantage_of(CENTRE.world, "conference-room", 1.0).places
+    spots = get_visibility_map(CENTRE.world, "conference-room", 1.0).positions
     x, y = spots[int(rng.integers(len(spots)))]
     pose = Pose2(x, y, float(rng.uniform(-math.pi, math.pi)))
-    lines = expected_lines(CENTRE, pose)
+    lines = predict_lines(CENTRE, pose)
     ends = lines.lines_world[..., 2]
     level = (np.ptp(ends, axis=1) < 0.01) & (np.abs(ends[:, 0] - 1.0) > 0.3)  # at the eye's height none tells
     assume(np.count_nonzero(level) >= 12)
@@ -194,9 +194,9 @@ def test_level_lines_tell_the_heading_but_for_right_angles(seed: int) -> None:
 
 def test_turns_between_looks_are_corrected_by_what_is_seen() -> None:
     rng, pose, turn = np.random.default_rng(3), Pose2(12.0, 5.0, 0.4), math.radians(95.0)
-    first = Glance(seen_from(CENTRE, pose, rng), Pose2(0.0, 0.0, -turn + math.radians(6.0)), np.zeros((3, 3)))
-    second = Glance(seen_from(CENTRE, pose @ Pose2(0.0, 0.0, turn), rng), HERE, np.zeros((3, 3)))
-    straight = squared([first, second], CAMERA, MOUNT.camera_from_robot)
+    first = CameraView(seen_from(CENTRE, pose, rng), Pose2(0.0, 0.0, -turn + math.radians(6.0)), np.zeros((3, 3)))
+    second = CameraView(seen_from(CENTRE, pose @ Pose2(0.0, 0.0, turn), rng), HERE, np.zeros((3, 3)))
+    straight = align_headings([first, second], CAMERA, MOUNT.camera_from_robot)
     assert straight[0].now_from_then.heading_rad == pytest.approx(-turn, abs=math.radians(0.5))
 
 
@@ -213,12 +213,12 @@ def test_marks_on_a_bare_wall_tell_no_heading() -> None:
 def test_looks_are_set_straight_by_one_another_where_the_last_shows_a_bare_wall() -> None:
     rng, pose, turn = np.random.default_rng(3), Pose2(12.0, 5.0, 0.4), math.radians(95.0)
     spread = np.diag([0.0, 0.0, 1e-4])
-    off = Glance(seen_from(CENTRE, pose, rng), Pose2(0.0, 0.0, -turn + math.radians(6.0)), spread)
-    good = Glance(seen_from(CENTRE, pose @ Pose2(0.0, 0.0, turn), rng), Pose2(0.0, 0.0, 0.0), spread)
-    bare = Glance(np.zeros((0, 2, 2)), HERE, np.zeros((3, 3)))
-    straight = squared([off, good, bare], CAMERA, MOUNT.camera_from_robot)
+    off = CameraView(seen_from(CENTRE, pose, rng), Pose2(0.0, 0.0, -turn + math.radians(6.0)), spread)
+    good = CameraView(seen_from(CENTRE, pose @ Pose2(0.0, 0.0, turn), rng), Pose2(0.0, 0.0, 0.0), spread)
+    bare = CameraView(np.zeros((0, 2, 2)), HERE, np.zeros((3, 3)))
+    straight = align_headings([off, good, bare], CAMERA, MOUNT.camera_from_robot)
     assert straight[0].now_from_then.heading_rad == pytest.approx(-turn, abs=math.radians(0.5))
-    assert 0.0 < straight[0].spread[2, 2] <= 1e-4
+    assert 0.0 < straight[0].covariance[2, 2] <= 1e-4
     assert straight[1].now_from_then.heading_rad == pytest.approx(0.0) and straight[2] is bare
 
 
@@ -232,8 +232,8 @@ def test_a_turn_that_is_corrected_takes_the_way_after_it_along(error: float, tur
     assume(all(find_level_direction(seen, CAMERA, MOUNT.camera_from_robot) is not None for seen in lines))
     claimed = Pose2(0.0, 0.0, turn + error) @ Pose2(move, 0.0, 0.0)
     spread = np.diag([1e-3, 1e-3, 1e-2])
-    straight = squared([Glance(lines[0], claimed.inverse(), spread), Glance(lines[1], HERE, spread)], CAMERA,
-                       MOUNT.camera_from_robot)
+    views = [CameraView(lines[0], claimed.inverse(), spread), CameraView(lines[1], HERE, spread)]
+    straight = align_headings(views, CAMERA, MOUNT.camera_from_robot)
     assert straight[0].now_from_then.distance_to(true.inverse()) < 0.01
 
 
@@ -242,14 +242,14 @@ def test_a_turn_that_is_corrected_takes_the_way_after_it_along(error: float, tur
 def test_a_turn_that_is_unsure_is_corrected_and_not_the_pose(error: float, turn: float, heading: float) -> None:
     rng, before = np.random.default_rng(3), Pose2(12.0, 5.0, heading)
     pose = before @ Pose2(0.0, 0.0, turn)
-    assume(all(len(expected_lines(CENTRE, there)) >= 20 for there in (before, pose)))
-    looks = [Glance(seen_from(CENTRE, before, rng), Pose2(0.0, 0.0, -turn + error), np.diag([1e-6, 1e-6, 0.05**2])),
-             Glance(seen_from(CENTRE, pose, rng), HERE, np.zeros((3, 3)))]
-    there, covariance = settled(CENTRE, looks, pose)
+    assume(all(len(predict_lines(CENTRE, there)) >= 20 for there in (before, pose)))
+    looks = [CameraView(seen_from(CENTRE, before, rng), Pose2(0.0, 0.0, -turn + error), np.diag([1e-6, 1e-6, 0.05**2])),
+             CameraView(seen_from(CENTRE, pose, rng), HERE, np.zeros((3, 3)))]
+    there, covariance = refine_pose(CENTRE, looks, pose)
     assert there.distance_to(pose) < 0.02
     assert abs(wrap_angle(there.heading_rad - pose.heading_rad)) < math.radians(0.3)
     assert np.linalg.eigvalsh(covariance)[0] > 0.0
-    told = refined(CENTRE, looks, there, covariance)[0].now_from_then.heading_rad
+    told = refine_view_motions(CENTRE, looks, there, covariance)[0].now_from_then.heading_rad
     assert abs(wrap_angle(told + turn)) < math.radians(0.5)
 
 
@@ -258,12 +258,12 @@ def test_a_turn_that_is_unsure_is_corrected_and_not_the_pose(error: float, turn:
 
 @pytest.mark.parametrize("room", ["robot-laboratory", "hallway"])
 def test_what_is_in_sight_is_what_the_exact_computation_sees(room: str) -> None:
-    vantage = vantage_of(CENTRE.world, room, 1.0)
+    vantage = get_visibility_map(CENTRE.world, room, 1.0)
     agree = []
     for square in range(0, len(vantage.first) - 1, 12):
         eye = vantage.eyes[square]
         in_sight = np.zeros(len(vantage.points), bool)
-        in_sight[vantage.seen[vantage.first[square]: vantage.first[square + 1]]] = True
+        in_sight[vantage.visible[vantage.first[square]: vantage.first[square + 1]]] = True
         for heading in (0.0, 2.0, 4.0):
             camera_from_world = CENTRE.camera_from_world(Pose2(*eye, heading) @ Pose2(-0.1, 0.0, 0.0))
             ahead = camera_from_world.apply(vantage.points)
@@ -277,10 +277,10 @@ def test_what_is_in_sight_is_what_the_exact_computation_sees(room: str) -> None:
 # -- never a guess ---------------------------------------------------------------------------------------------------
 
 
-def glances_from(robot: RobotModel, pose: Pose2, turns: tuple[float, ...], seed: int) -> list[Glance]:
+def glances_from(robot: RobotModel, pose: Pose2, turns: tuple[float, ...], seed: int) -> list[CameraView]:
     rng = np.random.default_rng(seed)
     now = pose @ Pose2(0.0, 0.0, turns[-1])
-    return [Glance(seen_from(robot, there, rng), now.inverse() @ there, np.diag([1e-5, 1e-5, 1e-4]))
+    return [CameraView(seen_from(robot, there, rng), now.inverse() @ there, np.diag([1e-5, 1e-5, 1e-4]))
             for there in (pose @ Pose2(0.0, 0.0, turn) for turn in turns)]
 
 
@@ -294,8 +294,8 @@ def test_in_a_corridor_that_looks_the_same_from_both_ends_it_never_says_where_it
     pose = Pose2(low[0] + part * (high[0] - low[0]), 0.5 * (low[1] + high[1]) + 0.3, heading)
     rooms = list(SYMMETRIC.world.rooms)
     for turns in ((0.0, math.pi), (0.0, 1.5, 3.0, 4.5)):
-        found = finding(TWIN, glances_from(TWIN, pose, turns, seed), rooms)
-        assert found.verdict is not Verdict.FOUND
+        found = localize(TWIN, glances_from(TWIN, pose, turns, seed), rooms)
+        assert found.status is not LocalizationStatus.FOUND
     assert len(found.candidates) >= 2
     turned = Pose2(*(low + high - pose.position), wrap_angle(pose.heading_rad + turns[-1] + math.pi))
     assert any(c.world_from_robot.distance_to(turned) < 0.1 for c in found.candidates)
@@ -309,10 +309,10 @@ def test_the_twin_of_a_place_is_found_from_the_model_alone(part: float, heading:
     low, high = outline.min(axis=0), outline.max(axis=0)
     pose = Pose2(low[0] + part * (high[0] - low[0]), 0.5 * (low[1] + high[1]) + 0.3, heading)
     nothing = np.zeros((0, 2, 2))  # whatever was seen, it is not asked
-    looks = [Glance(nothing, Pose2(0.0, 0.0, a), np.diag([1e-5, 1e-5, 1e-4])) for a in (turn, turn + 1.0, 0.0)]
+    looks = [CameraView(nothing, Pose2(0.0, 0.0, a), np.diag([1e-5, 1e-5, 1e-4])) for a in (turn, turn + 1.0, 0.0)]
     turned = Pose2(*(low + high - pose.position), wrap_angle(heading + math.pi))
     assume(pose.distance_to(turned) > 0.5)
-    found = [other for _, other, _ in twins(TWIN, looks, pose, list(SYMMETRIC.world.rooms))]
+    found = [other for _, other, _ in find_aliases(TWIN, looks, pose, list(SYMMETRIC.world.rooms))]
     assert any(other.distance_to(turned) < 0.02 for other in found)
 
 
@@ -320,16 +320,16 @@ def test_the_twin_of_a_place_is_found_from_the_model_alone(part: float, heading:
 @given(seed=st.integers(0, 10_000), heading=angles)
 def test_in_a_building_that_differs_everywhere_it_says_where_it_is(seed: int, heading: float) -> None:
     rng = np.random.default_rng(seed)
-    spots = vantage_of(CENTRE.world, "robot-laboratory", 1.0).places
+    spots = get_visibility_map(CENTRE.world, "robot-laboratory", 1.0).positions
     x, y = spots[int(rng.integers(len(spots)))]
     pose, turns = Pose2(x, y, heading), (0.0, math.pi, 0.5 * math.pi, -0.5 * math.pi)
-    found = finding(CENTRE, glances_from(CENTRE, pose, turns, seed), list(CENTRE.world.rooms))
-    assert found.verdict is Verdict.FOUND and found.candidates[0].room == "robot-laboratory"
+    found = localize(CENTRE, glances_from(CENTRE, pose, turns, seed), list(CENTRE.world.rooms))
+    assert found.status is LocalizationStatus.FOUND and found.candidates[0].room == "robot-laboratory"
     assert found.candidates[0].world_from_robot.distance_to(pose) < 0.05
 
 
 def candidate(seen: int, accounted: int, likelihood: float, explained: float, weakest: float) -> Candidate:
-    evidence = Support(seen, accounted, likelihood, explained, weakest)
+    evidence = PoseLikelihood(seen, accounted, likelihood, explained, weakest)
     return Candidate("hallway", Pose2(0.0, 0.0, 0.0), np.eye(3), evidence)
 
 
@@ -343,14 +343,14 @@ def test_a_place_that_stands_stands_with_more_evidence_too(
     seen: int, accounted: float, likelihood: float, explained: float, weakest: float, more: float
 ) -> None:
     count = int(accounted * seen)
-    if candidate(seen, count, likelihood, explained, weakest).stands:
-        assert candidate(seen, int(count + more * (seen - count)), likelihood, explained, weakest).stands
-        assert candidate(seen, count, likelihood + 10.0 * more, explained, weakest).stands
-        assert candidate(seen, count, likelihood, explained + more * (1.0 - explained), weakest).stands
-        assert candidate(seen, count, likelihood, explained, weakest + more * (1.0 - weakest)).stands
+    if candidate(seen, count, likelihood, explained, weakest).is_accepted:
+        assert candidate(seen, int(count + more * (seen - count)), likelihood, explained, weakest).is_accepted
+        assert candidate(seen, count, likelihood + 10.0 * more, explained, weakest).is_accepted
+        assert candidate(seen, count, likelihood, explained + more * (1.0 - explained), weakest).is_accepted
+        assert candidate(seen, count, likelihood, explained, weakest + more * (1.0 - weakest)).is_accepted
 
 
 def test_a_little_of_both_is_not_enough() -> None:
     """As at a place 0.12 m beside the right one (rough-day, seed 91), where 99 of 158 lines were accounted for."""
-    assert not candidate(158, 99, 30.0, 0.38, 0.5).stands
-    assert candidate(324, 204, 30.0, 0.75, 0.5).stands
+    assert not candidate(158, 99, 30.0, 0.38, 0.5).is_accepted
+    assert candidate(324, 204, 30.0, 0.75, 0.5).is_accepted

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization.locate_camera import Location, Verdict, locate
+from knowledge_sources.methods.localization.locate_camera import CameraFix, PoseVerdict, locate_camera
 from knowledge_sources.methods.matching.pose_matching import PosedMatch
 from knowledge_sources.methods.matching.space_matching import match_in_space
 from world_models.camera import Camera
@@ -103,8 +103,8 @@ def test_nothing_predicted_is_the_caller_s_mistake() -> None:
         match_in_space(hall(), np.zeros((0, 2, 2)), CAMERA, Pose.identity(), np.eye(3))
 
 
-def located(image: NDArray[np.uint8], prior: Pose, rng: np.random.Generator) -> Location | None:
-    return locate(hall(), image, CAMERA, prior, SPREAD, tolerance_m=0.05, tolerance_rad=0.005, rng=rng)
+def located(image: NDArray[np.uint8], prior: Pose, rng: np.random.Generator) -> CameraFix | None:
+    return locate_camera(hall(), image, CAMERA, prior, SPREAD, tolerance_m=0.05, tolerance_rad=0.005, rng=rng)
 
 
 def drawn(segments: Array) -> NDArray[np.uint8]:
@@ -126,11 +126,11 @@ def test_what_is_verified_is_right_and_another_picture_is_not_verified(seed: int
     _, truth, prior, rng = scene(seed)
     seen, visible = CAMERA.project_segments(hall(), truth)
     here = located(drawn(seen[visible]), prior, rng)
-    assert here is not None and here.verdict is Verdict.VERIFIED
+    assert here is not None and here.verdict is PoseVerdict.VERIFIED
     assert apart(here.camera_from_world, truth) < 0.05
     lines = rng.uniform(30.0, 480.0, (30, 2, 2))
     elsewhere = located(drawn(lines), prior, rng)
-    assert elsewhere is None or elsewhere.verdict is not Verdict.VERIFIED
+    assert elsewhere is None or elsewhere.verdict is not PoseVerdict.VERIFIED
 
 
 def test_an_empty_picture_tells_nothing() -> None:

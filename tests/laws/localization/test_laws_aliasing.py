@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization import aliasing as lookalikes
+from knowledge_sources.methods.localization import aliasing
 from knowledge_sources.methods.localization.aliasing import (
     GRID_M,
     GRID_RAD,
-    anticipate,
-    hardest_to_tell,
-    looked_for,
+    find_strongest_alias,
+    precompute_views,
+    predict_views_on_grid,
+    score_view,
     view,
-    views_near,
 )
-from knowledge_sources.methods.verification.agreement import coverage
+from knowledge_sources.methods.verification.agreement import compute_coverage
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.files.store import WORLDS, load_world
@@ -37,7 +37,7 @@ few = settings(max_examples=40, deadline=None)
 
 def margin(one: Floats, other: Floats, seen: Floats) -> float:
     """Of two views, by what was seen."""
-    return lookalikes.margin(looked_for(one, seen), looked_for(other, seen))
+    return aliasing.margin(score_view(one, seen), score_view(other, seen))
 
 
 @st.composite
@@ -88,9 +88,9 @@ def test_from_the_middle_of_the_hallway_the_other_way_round_is_told() -> None:
     """What should be seen in one direction is not what should be seen from where the hallway repeats itself."""
     here = Pose2(*WORLD.world_from_locale("hallway").apply([6.0, 1.2, 0.0])[:2], 0.0)
     seen = view(ROBOT, here).segments_px
-    found = hardest_to_tell(ROBOT, seen, "hallway", here)
+    found = find_strongest_alias(ROBOT, seen, "hallway", here)
     assert found is not None and found.margin > 1.0
-    from_there = hardest_to_tell(ROBOT, view(ROBOT, found.world_from_robot).segments_px, "hallway", here)
+    from_there = find_strongest_alias(ROBOT, view(ROBOT, found.world_from_robot).segments_px, "hallway", here)
     assert from_there is not None and from_there.margin < 0.0
 
 
@@ -102,10 +102,10 @@ def test_what_can_be_seen_from_near_is_projected_to_where_it_is_seen_from_the_po
     pose = Pose2(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
     of_grid = Pose2(*(round(v / by) * by for v, by in zip(
         (pose.x_m, pose.y_m, pose.heading_rad), (GRID_M, GRID_M, GRID_RAD), strict=True)))
-    assert views_near(ROBOT, [of_grid])[0] == pytest.approx(view(ROBOT, of_grid).segments_px, abs=1e-6)
-    (near,), exact = views_near(ROBOT, [pose]), view(ROBOT, pose).segments_px
+    assert predict_views_on_grid(ROBOT, [of_grid])[0] == pytest.approx(view(ROBOT, of_grid).segments_px, abs=1e-6)
+    (near,), exact = predict_views_on_grid(ROBOT, [pose]), view(ROBOT, pose).segments_px
     length = np.linalg.norm(exact[:, 1] - exact[:, 0], axis=1)
-    covered = np.nan_to_num(coverage(exact, near, 0.5, 0.06))
+    covered = np.nan_to_num(compute_coverage(exact, near, 0.5, 0.06))
     assert np.sum(length * covered) >= 0.7 * np.sum(length)
 
 
@@ -114,5 +114,5 @@ def test_to_have_thought_of_it_beforehand_changes_no_answer() -> None:
     seen = view(ROBOT, here).segments_px
     world = load_world(WORLDS / "research_center.toml", details=[])
     asked = RobotModel(world, ROBOT.camera, ROBOT.mount, ROBOT.actuator)
-    anticipate(asked, "hallway", here @ Pose2(0.02, -0.01, 0.004))
-    assert hardest_to_tell(asked, seen, "hallway", here) == hardest_to_tell(ROBOT, seen, "hallway", here)
+    precompute_views(asked, "hallway", here @ Pose2(0.02, -0.01, 0.004))
+    assert find_strongest_alias(asked, seen, "hallway", here) == find_strongest_alias(ROBOT, seen, "hallway", here)

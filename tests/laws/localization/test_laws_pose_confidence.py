@@ -10,10 +10,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.verification.color_check import NOTHING, Probe, expected_looks, imagined, probe
-from knowledge_sources.methods.verification.line_check import verify
+from knowledge_sources.methods.verification.color_check import (
+    NOT_TESTED,
+    ColorCheck,
+    check_colors,
+    predict_color_check,
+    predict_face_colors,
+)
+from knowledge_sources.methods.verification.line_check import check_lines
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, TERMS, fitted, terms, unseen
-from knowledge_sources.methods.verification.pose_evidence import NAMES, PoseEvidence, evidence, wheels_px
+from knowledge_sources.methods.verification.pose_evidence import (
+    NAMES,
+    PoseEvidence,
+    compute_evidence,
+    compute_motion_tolerance_px,
+)
 from knowledge_sources.plan.milestone_selector import expectation
 from sim.made_up.generated_floors import generated_floor
 from sim.render.renderer import Renderer
@@ -52,9 +63,10 @@ def _segments(pose: Pose2) -> np.ndarray:
     return np.nan_to_num(robot.camera.project_segments(_lines(), robot.camera_from_world(pose))[0], nan=-99.0)
 
 
-def _told(lines: np.ndarray, segments: np.ndarray, pose: Pose2, faces: Probe = NOTHING) -> PoseEvidence:
+def _told(lines: np.ndarray, segments: np.ndarray, pose: Pose2, faces: ColorCheck = NOT_TESTED) -> PoseEvidence:
     robot = _robot()
-    return evidence(robot, lines, segments, pose, SPREAD, _place(), SPREAD, verify(robot, lines, segments, pose), faces)
+    checked = check_lines(robot, lines, segments, pose)
+    return compute_evidence(robot, lines, segments, pose, SPREAD, _place(), SPREAD, checked, faces)
 
 
 @given(EVIDENCE, st.sampled_from(NAMES), st.floats(0.0, 0.5))
@@ -80,7 +92,7 @@ def test_the_order_of_lines_and_segments_does_not_matter(seed: int) -> None:
 
 
 def test_the_right_place_is_surer_than_those_about_it() -> None:
-    faces = Probe(8, 1.0, 0.2)
+    faces = ColorCheck(8, 1.0, 0.2)
     here = POSE_CONFIDENCE.p_false(_told(_lines(), _segments(_place()), _place(), faces))
     for x, y, turn in ((0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.1), (-0.5, 0.2, 0.05)):
         there = _place() @ Pose2(x, y, turn)
@@ -88,10 +100,10 @@ def test_the_right_place_is_surer_than_those_about_it() -> None:
 
 
 def test_the_tolerance_grows_with_what_the_wheels_may_have_done() -> None:
-    small, large = (wheels_px(_robot(), _lines(), _place(), factor * SPREAD) for factor in (1.0, 9.0))
+    small, large = (compute_motion_tolerance_px(_robot(), _lines(), _place(), factor * SPREAD) for factor in (1.0, 9.0))
     assert 0.0 < small < large
     assert large == pytest.approx(3.0 * small)
-    assert wheels_px(_robot(), _lines()[:0], _place(), SPREAD) == 0.0
+    assert compute_motion_tolerance_px(_robot(), _lines()[:0], _place(), SPREAD) == 0.0
 
 
 def test_the_fit_finds_weights_that_part_right_from_wrong_and_none_is_negative() -> None:
@@ -115,29 +127,30 @@ def _picture() -> np.ndarray:
 
 @pytest.mark.parametrize("gain", [(1.0, 1.0, 1.0), (0.4, 0.4, 0.4), (1.3, 1.15, 1.2)])
 def test_faces_have_the_models_colours_in_any_light(gain: tuple[float, float, float]) -> None:
-    robot, looks = _robot(), expected_looks(_robot(), _place())
+    robot, looks = _robot(), predict_face_colors(_robot(), _place())
     lit = np.clip(_picture() * np.array(gain), 0.0, 255.0).astype(np.uint8)
-    found = probe(robot, _place(), lit, looks)
-    assert found.is_testable and found.agree >= 0.7 and found.agree > found.chance + 0.3
+    found = check_colors(robot, _place(), lit, looks)
+    assert found.is_testable and found.agreeing >= 0.7 and found.agreeing > found.chance + 0.3
 
 
 def test_faces_of_other_colours_do_not_agree() -> None:
-    robot, looks = _robot(), expected_looks(_robot(), _place())
+    robot, looks = _robot(), predict_face_colors(_robot(), _place())
     strange = [((blue, 1.0 - red, green), points) for (red, green, blue), points in looks]
-    assert probe(robot, _place(), _picture(), strange).agree < probe(robot, _place(), _picture(), looks).agree - 0.2
+    right = check_colors(robot, _place(), _picture(), looks)
+    assert check_colors(robot, _place(), _picture(), strange).agreeing < right.agreeing - 0.2
 
 
 def test_one_colour_everywhere_tells_nothing() -> None:
-    looks = expected_looks(_robot(), _place())
+    looks = predict_face_colors(_robot(), _place())
     same = [((0.5, 0.5, 0.5), points) for _, points in looks]
-    assert not imagined(same).is_testable
-    assert imagined(looks).agree == 1.0 and imagined(looks).is_testable
-    assert not probe(_robot(), _place(), _picture(), []).is_testable
+    assert not predict_color_check(same).is_testable
+    assert predict_color_check(looks).agreeing == 1.0 and predict_color_check(looks).is_testable
+    assert not check_colors(_robot(), _place(), _picture(), []).is_testable
 
 
 def test_expected_points_are_in_sight_and_of_the_models_world() -> None:
     robot = _robot()
-    points = np.array([p for _, some in expected_looks(robot, _place()) for p in some])
+    points = np.array([p for _, some in predict_face_colors(robot, _place()) for p in some])
     pixels = robot.camera.project(robot.camera_from_world(_place()).apply(points))
     assert robot.camera.inside(pixels).all()
     assert math.isfinite(float(points.sum())) and len(points) > 10

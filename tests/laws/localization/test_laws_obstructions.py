@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.localization.obstructions import (
     MOST_AREA,
-    before_camera,
+    find_obstruction,
+    has_counterpart,
     is_opaque,
-    obstruction_in,
-    twinned,
+    update_obstruction,
 )
-from knowledge_sources.methods.localization.refinement import expected_lines
-from knowledge_sources.methods.localization.views import Glance
-from knowledge_sources.methods.verification.color_check import expected_looks
+from knowledge_sources.methods.localization.refinement import predict_lines
+from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.methods.verification.color_check import predict_face_colors
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries.obstruction import MOST_HIDDEN, Obstruction
@@ -52,7 +52,7 @@ def somewhere(rng: np.random.Generator) -> Pose2:
 
 def seen(robot: RobotModel, pose: Pose2, before: Obstruction | None, rng: np.random.Generator) -> Floats:
     """What a line finder would find: nine in ten of the model's lines, and the sides of what is before the camera."""
-    lines = expected_lines(robot, pose).segments_px
+    lines = predict_lines(robot, pose).segments_px
     lines = lines[rng.random(len(lines)) > 0.1]
     if before is None:
         return lines
@@ -65,17 +65,17 @@ def seen(robot: RobotModel, pose: Pose2, before: Obstruction | None, rng: np.ran
     return np.asarray(both + rng.normal(0.0, 0.2, both.shape))
 
 
-def looks(pose: Pose2, before: Obstruction | None, rng: np.random.Generator) -> list[Glance]:
+def looks(pose: Pose2, before: Obstruction | None, rng: np.random.Generator) -> list[CameraView]:
     turns = [Pose2(0.0, 0.0, k * 2.0 * math.pi / LOOKS) for k in range(LOOKS)]
-    return [Glance(seen(ROBOT, pose @ turn, before, rng), turn, np.zeros((3, 3))) for turn in turns]
+    return [CameraView(seen(ROBOT, pose @ turn, before, rng), turn, np.zeros((3, 3))) for turn in turns]
 
 
-def driving(pose: Pose2, before: Obstruction | None, rng: np.random.Generator, number: int) -> list[Glance]:
+def driving(pose: Pose2, before: Obstruction | None, rng: np.random.Generator, number: int) -> list[CameraView]:
     """Looks for milestones: some from the same spot, some a little further on, and never all in one direction."""
     taken, aside = [], rng.choice([30.0, -30.0, 60.0])
     for k in range(number):
         here = pose @ Pose2(0.0, 0.0, math.radians(float(rng.choice([0.0, aside])) if k != 1 else aside))
-        taken.append(Glance(seen(ROBOT, here, before, rng), Pose2(0.0, 0.0, here.heading_rad), np.zeros((3, 3))))
+        taken.append(CameraView(seen(ROBOT, here, before, rng), Pose2(0.0, 0.0, here.heading_rad), np.zeros((3, 3))))
         if rng.random() < 0.6:
             pose = pose @ Pose2(rng.uniform(0.2, 0.6), 0.0, 0.0)
     return taken
@@ -119,11 +119,11 @@ def test_behind_something_the_robot_expects_what_it_did_but_for_what_is_hidden(s
     rng = np.random.default_rng(seed)
     told, pose = outline(rng), somewhere(rng)
     robot = ROBOT.behind(told)
-    before, after = expected_lines(ROBOT, pose).segments_px, expected_lines(robot, pose).segments_px
+    before, after = predict_lines(ROBOT, pose).segments_px, predict_lines(robot, pose).segments_px
     assert np.array_equal(before[told.shows(before)], after)
     points = visible_points(WORLD, robot.camera, robot.camera_from_world(pose)).points_px
     assert not np.any(told.covers(points))
-    for _, at in expected_looks(robot, pose):
+    for _, at in predict_face_colors(robot, pose):
         pixels = robot.camera.project(robot.camera_from_world(pose).apply(np.array(at)))
         assert not np.any(told.covers(pixels))
     assert robot.behind(None).camera.obstruction is None
@@ -140,7 +140,7 @@ def test_what_hides_a_part_of_every_look_is_found_where_it_is() -> None:
     for seed in range(200):
         rng = np.random.default_rng(seed)
         told = outline(rng)
-        found = obstruction_in(looks(somewhere(rng), told, rng), CAMERA)
+        found = find_obstruction(looks(somewhere(rng), told, rng), CAMERA)
         if found is not None:
             hidden, said = told.covers(grid), found.covers(grid, -4.0)
             right += bool(np.sum(said & hidden) >= 0.4 * np.sum(hidden) and np.mean(said & ~hidden) <= 0.12)
@@ -151,7 +151,7 @@ def test_what_hides_a_part_of_every_look_is_found_where_it_is() -> None:
 @given(seed=seeds)
 def test_where_nothing_is_before_the_camera_nothing_is_found(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    found = obstruction_in(looks(somewhere(rng), None, rng), CAMERA)
+    found = find_obstruction(looks(somewhere(rng), None, rng), CAMERA)
     assert found is None
 
 
@@ -163,11 +163,11 @@ def test_it_is_found_by_looks_for_milestones_too_and_hardly_ever_where_nothing_i
     for seed in range(100):
         rng = np.random.default_rng([seed, 6])
         told, pose = outline(rng), somewhere(rng)
-        found = obstruction_in(driving(pose, told, rng, 6), CAMERA)
+        found = find_obstruction(driving(pose, told, rng, 6), CAMERA)
         if found is not None:
             hidden, said = told.covers(grid), found.covers(grid, -4.0)
             right += bool(np.sum(said & hidden) >= 0.4 * np.sum(hidden) and np.mean(said & ~hidden) <= 0.12)
-        nothing = obstruction_in(driving(pose, None, rng, 6), CAMERA)
+        nothing = find_obstruction(driving(pose, None, rng, 6), CAMERA)
         if nothing is not None:
             wrong += 1
             assert np.mean(nothing.covers(grid)) <= 0.1
@@ -179,8 +179,8 @@ def test_it_is_found_by_looks_for_milestones_too_and_hardly_ever_where_nothing_i
 def test_a_robot_that_did_not_turn_though_its_wheels_say_so_has_nothing_before_its_camera(seed: int) -> None:
     rng = np.random.default_rng(seed)
     segments = seen(ROBOT, somewhere(rng), None, rng)
-    stuck = [Glance(segments, Pose2(0.0, 0.0, 0.5 * k), np.zeros((3, 3))) for k in range(LOOKS)]
-    found = obstruction_in(stuck, CAMERA)
+    stuck = [CameraView(segments, Pose2(0.0, 0.0, 0.5 * k), np.zeros((3, 3))) for k in range(LOOKS)]
+    found = find_obstruction(stuck, CAMERA)
     assert found is None or _part(found) <= MOST_AREA
 
 
@@ -193,12 +193,12 @@ def _part(found: Obstruction) -> float:
 def test_what_was_found_before_is_believed_until_something_is_seen_through_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
     told, pose = outline(rng), somewhere(rng)
-    one = [Glance(seen(ROBOT, pose, told, rng), Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))]
-    assert before_camera(one, CAMERA, None) is None
-    assert before_camera(one, CAMERA, told) == told
+    one = [CameraView(seen(ROBOT, pose, told, rng), Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))]
+    assert update_obstruction(one, CAMERA, None) is None
+    assert update_obstruction(one, CAMERA, told) == told
     (left, top), _, (right, bottom), _ = told.outline_px
     across = np.array([[[left + 10, top + 10], [right - 10, bottom - 10]]])
-    assert before_camera([Glance(across, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))], CAMERA, told) is None
+    assert update_obstruction([CameraView(across, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))], CAMERA, told) is None
 
 
 @few
@@ -206,8 +206,8 @@ def test_what_was_found_before_is_believed_until_something_is_seen_through_it(se
 def test_one_direction_tells_nothing(seed: int) -> None:
     rng = np.random.default_rng(seed)
     told, pose = outline(rng), somewhere(rng)
-    here = [Glance(seen(ROBOT, pose, told, rng), Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))) for _ in range(LOOKS)]
-    assert obstruction_in(here, CAMERA) is None
+    here = [CameraView(seen(ROBOT, pose, told, rng), Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))) for _ in range(LOOKS)]
+    assert find_obstruction(here, CAMERA) is None
 
 
 @few
@@ -215,9 +215,9 @@ def test_one_direction_tells_nothing(seed: int) -> None:
 def test_the_order_of_looks_and_segments_does_not_matter(seed: int) -> None:
     rng = np.random.default_rng(seed)
     there = looks(somewhere(rng), outline(rng), rng)
-    mixed = [Glance(rng.permutation(g.segments_px), g.now_from_then, g.spread)
+    mixed = [CameraView(rng.permutation(g.segments_px), g.now_from_then, g.covariance)
              for g in (there[k] for k in rng.permutation(LOOKS))]
-    one, other = obstruction_in(there, CAMERA), obstruction_in(mixed, CAMERA)
+    one, other = find_obstruction(there, CAMERA), find_obstruction(mixed, CAMERA)
     assert (one is None) is (other is None)
     if one is not None and other is not None:
         assert sorted(one.outline_px) == sorted(other.outline_px)
@@ -241,7 +241,7 @@ def test_a_segment_is_its_own_twin_and_none_of_one_further_off(seed: int) -> Non
     start, angle, length = rng.uniform(100, 400, (8, 2)), rng.uniform(0, math.pi, 8), rng.uniform(12, 90, 8)
     along = np.column_stack([np.cos(angle), np.sin(angle)])
     one = np.stack([start, start + length[:, None] * along], axis=1)
-    assert np.all(twinned(one, one[::-1, ::-1]))
+    assert np.all(has_counterpart(one, one[::-1, ::-1]))
     away = one + 4.0 * np.column_stack([-along[:, 1], along[:, 0]])[:, None]
     for a, b in zip(one, away, strict=True):
-        assert not twinned(a[None], b[None])[0]
+        assert not has_counterpart(a[None], b[None])[0]
