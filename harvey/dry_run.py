@@ -17,7 +17,7 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import RAISED, Scheduler
-from harvey.wiring import command, knowledge_sources, robot_model
+from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.verification.line_check import LEAST_ACCOUNTED
 from knowledge_sources.methods.verification.milestone_preview import find_alias, predict_p_false
@@ -25,7 +25,6 @@ from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDEN
 from knowledge_sources.methods.verification.view_quality import compute_view_quality
 from knowledge_sources.plan.milestone_selector import GOOD_PART, GOOD_RAD, LEAST_LINES
 from knowledge_sources.questions import held
-from sim.scenario import Scenario
 from world_models.entries.body import MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.task import Command, Milestone, Outcome, PlanSketch
@@ -39,7 +38,7 @@ SEEN_M, SEEN_RAD = 0.003, 0.001
 
 
 @dataclass(frozen=True, slots=True)
-class Prospect:
+class MilestonePreview:
     """A milestone to come.
 
     Attributes:
@@ -68,7 +67,7 @@ class Prospect:
     alike: str = ""
 
 
-class Believer(KnowledgeSource):
+class AcceptEveryMilestone(KnowledgeSource):
     """Takes every milestone that is expected for verified."""
 
     level = Level.PLAN
@@ -83,7 +82,7 @@ class Believer(KnowledgeSource):
             yield Revise(milestone, replace(milestone.value, status="verified"), (milestone,))
 
 
-class PerfectWheels:
+class IdealBodyPort:
     """A port that claims to have done exactly what was asked."""
 
     name = "body"
@@ -96,17 +95,13 @@ class PerfectWheels:
             yield Post(RideReport(value.passage, value.destination, 0.0, 0.0), (change.entry,))
 
 
-def rehearse(scenario: Scenario) -> tuple[tuple[Prospect, ...], Outcome]:
-    """The milestones in the order in which they will come, and how the mission ends in thought."""
-    return rehearsed(replace(robot_model(scenario), continuous=False), command(scenario))
-
-
-def rehearsed(robot: RobotModel, task: Command) -> tuple[tuple[Prospect, ...], Outcome]:
-    """The same for any robot and whatever is asked of it."""
+def dry_run(robot: RobotModel, task: Command) -> tuple[tuple[MilestonePreview, ...], Outcome]:
+    """The milestones in the order in which they will come, and how the dry run of the mission ends."""
+    robot = replace(robot, continuous=False)
     experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
-    scheduler = Scheduler([*experts, Believer()], ports=(PerfectWheels(),))
+    scheduler = Scheduler([*experts, AcceptEveryMilestone()], ports=(IdealBodyPort(),))
     scheduler.tell([Post(replace(task, start_covariance=diagonal(SEEN_M, SEEN_RAD)))], "user")
-    prospects: list[Prospect] = []
+    prospects: list[MilestonePreview] = []
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < MOST_CYCLES:
         decision = scheduler.step()
         if decision is None:
@@ -119,7 +114,7 @@ def rehearsed(robot: RobotModel, task: Command) -> tuple[tuple[Prospect, ...], O
     return tuple(prospects), outcome.value if outcome else Outcome("failed", f"not there after {MOST_CYCLES} cycles")
 
 
-def _prospects(robot: RobotModel, view: View, made: Sequence[Change]) -> list[Prospect]:
+def _prospects(robot: RobotModel, view: View, made: Sequence[Change]) -> list[MilestonePreview]:
     """Those of the milestones that were just taken for verified."""
     belief = held(view)
     if belief is None:
@@ -129,7 +124,7 @@ def _prospects(robot: RobotModel, view: View, made: Sequence[Change]) -> list[Pr
     return [_prospect(robot, view, belief.value, milestone) for milestone in milestones]
 
 
-def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Milestone) -> Prospect:
+def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Milestone) -> MilestonePreview:
     lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
     pose = belief.world_from_robot(robot.world)
     mount = robot.standing_in(belief.locale).mount
@@ -140,7 +135,7 @@ def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Mile
     p_false = predict_p_false(standing, pose, lines, np.array(diagonal(SEEN_M, SEEN_RAD))) if seen else 1.0
     other = find_alias(standing, belief.locale, pose, lines) if seen else None
     clear = sharp and len(lines) >= LEAST_LINES and p_false <= POSE_CONFIDENCE.accept
-    return Prospect(
+    return MilestonePreview(
         milestone.what, belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m,
         milestone.look_heading_rad, len(milestone.landmarks), len(lines), quality.sigma_m, quality.sigma_rad,
         "not testable" if not seen else "ambiguous" if other is not None else "clear" if clear else "weak",

@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from blackboard import scheduler
 from sim.made_up.short_missions import OFFICE
-from harvey.mission import run_mission
+from harvey.simulation.run import run_mission
 from sim.stage import set_stage
 from sim.scenario import parse_scenario
 run_mission(set_stage(parse_scenario(OFFICE, "across-allens-office")), {SEED}, out=Path(sys.argv[1]))

@@ -17,7 +17,7 @@ from harvey.campaign.progress import counted
 from harvey.units import INCH_M
 
 if TYPE_CHECKING:
-    from harvey.referee import MissionResult
+    from harvey.simulation.referee import MissionResult
 
 SCENARIOS = ("lab-to-allens-office", "hallway-kidnap")
 LEVELS: tuple[tuple[str, tuple[str, ...]], ...] = (

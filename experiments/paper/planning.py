@@ -18,8 +18,9 @@ from blackboard.effect import Post
 from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from experiments.report import Report
-from harvey.dry_run import Believer, PerfectWheels
-from harvey.wiring import command, knowledge_sources, robot_model
+from harvey.dry_run import AcceptEveryMilestone, IdealBodyPort
+from harvey.simulation.run import robot_model
+from harvey.wiring import knowledge_sources
 from sim.scenario import Scenario, load_scenario
 from world_models.building.world import World
 from world_models.entries.task import Milestone, Outcome, PlanSketch
@@ -114,8 +115,8 @@ class Thought:
     def __init__(self, robot: RobotModel, scenario: Scenario) -> None:
         experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
         self.clock = Clock()
-        self._scheduler = Scheduler([*experts, Believer()], ports=(PerfectWheels(),), sinks=(self.clock,))
-        self._scheduler.tell([Post(command(scenario))], "user")
+        self._scheduler = Scheduler([*experts, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(self.clock,))
+        self._scheduler.tell([Post(scenario.command)], "user")
 
     def step(self) -> bool:
         """Decide once more; False when there is an outcome."""

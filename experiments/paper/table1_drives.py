@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from blackboard.journal import Decision
 from harvey.agent import agent_of
 from harvey.campaign.campaign import Task
-from harvey.mission import Mission, head_of
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_recorder import RunRecorder
+from harvey.simulation.run import Mission, head_of
 from harvey.units import INCH_M
 from sim.stage import Stage
 from sim.truth import Truth

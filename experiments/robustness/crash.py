@@ -20,8 +20,8 @@ import numpy as np
 
 from experiments.report import Cell, Report
 from experiments.trials import campaign_folder, found_by_all
-from harvey.replay.body_replay import interrupted_in
 from harvey.run_files.records import read_records
+from harvey.simulation.body_replay import interrupted_in
 from sim.made_up.short_missions import HALLWAY, OFFICE, fault
 
 CHILD = (sys.executable, "-m", "experiments.robustness.crash_child")

@@ -13,12 +13,12 @@ from pathlib import Path
 
 from harvey.agent import agent_of
 from harvey.campaign.campaign import Task
-from harvey.mission import Around, run_mission
-from harvey.ports import Body
 from harvey.replay.replay import pictures_of, replayed
 from harvey.replay.resume import remains_of, resume
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
+from harvey.runner.ports import Body
+from harvey.simulation.run import Around, run_mission
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
 
 MOTION_S = 0.05

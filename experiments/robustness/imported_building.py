@@ -27,7 +27,7 @@ from world_models.files.store import load_world
 from world_models.phrases import middle_of
 
 if TYPE_CHECKING:
-    from harvey.referee import MissionResult
+    from harvey.simulation.referee import MissionResult
 
 MISSIONS, QUICK_MISSIONS = 50, 2
 LEAST = 0.96
@@ -63,7 +63,7 @@ class Errand:
 
 def run(quick: bool, seed: int) -> Report:
     """Import, check, drive."""
-    from harvey.referee import MissionResult
+    from harvey.simulation.referee import MissionResult
 
     path, title = building_file(DUPLEX), "Missions between the rooms of an imported house"
     if find_spec("ifcopenshell") is None or not path.is_file():

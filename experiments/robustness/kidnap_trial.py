@@ -14,9 +14,9 @@ from blackboard.effect import Post
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy, Servoing
-from harvey.loop import until_outcome
-from harvey.ports import BodyPort
 from harvey.retention import RETENTION
+from harvey.runner.ports import BodyPort
+from harvey.runner.run import until_outcome
 from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.goal.relocalizer import Relocalizer

@@ -16,8 +16,8 @@ from blackboard.journal import Decision
 from experiments.report import Cell, Report
 from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
 from harvey.hardware.drivers.cameras.video_file import write_video
-from harvey.mission import run_mission
-from harvey.ports import Body
+from harvey.runner.ports import Body
+from harvey.simulation.run import run_mission
 from sim.scenario import load_scenario, with_settings
 from sim.stage import Stage, set_stage
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport

@@ -13,9 +13,9 @@ from blackboard.effect import Effect, Post
 from blackboard.journal import Decision, JournalLines
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Scheduler
-from harvey.mission import run_mission
 from harvey.retention import RETENTION
-from harvey.wiring import knowledge_sources, robot_model, servoing
+from harvey.simulation.run import robot_model, run_mission
+from harvey.wiring import knowledge_sources, servoing
 from sim.scenario import Scenario, load_scenario
 from sim.stage import set_stage
 

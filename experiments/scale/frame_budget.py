@@ -12,7 +12,7 @@ from blackboard.change import Change
 from blackboard.effect import Effect
 from blackboard.knowledge_source import KnowledgeSource
 from experiments.report import Cell, Report
-from harvey.mission import run_mission
+from harvey.simulation.run import run_mission
 from harvey.wiring import knowledge_sources
 from sim.scenario import load_scenario
 from sim.stage import set_stage

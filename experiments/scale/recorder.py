@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from blackboard.journal import Decision, decision_line
 from experiments.report import Cell, Report
-from harvey.mission import run_mission
-from harvey.wiring import robot_model
+from harvey.simulation.run import robot_model, run_mission
 from logs.recording.loggers.frames import Frames
 from logs.recording.stream import FLUSH_CYCLES
 from logs.recording.writer import RecordingWriter, all_loggers

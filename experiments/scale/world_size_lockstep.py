@@ -17,8 +17,9 @@ from blackboard.effect import Post
 from blackboard.scheduler import Scheduler
 from experiments.paper.planning import Thought
 from experiments.scale.world_size_probe import staged
-from harvey.ports import BodyPort
-from harvey.wiring import command, knowledge_sources, robot_model, servoing
+from harvey.runner.ports import BodyPort
+from harvey.simulation.run import robot_model
+from harvey.wiring import knowledge_sources, servoing
 from sim.body.faulty_body import FaultyBody
 from sim.stage import Stage
 from world_models.entries.body import MotorCommand
@@ -44,7 +45,7 @@ def _start(stage: Stage, seed: int) -> Step:
     robot = robot_model(stage.scenario)
     scheduler = Scheduler(knowledge_sources(robot), ports=(BodyPort(FaultyBody(stage.body(seed))),),
                           servoing=servoing(stage.scenario.servo))
-    scheduler.tell([Post(command(stage.scenario))], "user")
+    scheduler.tell([Post(stage.scenario.command)], "user")
 
     def step() -> bool:
         decision = scheduler.step()

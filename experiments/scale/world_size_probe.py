@@ -16,9 +16,10 @@ from typing import Any
 from blackboard.effect import Post
 from blackboard.journal import Decision, JournalLines
 from blackboard.scheduler import Scheduler
-from harvey.loop import until_outcome
-from harvey.ports import BodyPort
-from harvey.wiring import command, knowledge_sources, robot_model, servoing
+from harvey.runner.ports import BodyPort
+from harvey.runner.run import until_outcome
+from harvey.simulation.run import robot_model
+from harvey.wiring import knowledge_sources, servoing
 from sim.body.faulty_body import FaultyBody
 from sim.scenario import parse_scenario
 from sim.stage import Stage, set_stage
@@ -102,7 +103,7 @@ def _drive(stage: Stage, seed: int) -> dict[str, Any]:
     watcher, robot = _Watcher(), robot_model(stage.scenario)
     scheduler = Scheduler(knowledge_sources(robot), ports=(BodyPort(FaultyBody(stage.body(seed))),),
                           servoing=servoing(stage.scenario.servo), sinks=(watcher,))
-    scheduler.tell([Post(command(stage.scenario))], "user")
+    scheduler.tell([Post(stage.scenario.command)], "user")
     outcome = until_outcome(scheduler)
     frames = robot.world.frames
     assert isinstance(frames, SqliteFrames)

@@ -17,7 +17,7 @@ from harvey.run_files.run_directory import RunDirectory, new_run
 
 if TYPE_CHECKING:
     from harvey.campaign.tally import Tally
-    from harvey.referee import MissionResult
+    from harvey.simulation.referee import MissionResult
     from sim.scenario import Scenario
     from sim.stage import Stage
 
@@ -113,7 +113,7 @@ def run_task(
     """Run one mission; ``follow`` makes a sink that shows what is counted. Raises BadInput for what the user gave."""
     stage = task.stage()
     from harvey.campaign.tally import Tally
-    from harvey.mission import run_mission
+    from harvey.simulation.run import run_mission
 
     tally = Tally(stage)
     shown = (tally, follow(tally)) if follow else ()
@@ -134,10 +134,10 @@ def room_for(out: Path, name: str, seed: int) -> Path:
 
 def _kept_or_resumed(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence[Sink], live: bool) -> MissionResult:
     """What an earlier campaign did of this mission. Raises BadInput where another mission is there."""
-    from harvey.mission import head_of
-    from harvey.referee import MissionResult
     from harvey.replay.resume import remains_of, resume
     from harvey.run_files.run_head import RunHead
+    from harvey.simulation.referee import MissionResult
+    from harvey.simulation.run import head_of
 
     if not RunHead.read(run.path).is_like(head_of(stage, task.seed, task.body)):
         raise BadInput(f"{run.path}: expected a run of {task.named}, got one that began otherwise")

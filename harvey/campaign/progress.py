@@ -15,7 +15,7 @@ from harvey.campaign.tally import Tally
 from harvey.units import count
 
 if TYPE_CHECKING:
-    from harvey.referee import MissionResult
+    from harvey.simulation.referee import MissionResult
 
 
 class Bar:

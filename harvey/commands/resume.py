@@ -55,11 +55,11 @@ def _on_hardware(
     """Everything is checked as before a first move; then the mission goes on."""
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
     from harvey.commands.drive import checked, follow, summary, tell_how_to_stop
-    from harvey.hardware.mission import mission_again
+    from harvey.hardware.mission import mission_of
     from harvey.hardware.preflight import Preflight
     from harvey.hardware.resume import resume, stood_at
 
-    mission, began_s = mission_again(head, moved), time.monotonic() - stood_at(run)[0]
+    mission, began_s = mission_of(head, moved), time.monotonic() - stood_at(run)[0]
 
     def clock() -> float:
         return time.monotonic() - began_s

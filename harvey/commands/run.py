@@ -31,7 +31,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.serial_body import body_kind
+    from harvey.simulation.serial_body import body_kind
 
     seeds, settings, body = seeds_of(args.seed), settings_of(args.settings), body_kind(args.body)
     tasks = tuple(
@@ -55,12 +55,14 @@ def _out(args: Namespace, seed: int, many: bool) -> Path:
 def _check(task: Task) -> int:
     stage = task.stage()
     from harvey.campaign.summary import foreseen, prospects
-    from harvey.dry_run import rehearse
+    from harvey.dry_run import dry_run
+    from harvey.simulation.run import robot_model
 
-    ahead, outcome = rehearse(stage.scenario)
+    scenario = stage.scenario
+    ahead, outcome = dry_run(robot_model(scenario), scenario.command)
     print(prospects(ahead))
     told, bodes_well = foreseen(ahead, outcome)
-    print(f"\nin thought, {stage.scenario.name} {told}")
+    print(f"\nin thought, {scenario.name} {told}")
     return 0 if bodes_well else 1
 
 

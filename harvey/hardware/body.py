@@ -85,7 +85,7 @@ class Watching:
 
 
 class HardwareBody:
-    """A robot by its drivers (:class:`harvey.ports.Body`).
+    """A robot by its drivers (:class:`harvey.runner.ports.Body`).
 
     Args:
         clock: the time that claims and faults are dated by [s].

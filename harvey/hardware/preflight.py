@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 
 from harvey.campaign.summary import foreseen
-from harvey.dry_run import Prospect, rehearsed
+from harvey.dry_run import MilestonePreview, dry_run
 from harvey.errors import BadInput
 from harvey.hardware.base import kind_of, open_base
 from harvey.hardware.drivers.bases.base import Base, BaseFault
@@ -70,7 +70,7 @@ class Preflight:
         self.robot: RobotModel | None = None
         self.base: Base | None = None
         self.camera: VideoCamera | None = None
-        self.prospects: tuple[Prospect, ...] = ()
+        self.prospects: tuple[MilestonePreview, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -144,7 +144,7 @@ class Preflight:
             yield Check("goal", f"{lost[0]} is not within its locale", todo)
             return
         yield Check("goal", f"from {origin} to {destination}")
-        self.prospects, outcome = rehearsed(robot, self._mission.command)
+        self.prospects, outcome = dry_run(robot, self._mission.command)
         if outcome.kind != "reached":
             yield Check("plan", outcome.reason, "another start or goal, or a world with a way between them")
             return

@@ -20,12 +20,12 @@ from harvey.hardware.drivers.bases.base import Base
 from harvey.hardware.drivers.cameras.video_camera import VideoCamera
 from harvey.hardware.mission import HardwareMission
 from harvey.hardware.run import HardwareRun, driven
-from harvey.replay.body_replay import RESUME
 from harvey.replay.replay import checked, pictures_of, replayed
 from harvey.replay.resume import Remains, is_command
 from harvey.run_files.records import read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
+from harvey.simulation.body_replay import RESUME
 from world_models.entries.body import BodyFault, Frame
 from world_models.entries.task import Resumed
 

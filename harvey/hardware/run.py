@@ -18,12 +18,12 @@ from harvey.hardware.drivers.cameras.video_camera import VideoCamera
 from harvey.hardware.heartbeat import Heartbeat
 from harvey.hardware.mission import HardwareMission
 from harvey.hardware.stop_key import stop_key
-from harvey.loop import until_outcome
-from harvey.ports import BodyPort
-from harvey.referee import Counts
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import HARDWARE, RunHead
 from harvey.run_files.run_recorder import Extent, RunRecorder
+from harvey.runner.ports import BodyPort
+from harvey.runner.run import until_outcome
+from harvey.simulation.referee import Counts
 from logs.disk import CannotWriteError
 from logs.errors import RecordingError
 from world_models.entries.body import Frame, MotionReport
@@ -83,7 +83,7 @@ def drive(
     Returns what ``result.json`` holds: as for a run in the simulator, with null for what only the truth could tell.
     """
     head = RunHead.of(HARDWARE, mission.name, 0, mission.world, robot, mission.servo, mission.command,
-                      scenario=mission.data, folder=str(mission.folder.resolve()))
+                      scenario=mission.source.data, folder=str(mission.folder.resolve()))
     eye = Watching(camera, clock, mission.camera.rate_hz)
     return driven(mission, head, base, eye, clock, RunDirectory(out), HardwareRun.begin, sinks=sinks, live=live)
 

@@ -18,11 +18,6 @@ from blackboard.journal import Decision, decision_line, decision_record
 from blackboard.scheduler import Scheduler
 from harvey.agent import agent_of
 from harvey.campaign.campaign import room_for
-from harvey.loop import Over, endless, until_outcome
-from harvey.mission import UNFINISHED, Mission
-from harvey.ports import BodyPort
-from harvey.referee import MissionResult
-from harvey.replay.body_replay import RESUME, BodyReplay
 from harvey.replay.hidden_segments import check_segments
 from harvey.replay.replay import Live, pictures_of
 from harvey.replay.resume import stage_of
@@ -31,6 +26,11 @@ from harvey.run_files.records import DecisionRecord, EntryRecord, as_line, decis
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import SIMULATOR, RunHead
 from harvey.run_files.run_recorder import RunRecorder
+from harvey.runner.ports import BodyPort
+from harvey.runner.run import Over, endless, until_outcome
+from harvey.simulation.body_replay import RESUME, BodyReplay
+from harvey.simulation.referee import MissionResult
+from harvey.simulation.run import UNFINISHED, Mission
 from logs.journal_file import ACTED_ON
 from world_models.entries.task import Outcome
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 from harvey.campaign.summary import millimetres
 from harvey.diff.first_difference import describe, differing_leaves
-from harvey.mission import UNFINISHED
 from harvey.replay.counterfactual import ASKED, Answer, Parting
 from harvey.run_files.records import DecisionRecord
 from harvey.run_files.run_directory import RunDirectory
+from harvey.simulation.run import UNFINISHED
 from harvey.units import count
 from harvey.why.sentences import sentence
 

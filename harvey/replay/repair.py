@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 from blackboard.journal import Sink
 from harvey.agent import agent_of
-from harvey.mission import Mission
 from harvey.replay.replay import checked, pictures_of, replayed
 from harvey.replay.resume import relived, remains_of, stage_of
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import SIMULATOR, RunHead
 from harvey.run_files.run_recorder import RunRecorder
+from harvey.simulation.run import Mission
 
 
 def redrawn(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:

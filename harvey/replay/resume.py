@@ -17,19 +17,20 @@ from blackboard.effect import Post
 from blackboard.journal import Decision, Sink
 from harvey.agent import agent_of
 from harvey.errors import BadInput
-from harvey.mission import Around, Mission
-from harvey.referee import MissionResult
-from harvey.replay.body_replay import RESUME, BodyReplay
 from harvey.replay.replay import camera_bytes, checked, pictures_of, replayed
 from harvey.run_files.records import read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import HARDWARE, RunHead
 from harvey.run_files.run_recorder import Extent, RunRecorder
+from harvey.simulation.body_replay import RESUME, BodyReplay
+from harvey.simulation.referee import MissionResult
+from harvey.simulation.run import Around, Mission
 from logs.camera_file import Pictures
-from sim.scenario import ROOT, ScenarioError, scenario_from_tables
+from sim.scenario import ScenarioError, scenario_from_tables
 from sim.stage import Stage, set_stage
 from world_models.entries.body import Course, MotorCommand
 from world_models.entries.task import Outcome, Resumed
+from world_models.files.toml.mission import ROOT
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +90,7 @@ def resume(
     Args:
         remains: what is whole of it; the rest of its files is dropped.
         stage: the building of its scenario, where somebody has it at hand.
-        sinks, live, around: as for :func:`harvey.mission.run_mission`.
+        sinks, live, around: as for :func:`harvey.simulation.run.run_mission`.
 
     Raises:
         BadInput: it is no run of the simulator, or cannot be told again as it was.

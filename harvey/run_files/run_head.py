@@ -16,12 +16,12 @@ from harvey.arithmetic import arithmetic
 from harvey.errors import BadInput
 from harvey.run_files.deciding_code import deciding_code
 from harvey.run_files.observations import MisfitError, decoded, fields_of
-from sim.scenario import ROOT, Servo
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries.task import Command
 from world_models.files.store import fingerprint, load_world
+from world_models.files.toml.mission import ROOT, Servo
 from world_models.robot import RobotModel
 
 SIMULATOR, HARDWARE = "simulator", "hardware"
@@ -47,7 +47,7 @@ class RunHead:
         without, constants: what was taken from the experts' agents, for a run that tells what would have been.
         scenario: simulator: the scenario's tables as read, with ``--set`` applied; hardware: what the driver needs.
         folder: simulator: where the scenario's file was.
-        body: simulator: how the body is reached, as :func:`harvey.serial_body.reached` knows it.
+        body: simulator: how the body is reached, as :func:`harvey.simulation.serial_body.reached` knows it.
         harvey: version; code: what :func:`~harvey.run_files.deciding_code.deciding_code` says of the deciding program,
             "" in a run that is older than that.
         arithmetic: how the libraries calculated, as :func:`harvey.arithmetic.arithmetic` tells; "" in an older run.

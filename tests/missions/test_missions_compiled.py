@@ -14,7 +14,7 @@ import pytest
 
 from elsewhere import ROOT, SEED, drive_elsewhere
 from harvey.compiled import CannotCompileError, compile_board
-from harvey.mission import run_mission
+from harvey.simulation.run import run_mission
 from sim.stage import Stage
 
 LAWS = ("agenda", "board", "journal", "retention", "scheduler", "servoing")

@@ -10,10 +10,10 @@ import pytest
 
 from harvey.cli import main
 from harvey.errors import BadInput
-from harvey.mission import run_mission
 from harvey.replay.counterfactual import what_if
 from harvey.run_files.records import DecisionRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
+from harvey.simulation.run import run_mission
 from knowledge_sources import tolerances
 from sim.stage import Stage
 

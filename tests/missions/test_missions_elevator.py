@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from harvey.mission import run_mission
-from harvey.referee import MissionResult
+from harvey.simulation.referee import MissionResult
+from harvey.simulation.run import run_mission
 from sim.scenario import parse_scenario
 from sim.stage import set_stage
 from towers import tower

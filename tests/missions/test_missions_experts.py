@@ -15,8 +15,8 @@ from blackboard.effect import Effect, Post
 from blackboard.journal import Decision, plain
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from harvey.mission import run_mission
-from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources, robot_model
+from harvey.simulation.run import robot_model, run_mission
+from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources
 from sim.body.simulated_body import SimulatedBody
 from sim.stage import Stage
 from sim.truth import Truth

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from blackboard.journal import Decision
-from harvey.mission import run_mission
-from harvey.referee import MissionResult
+from harvey.simulation.referee import MissionResult
+from harvey.simulation.run import run_mission
 from sim.body.faulty_body import AILMENTS
 from sim.faults.faults import Ailment, Moment
 from sim.stage import Stage

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from harvey.mission import run_mission
 from harvey.run_files.run_directory import RunDirectory
+from harvey.simulation.run import run_mission
 from logs.journal_file import read_journal
 from logs.reader import read_decisions, read_frames
 from logs.recording.overview import read_series

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from harvey.agent import agent_of
-from harvey.mission import run_mission
 from harvey.replay.replay import pictures_of, replayed
 from harvey.replay.resume import remains_of, resume
 from harvey.run_files.records import read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
+from harvey.simulation.run import run_mission
 from sim.scenario import parse_scenario, with_settings
 from sim.stage import Stage, set_stage
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from blackboard.journal import Decision
-from harvey.mission import run_mission
+from harvey.simulation.run import run_mission
 from sim.faults.faults import Occlusion
 from sim.made_up.short_missions import HALLWAY, fault
 from sim.scenario import parse_scenario

@@ -15,14 +15,14 @@ import pytest
 from experiments.robustness import crash
 from harvey.agent import agent_of
 from harvey.cli import main
-from harvey.mission import run_mission
-from harvey.referee import MissionResult
 from harvey.replay.repair import redrawn
 from harvey.replay.replay import pictures_of, replayed
 from harvey.replay.resume import remains_of, resume
 from harvey.run_files.records import DecisionRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
+from harvey.simulation.referee import MissionResult
+from harvey.simulation.run import run_mission
 from logs import disk
 from logs.reader import damage_of, read_decisions, read_frames
 from sim.stage import Stage

@@ -9,8 +9,8 @@ import pytest
 import harvey.agent
 from blackboard.archive import Archive
 from blackboard.journal import Decision
-from harvey.mission import run_mission
 from harvey.retention import RETENTION
+from harvey.simulation.run import run_mission
 from sim.stage import Stage
 from world_models.entries.body import Frame
 

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from blackboard.journal import Decision, decision_line
-from harvey.mission import run_mission
-from harvey.referee import MissionResult
-from harvey.serial_body import KINDS
+from harvey.simulation.referee import MissionResult
+from harvey.simulation.run import run_mission
+from harvey.simulation.serial_body import KINDS
 from sim.body.simulated_body import SimulatedBody
 from sim.faults.faults import Ailment, Moment
 from sim.stage import Stage

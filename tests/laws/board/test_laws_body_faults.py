@@ -15,7 +15,7 @@ from blackboard.effect import Effect, Post
 from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
-from harvey.ports import BodyPort
+from harvey.runner.ports import BodyPort
 from knowledge_sources.action.fault_handler import FIRST_WAIT_S, LONGEST_WAIT_S, PATIENCE_S, STRIKES, FaultHandler
 from strategies import Note, Scripted
 from world_models.entries.body import STOP_KEY, BodyFault, Frame, Look, MotionReport, MotorCommand, Recovery

@@ -13,7 +13,7 @@ from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from experiments.paper.planning import TAKING_PART
 from experiments.perception.visibility import CAMERA, MOUNT
-from harvey.dry_run import Believer, PerfectWheels
+from harvey.dry_run import AcceptEveryMilestone, IdealBodyPort
 from harvey.wiring import knowledge_sources
 from towers import tower
 from world_models.actuator import ActuatorModel
@@ -44,7 +44,7 @@ def driven(world: World, origin: str, destination: str) -> tuple[list[object], O
 
     robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel())
     experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
-    scheduler = Scheduler([*experts, Believer()], ports=(PerfectWheels(),), sinks=(note,))
+    scheduler = Scheduler([*experts, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(note,))
     goal = f"(ptrans ({origin} (12,4.5,0)) ({destination} (14,4.2,0)))"
     scheduler.tell([Post(Command(goal, 0.5, None, diagonal(0.003, 0.001)))], "user")
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < 4_000:

@@ -25,7 +25,8 @@ from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
 from harvey.retention import RETENTION
-from harvey.wiring import KNOWLEDGE_SOURCES, command, robot_model
+from harvey.simulation.run import robot_model
+from harvey.wiring import KNOWLEDGE_SOURCES
 from knowledge_sources.plan.escalator import MOST_CHECKS, MOST_LOST
 from knowledge_sources.plan.milestone_judge import MOST_LOOKS
 from knowledge_sources.questions import (
@@ -183,8 +184,8 @@ class Ladder:
         self.seen: dict[Ref, Discrepancy] = {}
         self.scheduler = Scheduler(
             [*(e for e in real if e.name not in PERCEIVERS), *scripted], ports=[self.body], retention=RETENTION)
-        task = command(with_settings(load_scenario("lab-to-allens-office"), {
-            "goal": "(ptrans (allens-office (7,4,0)) (allens-office (13,12,0)))"}))
+        task = with_settings(load_scenario("lab-to-allens-office"), {
+            "goal": "(ptrans (allens-office (7,4,0)) (allens-office (13,12,0)))"}).command
         self.scheduler.tell([Post(task)], "user")
 
     @property

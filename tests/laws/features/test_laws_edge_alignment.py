@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from harvey.wiring import robot_model
+from harvey.simulation.run import robot_model
 from knowledge_sources.methods.features.images import decode
 from knowledge_sources.methods.motion.routes import compute_free_space
 from knowledge_sources.methods.tracking.edge_alignment import EdgeAlignment, align_to_edges

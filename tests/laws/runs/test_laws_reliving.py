@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey.replay.body_replay import part_of
+from harvey.simulation.body_replay import part_of
 from sim.body.actuator import ActuatorParameters
 from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody

@@ -13,7 +13,7 @@ from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from experiments.paper.planning import TAKING_PART
 from experiments.perception.visibility import CAMERA, MOUNT, house
-from harvey.dry_run import Believer, PerfectWheels
+from harvey.dry_run import AcceptEveryMilestone, IdealBodyPort
 from harvey.wiring import knowledge_sources
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
@@ -34,7 +34,7 @@ def planned(world: World) -> tuple[list[PlanSketch], Outcome]:
 
     robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel())
     experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
-    scheduler = Scheduler([*experts, Believer()], ports=(PerfectWheels(),), sinks=(note,))
+    scheduler = Scheduler([*experts, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(note,))
     ends = [world.locale(name).outline.mean(axis=0) / FOOT_M * part
             for name, part in ((world.rooms[0], 0.35), (world.rooms[-1], 0.35))]
     first, last = (f"({room} ({x:.2f},{y:.2f},0))" for room, (x, y) in

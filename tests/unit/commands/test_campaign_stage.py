@@ -10,7 +10,7 @@ import pytest
 
 from harvey.campaign.campaign import Task
 from harvey.errors import BadInput
-from harvey.mission import head_of
+from harvey.simulation.run import head_of
 from sim.made_up.short_missions import OFFICE
 from world_models.files.store import WORLDS
 

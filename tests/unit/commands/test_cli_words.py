@@ -17,10 +17,10 @@ from experiments.paper.levels import _row
 from experiments.report import Report
 from experiments.scale.render_speed import edge_offsets_px
 from harvey.campaign.summary import foreseen, one, several
-from harvey.dry_run import Prospect
+from harvey.dry_run import MilestonePreview
 from harvey.errors import BadInput
-from harvey.referee import MissionResult
 from harvey.run_files.records import EntryRecord
+from harvey.simulation.referee import MissionResult
 from harvey.tables import table
 from harvey.units import degrees, metres, turn
 from harvey.why.sentences import sentence
@@ -73,8 +73,8 @@ def test_a_table_aligns_numbers_right_and_words_left() -> None:
     assert table(["n"], [["9"], ["10"]]).splitlines()[2:] == [" 9", "10"]
 
 
-def ahead(*verdicts: str) -> list[Prospect]:
-    return [Prospect("M", "hall", 0.0, 0.0, 0.0, 1, 9, 0.01, 0.01, verdict) for verdict in verdicts]
+def ahead(*verdicts: str) -> list[MilestonePreview]:
+    return [MilestonePreview("M", "hall", 0.0, 0.0, 0.0, 1, 9, 0.01, 0.01, verdict) for verdict in verdicts]
 
 
 REACHED, BLOCKED = Outcome("reached", "all verified"), Outcome("blocked", "no way")

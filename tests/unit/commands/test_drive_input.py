@@ -19,7 +19,7 @@ from harvey.hardware.base import open_base
 from harvey.hardware.mission import load_mission
 from harvey.hardware.preflight import Preflight
 from harvey.hardware.stop_key import stop_key
-from harvey.serial_body import body_kind
+from harvey.simulation.serial_body import body_kind
 from sim.emulators.denning import DenningEmulator
 from sim.emulators.denning_motion import Rolling
 from sim.emulators.ground import Floor

@@ -12,12 +12,12 @@ import pytest
 
 from harvey.errors import BadInput
 from harvey.run_files.run_head import HARDWARE, RunHead
-from sim.scenario import Servo
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command
 from world_models.files.store import WORLDS, load_world
+from world_models.files.toml.mission import Servo
 from world_models.robot import RobotModel
 
 WORLD = WORLDS / "research_center.toml"

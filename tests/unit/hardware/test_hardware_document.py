@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from harvey.cli import main, parser
-from harvey.dry_run import rehearsed
+from harvey.dry_run import dry_run
 from harvey.hardware.body import BASE_WORDS, CAMERA_WORDS
 from harvey.hardware.mission import load_mission
-from harvey.wiring import robot_model
+from harvey.simulation.run import robot_model
 from knowledge_sources.action.fault_handler import FIRST_WAIT_S, LONGEST_WAIT_S, PATIENCE_S, STRIKES
 from sim.scenario import load_scenario
 from world_models.actuator import ActuatorModel
@@ -47,7 +47,7 @@ def test_its_flat_is_a_world_without_faults_and_its_mission_is_planned_with_ever
     mission, scenario = load_mission(FLAT / "mission.toml", {}), load_scenario(FLAT / "flat-sim.toml")
     assert mission.goal == scenario.goal and mission.world == scenario.world
     assert mission.start == scenario.start
-    prospects, outcome = rehearsed(robot_model(scenario), mission.command)
+    prospects, outcome = dry_run(robot_model(scenario), mission.command)
     assert outcome.kind == "reached" and {p.verdict for p in prospects} == {"clear"}
     assert f"{len(prospects)} milestones, 0 of them weak" in TEXT
 

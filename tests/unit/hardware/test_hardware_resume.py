@@ -8,8 +8,8 @@ import pytest
 
 from harvey.errors import BadInput
 from harvey.hardware.resume import stood_at
-from harvey.mission import run_mission
 from harvey.run_files.run_directory import RunDirectory
+from harvey.simulation.run import run_mission
 from sim.stage import Stage
 
 

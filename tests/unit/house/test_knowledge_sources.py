@@ -19,8 +19,8 @@ from blackboard.entry import Entry, Ref
 from blackboard.journal import plain
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from harvey.mission import run_mission
-from harvey.wiring import knowledge_sources, robot_model
+from harvey.simulation.run import robot_model, run_mission
+from harvey.wiring import knowledge_sources
 from sim.scenario import load_scenario
 from sim.stage import set_stage
 from world_models.entries.body import Frame, MotionReport, RideReport

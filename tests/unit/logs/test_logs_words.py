@@ -4,7 +4,8 @@ from blackboard.board import Blackboard
 from blackboard.effect import Post, Revise
 from blackboard.entry import Ref
 from blackboard.journal import Decision
-from harvey.wiring import knowledge_sources, robot_model
+from harvey.simulation.run import robot_model
+from harvey.wiring import knowledge_sources
 from logs.recording.activity import activity
 from logs.recording.board_mirror import Mirror
 from logs.recording.deeds import TELLERS, Deeds

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harvey.ports import BodyPort
+from harvey.runner.ports import BodyPort
 from sim.body.elevator import Helper
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
@@ -108,4 +108,4 @@ def test_mistakes_in_rides_are_told(folder: Path, rides: str, message: str) -> N
 def test_a_scenario_with_rides_is_read_again_from_its_tables(folder: Path) -> None:
     scenario = parse_scenario(SCENARIO + RIDES, "tower", folder)
     assert scenario.rides == (Helper("elevator-1-2", 3.0, 9.0, "", 1),)
-    assert scenario_from_tables(scenario.data, "tower", folder).rides == scenario.rides
+    assert scenario_from_tables(scenario.source.data, "tower", folder).rides == scenario.rides

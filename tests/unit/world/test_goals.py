@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from harvey.cli import main
-from harvey.dry_run import rehearsed
+from harvey.dry_run import dry_run
 from rehearsal import CAMERA, HOUSE, MOUNT
 from world_models.actuator import ActuatorModel
 from world_models.entries.location import diagonal
@@ -29,7 +29,7 @@ def outcome(x_m: float, y_m: float, radius_m: float = 0.35) -> Outcome:
     """How a mission to a place in the kitchen ends in thought."""
     robot = RobotModel(read_world(Source.parse(FURNISHED, "house.toml")), CAMERA, MOUNT, ActuatorModel(), radius_m)
     places = [f"(kitchen ({x / FOOT_M:.4f},{y / FOOT_M:.4f},0))" for x, y in ((2.0, 2.0), (x_m, y_m))]
-    return rehearsed(robot, Command(f"(ptrans {' '.join(places)})", 0.0, None, diagonal(0.01, 0.01)))[1]
+    return dry_run(robot, Command(f"(ptrans {' '.join(places)})", 0.0, None, diagonal(0.01, 0.01)))[1]
 
 
 @pytest.mark.parametrize(("x_m", "y_m", "told"), [

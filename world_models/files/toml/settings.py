@@ -62,7 +62,7 @@ def read_settings(node: Node, kind: type[T]) -> T:
         number = "a whole number" if hints[error.key] is int else "a number"
         raise node[key].fail(f"{number} {error.bounds.words(known[key][1])}") from None
     except (TypeError, ValueError) as error:
-        raise WorldError(f"{node.where}: {'.'.join(map(str, node.key))}: {error}") from None
+        raise WorldError(f"{node.place}: {error}") from None
 
 
 def _value(item: Node, hint: Any, factor: float) -> Any:

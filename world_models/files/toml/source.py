@@ -29,6 +29,7 @@ class Source:
         folder: from where files that it names are looked for.
         text: as it was read.
         depth: how many files named each other until this one was named.
+        settings: keys whose values were replaced since it was read (``--set``).
     """
 
     name: str
@@ -37,6 +38,7 @@ class Source:
     folder: Path = Path()
     text: str = ""
     depth: int = 0
+    settings: frozenset[Key] = frozenset()
 
     @staticmethod
     def read(path: Path, depth: int = 0) -> Source:
@@ -80,6 +82,12 @@ class Source:
             key = key[:-1]
         return f"{self.name}:{self.lines.get(key, 1)}"
 
+    def place(self, key: Key) -> str:
+        """``file:line: key`` of a value, or ``--set key`` where it, or a value of its table, was replaced."""
+        if key and (replaced := [k for k in self.settings if k[: len(key)] == key]):
+            return f"--set {'.'.join(map(str, min(replaced)))}"
+        return f"{self.where(key)}: {'.'.join(map(str, key)) or 'the file'}"
+
 
 @dataclass(frozen=True, eq=False)
 class Node:
@@ -93,11 +101,14 @@ class Node:
     def where(self) -> str:
         return self.source.where(self.key)
 
+    @property
+    def place(self) -> str:
+        return self.source.place(self.key)
+
     def fail(self, expected: str, got: str | None = None) -> WorldError:
         """The error to raise when this value is not what was expected."""
         came = _shortened(shown(self.value)) if got is None else got
-        path = ".".join(str(part) for part in self.key) or "the file"
-        return WorldError(f"{self.where}: {path}: expected {expected}, got {came}")
+        return WorldError(f"{self.place}: expected {expected}, got {came}")
 
     def table(self, required: tuple[str, ...] = (), optional: tuple[str, ...] = ()) -> Node:
         """This node, after checking that it is a table with the required keys and none but these."""

@@ -16,7 +16,7 @@ from harvey.hardware.drivers.bases.create2 import Create2Base
 from harvey.hardware.drivers.bases.denning import DenningBase
 from harvey.hardware.drivers.bases.link import Link
 from harvey.hardware.drivers.bases.p2os import P2osBase
-from harvey.ports import Body
+from harvey.runner.ports import Body
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
 from sim.emulators.create2 import Create2Emulator

@@ -13,21 +13,25 @@ from blackboard.effect import Post
 from blackboard.journal import Decision, Sink
 from blackboard.scheduler import Scheduler
 from harvey.agent import Agent, Sources, agent_of
-from harvey.loop import until_outcome
-from harvey.ports import Body, BodyPort
-from harvey.referee import MissionResult, Referee
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import SIMULATOR, RunHead, known_world
 from harvey.run_files.run_recorder import RunRecorder
-from harvey.serial_body import IN_PROCESS, reached
-from harvey.wiring import command, knowledge_sources, robot_model
+from harvey.runner.ports import Body, BodyPort
+from harvey.runner.run import until_outcome
+from harvey.simulation.referee import MissionResult, Referee
+from harvey.simulation.serial_body import IN_PROCESS, reached
+from harvey.wiring import knowledge_sources
 from logs.disk import CannotWriteError
 from logs.errors import RecordingError
 from sim.body.simulated_body import SimulatedBody
-from sim.scenario import Limits
+from sim.scenario import Scenario, ScenarioLimits
 from sim.stage import Stage
+from world_models.actuator import ActuatorModel
+from world_models.building.world import World
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Outcome
+from world_models.files.store import load_world
+from world_models.robot import RobotModel
 
 Around = Callable[[Body, Callable[[], bool]], Body]
 """Puts something between the agent and the body; the second argument tells whether the run is only told again."""
@@ -58,7 +62,7 @@ def run_mission(
         live: let a viewer watch.
         sources: which experts sit round the board.
         head: how the run begins, if otherwise than the scenario says.
-        body: how the body is reached (:func:`harvey.serial_body.reached`), where ``head`` does not say it.
+        body: how the body is reached (:func:`harvey.simulation.serial_body.reached`), where ``head`` does not say it.
         around: puts something between the agent and the body.
     """
     head = head or head_of(stage, seed, body)
@@ -73,8 +77,18 @@ def head_of(stage: Stage, seed: int, body: str = IN_PROCESS) -> RunHead:
     """How a run of a scenario begins."""
     s = stage.scenario
     robot = robot_model(s, known_world(s.world))
-    return RunHead.of(SIMULATOR, s.name, seed, s.world, robot, s.servo, command(s), scenario=s.data,
+    return RunHead.of(SIMULATOR, s.name, seed, s.world, robot, s.servo, s.command, scenario=s.source.data,
                       folder=str(s.folder), body=body)
+
+
+def robot_model(scenario: Scenario, world: World | None = None) -> RobotModel:
+    """What the robot knows: the world file without the building's details, its camera and its wheels' kind.
+
+    ``world`` is that file's world where it has been read already.
+    """
+    camera = scenario.camera
+    return RobotModel(world or load_world(scenario.world), camera.camera, camera.mount, ActuatorModel(),
+                      continuous=scenario.motion.continuous)
 
 
 class Mission:
@@ -165,7 +179,7 @@ def stopped(run: RunDirectory | None, error: Exception) -> Outcome:
     return Outcome("failed", f"stopped, because nothing more can be written down: {why}{go_on}")
 
 
-def _over(limits: Limits, scheduler: Scheduler, body: SimulatedBody) -> str | None:
+def _over(limits: ScenarioLimits, scheduler: Scheduler, body: SimulatedBody) -> str | None:
     truth = body.truth
     if truth.collisions > limits.max_collisions:
         return f"{truth.collisions} collisions"

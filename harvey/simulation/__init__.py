@@ -1,0 +1,1 @@
+"""Runs in the simulator: agent and simulated body put together, and scored against the truth."""

@@ -1,0 +1,193 @@
+"""A mission's file: what a scenario of the simulator and a mission on hardware have in common.
+
+World, goal, start, arrival, servo levels, way of driving, limits. Each format adds tables of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from world_models.bounds import Bounds, check_bounds
+from world_models.entries.location import diagonal
+from world_models.entries.task import Command
+from world_models.files.compiled.schema import SUFFIXES
+from world_models.files.toml.includes import WORLDS
+from world_models.files.toml.settings import MOST, known_keys, merged, near, parsed, read_settings
+from world_models.files.toml.source import Node, Source, WorldError
+from world_models.phrases import check_command
+
+ROOT = WORLDS.parents[1]
+"""The folder of the packages: files that come with the project are named relative to it."""
+TURN = Bounds(-2.0 * math.pi, 2.0 * math.pi)
+MIN_SIGMA = 0.005
+"""Floor of the start's standard deviations [m, rad]: nobody puts a robot down better."""
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """How the robot is put down: heading in the first locale's frame, and standard deviations of the placing."""
+
+    heading_rad: float = 0.0
+    put_down_sigma_m: float = 0.0
+    put_down_sigma_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_bounds(self, {"heading_rad": TURN, "put_down_sigma_m": Bounds(0.0, 2.0),
+                            "put_down_sigma_rad": Bounds(0.0, math.pi)})
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """The heading wanted at the goal, in the last locale's frame; NaN for any."""
+
+    heading_rad: float = math.nan
+
+    def __post_init__(self) -> None:
+        if self.matters:
+            check_bounds(self, {"heading_rad": TURN})
+
+    @property
+    def matters(self) -> bool:
+        return not math.isnan(self.heading_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class Servo:
+    """Which levels of perceptual servoing (Figure 2) are on."""
+
+    action: bool = True
+    plan: bool = True
+    goal: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Whether legs are driven without stopping at each increment: corrected on the move, thirty times a second."""
+
+    continuous: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """When to give up."""
+
+    max_time_s: float = 3600.0
+    max_cycles: int = 20000
+
+    def __post_init__(self) -> None:
+        some = Bounds(0.0, MOST, above=True)
+        check_bounds(self, {"max_time_s": some, "max_cycles": some})
+
+
+TABLES: Mapping[str, type[Any]] = {
+    "start": Start, "arrival": Arrival, "servo": Servo, "motion": Motion, "limits": Limits}
+"""The tables that every mission may have."""
+TEXTS = ("description", "world", "goal")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Mission:
+    """A mission as its file gives it; the tables of the file are the attributes of the same name.
+
+    Attributes:
+        name: the file's, without its ending.
+        world: the world file that the robot believes in.
+        goal: in words, or in conceptual-dependency form with coordinates in feet.
+        folder: where the file is; file names in it are relative to it.
+        source: the file, with the settings that replaced some of its values.
+    """
+
+    name: str
+    description: str = ""
+    world: Path
+    goal: str
+    start: Start
+    arrival: Arrival
+    servo: Servo
+    motion: Motion
+    limits: Limits
+    folder: Path
+    source: Source = field(repr=False)
+
+    @property
+    def command(self) -> Command:
+        """What the user asks for, and how the robot is put down."""
+        s = self.start
+        covariance = diagonal(max(s.put_down_sigma_m, MIN_SIGMA), max(s.put_down_sigma_rad, MIN_SIGMA))
+        return Command(self.goal, s.heading_rad, self.arrival.heading_rad if self.arrival.matters else None, covariance)
+
+
+@dataclass(frozen=True, slots=True)
+class MissionFormat:
+    """One kind of mission file.
+
+    Attributes:
+        tables: the settings class of each table.
+        others: further keys at the top of the file, which the caller reads.
+    """
+
+    tables: Mapping[str, type[Any]]
+    others: tuple[str, ...] = ()
+
+    def keys(self) -> tuple[str, ...]:
+        """Every key that :meth:`with_settings` understands."""
+        return (*TEXTS, *(f"{name}.{key}" for name, kind in self.tables.items() for key in known_keys(kind)))
+
+    def with_settings(self, source: Source, settings: Mapping[str, Any]) -> Source:
+        """The file with some values replaced, as ``{"servo.action": "off", "start.heading_deg": 90}``.
+
+        Raises:
+            WorldError: a key is unknown; near ones are listed.
+        """
+        for key, value in settings.items():
+            if key not in self.keys():
+                raise WorldError(f"--set {key}: expected {near(key, self.keys())}, got {key!r}")
+            path = tuple(key.split("."))
+            new = value if self._is_text(path) or not isinstance(value, str) else parsed(value)
+            data = merged(self._without_other_spellings(source.data, path), path, new)
+            source = replace(source, data=data, settings=source.settings | {path})
+        return source
+
+    def read(self, source: Source, name: str, folder: Path) -> dict[str, Any]:
+        """The attributes of a :class:`Mission`, and the other tables of the format. Raises WorldError."""
+        node = source.root.table(("world", "goal"), ("description", *self.others, *self.tables))
+        tables = {key: read_settings(node[key], kind) if key in node else kind() for key, kind in self.tables.items()}
+        return {
+            "name": name, "description": node["description"].text() if "description" in node else "",
+            "world": named_file(node["world"].text(), WORLDS, folder), "goal": _goal(node["goal"]),
+            "folder": folder, "source": source, **tables,
+        }
+
+    def _is_text(self, path: tuple[str, ...]) -> bool:
+        """Whether a key holds a text: then ``--set`` does not read its value as TOML."""
+        if len(path) == 1:
+            return True
+        kind = self.tables[path[0]]
+        return get_type_hints(kind)[known_keys(kind)[path[1]][0]] is str
+
+    def _without_other_spellings(self, data: Mapping[str, Any], path: tuple[str, ...]) -> Mapping[str, Any]:
+        """The tables without the same setting in another unit."""
+        if len(path) == 1 or not isinstance(table := data.get(path[0]), Mapping):
+            return data
+        known = known_keys(self.tables[path[0]])
+        others = {key for key in table if key in known and known[key][0] == known[path[1]][0]}
+        return {**data, path[0]: {key: value for key, value in table.items() if key not in others}}
+
+
+def named_file(text: str, shipped: Path, folder: Path) -> Path:
+    """A file that comes with the project, by its bare name, or any file, relative to the mission's folder."""
+    return folder / text if text.endswith((".toml", *SUFFIXES)) else shipped / f"{text}.toml"
+
+
+def _goal(node: Node) -> str:
+    try:
+        check_command(node.text())
+    except WorldError:
+        raise
+    except ValueError as error:
+        raise WorldError(f"{node.place}: {error}") from None
+    return node.text()
