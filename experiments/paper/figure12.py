@@ -7,8 +7,7 @@ from itertools import pairwise, zip_longest
 import numpy as np
 
 from experiments.report import Cell, Report
-from knowledge_sources.methods.matching.hough import Peak
-from knowledge_sources.methods.matching.image_matching import Match, TraceStep, format_trace, match_lines
+from knowledge_sources.methods.matching import Match, Peak, TraceStep, format_trace, match_lines
 
 NAMES = "ABCD"
 MODEL = (

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.pose.line_set import line_set
-from knowledge_sources.methods.pose.numerics.image_error import image_jacobian
-from knowledge_sources.methods.pose.numerics.levenberg_marquardt import information_inverse
+from knowledge_sources.methods.pose.line_set import build_line_set
+from knowledge_sources.methods.pose.numerics.image_error import compute_image_jacobian
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import invert_information
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -141,14 +141,14 @@ def position_error_ft(found: Pose, truth: Pose) -> Array:
 
 def information(scene: PoseScene, sigma_px: float) -> Array:
     """(6, 6) Fisher information of the lines on the pose's left perturbation, at the truth."""
-    lines, truth = line_set(scene.lines_world, scene.segments_px, scene.camera, sigma_px), scene.camera_from_world
-    slopes = image_jacobian(lines, truth.rotation, truth.translation)[1].reshape(-1, 6) / sigma_px
+    lines, truth = build_line_set(scene.lines_world, scene.segments_px, scene.camera, sigma_px), scene.camera_from_world
+    slopes = compute_image_jacobian(lines, truth.rotation, truth.translation)[1].reshape(-1, 6) / sigma_px
     return np.asarray(slopes.T @ slopes)
 
 
 def position_limit_ft(scene: PoseScene, sigma_px: float) -> Array:
     """(3,) deviation of the camera's position in the paper's axes that no unbiased estimate stays below [ft]."""
-    variance = np.diag(information_inverse(information(scene, sigma_px)))[3:]
+    variance = np.diag(invert_information(information(scene, sigma_px)))[3:]
     return np.asarray(np.sqrt(variance[[1, 0, 2]]) * FEET_PER_M)
 
 

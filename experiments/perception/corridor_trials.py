@@ -14,7 +14,7 @@ from experiments.perception.corridor_data import SHOWN, Corridor, CorridorFrame,
 from harvey.errors import BadInput
 from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX, LineSegments, find_lines
 from knowledge_sources.methods.localization.locate_camera import LEAST_LENGTH_PX, CameraFix, PoseVerdict, locate_camera
-from knowledge_sources.methods.matching.image_matching import match_lines
+from knowledge_sources.methods.matching import match_lines
 from knowledge_sources.methods.pose import med_r_and_t
 from world_models.frames import Pose
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching.fit import Similarity2, best_fits
-from knowledge_sources.methods.matching.hough import line_table
-from knowledge_sources.methods.matching.pairs import PairTable, model_move, pair_table
+from knowledge_sources.methods.matching import Similarity2
+from knowledge_sources.methods.matching.fit import compute_best_fits
+from knowledge_sources.methods.matching.hough import build_line_table
+from knowledge_sources.methods.matching.pairs import PairTable, build_pair_table, compute_model_motion
 
 Array = NDArray[np.float64]
 
@@ -21,13 +22,13 @@ STILL = (1.0, 0.0, 0.0, 0.0, 1.0)
 def ransac_icp(model_px: Array, data_px: Array, rng: np.random.Generator) -> Similarity2:
     """The move of the model: of 500 drawn from two pairs the one with most length near, refitted to what is near."""
     centre = model_px.reshape(-1, 2).mean(axis=0)
-    model, data = line_table(model_px, centre), line_table(data_px, centre)
-    table = pair_table(model, data, np.full(len(model_px), WINDOW_PX), WINDOW_RAD)
+    model, data = build_line_table(model_px, centre), build_line_table(data_px, centre)
+    table = build_pair_table(model, data, np.full(len(model_px), WINDOW_PX), WINDOW_RAD)
     placements = np.concatenate([np.array([STILL]), _drawn(table, rng)])
     best = placements[int(np.argmax([_score(table, placement) for placement in placements]))]
     for _ in range(ROUNDS):
         best = _refitted(table, best)
-    return model_move(best, centre)
+    return compute_model_motion(best, centre)
 
 
 def _drawn(table: PairTable, rng: np.random.Generator) -> Array:
@@ -77,10 +78,10 @@ def _refitted(table: PairTable, placement: Array) -> Array:
 def told(model_px: Array, data_px: Array, owner: NDArray[np.intp]) -> Similarity2:
     """The fit to the right pairs, told by ``owner`` (k,): the best that any search for pairs could give."""
     centre = model_px.reshape(-1, 2).mean(axis=0)
-    model, data = line_table(model_px, centre), line_table(data_px, centre)
-    table = pair_table(model, data, np.full(len(model_px), 3.0 * WINDOW_PX), 2.0 * WINDOW_RAD)
+    model, data = build_line_table(model_px, centre), build_line_table(data_px, centre)
+    table = build_pair_table(model, data, np.full(len(model_px), 3.0 * WINDOW_PX), 2.0 * WINDOW_RAD)
     right = np.flatnonzero(owner[table.data] == table.model)
-    return model_move(_fitted(table, right, np.array(STILL)), centre)
+    return compute_model_motion(_fitted(table, right, np.array(STILL)), centre)
 
 
 def _fitted(table: PairTable, chosen: NDArray[np.intp], placement: Array) -> Array:
@@ -89,4 +90,4 @@ def _fitted(table: PairTable, chosen: NDArray[np.intp], placement: Array) -> Arr
         return placement
     rows = table.across[chosen] * np.sqrt(table.shares[chosen])[:, None, None]
     form = np.einsum("pea,peb->ab", rows, rows) + 1e-6 * np.diag([0.0, 0.0, 1.0, 1.0, 0.0])
-    return np.asarray(best_fits(form[None], False, placement).placements[0])
+    return np.asarray(compute_best_fits(form[None], False, placement).placements[0])

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching.fit import Similarity2
+from knowledge_sources.methods.matching import Similarity2
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]

@@ -12,8 +12,7 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
-from knowledge_sources.methods.matching.floor_matching import FloorMatch, match_on_floor
-from knowledge_sources.methods.matching.image_matching import Match, match_lines
+from knowledge_sources.methods.matching import FloorMatch, Match, match_lines, match_on_floor
 from knowledge_sources.questions import held
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from knowledge_sources.methods.matching.hough import Peak
-from knowledge_sources.methods.matching.image_matching import Match, format_trace, match_lines
+from knowledge_sources.methods.matching import Match, Peak, format_trace, match_lines
 
 MODEL = np.array(
     [

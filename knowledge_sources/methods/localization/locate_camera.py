@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX, LineSegments, find_lines, remove_duplicates
-from knowledge_sources.methods.matching.space_matching import match_in_space
+from knowledge_sources.methods.matching import match_in_space
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, trunc_r_and_t
 from knowledge_sources.methods.verification.agreement import Agreement, compute_agreement
 from world_models.camera import Camera

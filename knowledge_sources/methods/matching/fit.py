@@ -54,7 +54,7 @@ class Fitting(NamedTuple):
 
     @staticmethod
     def of_figure(with_scale: bool, start: Array) -> Fitting:
-        """As :func:`best_fits`, from the turn of a placement (5,)."""
+        """As :func:`compute_best_fits`, from the turn of a placement (5,)."""
         return Fitting(SCALED if with_scale else RIGID, math.atan2(start[1], start[0]))
 
     def of(self, forms: Array) -> Fits:
@@ -63,10 +63,10 @@ class Fitting(NamedTuple):
 
 
 STEPS = Fitting(STEP, 0.0)
-"""As :func:`step_fits`."""
+"""As :func:`compute_step_fits`."""
 
 
-def best_fits(forms: Array, with_scale: bool, start: Array) -> Fits:
+def compute_best_fits(forms: Array, with_scale: bool, start: Array) -> Fits:
     """Minimise k quadratic forms (k, 5, 5) over R, T and, if asked, s: T and s by elimination, then R.
 
     Source: §6.1.2, E_fit = sum_i (l_i / 2) sum over both ends (n_i . (R p_i + T) - s rho_i)^2, each bracket linear
@@ -80,6 +80,6 @@ def best_fits(forms: Array, with_scale: bool, start: Array) -> Fits:
     return Fits(*fits(np.ascontiguousarray(forms), SCALED if with_scale else RIGID, turns))
 
 
-def step_fits(forms: Array) -> Fits:
+def compute_step_fits(forms: Array) -> Fits:
     """Minimise k forms (k, d + 1, d + 1) over the first d of (step, 1); ``placements`` are the steps (k, d)."""
     return STEPS.of(forms)

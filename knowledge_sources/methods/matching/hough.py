@@ -35,7 +35,7 @@ class LineTable:
     angles: Array
 
 
-def line_table(segments_px: Array, centre: Array) -> LineTable:
+def build_line_table(segments_px: Array, centre: Array) -> LineTable:
     """Prepare segments (n, 2, 2), coordinates relative to ``centre``."""
     ends = segments_px - centre
     span = ends[:, 1] - ends[:, 0]

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching.fit import Fits, Fitting, Similarity2
-from knowledge_sources.methods.matching.hough import LineTable, Peak, hough_peaks, line_table
+from knowledge_sources.methods.matching.hough import LineTable, Peak, build_line_table, hough_peaks
 from knowledge_sources.methods.matching.objective import Objective, Terms, likelihood_terms, paper_terms
 from knowledge_sources.methods.matching.pairs import (
     SETTLE_PX,
     PairTable,
+    build_pair_table,
+    compute_model_motion,
     gated,
-    model_move,
-    pair_table,
     placement_of,
     settled,
     start_anchor,
@@ -117,7 +117,7 @@ def match_lines(
     """
     model, data = _checked(model_px, "model_px"), _checked(data_px, "data_px")
     centre = model.reshape(-1, 2).mean(axis=0) if len(model) else np.zeros(2)
-    still, scene = line_table(model, centre), line_table(data, centre)
+    still, scene = build_line_table(model, centre), build_line_table(data, centre)
     gates = _gates(pair_px, len(model))
     width = float(np.median(gates)) if len(gates) else 3.0
     if objective == "paper":
@@ -128,7 +128,7 @@ def match_lines(
         terms = likelihood_terms(still.lengths, len(data), sigma, chance_exponent, chance_px, start_px)
     else:
         raise ValueError(f'expected objective "paper" or "likelihood", got {objective!r}')
-    table = pair_table(still, scene, hough_px + np.maximum(gates, SETTLE_PX[0]), hough_rad + pair_rad)
+    table = build_pair_table(still, scene, hough_px + np.maximum(gates, SETTLE_PX[0]), hough_rad + pair_rad)
     placements = [placement_of(start)] if start else _starts(still, scene, table, hough_px, hough_rad, peaks)
     tries = []
     for placement in placements:
@@ -197,7 +197,7 @@ def _match(
     chosen = chosen[np.lexsort((space.data[chosen], space.model[chosen]))]
     return Match(
         pairs=np.stack([space.model[chosen], space.data[chosen]], axis=1),
-        transform=model_move(fit.placements[0], centre),
+        transform=compute_model_motion(fit.placements[0], centre),
         e_fit=float(fit.errors[0]),
         e_omission=float(terms.omission(1.0 - covered, np.arange(space.lines)).sum()),
         coverage=covered,

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching.fit import Similarity2, best_fits
+from knowledge_sources.methods.matching.fit import Similarity2, compute_best_fits
 from knowledge_sources.methods.matching.hough import LineTable, Peak, pairs_within, undirected
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ class PairTable:
         )
 
 
-def pair_table(model: LineTable, data: LineTable, window_px: Array, window_rad: float) -> PairTable:
+def build_pair_table(model: LineTable, data: LineTable, window_px: Array, window_rad: float) -> PairTable:
     """Every pair within the windows: (m,) pixels across and along, and an angle; the turn's lever arm is added."""
     i, k = pairs_within(model, data, window_px, window_rad)
     starts = np.sum(model.directions * model.ends[:, 0], axis=1)
@@ -77,7 +77,7 @@ def placement_of(peak: Peak) -> Array:
     return np.array([c, -s, -(c * u + s * v), -(-s * u + c * v), 1.0])
 
 
-def model_move(placement: Array, centre: Array) -> Similarity2:
+def compute_model_motion(placement: Array, centre: Array) -> Similarity2:
     """The move of the model onto the data: the placement turned round."""
     c, s, u, v, scale = placement
     return Similarity2(
@@ -110,7 +110,7 @@ def settled(table: PairTable, placements: Array) -> tuple[Array, Array]:
         weights = _closeness(table, at, width) ** 2 * table.shares
         total = weights.sum(axis=1)
         anchors = start_anchor(at, 1e-3 * total + 1e-9, 10.0 * total + 1e-9, total + 1e-9)
-        at = best_fits((weights @ forms).reshape(-1, 5, 5) + anchors, False, at).placements
+        at = compute_best_fits((weights @ forms).reshape(-1, 5, 5) + anchors, False, at).placements
     return at, _support(table, at)
 
 
@@ -149,7 +149,7 @@ def _support(table: PairTable, placements: Array) -> Array:
 
 
 def _closeness(table: PairTable, placements: Array, width: float) -> Array:
-    """(k, p) from 1, on the model line and overlapping it, to 0."""
+    """(k, p) from 1, on the model line and find_overlapping it, to 0."""
     close: Array = _close(table.across, table.along, table.lengths, np.ascontiguousarray(placements), width)
     return close
 

@@ -3,7 +3,7 @@
 The paper's matcher moves the projected model rigidly in the image. Close to the camera that is not how it moves: a
 pose error of 0.3 m shifts a line at 2 m by 60 px and one at 20 m by 6. Here a placement is a change of the camera's
 pose, linear in the image to first order, so the spatial fit is again closed and each pair again a matrix; the objective
-and the local search are those of :func:`match_lines`. How the pose may change is a :class:`Freedom`:
+and the local search are those of :func:`match_lines`. How the pose may change is a :class:`PoseParameters`:
 :func:`match_on_floor` and :func:`match_in_space` give one each.
 """
 
@@ -15,18 +15,23 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.matching.fit import STEPS
-from knowledge_sources.methods.matching.freedom import Array, Freedom
 from knowledge_sources.methods.matching.objective import Terms, likelihood_terms
 from knowledge_sources.methods.matching.pose_pairs import (
     Index,
+    LineScene,
     Mask,
-    PosedPairs,
-    PosedScene,
+    PosePairs,
+    build_scene,
     gated_pairs,
+    linearise_pairs,
     near_pairs,
-    pairs_at,
-    posed_scene,
     projected,
+)
+from knowledge_sources.methods.matching.pose_parameters import (
+    Array,
+    PoseParameters,
+    build_camera_parameters,
+    build_floor_parameters,
 )
 from knowledge_sources.methods.matching.pose_starts import settled_poses
 from knowledge_sources.methods.matching.search import (
@@ -39,7 +44,7 @@ from knowledge_sources.methods.matching.search import (
     nearest,
 )
 from world_models.camera import Camera
-from world_models.frames import Pose
+from world_models.frames import Pose, Pose2
 
 COVER_CELLS = 48
 """Cells along a model line by which its coverage is counted."""
@@ -62,7 +67,7 @@ class Tuning:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PosedMatch:
+class PoseMatch:
     """The best correspondence and where it puts the camera.
 
     Attributes:
@@ -85,13 +90,71 @@ class PosedMatch:
         return self.e_fit + self.e_omission
 
 
-def match_posed(model_lines_world: Any, data_px: Any, camera: Camera, freedom: Freedom, tuning: Tuning) -> PosedMatch:
+@dataclass(frozen=True, slots=True, eq=False)
+class FloorMatch(PoseMatch):
+    """The best correspondence and where it puts the robot, ``world_from_robot``: refine it with a planar solver."""
+
+    world_from_robot: Pose2
+
+
+def match_on_floor(
+    model_lines_world: Any,
+    data_px: Any,
+    camera: Camera,
+    camera_from_robot: Pose,
+    prior: Pose2,
+    prior_covariance: Any,
+    **tuning: float,
+) -> FloorMatch:
+    """Match model lines to data lines within what the prior allows; see :func:`match_posed`.
+
+    Args:
+        model_lines_world: (m, 2, 3) the pieces visible from about the prior [m]. data_px: (k, 2, 2) as seen.
+        camera_from_robot: the mount. prior, prior_covariance: ``world_from_robot`` and (3, 3) of (x, y, heading).
+        tuning: see :class:`Tuning`.
+
+    Raises:
+        ValueError: no model line, or a wrong shape.
+    """
+    freedom = build_floor_parameters(camera_from_robot, prior, prior_covariance)
+    found = match_posed(model_lines_world, data_px, camera, freedom, Tuning(**tuning))
+    return FloorMatch(
+        found.pairs, found.camera_from_world, found.e_fit, found.e_omission, found.coverage, found.residuals_px,
+        freedom.robot(found.camera_from_world),
+    )
+
+
+def match_in_space(
+    model_lines_world: Any,
+    data_px: Any,
+    camera: Camera,
+    prior: Pose,
+    prior_covariance: Any,
+    **tuning: float,
+) -> PoseMatch:
+    """Match model lines to data lines within what the prior allows; see :func:`match_posed`.
+
+    Args:
+        model_lines_world: (m, 2, 3) the pieces visible from about the prior [m]. data_px: (k, 2, 2) as seen.
+        prior, prior_covariance: ``camera_from_world`` and (6, 6) of its left perturbation (rotation, translation).
+        tuning: see :class:`Tuning`.
+
+    Raises:
+        ValueError: no model line, or a wrong shape.
+    """
+    freedom = build_camera_parameters(prior, prior_covariance)
+    return match_posed(model_lines_world, data_px, camera, freedom, Tuning(**tuning))
+
+
+def match_posed(
+    model_lines_world: Any, data_px: Any, camera: Camera, freedom: PoseParameters, tuning: Tuning
+) -> PoseMatch:
     """Match model lines (m, 2, 3) to data lines (k, 2, 2) within what the prior allows.
 
     Pairs within 3 deviations of the prediction vote by a robust fit from starts all over the prior; the best places
     are searched as :func:`match_lines` does, under its objective "likelihood" with the prior as one more term.
     """
-    scene = posed_scene(model_lines_world, data_px, camera, freedom)
+    scene = build_scene(model_lines_world, data_px, camera, freedom)
     terms = likelihood_terms(
         projected(scene, freedom.prior)[1], len(scene.data), tuning.sigma_px, tuning.chance_exponent, tuning.chance_px,
         tuning.pair_px,
@@ -99,7 +162,7 @@ def match_posed(model_lines_world: Any, data_px: Any, camera: Camera, freedom: F
     wide = gated_pairs(scene)
     tries = []
     for pose in settled_poses(scene, wide):
-        pairs = pairs_at(scene, pose, wide.model, wide.data)
+        pairs = linearise_pairs(scene, pose, wide.model, wide.data)
         pairs = pairs.take(near_pairs(pairs, tuning.pair_px, tuning.pair_rad))
         space, first = _space(scene, pose, pairs, tuning)
         found = local_search(space, terms, first, strategy="steepest", replace=True, keep_trace=False)
@@ -108,7 +171,7 @@ def match_posed(model_lines_world: Any, data_px: Any, camera: Camera, freedom: F
     return _match(scene, space, pairs, pose, found, terms)
 
 
-def _space(scene: PosedScene, pose: Pose, pairs: PosedPairs, tuning: Tuning) -> tuple[PairSpace, Mask]:
+def _space(scene: LineScene, pose: Pose, pairs: PosePairs, tuning: Tuning) -> tuple[PairSpace, Mask]:
     """The restricted space at a pose: forms in (step, 1), the prior as anchor."""
     freedom = scene.freedom
     rows = np.concatenate([pairs.slopes, pairs.distances[..., None]], axis=-1) / (np.sqrt(2.0) * tuning.sigma_px)
@@ -129,13 +192,13 @@ def _space(scene: PosedScene, pose: Pose, pairs: PosedPairs, tuning: Tuning) -> 
 
 
 def _match(
-    scene: PosedScene, space: PairSpace, pairs: PosedPairs, pose: Pose, found: Found, terms: Terms
-) -> PosedMatch:
+    scene: LineScene, space: PairSpace, pairs: PosePairs, pose: Pose, found: Found, terms: Terms
+) -> PoseMatch:
     fit = fit_of(space, found.chosen)
     step = fit.placements[0]
     chosen = np.flatnonzero(found.chosen)
     chosen = chosen[np.lexsort((space.data[chosen], space.model[chosen]))]
-    return PosedMatch(
+    return PoseMatch(
         pairs=np.stack([space.model[chosen], space.data[chosen]], axis=1),
         camera_from_world=scene.freedom.moved(pose, step),
         e_fit=float(fit.errors[0]),

@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching.freedom import Array, Freedom
-from knowledge_sources.methods.pose.line_set import LineSet, line_set
+from knowledge_sources.methods.matching.pose_parameters import Array, PoseParameters
+from knowledge_sources.methods.pose.line_set import LineSet, build_line_set
 from world_models.camera import NEAR_M, Camera
 from world_models.frames import Pose
 
@@ -30,18 +30,18 @@ TINY = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PosedScene:
+class LineScene:
     """The call's givens: model lines; data lines (k, 2, 2) without distortion and their rays (k, 2, 3); the prior."""
 
     model: LineSet
     data: Array
     rays: Array
     camera: Camera
-    freedom: Freedom
+    freedom: PoseParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PosedPairs:
+class PosePairs:
     """p pairs at a pose: distances (p, 2) [px], slopes (p, 2, d), along (p, 2) from 0 to ``lengths`` (p,) [px].
 
     ``angles`` (p,) are those of the data lines from their model lines [rad], ``shares`` (p,) the shorter lengths [px].
@@ -56,21 +56,21 @@ class PosedPairs:
     angles: Array
     shares: Array
 
-    def take(self, chosen: Mask) -> PosedPairs:
+    def take(self, chosen: Mask) -> PosePairs:
         """The pairs of a mask."""
-        return PosedPairs(*(getattr(self, name)[chosen] for name in PosedPairs.__slots__))
+        return PosePairs(*(getattr(self, name)[chosen] for name in PosePairs.__slots__))
 
 
-def posed_scene(model: Any, data: Any, camera: Camera, freedom: Freedom) -> PosedScene:
+def build_scene(model: Any, data: Any, camera: Camera, freedom: PoseParameters) -> LineScene:
     """Prepare the lines. Raises ValueError: no model line, or a wrong shape."""
     lines = np.asarray(model, float).reshape(-1, 2, 3)
     if not len(lines):
         raise ValueError("expected at least one model line, got none")
     segments = np.asarray(data, float).reshape(-1, 2, 2)
     anywhere = np.broadcast_to([[0.0, 0.0], [1.0, 0.0]], (len(lines), 2, 2))
-    seen = line_set(np.broadcast_to(lines[:1], (len(segments), 2, 3)), segments, camera, 1.0)
-    return PosedScene(
-        line_set(lines, anywhere, camera, 1.0),
+    seen = build_line_set(np.broadcast_to(lines[:1], (len(segments), 2, 3)), segments, camera, 1.0)
+    return LineScene(
+        build_line_set(lines, anywhere, camera, 1.0),
         np.ascontiguousarray(camera.undistort(segments)),
         seen.rays,
         replace(camera, distortion=None),
@@ -78,7 +78,7 @@ def posed_scene(model: Any, data: Any, camera: Camera, freedom: Freedom) -> Pose
     )
 
 
-def projected(scene: PosedScene, pose: Pose) -> tuple[Array, Array, Mask]:
+def projected(scene: LineScene, pose: Pose) -> tuple[Array, Array, Mask]:
     """(m, 2, 2) model lines in the image plane, cut at the near plane but not at the border; lengths; what is left."""
     c = scene.camera
     seen: tuple[Array, Array, Mask] = _projected(
@@ -87,11 +87,11 @@ def projected(scene: PosedScene, pose: Pose) -> tuple[Array, Array, Mask]:
     return seen
 
 
-def gated_pairs(scene: PosedScene) -> PosedPairs:
+def gated_pairs(scene: LineScene) -> PosePairs:
     """Pairs within 3 deviations of the prediction, in offset at both ends and in angle."""
     px, _, visible = projected(scene, scene.freedom.prior)
     i, k = _nearly_parallel(px, visible, scene.data)
-    pairs = pairs_at(scene, scene.freedom.prior, i, k)
+    pairs = linearise_pairs(scene, scene.freedom.prior, i, k)
     data_lengths = np.linalg.norm(scene.data[:, 1] - scene.data[:, 0], axis=1)
     return pairs.take(
         _within(pairs.distances, pairs.slopes, pairs.along, pairs.lengths, pairs.angles, data_lengths[k],
@@ -99,7 +99,7 @@ def gated_pairs(scene: PosedScene) -> PosedPairs:
     )
 
 
-def pairs_at(scene: PosedScene, pose: Pose, i: Index, k: Index) -> PosedPairs:
+def linearise_pairs(scene: LineScene, pose: Pose, i: Index, k: Index) -> PosePairs:
     """Model lines ``i`` with data lines ``k``, linearised at a pose."""
     px, lengths, _ = projected(scene, pose)
     model = scene.model
@@ -108,10 +108,10 @@ def pairs_at(scene: PosedScene, pose: Pose, i: Index, k: Index) -> PosedPairs:
         np.array(pose.translation), scene.freedom.basis(pose), i, k,
     )
     distances, slopes, along, angles, shares = found
-    return PosedPairs(i, k, distances, slopes, along, lengths[i], angles, shares)
+    return PosePairs(i, k, distances, slopes, along, lengths[i], angles, shares)
 
 
-def near_pairs(pairs: PosedPairs, pair_px: float, pair_rad: float) -> Mask:
+def near_pairs(pairs: PosePairs, pair_px: float, pair_rad: float) -> Mask:
     """(p,) which lie within the limits across, overlap along and are nearly parallel."""
     near = (np.abs(pairs.distances).max(axis=1) <= pair_px) & (np.abs(pairs.angles) <= pair_rad)
     beside = (pairs.along.max(axis=1) < -pair_px) | (pairs.along.min(axis=1) > pairs.lengths + pair_px)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from knowledge_sources.methods.matching.freedom import Array, Widths
-from knowledge_sources.methods.matching.pose_pairs import PosedPairs, PosedScene, pairs_at
+from knowledge_sources.methods.matching.pose_pairs import LineScene, PosePairs, linearise_pairs
+from knowledge_sources.methods.matching.pose_parameters import Array, Widths
 from world_models.frames import Pose
 
 compiled = njit(cache=True, error_model="numpy")
@@ -25,7 +25,7 @@ FINALISTS = 8
 SEARCHED = 4
 
 
-def settled_poses(scene: PosedScene, wide: PosedPairs) -> list[Pose]:
+def settled_poses(scene: LineScene, wide: PosePairs) -> list[Pose]:
     """Poses to search from: starts all over the prior, settled, the best settled again at their own places."""
     freedom = scene.freedom
     if not len(wide.model):
@@ -42,12 +42,12 @@ def settled_poses(scene: PosedScene, wide: PosedPairs) -> list[Pose]:
 
 
 def _settled_exactly(
-    scene: PosedScene, wide: PosedPairs, pose: Pose, widths: tuple[Widths, ...]
+    scene: LineScene, wide: PosePairs, pose: Pose, widths: tuple[Widths, ...]
 ) -> tuple[Pose, float]:
     """A pose settled with the pairs linearised there, group of widths by group; its support."""
     freedom, support = scene.freedom, 0.0
     for group in widths:
-        pairs = pairs_at(scene, pose, wide.model, wide.data)
+        pairs = linearise_pairs(scene, pose, wide.model, wide.data)
         pairs = pairs.take(np.abs(pairs.distances).max(axis=1) < CLOSE_PX)
         if not len(pairs.model):
             break
@@ -57,7 +57,7 @@ def _settled_exactly(
     return pose, support
 
 
-def _distinct(steps: Array, scores: Array, count: int, scene: PosedScene) -> list[int]:
+def _distinct(steps: Array, scores: Array, count: int, scene: LineScene) -> list[int]:
     """The best ``count`` that differ by more than a twentieth of the prior's deviation."""
     whitened = steps @ np.linalg.inv(scene.freedom.root).T
     free = np.ones(len(steps), np.bool_)
@@ -72,7 +72,7 @@ def _distinct(steps: Array, scores: Array, count: int, scene: PosedScene) -> lis
 
 
 def _settled(
-    pairs: PosedPairs, steps: Array, information: Array, offset: Array, widths: Widths
+    pairs: PosePairs, steps: Array, information: Array, offset: Array, widths: Widths
 ) -> tuple[Array, Array]:
     """Steps (s, d) moved to where close pairs agree, to first order, and their support (s,) [px of model line]."""
     moved: Array = _descended(

@@ -66,7 +66,7 @@ class LineSet:
         )
 
 
-def line_set(model_lines_world: Any, segments_px: Any, camera: Camera, sigma_px: Any) -> LineSet:
+def build_line_set(model_lines_world: Any, segments_px: Any, camera: Camera, sigma_px: Any) -> LineSet:
     """Check the shapes and prepare the lines.
 
     Raises:

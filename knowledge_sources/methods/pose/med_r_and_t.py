@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.pose.estimate import Array, Mask, PoseEstimate
-from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, build_line_set, landmark_groups
 from knowledge_sources.methods.pose.numerics.finish import NO_SUBSET, estimate_at, guarded, prior_estimate, reasons
-from knowledge_sources.methods.pose.numerics.levenberg_marquardt import information_inverse
-from knowledge_sources.methods.pose.numerics.subset_poses import concentrated, squared_distances, subset_poses
-from knowledge_sources.methods.pose.numerics.subsets import group_subsets, padded_rows, subsets_needed
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import invert_information
+from knowledge_sources.methods.pose.numerics.subset_poses import compute_squared_distances, concentrated, subset_poses
+from knowledge_sources.methods.pose.numerics.subsets import count_subsets, list_subsets, padded_rows
 from knowledge_sources.methods.pose.r_and_t import PoseState
 from knowledge_sources.methods.pose.r_and_t_ml import likeliest, r_and_t_ml
 from world_models.camera import Camera
@@ -60,12 +60,12 @@ def med_r_and_t(
             with this probability when the share ``outliers`` of the groups is wrong.
         cutoff: lines beyond this many standard deviations, estimated from the median, are outliers.
     """
-    lines = line_set(model_lines_world, segments_px, camera, sigma_px)
+    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     candidates = subset_candidates(lines, prior, landmark_ids, probability, outliers, rng)
     if candidates is None:
         return r_and_t_ml(model_lines_world, segments_px, camera, prior, sigma_px=sigma_px)
     turns, shifts = with_concentrated(lines, *candidates)
-    errors = squared_distances(lines, turns, shifts)
+    errors = compute_squared_distances(lines, turns, shifts)
     medians = np.median(errors, axis=1)
     least = float(medians.min())
     bound = 2.0 * (cutoff * _robust_scale(least, len(lines))) ** 2
@@ -76,7 +76,7 @@ def med_r_and_t(
 
 def with_concentrated(lines: LineSet, turns: Array, shifts: Array) -> tuple[Array, Array]:
     """The candidates and, besides, those of least median solved again on the better half of all lines."""
-    medians = np.median(squared_distances(lines, turns, shifts), axis=1)
+    medians = np.median(compute_squared_distances(lines, turns, shifts), axis=1)
     few = np.argsort(medians, kind="stable")[:CONCENTRATED]
     more = concentrated(lines, turns[few], shifts[few], (len(lines) + SUBSET) // 2)
     return np.concatenate([turns, more[0]]), np.concatenate([shifts, more[1]])
@@ -96,8 +96,8 @@ def subset_candidates(
         groups = landmark_groups(None, len(lines))
     if len(lines) <= SUBSET:
         return None
-    needed = None if probability is None else subsets_needed(SUBSET, outliers, probability)
-    rows, real = padded_rows(groups, group_subsets(len(groups), SUBSET, needed, rng))
+    needed = None if probability is None else count_subsets(SUBSET, outliers, probability)
+    rows, real = padded_rows(groups, list_subsets(len(groups), SUBSET, needed, rng))
     return subset_poses(lines, rows, real, prior)
 
 
@@ -112,13 +112,13 @@ def refined_on(lines: LineSet, prior: Pose, start: PoseState, near: Mask, bound:
     for _ in range(ROUNDS):
         end, reason = likeliest(lines.take(near), prior, start=start)
         start = rotation, translation = end.state
-        fine = squared_distances(lines, rotation, translation) <= bound
+        fine = compute_squared_distances(lines, rotation, translation) <= bound
         rejected = reasons(lines, rotation, translation, fine)
         again = np.array([r is None for r in rejected], bool)
         if np.array_equal(again, near) or int(np.count_nonzero(again)) < SUBSET:
             break
         near = again
-    covariance = information_inverse(end.normal.hessian)
+    covariance = invert_information(end.normal.hessian)
     estimate = estimate_at(
         lines, rotation, translation, covariance, rejected, end.normal.cost, end.iterations, reason
     )

@@ -39,7 +39,7 @@ class PlanarPrior:
         return self.mean, self.information
 
 
-def planar_prior(prior: Pose2, covariance: Any) -> PlanarPrior:
+def build_planar_prior(prior: Pose2, covariance: Any) -> PlanarPrior:
     """The prior as a Gaussian; without a covariance a weak one (1 m, 0.3 rad)."""
     mean = np.array([prior.x_m, prior.y_m, prior.heading_rad])
     if covariance is None:
@@ -69,14 +69,14 @@ def pose2(state: Array) -> Pose2:
     return Pose2(float(state[0]), float(state[1]), wrap_angle(float(state[2])))
 
 
-def camera_states(states: Array, camera_from_robot: Pose) -> tuple[Array, Array]:
+def compute_camera_poses(states: Array, camera_from_robot: Pose) -> tuple[Array, Array]:
     """Rotations (..., 3, 3) and translations (..., 3) of ``camera_from_world`` for states (..., 3)."""
     turn = camera_from_robot.rotation @ _robot_from_world(states[..., 2])
     floor = np.concatenate([states[..., :2], np.zeros_like(states[..., :1])], axis=-1)
     return turn, camera_from_robot.translation - np.matmul(turn, floor[..., None])[..., 0]
 
 
-def line_jacobian(
+def compute_line_jacobian(
     points: Array, directions: Array, lines: LineSet, states: Array, camera_from_robot: Pose
 ) -> tuple[Array, Array]:
     """Image distances (..., n, 2) [px] and derivatives (..., n, 2, 3) by (x, y, heading).
@@ -100,7 +100,7 @@ def line_jacobian(
     return distances, slopes @ np.swapaxes(moves, -1, -2)
 
 
-def point_jacobian(
+def compute_point_jacobian(
     points: Array, focal_px: Array, state: Array, camera_from_robot: Pose
 ) -> tuple[Array, Array, Array]:
     """Points in the camera frame (n, 3), pixels (n, 2) from the principal point and derivatives (n, 2, 3).

@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.pose.estimate import BEHIND, Array, Mask, PlanarEstimate
-from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, landmark_groups, line_set
+from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, build_line_set, landmark_groups
 from knowledge_sources.methods.pose.numerics import line_kernels as kernels
 from knowledge_sources.methods.pose.numerics.cautious_update import least_move, most_unexplained
 from knowledge_sources.methods.pose.numerics.finish import reasons
 from knowledge_sources.methods.pose.numerics.image_error import aspects
-from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Descent, Normal, information_inverse
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Descent, Normal, invert_information
 from knowledge_sources.methods.pose.planar import (
     FEW,
     NOT_BETTER,
     PlanarPrior,
-    camera_states,
+    build_planar_prior,
+    compute_camera_poses,
     mounted,
-    planar_prior,
     pose2,
 )
 from world_models.camera import Camera
@@ -70,9 +70,9 @@ def planar_from_lines(
         robust: False takes every line as right.
         cutoff: a line beyond this many standard deviations is an outlier.
     """
-    lines = line_set(model_lines_world, segments_px, camera, sigma_px)
+    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     groups = landmark_groups(landmark_ids, len(lines))
-    belief = planar_prior(prior, prior_covariance)
+    belief = build_planar_prior(prior, prior_covariance)
     bound = 2.0 * cutoff**2
     if not len(lines):
         return _estimate(lines, belief.mean, belief, camera_from_robot, (), bound, FEW)
@@ -138,7 +138,7 @@ def _agreed(lines: LineSet, state: Array, belief: PlanarPrior, mount: Pose, boun
 
 
 def _near(lines: LineSet, state: Array, mount: Pose, bound: float) -> Mask:
-    rotation, translation = camera_states(state, mount)
+    rotation, translation = compute_camera_poses(state, mount)
     distances, front, over = aspects(lines, rotation, translation)
     squares = np.sum((distances / lines.sigma_px[:, None]) ** 2, axis=1)
     return np.asarray(front & over & (squares <= bound))
@@ -168,7 +168,7 @@ def _settled(
             state = _descend(kept, state, alone, mount).state
         else:
             state = _cautious(kept, belief, mount)
-    rotation, translation = camera_states(state, mount)
+    rotation, translation = compute_camera_poses(state, mount)
     rejected = reasons(lines, rotation, translation, near)
     if np.isinf(bound):
         rejected = tuple(r if r == BEHIND else None for r in rejected)
@@ -211,10 +211,10 @@ def _estimate(
     normal = _descend(kept, state, belief, mount, iterations=0).normal
     weak = not belief.given and reason is None
     hessian = normal.hessian - belief.information if weak else normal.hessian
-    distances = aspects(lines, *camera_states(state, mount))[0]
+    distances = aspects(lines, *compute_camera_poses(state, mount))[0]
     return PlanarEstimate(
         world_from_robot=pose2(state),
-        covariance=information_inverse(hessian) * _excess(kept, distances[inliers]),
+        covariance=invert_information(hessian) * _excess(kept, distances[inliers]),
         inliers=inliers,
         residuals_px=distances,
         rejected=rejected,

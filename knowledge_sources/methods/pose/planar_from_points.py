@@ -9,12 +9,12 @@ import numpy as np
 from knowledge_sources.methods.pose.estimate import BEHIND, Array, Mask, PlanarEstimate
 from knowledge_sources.methods.pose.line_set import checked_sigma
 from knowledge_sources.methods.pose.numerics import point_kernels
-from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Descent, Normal, information_inverse
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Descent, Normal, invert_information
 from knowledge_sources.methods.pose.planar import (
     FEW,
     PlanarPrior,
+    build_planar_prior,
     mounted,
-    planar_prior,
     pose2,
 )
 from world_models.camera import NEAR_M, Camera
@@ -46,7 +46,7 @@ def planar_from_points(
     """
     world, pixels = _checked(points_world, points_px)
     sigma = checked_sigma(sigma_px, len(world))
-    belief = planar_prior(prior, prior_covariance)
+    belief = build_planar_prior(prior, prior_covariance)
     focal = np.array([camera.fx, camera.fy])
     observed = camera.undistort(pixels) - (camera.cx, camera.cy)
     problem = _Points(world, observed, sigma, focal, camera_from_robot, belief)
@@ -99,7 +99,7 @@ class _Points:
         few = not self.belief.given and int(np.count_nonzero(near)) < 2
         return PlanarEstimate(
             world_from_robot=pose2(state),
-            covariance=information_inverse(j.T @ j + self.belief.information) * _excess(residuals[near]),
+            covariance=invert_information(j.T @ j + self.belief.information) * _excess(residuals[near]),
             inliers=near,
             residuals_px=residuals * self.sigma[:, None],
             rejected=rejected,

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
-from knowledge_sources.methods.pose.line_set import TINY, LandmarkIds, LineSet, check_landmarks, line_set
+from knowledge_sources.methods.pose.line_set import TINY, LandmarkIds, LineSet, build_line_set, check_landmarks
 from knowledge_sources.methods.pose.numerics import line_kernels as kernels
 from knowledge_sources.methods.pose.numerics.finish import FEW_LINES, all_kept, estimate_at, guarded, prior_estimate
 from knowledge_sources.methods.pose.numerics.levenberg_marquardt import (
@@ -21,10 +21,10 @@ from knowledge_sources.methods.pose.numerics.levenberg_marquardt import (
 from knowledge_sources.methods.pose.numerics.line_kernels import PLANES
 from knowledge_sources.methods.pose.numerics.plane_error import (
     Weighting,
-    camera_ends,
+    compute_camera_ends,
+    compute_plane_distances,
+    compute_plane_jacobian,
     line_weights,
-    plane_distances_m,
-    plane_jacobian,
     propagated_covariance,
 )
 from world_models.camera import Camera
@@ -64,7 +64,7 @@ def r_and_t(
     """
     if objective not in ("E1", "E2"):
         raise ValueError(f'expected objective "E1" or "E2", got {objective!r}')
-    lines = line_set(model_lines_world, segments_px, camera, sigma_px)
+    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     check_landmarks(landmark_ids, len(lines))
     if len(lines) < 3:
         return prior_estimate(lines, prior, FEW_LINES)
@@ -77,7 +77,7 @@ def r_and_t(
     rotation, translation = end.state
     scale = np.ones((len(lines), 2))
     if objective == "E2":
-        scale = 1.0 / np.maximum(np.sum(camera_ends(lines, rotation, translation) ** 2, axis=-1), TINY)
+        scale = 1.0 / np.maximum(np.sum(compute_camera_ends(lines, rotation, translation) ** 2, axis=-1), TINY)
     covariance = propagated_covariance(lines, rotation, translation, weights[:, None] * scale)
     kept = all_kept(lines, rotation, translation)
     return guarded(
@@ -115,10 +115,10 @@ def moved(state: PoseState, step: Array) -> PoseState:
 
 def _e2_normal(lines: LineSet, weights: Array) -> Callable[[PoseState], Normal]:
     def linearise(state: PoseState) -> Normal:
-        ends = camera_ends(lines, *state)
+        ends = compute_camera_ends(lines, *state)
         reach = np.maximum(np.linalg.norm(ends, axis=-1), TINY)
-        sines = plane_distances_m(lines, ends) / reach
-        jacobian = plane_jacobian(lines, ends) / reach[..., None]
+        sines = compute_plane_distances(lines, ends) / reach
+        jacobian = compute_plane_jacobian(lines, ends) / reach[..., None]
         jacobian[..., 3:] -= (sines / reach**2)[..., None] * ends
         root = np.sqrt(weights)[:, None]
         return normal_equations(sines * root, jacobian * root[..., None])

@@ -10,9 +10,9 @@ from knowledge_sources.methods.pose.estimate import BEHIND, Array, PoseEstimate
 from knowledge_sources.methods.pose.line_set import (
     LandmarkIds,
     LineSet,
+    build_line_set,
     check_landmarks,
     checked_sigma,
-    line_set,
     matched_arrays,
 )
 from knowledge_sources.methods.pose.numerics import line_kernels as kernels
@@ -30,9 +30,9 @@ from knowledge_sources.methods.pose.numerics.finish import (
     prior_estimate,
 )
 from knowledge_sources.methods.pose.numerics.image_error import OVERLAP_SLACK_PX
-from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Descent, information_inverse
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Descent, invert_information
 from knowledge_sources.methods.pose.numerics.line_kernels import IMAGE
-from knowledge_sources.methods.pose.numerics.subset_poses import squared_distances
+from knowledge_sources.methods.pose.numerics.subset_poses import compute_squared_distances
 from knowledge_sources.methods.pose.r_and_t import PoseState, compiled_descent, solve_e1
 from world_models.camera import Camera
 from world_models.frames import Pose
@@ -64,7 +64,7 @@ def r_and_t_ml(
         found = _explained(model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px)
         if found is not None:
             return found
-    lines = line_set(model_lines_world, segments_px, camera, sigma_px)
+    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     check_landmarks(landmark_ids, len(lines))
     information = prior_information(prior_covariance)
     if not len(lines):
@@ -73,7 +73,7 @@ def r_and_t_ml(
     rotation, translation = end.state
     if _chi2(lines, rotation, translation) > _chi2(lines, prior.rotation, prior.translation):
         return prior_estimate(lines, prior, NOT_BETTER)
-    covariance = information_inverse(end.normal.hessian)
+    covariance = invert_information(end.normal.hessian)
     kept = all_kept(lines, rotation, translation)
     return guarded(
         lines,
@@ -160,4 +160,4 @@ def _best_start(lines: LineSet, prior: Pose) -> PoseState:
 
 
 def _chi2(lines: LineSet, rotation: Array, translation: Array) -> float:
-    return float(np.sum(squared_distances(lines, rotation, translation)))
+    return float(np.sum(compute_squared_distances(lines, rotation, translation)))

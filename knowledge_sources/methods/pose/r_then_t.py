@@ -7,25 +7,25 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.pose.estimate import Array, PoseEstimate
-from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, check_landmarks, line_set
+from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, build_line_set, check_landmarks
 from knowledge_sources.methods.pose.numerics.finish import FEW_LINES, all_kept, estimate_at, guarded, prior_estimate
 from knowledge_sources.methods.pose.numerics.levenberg_marquardt import (
     Descent,
     Normal,
     cross,
     descend,
-    information_inverse,
+    invert_information,
     normal_equations,
     rotations,
 )
 from knowledge_sources.methods.pose.numerics.plane_error import (
     Weighting,
     best_translation,
-    camera_ends,
+    compute_camera_ends,
+    compute_plane_distances,
+    compute_plane_jacobian,
     end_noise,
     line_weights,
-    plane_distances_m,
-    plane_jacobian,
 )
 from world_models.camera import Camera
 from world_models.frames import Pose
@@ -46,7 +46,7 @@ def r_then_t(
     Source: §6.2.1 (Liu et al. [27]). Rotation increments are axis-angle vectors, not Liu's Euler angles: the
     optimum is the same, the way to it safer. Arguments as in :func:`r_and_t`.
     """
-    lines = line_set(model_lines_world, segments_px, camera, sigma_px)
+    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     check_landmarks(landmark_ids, len(lines))
     if len(lines) < 3:
         return prior_estimate(lines, prior, FEW_LINES)
@@ -54,7 +54,7 @@ def r_then_t(
     end = _solve_rotation(lines, prior, weights)
     rotation = end.state
     translation = best_translation(lines, rotation, prior.translation, weights)
-    misses = plane_distances_m(lines, camera_ends(lines, rotation, translation))
+    misses = compute_plane_distances(lines, compute_camera_ends(lines, rotation, translation))
     cost = float(np.sum(weights[:, None] * misses**2))
     covariance = _covariance(lines, rotation, translation, weights)
     kept = all_kept(lines, rotation, translation)
@@ -80,13 +80,13 @@ def _covariance(lines: LineSet, rotation: Array, translation: Array, weights: Ar
     jacobian = cross(turned, lines.normals)
     noise = end_noise(lines, turned[:, None, :])[:, 0]
     weighted = jacobian * weights[:, None]
-    turn = -information_inverse(weighted.T @ jacobian) @ (weighted[:, None, :] * noise[..., None]).reshape(-1, 3).T
-    ends = camera_ends(lines, rotation, translation)
-    full = plane_jacobian(lines, ends)
+    turn = -invert_information(weighted.T @ jacobian) @ (weighted[:, None, :] * noise[..., None]).reshape(-1, 3).T
+    ends = compute_camera_ends(lines, rotation, translation)
+    full = compute_plane_jacobian(lines, ends)
     moved = np.einsum("ika,am->ikm", full[..., :3], turn)
     moved += _own_noise(end_noise(lines, ends))
     normals = lines.normals * weights[:, None]
-    shift = -information_inverse(2.0 * normals.T @ lines.normals) @ np.einsum("ia,ikm->am", normals, moved)
+    shift = -invert_information(2.0 * normals.T @ lines.normals) @ np.einsum("ia,ikm->am", normals, moved)
     both = np.vstack([turn, shift])
     return np.asarray(both @ both.T)
 

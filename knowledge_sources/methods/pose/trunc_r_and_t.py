@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.pose.estimate import Array, Mask, PoseEstimate
-from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, line_set
+from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, build_line_set
 from knowledge_sources.methods.pose.med_r_and_t import SUBSET, refined_on, subset_candidates
 from knowledge_sources.methods.pose.numerics import line_kernels as kernels
 from knowledge_sources.methods.pose.numerics.finish import WEAK_INFORMATION
 from knowledge_sources.methods.pose.numerics.image_error import OVERLAP_SLACK_PX
-from knowledge_sources.methods.pose.numerics.subset_poses import concentrated, squared_distances
+from knowledge_sources.methods.pose.numerics.subset_poses import compute_squared_distances, concentrated
 from knowledge_sources.methods.pose.r_and_t import PoseState
 from knowledge_sources.methods.pose.r_and_t_ml import r_and_t_ml
 from world_models.camera import Camera
@@ -44,7 +44,7 @@ def trunc_r_and_t(
     Candidates are those of :func:`med_r_and_t` (arguments as there); the best are polished on their own inliers,
     and a line that matches only beside its model line's ends, or behind the camera, counts as an outlier.
     """
-    lines = line_set(model_lines_world, segments_px, camera, sigma_px)
+    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     candidates = subset_candidates(lines, prior, landmark_ids, probability, outliers, rng)
     if candidates is None:
         return r_and_t_ml(model_lines_world, segments_px, camera, prior, sigma_px=sigma_px)
@@ -64,7 +64,7 @@ def _with_concentrated(lines: LineSet, turns: Array, shifts: Array, bound: float
 
 
 def _costs(lines: LineSet, turns: Array, shifts: Array, bound: float) -> Array:
-    return np.asarray(np.minimum(squared_distances(lines, turns, shifts), bound).sum(axis=1))
+    return np.asarray(np.minimum(compute_squared_distances(lines, turns, shifts), bound).sum(axis=1))
 
 
 def _polished(lines: LineSet, prior: Pose, state: PoseState, bound: float) -> tuple[PoseState, float]:

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.pose.planar import point_jacobian
+from knowledge_sources.methods.pose.planar import compute_point_jacobian
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
@@ -114,7 +114,7 @@ def _edges(robot: RobotModel, image: NDArray[np.uint8], lines: Floats, pose: Pos
         return None
     # what is halfway in the picture is not halfway in space; so points are intersected with the line by their part
     world = _on_line(robot, lines[line], pose, part)
-    p, at_px, jacobian = point_jacobian(
+    p, at_px, jacobian = compute_point_jacobian(
         world, np.array([camera.fx, camera.fy]), state, robot.mount.camera_from_robot)
     along = ends_px[line, 1] - ends_px[line, 0]
     along /= np.linalg.norm(along, axis=1, keepdims=True)

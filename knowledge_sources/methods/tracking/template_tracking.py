@@ -17,7 +17,7 @@ from knowledge_sources.methods.features.correlation import (
     correlate,
     lies_inside,
 )
-from knowledge_sources.methods.pose.planar import point_jacobian
+from knowledge_sources.methods.pose.planar import compute_point_jacobian
 from knowledge_sources.methods.pose.planar_from_points import planar_from_points
 from world_models.camera import NEAR_M
 from world_models.entries.percepts import Anchor, Track
@@ -139,7 +139,7 @@ def _predicted(
     """Depths (n,), pixels (n, 2) and the standard deviation (n,) of the pixels [px]."""
     state = np.array([pose.x_m, pose.y_m, pose.heading_rad])
     focal = np.array([robot.camera.fx, robot.camera.fy])
-    p, _, jacobian = point_jacobian(points, focal, state, robot.mount.camera_from_robot)
+    p, _, jacobian = compute_point_jacobian(points, focal, state, robot.mount.camera_from_robot)
     ahead = np.where(p[:, 2:] > NEAR_M, p, [0.0, 0.0, 1.0])
     spread = np.einsum("nij,jk,nik->ni", jacobian, covariance, jacobian)
     return p[:, 2], robot.camera.project(ahead), np.sqrt(np.max(spread, axis=1))

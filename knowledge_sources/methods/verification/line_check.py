@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.pose.planar import camera_states
+from knowledge_sources.methods.pose.planar import compute_camera_poses
 from knowledge_sources.methods.verification.agreement import Agreement, compute_agreement
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
@@ -52,7 +52,7 @@ def check_lines(robot: RobotModel, lines_world: Floats, segments_px: Floats, wor
 
 def _projected(robot: RobotModel, lines_world: Floats, states: Floats) -> Floats:
     """(p, m, 2, 2) the lines as seen from states (p, 3), world, NaN where not in view [px]."""
-    turns, shifts = camera_states(states, robot.mount.camera_from_robot)
+    turns, shifts = compute_camera_poses(states, robot.mount.camera_from_robot)
     lines_camera = lines_world.reshape(1, -1, 3) @ np.swapaxes(turns, 1, 2) + shifts[:, None]
     seen, _ = robot.camera.project_segments(lines_camera.reshape(-1, 2, 3), Pose.identity())
     return seen.reshape(len(states), -1, 2, 2)

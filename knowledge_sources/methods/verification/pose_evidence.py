@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.pose.planar import point_jacobian
+from knowledge_sources.methods.pose.planar import compute_point_jacobian
 from knowledge_sources.methods.verification.agreement import compute_coverage
 from knowledge_sources.methods.verification.color_check import ColorCheck
 from knowledge_sources.methods.verification.line_check import LineCheck
@@ -122,7 +122,8 @@ def _told(robot: RobotModel, lines_world: Floats, pose: Pose2) -> Floats:
 def _across(robot: RobotModel, lines_world: Floats, pose: Pose2) -> tuple[NDArray[np.bool_], Floats]:
     """Which lines (m,) lie before the camera, and how their ends (m, 2, 3) move across them by (x, y, heading) [px]."""
     state, focal = np.array([pose.x_m, pose.y_m, pose.heading_rad]), np.array([robot.camera.fx, robot.camera.fy])
-    points, pixels, slopes = point_jacobian(lines_world.reshape(-1, 3), focal, state, robot.mount.camera_from_robot)
+    mount = robot.mount.camera_from_robot
+    points, pixels, slopes = compute_point_jacobian(lines_world.reshape(-1, 3), focal, state, mount)
     ends = pixels.reshape(-1, 2, 2)
     along = ends[:, 1] - ends[:, 0]
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]

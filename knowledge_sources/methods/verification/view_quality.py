@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.pose.planar import point_jacobian
+from knowledge_sources.methods.pose.planar import compute_point_jacobian
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 
@@ -40,7 +40,7 @@ def compute_view_quality(
         return ViewQuality(math.inf, math.inf, 0)
     state = np.array([world_from_robot.x_m, world_from_robot.y_m, world_from_robot.heading_rad])
     focal = np.array([camera.fx, camera.fy])
-    _, pixels, slopes = point_jacobian(lines_world.reshape(-1, 3), focal, state, camera_from_robot)
+    _, pixels, slopes = compute_point_jacobian(lines_world.reshape(-1, 3), focal, state, camera_from_robot)
     along = np.diff(pixels.reshape(n, 2, 2), axis=1)[:, 0]
     across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
     rows = np.einsum("nj,nejk->nek", across, slopes.reshape(n, 2, 2, 3)).reshape(-1, 3) / sigma_px

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from knowledge_sources.methods.matching.fit import best_fits
-from knowledge_sources.methods.matching.hough import Peak
-from knowledge_sources.methods.matching.image_matching import Match, Similarity2, match_lines
+from knowledge_sources.methods.matching import Match, Peak, Similarity2, match_lines
+from knowledge_sources.methods.matching.fit import compute_best_fits
 
 Array = NDArray[np.float64]
 
@@ -188,7 +187,7 @@ def test_the_closed_fit_is_the_library_s_minimum(seed: int, with_scale: bool) ->
     rows[..., 2:4], rows[..., 4] = normals[:, None], -offsets[:, None]
     form = np.einsum("p,pea,peb->ab", weights, rows, rows)
     still = np.array([1.0, 0.0, 0.0, 0.0, 1.0])
-    found = best_fits(form[None], with_scale, still)
+    found = compute_best_fits(form[None], with_scale, still)
 
     def error(x: Any) -> float:
         c, s = np.cos(x[0] / 100.0), np.sin(x[0] / 100.0)

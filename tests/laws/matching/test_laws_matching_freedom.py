@@ -10,12 +10,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching.fit import step_fits
-from knowledge_sources.methods.matching.freedom import GRID_PX, GRID_SIDE, GRID_SIGMAS, Freedom, in_space, on_floor
-from knowledge_sources.methods.matching.pose_pairs import pairs_at, posed_scene
-from knowledge_sources.methods.pose.line_set import line_set
-from knowledge_sources.methods.pose.numerics.image_error import image_jacobian
-from knowledge_sources.methods.pose.planar import line_jacobian
+from knowledge_sources.methods.matching.fit import compute_step_fits
+from knowledge_sources.methods.matching.pose_pairs import build_scene, linearise_pairs
+from knowledge_sources.methods.matching.pose_parameters import (
+    GRID_PX,
+    GRID_SIDE,
+    GRID_SIGMAS,
+    PoseParameters,
+    build_camera_parameters,
+    build_floor_parameters,
+)
+from knowledge_sources.methods.pose.line_set import build_line_set
+from knowledge_sources.methods.pose.numerics.image_error import compute_image_jacobian
+from knowledge_sources.methods.pose.planar import compute_line_jacobian
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
 
@@ -26,11 +33,11 @@ seeds = st.integers(0, 2**32 - 1)
 some = settings(max_examples=25, deadline=None)
 
 
-def freedoms(rng: np.random.Generator) -> tuple[Freedom, Freedom, Pose2]:
+def freedoms(rng: np.random.Generator) -> tuple[PoseParameters, PoseParameters, Pose2]:
     """One of each kind, with the same camera pose for a prior; and the robot's."""
     robot = Pose2(*rng.uniform(-3.0, 3.0, 2), rng.uniform(-3.1, 3.1))
-    floor = on_floor(MOUNT, robot, np.diag(rng.uniform(0.05, 0.3, 3) ** 2))
-    return floor, in_space(floor.prior, np.diag(rng.uniform(0.02, 0.2, 6) ** 2)), robot
+    floor = build_floor_parameters(MOUNT, robot, np.diag(rng.uniform(0.05, 0.3, 3) ** 2))
+    return floor, build_camera_parameters(floor.prior, np.diag(rng.uniform(0.02, 0.2, 6) ** 2)), robot
 
 
 def apart(a: Pose, b: Pose) -> float:
@@ -96,13 +103,13 @@ def test_the_compiled_pairs_are_those_of_the_pose_solvers(seed: int) -> None:
     ahead = rng.uniform((-2.0, -1.5, 3.0), (2.0, 1.5, 9.0), (12, 2, 3))
     model = floor.prior.inverse().apply(ahead)
     data = rng.uniform(0.0, 511.0, (12, 2, 2))
-    lines = line_set(model, data, CAMERA, 1.0)
+    lines = build_line_set(model, data, CAMERA, 1.0)
     rows = np.arange(12)
     state = np.array([robot.x_m, robot.y_m, robot.heading_rad])
-    by_floor = line_jacobian(lines.points[:, 0], lines.directions, lines, state, MOUNT)
-    by_space = image_jacobian(lines, space.prior.rotation, space.prior.translation)
+    by_floor = compute_line_jacobian(lines.points[:, 0], lines.directions, lines, state, MOUNT)
+    by_space = compute_image_jacobian(lines, space.prior.rotation, space.prior.translation)
     for freedom, (distances, slopes) in ((floor, by_floor), (space, by_space)):
-        pairs = pairs_at(posed_scene(model, data, CAMERA, freedom), freedom.prior, rows, rows)
+        pairs = linearise_pairs(build_scene(model, data, CAMERA, freedom), freedom.prior, rows, rows)
         np.testing.assert_allclose(pairs.distances, distances, rtol=1e-6, atol=1e-6)
         np.testing.assert_allclose(pairs.slopes, slopes, rtol=1e-6, atol=1e-4)
 
@@ -112,7 +119,7 @@ def test_the_compiled_pairs_are_those_of_the_pose_solvers(seed: int) -> None:
 def test_the_closed_fit_is_the_least_squares_solution(seed: int, unknowns: int) -> None:
     rng = np.random.default_rng(seed)
     rows = rng.normal(size=(5, 4 + unknowns, unknowns + 1))
-    fits = step_fits(np.swapaxes(rows, 1, 2) @ rows)
+    fits = compute_step_fits(np.swapaxes(rows, 1, 2) @ rows)
     for k in range(5):
         step, rest, *_ = np.linalg.lstsq(rows[k, :, :-1], -rows[k, :, -1], rcond=None)
         np.testing.assert_allclose(fits.placements[k], step, rtol=1e-6, atol=1e-8)
@@ -126,5 +133,5 @@ def test_lens_distortion_is_taken_from_the_data_and_not_put_on_the_model() -> No
     model = floor.prior.inverse().apply(rng.uniform((-1.0, -0.8, 3.0), (1.0, 0.8, 6.0), (8, 2, 3)))
     seen = bent.project(floor.prior.apply(model))
     rows = np.arange(8)
-    pairs = pairs_at(posed_scene(model, seen, bent, floor), floor.prior, rows, rows)
+    pairs = linearise_pairs(build_scene(model, seen, bent, floor), floor.prior, rows, rows)
     np.testing.assert_allclose(pairs.distances, 0.0, atol=1e-3)

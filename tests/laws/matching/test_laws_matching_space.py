@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.localization.locate_camera import CameraFix, PoseVerdict, locate_camera
-from knowledge_sources.methods.matching.pose_matching import PosedMatch
-from knowledge_sources.methods.matching.space_matching import match_in_space
+from knowledge_sources.methods.matching import PoseMatch, match_in_space
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -53,7 +52,7 @@ def apart(found: Pose, other: Pose) -> float:
     return max(float(shift), 10.0 * found.angle_to(other))
 
 
-def matched(lines: Array, data: Array, prior: Pose) -> PosedMatch:
+def matched(lines: Array, data: Array, prior: Pose) -> PoseMatch:
     return match_in_space(lines, data, CAMERA, prior, SPREAD)
 
 

@@ -12,10 +12,14 @@ from hypothesis import strategies as st
 
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
-from knowledge_sources.methods.pose.line_set import line_set
+from knowledge_sources.methods.pose.line_set import build_line_set
 from knowledge_sources.methods.pose.numerics.finish import WEAK_INFORMATION
-from knowledge_sources.methods.pose.numerics.image_error import image_jacobian, in_front
-from knowledge_sources.methods.pose.numerics.plane_error import camera_ends, plane_distances_m, plane_jacobian
+from knowledge_sources.methods.pose.numerics.image_error import compute_image_jacobian, find_in_front
+from knowledge_sources.methods.pose.numerics.plane_error import (
+    compute_camera_ends,
+    compute_plane_distances,
+    compute_plane_jacobian,
+)
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -144,9 +148,9 @@ def test_a_pose_behind_the_camera_is_never_returned(solver: Solver, scene: PoseS
     scene = some(scene, rng)
     prior = scene.camera_from_world.perturbed(rng.uniform(-3.1, 3.1, 3), rng.uniform(-5.0, 5.0, 3))
     found = solve(solver, scene, scene.segments_px, prior)
-    lines = line_set(scene.lines_world, scene.segments_px, scene.camera, SIGMA_PX)
+    lines = build_line_set(scene.lines_world, scene.segments_px, scene.camera, SIGMA_PX)
     pose = found.camera_from_world
-    front = in_front(lines, pose.rotation, pose.translation)
+    front = find_in_front(lines, pose.rotation, pose.translation)
     assert not np.any(found.inliers & ~front)
     assert not found.ok or 2 * front.sum() > len(scene) or 2 * found.inliers.sum() <= len(scene)
     assert found.ok or found.reason
@@ -202,17 +206,18 @@ def weighed(found: Pose, truth: Pose) -> float:
 @quick
 def test_derivatives_are_those_of_the_residuals(scene: PoseScene, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    lines = line_set(scene.lines_world, end_noise(scene.segments_px, 2.0, rng), scene.camera, 1.0)
+    lines = build_line_set(scene.lines_world, end_noise(scene.segments_px, 2.0, rng), scene.camera, 1.0)
     pose = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
-    _, image = image_jacobian(lines, pose.rotation, pose.translation)
-    plane = plane_jacobian(lines, camera_ends(lines, pose.rotation, pose.translation))
+    _, image = compute_image_jacobian(lines, pose.rotation, pose.translation)
+    plane = compute_plane_jacobian(lines, compute_camera_ends(lines, pose.rotation, pose.translation))
     for k in range(6):
         step = np.zeros(6)
         step[k] = 1e-6
         sides = [pose.perturbed(sign * step[:3], sign * step[3:]) for sign in (1.0, -1.0)]
-        far, near = (image_jacobian(lines, p.rotation, p.translation)[0] for p in sides)
+        far, near = (compute_image_jacobian(lines, p.rotation, p.translation)[0] for p in sides)
         np.testing.assert_allclose((far - near) / 2e-6, image[..., k], rtol=1e-4, atol=1e-3)
-        far, near = (plane_distances_m(lines, camera_ends(lines, p.rotation, p.translation)) for p in sides)
+        ends = (compute_camera_ends(lines, p.rotation, p.translation) for p in sides)
+        far, near = (compute_plane_distances(lines, q) for q in ends)
         np.testing.assert_allclose((far - near) / 2e-6, plane[..., k], rtol=1e-4, atol=1e-5)
 
 

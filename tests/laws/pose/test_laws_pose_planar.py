@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from knowledge_sources.methods.pose import planar_from_lines, planar_from_points
-from knowledge_sources.methods.pose.line_set import line_set
-from knowledge_sources.methods.pose.numerics.image_error import image_distances
-from knowledge_sources.methods.pose.planar import camera_states, line_jacobian, planar_prior
+from knowledge_sources.methods.pose.line_set import LineSet, build_line_set
+from knowledge_sources.methods.pose.numerics.image_error import compute_image_distances
+from knowledge_sources.methods.pose.planar import build_planar_prior, compute_camera_poses, compute_line_jacobian
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle
 
@@ -48,6 +48,10 @@ def seen(truth: Pose2, seed: int) -> tuple[Array, Array, np.random.Generator]:
     return lines, segments + rng.normal(0.0, SIGMA_PX, segments.shape), rng
 
 
+def distances_at(lines: LineSet, state: Array) -> Array:
+    return compute_image_distances(lines, *compute_camera_poses(state, MOUNT))
+
+
 def off(found: Pose2, truth: Pose2) -> Array:
     turn = wrap_angle(found.heading_rad - truth.heading_rad)
     return np.array([found.x_m - truth.x_m, found.y_m - truth.y_m, turn])
@@ -67,11 +71,11 @@ def test_lines_agree_with_the_library_s_least_squares(heading: float, seed: int)
     found = planar_from_lines(
         lines, segments, CAMERA, MOUNT, prior, prior_covariance=PRIOR, sigma_px=SIGMA_PX, robust=False
     )
-    prepared = line_set(lines, segments, CAMERA, SIGMA_PX)
+    prepared = build_line_set(lines, segments, CAMERA, SIGMA_PX)
     root = np.linalg.cholesky(np.linalg.inv(PRIOR)).T
 
     def residuals(state: Any) -> Array:
-        image = image_distances(prepared, *camera_states(np.asarray(state), MOUNT)) / SIGMA_PX
+        image = compute_image_distances(prepared, *compute_camera_poses(np.asarray(state), MOUNT)) / SIGMA_PX
         belief = root @ off(Pose2(*state), prior)
         return np.concatenate([image.ravel(), belief])
 
@@ -85,12 +89,12 @@ def test_lines_agree_with_the_library_s_least_squares(heading: float, seed: int)
 def test_derivatives_are_those_of_the_residuals(heading: float, seed: int) -> None:
     truth = Pose2(4.0, -2.0, heading)
     lines, segments, rng = seen(truth, seed)
-    prepared = line_set(lines, segments, CAMERA, 1.0)
+    prepared = build_line_set(lines, segments, CAMERA, 1.0)
     state = np.array([truth.x_m, truth.y_m, truth.heading_rad]) + rng.normal(0.0, 0.02, 3)
-    distances, slopes = line_jacobian(prepared.points[:, 0], prepared.directions, prepared, state, MOUNT)
-    np.testing.assert_allclose(distances, image_distances(prepared, *camera_states(state, MOUNT)), atol=1e-6)
+    distances, slopes = compute_line_jacobian(prepared.points[:, 0], prepared.directions, prepared, state, MOUNT)
+    np.testing.assert_allclose(distances, distances_at(prepared, state), atol=1e-6)
     for k, step in enumerate(np.eye(3) * 1e-6):
-        sides = [image_distances(prepared, *camera_states(state + sign * step, MOUNT)) for sign in (1.0, -1.0)]
+        sides = [distances_at(prepared, state + sign * step) for sign in (1.0, -1.0)]
         np.testing.assert_allclose((sides[0] - sides[1]) / 2e-6, slopes[..., k], rtol=1e-3, atol=1e-2)
 
 
@@ -148,7 +152,7 @@ def test_few_lines_never_make_a_prior_worse(heading: float, count: int, seed: in
     rows = rng.permutation(np.flatnonzero(visible))[:count]
     prior = near(truth, rng, 0.1)
     for covariance in (PRIOR, None):
-        information = planar_prior(prior, covariance).information
+        information = build_planar_prior(prior, covariance).information
         found = planar_from_lines(
             lines[rows], segments[rows], CAMERA, MOUNT, prior, prior_covariance=covariance, sigma_px=SIGMA_PX
         )
@@ -166,7 +170,7 @@ def test_nor_do_few_noisy_lines_of_a_prior_that_nobody_weighed(count: int, headi
     rows = rng.permutation(len(lines))[:count]
     prior = near(truth, rng)
     found = planar_from_lines(lines[rows], segments[rows], CAMERA, MOUNT, prior, sigma_px=SIGMA_PX)
-    information = planar_prior(prior, None).information
+    information = build_planar_prior(prior, None).information
     before, after = off(prior, truth), off(found.world_from_robot, truth)
     assert after @ information @ after <= before @ information @ before * 1.05 + 1e-9
 
@@ -202,7 +206,7 @@ def test_points_with_outliers(heading: float, seed: int) -> None:
 def test_the_camera_s_rotation_convention_is_pose2_s(heading: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     state = np.array([*rng.normal(0.0, 3.0, 2), heading])
-    rotation, translation = camera_states(state, MOUNT)
+    rotation, translation = compute_camera_poses(state, MOUNT)
     expected = MOUNT @ Pose2(*state).lifted().inverse()
     np.testing.assert_allclose(rotation, expected.rotation, atol=1e-12)
     np.testing.assert_allclose(translation, expected.translation, atol=1e-12)

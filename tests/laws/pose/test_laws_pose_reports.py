@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose.estimate import BEHIND, DISTANCE, NO_LENGTH, NO_OVERLAP
-from knowledge_sources.methods.pose.line_set import line_set
-from knowledge_sources.methods.pose.numerics.image_error import image_distances, in_front, overlapping
+from knowledge_sources.methods.pose.line_set import build_line_set
+from knowledge_sources.methods.pose.numerics.image_error import compute_image_distances, find_in_front, find_overlapping
 
 SOLVERS = [r_then_t, r_and_t, r_and_t_ml, med_r_and_t, trunc_r_and_t]
 ROBUST = [med_r_and_t, trunc_r_and_t]
@@ -45,8 +45,8 @@ def test_residuals_are_those_of_the_pose(solver: Solver, scene: PoseScene, seed:
     rng = np.random.default_rng(seed)
     segments, _ = wrong_landmarks(scene, end_noise(scene.segments_px, SIGMA_PX, rng), 6, rng)
     found = solve(solver, scene, segments, rng)
-    lines, pose = line_set(scene.lines_world, segments, scene.camera, SIGMA_PX), found.camera_from_world
-    expected = image_distances(lines, pose.rotation, pose.translation)
+    lines, pose = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX), found.camera_from_world
+    expected = compute_image_distances(lines, pose.rotation, pose.translation)
     np.testing.assert_allclose(np.abs(found.residuals_px), np.abs(expected), atol=1e-6, rtol=1e-6)
 
 
@@ -60,9 +60,9 @@ def test_each_rejected_line_has_a_reason_that_is_true(solver: Solver, scene: Pos
     along = segments[1, 1] - segments[1, 0]
     segments[1] += 3.0 * along
     found = solve(solver, scene, segments, rng)
-    lines, pose = line_set(scene.lines_world, segments, scene.camera, SIGMA_PX), found.camera_from_world
-    front = in_front(lines, pose.rotation, pose.translation)
-    over = overlapping(lines, pose.rotation, pose.translation)
+    lines, pose = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX), found.camera_from_world
+    front = find_in_front(lines, pose.rotation, pose.translation)
+    over = find_overlapping(lines, pose.rotation, pose.translation)
     far = np.sum((found.residuals_px / SIGMA_PX) ** 2, axis=1)
     assert found.rejected[0] == NO_LENGTH and found.rejected[1] is not None
     for i, reason in enumerate(found.rejected):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching.floor_matching import match_on_floor
+from knowledge_sources.methods.matching import match_on_floor
 from knowledge_sources.methods.pose import planar_from_lines
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle

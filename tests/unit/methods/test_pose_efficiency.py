@@ -13,8 +13,8 @@ from scipy.stats import chi2
 
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, fragmented
 from knowledge_sources.methods.pose import PoseEstimate, r_and_t, r_and_t_ml, r_then_t
-from knowledge_sources.methods.pose.line_set import line_set
-from knowledge_sources.methods.pose.numerics.image_error import image_distances, image_jacobian
+from knowledge_sources.methods.pose.line_set import build_line_set
+from knowledge_sources.methods.pose.numerics.image_error import compute_image_distances, compute_image_jacobian
 
 SIGMA_PX = 0.5
 TRIALS = 150
@@ -29,9 +29,9 @@ def scene_of(name: str, whole: bool) -> PoseScene:
 
 def bound_of(scene: PoseScene) -> Array:
     """(6, 6) the Cramér-Rao bound: no unbiased estimate has a smaller covariance."""
-    lines = line_set(scene.lines_world, scene.segments_px, scene.camera, SIGMA_PX)
+    lines = build_line_set(scene.lines_world, scene.segments_px, scene.camera, SIGMA_PX)
     pose = scene.camera_from_world
-    slopes = image_jacobian(lines, pose.rotation, pose.translation)[1].reshape(-1, 6) / SIGMA_PX
+    slopes = compute_image_jacobian(lines, pose.rotation, pose.translation)[1].reshape(-1, 6) / SIGMA_PX
     return np.asarray(np.linalg.inv(slopes.T @ slopes))
 
 
@@ -92,11 +92,11 @@ def test_the_likelihood_agrees_with_the_library_s_least_squares() -> None:
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
     prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
     found = r_and_t_ml(scene.lines_world, segments, scene.camera, prior, sigma_px=SIGMA_PX)
-    lines = line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
+    lines = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
 
     def residuals(step: Array) -> Array:
         pose = scene.camera_from_world.perturbed(step[:3], step[3:])
-        return image_distances(lines, pose.rotation, pose.translation).ravel() / SIGMA_PX
+        return compute_image_distances(lines, pose.rotation, pose.translation).ravel() / SIGMA_PX
 
     oracle = least_squares(residuals, np.zeros(6), xtol=1e-13, ftol=1e-13, gtol=1e-13)
     expected = scene.camera_from_world.perturbed(oracle.x[:3], oracle.x[3:])

@@ -12,11 +12,11 @@ from scipy.optimize import least_squares
 
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import med_r_and_t, planar_from_points, r_and_t, r_then_t, trunc_r_and_t
-from knowledge_sources.methods.pose.line_set import LineSet, line_set
-from knowledge_sources.methods.pose.numerics.plane_error import camera_ends, plane_distances_m
-from knowledge_sources.methods.pose.numerics.subset_poses import squared_distances
-from knowledge_sources.methods.pose.numerics.subsets import group_subsets, subsets_needed
-from knowledge_sources.methods.pose.planar import planar_prior, point_jacobian
+from knowledge_sources.methods.pose.line_set import LineSet, build_line_set
+from knowledge_sources.methods.pose.numerics.plane_error import compute_camera_ends, compute_plane_distances
+from knowledge_sources.methods.pose.numerics.subset_poses import compute_squared_distances
+from knowledge_sources.methods.pose.numerics.subsets import count_subsets, list_subsets
+from knowledge_sources.methods.pose.planar import build_planar_prior, compute_point_jacobian
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2, wrap_angle
 
@@ -28,7 +28,7 @@ Residuals = Callable[[Pose], Array]
 def problem(scene: PoseScene, seed: int) -> tuple[Array, Pose, LineSet]:
     rng = np.random.default_rng(seed)
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
-    lines = line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
+    lines = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
     return segments, drawn_prior(scene.camera_from_world, 0.3, 0.03, rng), lines
 
 
@@ -46,13 +46,17 @@ def assert_same(found: Pose, expected: Pose) -> None:
 
 
 def e1(lines: LineSet) -> Residuals:
-    return lambda pose: plane_distances_m(lines, camera_ends(lines, pose.rotation, pose.translation)).ravel()
+    def residuals(pose: Pose) -> Array:
+        ends = compute_camera_ends(lines, pose.rotation, pose.translation)
+        return compute_plane_distances(lines, ends).ravel()
+
+    return residuals
 
 
 def e2(lines: LineSet) -> Residuals:
     def residuals(pose: Pose) -> Array:
-        ends = camera_ends(lines, pose.rotation, pose.translation)
-        return np.asarray((plane_distances_m(lines, ends) / np.linalg.norm(ends, axis=-1)).ravel())
+        ends = compute_camera_ends(lines, pose.rotation, pose.translation)
+        return np.asarray((compute_plane_distances(lines, ends) / np.linalg.norm(ends, axis=-1)).ravel())
 
     return residuals
 
@@ -89,10 +93,10 @@ def test_no_triple_of_landmarks_has_a_much_smaller_median() -> None:
     scene = corridor(doors=5)
     segments, prior, _ = problem(scene, 3)
     segments, _ = wrong_landmarks(scene, segments, 7, np.random.default_rng(3))
-    lines = line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
+    lines = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
 
     def median(pose: Pose) -> float:
-        return float(np.median(squared_distances(lines, pose.rotation, pose.translation)))
+        return float(np.median(compute_squared_distances(lines, pose.rotation, pose.translation)))
 
     medians = [
         median(least(e1(lines.take(np.flatnonzero(np.isin(scene.landmark_ids, triple)))), prior))
@@ -107,13 +111,13 @@ def test_no_triple_of_landmarks_has_a_much_smaller_median() -> None:
 def test_so_many_subsets_are_drawn_that_one_is_clean() -> None:
     """The stated probability against the share of clean draws, by trying."""
     for outliers, probability in ((0.3, 0.9), (0.5, 0.99), (0.7, 0.9)):
-        needed = subsets_needed(3, outliers, probability)
+        needed = count_subsets(3, outliers, probability)
         missed = [(1.0 - (1.0 - outliers) ** 3) ** n for n in (needed, needed - 1)]
         assert 1.0 - missed[0] >= probability > 1.0 - missed[1]
-    drawn = group_subsets(12, 3, 40, np.random.default_rng(0))
+    drawn = list_subsets(12, 3, 40, np.random.default_rng(0))
     assert len({tuple(row) for row in drawn.tolist()}) == len(drawn) <= 40
     assert all(a < b < c < 12 for a, b, c in drawn.tolist())
-    assert len(group_subsets(6, 3)) == 20
+    assert len(list_subsets(6, 3)) == 20
 
 
 def test_the_truncated_loss_holds_beyond_half() -> None:
@@ -139,11 +143,11 @@ def test_points_agree_with_the_library_s_least_squares() -> None:
     pixels = camera.project((mount @ truth.lifted().inverse()).apply(world)) + rng.uniform(-0.2, 0.2, (20, 2))
     prior, covariance = Pose2(4.1, -2.1, 0.72), np.diag([0.2, 0.2, 0.05]) ** 2
     found = planar_from_points(world, pixels, camera, mount, prior, covariance, sigma_px=0.3)
-    belief, focal = planar_prior(prior, covariance), np.array([camera.fx, camera.fy])
+    belief, focal = build_planar_prior(prior, covariance), np.array([camera.fx, camera.fy])
     observed, root = pixels - (camera.cx, camera.cy), np.linalg.cholesky(np.linalg.inv(covariance)).T
 
     def residuals(state: Array) -> Array:
-        image = (point_jacobian(world, focal, state, mount)[1] - observed) / 0.3
+        image = (compute_point_jacobian(world, focal, state, mount)[1] - observed) / 0.3
         return np.concatenate([image.ravel(), root @ (state - belief.mean)])
 
     oracle = least_squares(residuals, belief.mean, x_scale=(1.0, 1.0, 0.1), xtol=1e-14, ftol=1e-14, gtol=1e-14).x

@@ -16,7 +16,7 @@ from knowledge_sources.methods.pose.estimate import (
     PoseEstimate,
 )
 from knowledge_sources.methods.pose.line_set import LineSet
-from knowledge_sources.methods.pose.numerics.image_error import aspects, in_front
+from knowledge_sources.methods.pose.numerics.image_error import aspects, find_in_front
 from knowledge_sources.methods.pose.numerics.levenberg_marquardt import orthonormal
 from world_models.frames import Pose
 
@@ -41,7 +41,7 @@ def open_direction(hessian: Array) -> bool:
 
 def mostly_in_front(lines: LineSet, rotation: Array, translation: Array) -> bool:
     """Whether more than half of the lines pass in front of the camera."""
-    return len(lines) == 0 or 2 * int(np.count_nonzero(in_front(lines, rotation, translation))) > len(lines)
+    return len(lines) == 0 or 2 * int(np.count_nonzero(find_in_front(lines, rotation, translation))) > len(lines)
 
 
 def reasons(lines: LineSet, rotation: Array, translation: Array, near: Mask) -> tuple[str | None, ...]:
@@ -81,7 +81,7 @@ def estimate_at(
 
 def prior_estimate(lines: LineSet, prior: Pose, reason: str) -> PoseEstimate:
     """The prior as it came, with the reason why; lines behind it are no inliers."""
-    front = in_front(lines, prior.rotation, prior.translation)
+    front = find_in_front(lines, prior.rotation, prior.translation)
     rejected = tuple(None if f else BEHIND for f in front)
     covariance = np.linalg.inv(WEAK_INFORMATION)
     return estimate_at(lines, prior.rotation, prior.translation, covariance, rejected, float("inf"), 0, reason)
@@ -89,7 +89,7 @@ def prior_estimate(lines: LineSet, prior: Pose, reason: str) -> PoseEstimate:
 
 def all_kept(lines: LineSet, rotation: Array, translation: Array) -> tuple[str | None, ...]:
     """Reasons of a solver that rejects nothing but what lies behind the camera."""
-    return tuple(None if f else BEHIND for f in in_front(lines, rotation, translation))
+    return tuple(None if f else BEHIND for f in find_in_front(lines, rotation, translation))
 
 
 def guarded(lines: LineSet, prior: Pose, estimate: PoseEstimate, kept: Mask | None = None) -> PoseEstimate:

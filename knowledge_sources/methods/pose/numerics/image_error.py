@@ -24,7 +24,7 @@ def projection_planes(lines: LineSet, rotation: Array, translation: Array) -> tu
     return directions, lines.moments @ turned + cross(translation[..., None, :], directions)
 
 
-def image_distances(lines: LineSet, rotation: Array, translation: Array) -> Array:
+def compute_image_distances(lines: LineSet, rotation: Array, translation: Array) -> Array:
     """(..., n, 2) signed distances of the observed ends to the projected infinite model lines [px]."""
     _, planes = projection_planes(lines, rotation, translation)
     return plane_distances(lines, planes)
@@ -54,7 +54,7 @@ def distance_slopes(lines: LineSet, planes: Array) -> tuple[Array, Array]:
     return distances, slopes
 
 
-def image_jacobian(lines: LineSet, rotation: Array, translation: Array) -> tuple[Array, Array]:
+def compute_image_jacobian(lines: LineSet, rotation: Array, translation: Array) -> tuple[Array, Array]:
     """Distances (..., n, 2) [px] and their derivatives (..., n, 2, 6) by the left perturbation (rotation, translation).
 
     A turn w moves a plane's normal m by w x m; a shift t by t x d.
@@ -70,8 +70,8 @@ def aspects(lines: LineSet, rotation: Array, translation: Array) -> tuple[Array,
     """How the lines look from one pose.
 
     Returns:
-        (n, 2) :func:`image_distances`; (n,) which model lines pass both observed ends in front of the camera; (n,)
-        which observed segments overlap their model line's extent (an infinite line does not end; a door does).
+        (n, 2) :func:`compute_image_distances`; (n,) which model lines pass both observed ends in front of the camera;
+        (n,) which observed segments overlap their model line's extent (an infinite line does not end; a door does).
     """
     seen: tuple[Array, Mask, Mask] = kernels.aspects(
         lines.arrays, np.array(rotation), np.array(translation), OVERLAP_SLACK_PX
@@ -79,11 +79,11 @@ def aspects(lines: LineSet, rotation: Array, translation: Array) -> tuple[Array,
     return seen
 
 
-def in_front(lines: LineSet, rotation: Array, translation: Array) -> Mask:
+def find_in_front(lines: LineSet, rotation: Array, translation: Array) -> Mask:
     """(n,) which lines pass both observed ends in front of the camera."""
     return aspects(lines, rotation, translation)[1]
 
 
-def overlapping(lines: LineSet, rotation: Array, translation: Array) -> Mask:
+def find_overlapping(lines: LineSet, rotation: Array, translation: Array) -> Mask:
     """(n,) which observed segments overlap their model line's extent."""
     return aspects(lines, rotation, translation)[2]

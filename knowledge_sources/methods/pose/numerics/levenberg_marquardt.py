@@ -99,7 +99,7 @@ def orthonormal(rotation: Array) -> Array:
     return np.asarray(u @ vt)
 
 
-def information_inverse(hessian: Array) -> Array:
+def invert_information(hessian: Array) -> Array:
     """Inverse of a positive semi-definite matrix; directions without information get a huge but finite variance."""
     values, vectors = np.linalg.eigh(0.5 * (hessian + hessian.T))
     floor = max(float(values[-1]) * 1e-15, 1e-12)

@@ -111,7 +111,7 @@ def descend(
 
 
 @compiled
-def squared_distances(lines: Any, turns: Any, shifts: Any) -> Any:
+def compute_squared_distances(lines: Any, turns: Any, shifts: Any) -> Any:
     """(k, n) squared image distance of each line under each of k poses, in units of its variance."""
     _, directions, moments, rays, _, _, sigma, focal = lines
     out = np.empty((len(turns), len(directions)))

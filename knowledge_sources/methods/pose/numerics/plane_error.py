@@ -8,7 +8,7 @@ import numpy as np
 
 from knowledge_sources.methods.pose.estimate import Array
 from knowledge_sources.methods.pose.line_set import TINY, LineSet
-from knowledge_sources.methods.pose.numerics.levenberg_marquardt import cross, information_inverse
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import cross, invert_information
 
 Weighting = Literal["unit", "length"]
 
@@ -22,17 +22,17 @@ def line_weights(lines: LineSet, weighting: Weighting) -> Array:
     raise ValueError(f'expected weighting "unit" or "length", got {weighting!r}')
 
 
-def camera_ends(lines: LineSet, rotation: Array, translation: Array) -> Array:
+def compute_camera_ends(lines: LineSet, rotation: Array, translation: Array) -> Array:
     """q = R p + T, (n, 2, 3) [m, camera]."""
     return np.asarray(lines.points @ rotation.T + translation)
 
 
-def plane_distances_m(lines: LineSet, ends: Array) -> Array:
+def compute_plane_distances(lines: LineSet, ends: Array) -> Array:
     """n . q, (n, 2) [m]: the bracket of E1."""
     return np.asarray(np.matmul(ends, lines.normals[:, :, None])[..., 0])
 
 
-def plane_jacobian(lines: LineSet, ends: Array) -> Array:
+def compute_plane_jacobian(lines: LineSet, ends: Array) -> Array:
     """Derivatives (n, 2, 6) of n . q by the left perturbation: (q x n, n)."""
     turn = cross(ends, lines.normals[:, None, :])
     return np.concatenate([turn, np.broadcast_to(lines.normals[:, None, :], ends.shape)], axis=-1)
@@ -40,7 +40,7 @@ def plane_jacobian(lines: LineSet, ends: Array) -> Array:
 
 def best_translation(lines: LineSet, rotation: Array, translation: Array, weights: Array) -> Array:
     """T (3,) that minimises E1 for a given R, exactly; what the lines do not say stays as in ``translation``."""
-    misses = plane_distances_m(lines, camera_ends(lines, rotation, translation))
+    misses = compute_plane_distances(lines, compute_camera_ends(lines, rotation, translation))
     weighted = lines.normals * weights[:, None]
     moved = weighted.T @ misses.sum(axis=1)
     values, vectors = np.linalg.eigh(2.0 * weighted.T @ lines.normals)
@@ -66,10 +66,10 @@ def propagated_covariance(lines: LineSet, rotation: Array, translation: Array, w
 
     E1 is not a likelihood, so the inverse Hessian would not do. For E2 divide the weights by |q|^2.
     """
-    ends = camera_ends(lines, rotation, translation)
-    jacobian = plane_jacobian(lines, ends)
+    ends = compute_camera_ends(lines, rotation, translation)
+    jacobian = compute_plane_jacobian(lines, ends)
     weighted = jacobian * weights[..., None]
     hessian = np.einsum("ika,ikb->ab", weighted, jacobian)
     spread = np.einsum("ika,ikj->aij", weighted, end_noise(lines, ends)).reshape(6, -1)
-    gain = information_inverse(hessian) @ spread
+    gain = invert_information(hessian) @ spread
     return np.asarray(gain @ gain.T)

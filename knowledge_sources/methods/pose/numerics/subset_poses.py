@@ -27,15 +27,15 @@ def concentrated(lines: LineSet, turns: Array, shifts: Array, keep: int, rounds:
     A minimal subset amplifies the noise; half of all lines do not.
     """
     for _ in range(rounds):
-        errors = squared_distances(lines, turns, shifts)
+        errors = compute_squared_distances(lines, turns, shifts)
         rows = np.ascontiguousarray(np.argsort(errors, axis=1, kind="stable")[:, :keep])
         turns, shifts = kernels.subset_poses(lines.arrays, rows, np.ones(rows.shape), turns, shifts, 2)
     return turns, shifts
 
 
-def squared_distances(lines: LineSet, turns: Array, shifts: Array) -> Array:
+def compute_squared_distances(lines: LineSet, turns: Array, shifts: Array) -> Array:
     """(k, n), or (n,) for one pose, squared image distance of each line, in units of its variance."""
-    many = kernels.squared_distances(
+    many = kernels.compute_squared_distances(
         lines.arrays, np.array(turns).reshape(-1, 3, 3), np.array(shifts).reshape(-1, 3)
     )
     return np.asarray(many if turns.ndim == 3 else many[0])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Groups = list[NDArray[np.intp]]
 
 
-def subsets_needed(size: int, outliers: float, probability: float) -> int:
+def count_subsets(size: int, outliers: float, probability: float) -> int:
     """Random subsets to draw so that one is free of outliers with the stated probability."""
     if not (0.0 <= outliers < 1.0 and 0.0 < probability < 1.0):
         raise ValueError(f"expected outliers in [0, 1) and probability in (0, 1), got {outliers} and {probability}")
@@ -19,7 +19,7 @@ def subsets_needed(size: int, outliers: float, probability: float) -> int:
     return 1 if clean >= 1.0 else max(1, math.ceil(math.log1p(-probability) / math.log1p(-clean)))
 
 
-def group_subsets(
+def list_subsets(
     count: int, size: int, needed: int | None = None, rng: np.random.Generator | None = None
 ) -> NDArray[np.intp]:
     """Subsets (k, size) of ``count`` groups: all of them, or ``needed`` different ones drawn with ``rng``."""

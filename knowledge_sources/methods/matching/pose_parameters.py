@@ -31,7 +31,7 @@ STARTS = 128
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Freedom(ABC):
+class PoseParameters(ABC):
     """A prior in d unknowns, and how they move the camera.
 
     Attributes:
@@ -65,7 +65,7 @@ class Freedom(ABC):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class InSpace(Freedom):
+class CameraParameters(PoseParameters):
     """All six: a step is a left perturbation (turn, shift)."""
 
     first_widths = (16.0, 12.0, 8.0, 6.0)
@@ -86,7 +86,7 @@ class InSpace(Freedom):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OnFloor(Freedom):
+class FloorParameters(PoseParameters):
     """A robot that carries the camera on ``mount``, ``camera_from_robot``: a step is one of (x, y, heading), world.
 
     ``turning`` (6,) is the left perturbation of the camera, by a radian that the robot turns to the left.
@@ -124,15 +124,15 @@ class OnFloor(Freedom):
         return np.array([a.x_m - b.x_m, a.y_m - b.y_m, wrap_angle(a.heading_rad - b.heading_rad)])
 
 
-def in_space(prior: Pose, covariance: Any) -> InSpace:
+def build_camera_parameters(prior: Pose, covariance: Any) -> CameraParameters:
     """``covariance`` (6, 6) of the prior's left perturbation. Raises ValueError for another shape."""
     spread = np.asarray(covariance, float)
     if spread.shape != (6, 6):
         raise ValueError(f"expected a prior_covariance of shape (6, 6), got {spread.shape}")
-    return InSpace(prior, np.linalg.inv(spread), np.linalg.cholesky(spread))
+    return CameraParameters(prior, np.linalg.inv(spread), np.linalg.cholesky(spread))
 
 
-def on_floor(mount: Pose, prior: Pose2, covariance: Any) -> OnFloor:
+def build_floor_parameters(mount: Pose, prior: Pose2, covariance: Any) -> FloorParameters:
     """``covariance`` (3, 3) of ``prior``, ``world_from_robot``. Raises ValueError for another shape."""
     spread = np.asarray(covariance, float)
     if spread.shape != (3, 3):
@@ -140,7 +140,7 @@ def on_floor(mount: Pose, prior: Pose2, covariance: Any) -> OnFloor:
     axis = -mount.rotation[:, 2]
     turning = np.concatenate([axis, np.cross(mount.translation, axis)])
     seen = mount @ prior.lifted().inverse()
-    return OnFloor(seen, np.linalg.inv(spread), np.linalg.cholesky(spread), mount, turning)
+    return FloorParameters(seen, np.linalg.inv(spread), np.linalg.cholesky(spread), mount, turning)
 
 
 @lru_cache(maxsize=(GRID_SIDE + 1) ** 3)
