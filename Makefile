@@ -13,13 +13,12 @@ COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help run test environment compiled lock clean
+.PHONY: help run test environment lock clean
 
 help:
 	@echo "make run          prepare everything, then drive: harvey run $(SCENARIO)"
 	@echo "make test         ruff, mypy, import contracts, pytest"
 	@echo "make environment  only prepare $(VENV), for running and for testing"
-	@echo "make compiled     the board as machine code in build/compiled (needs a C compiler; no mission needs it)"
 	@echo "make lock         write requirements.lock and requirements-dev.lock anew from pyproject.toml"
 	@echo "make clean        remove environments and caches; recordings in runs/ stay"
 	@echo "Options: PYTHON=$(PYTHON) (3.11 or newer), VENV=$(VENV), SCENARIO=$(SCENARIO)"
@@ -34,9 +33,6 @@ test: $(VENV)/.ready-to-test
 	@echo "== pytest" && $(BIN)/pytest -n 2
 
 environment: $(VENV)/.ready-to-test
-
-compiled: $(VENV)/.ready-to-test
-	@$(BIN)/python -m harvey.compiled build/compiled
 
 $(BIN)/python:
 	@$(PYTHON) -c "" 2>/dev/null \
@@ -63,8 +59,8 @@ lock:
 	@$(PYTHON) -m venv $(LOCK)
 	@$(LOCK)/bin/pip install --quiet --quiet pip-tools
 	@echo "== requirements.lock" && $(COMPILE) --build-deps-for editable -o requirements.lock pyproject.toml
-	@echo "== requirements-dev.lock" && $(PYTHON) -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))\
-	['project']['optional-dependencies']['dev'], sep='\n')" | $(COMPILE) -c requirements.lock -o requirements-dev.lock -
+	@echo "== requirements-dev.lock" && $(PYTHON) -c "import tomllib; print(*sum(tomllib.load(open('pyproject.toml', 'rb'))\
+	['project']['optional-dependencies'].values(), []), sep='\n')" | $(COMPILE) -c requirements.lock -o requirements-dev.lock -
 	@rm -rf $(LOCK)
 
 clean:

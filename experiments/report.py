@@ -87,4 +87,6 @@ def _alone(figures: Mapping[str, Cell]) -> Cell | Mapping[str, Cell]:
 def _shown(cell: Cell) -> str:
     if cell is None:
         return "-"
-    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)
+    if not isinstance(cell, float):
+        return str(cell)
+    return f"{cell:.0f}" if 1e4 <= abs(cell) < 1e9 else f"{cell:.4g}"

@@ -1,4 +1,4 @@
-"""A board that runs for a very long time: what it holds in memory, with and without forgetting."""
+"""Memory of a board over very many cycles, with and without retention."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from blackboard.servoing import Discrepancy
 from logs.journal_file import JournalFile
 
 DOUBT_EVERY = 20
-"""One picture in so many shows something unexpected."""
+"""One picture in this many shows something unexpected."""
 PIXELS = 256
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """Something seen: bytes, so that keeping them all would show."""
+    """An observation with enough bytes for a leak to show."""
 
     number: int
     pixels: bytes
@@ -34,14 +34,14 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """What follows from all that was seen; one entry, revised for ever."""
+    """Follows from all observations; one entry, revised for ever."""
 
     picture: str
     count: int
 
 
 class Seer(KnowledgeSource):
-    """Takes up a picture into the belief, and asks for the next; now and then it is in doubt."""
+    """Takes a picture into the belief and posts the next one; now and then it posts a discrepancy."""
 
     level = Level.ACTION
     watches = (Watch(Picture, (Posted,)),)
@@ -60,7 +60,7 @@ class Seer(KnowledgeSource):
 
 
 class Corrector(KnowledgeSource):
-    """Closes a doubt."""
+    """Closes a discrepancy."""
 
     level = Level.ACTION
     watches = (Watch(Discrepancy, (Posted,), lambda found: found.is_open),)
@@ -81,12 +81,12 @@ RETENTION: tuple[Forget[Any], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """What was held after a tenth of the cycles, and after all of them.
+    """Memory after a tenth of the cycles and after all of them.
 
     Attributes:
-        cycles: how many.
-        early_bytes, late_bytes: of the process, resident.
-        entries: on the board in the end.
+        cycles: number of cycles.
+        early_bytes, late_bytes: resident set of the process.
+        entries: entries on the board at the end.
         posted: pictures that were posted.
     """
 
@@ -97,13 +97,13 @@ class Memory:
     posted: int
 
     @property
-    def a_cycle_bytes(self) -> float:
-        """By how much it grew with each cycle."""
+    def growth_bytes(self) -> float:
+        """Growth per cycle [bytes]."""
         return (self.late_bytes - self.early_bytes) / (self.cycles - self.cycles // 10)
 
 
 def long_run(cycles: int, retention: Sequence[Forget[Any]]) -> Memory:
-    """Run so many cycles; the journal's lines are made and written, but to the null device."""
+    """Run a number of cycles; the journal's lines are written to the null device."""
     journal = JournalFile(Path(os.devnull))
     scheduler = Scheduler([Seer(), Corrector()], sinks=[journal], retention=retention)
     scheduler.tell([Post(Picture(0, bytes(PIXELS)))], "user")
@@ -119,7 +119,7 @@ def long_run(cycles: int, retention: Sequence[Forget[Any]]) -> Memory:
 
 
 def resident_bytes() -> int:
-    """Of this process now; its peak where the system does not say."""
+    """Resident set of this process now; its peak where the system does not say."""
     try:
         return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * resource.getpagesize()
     except OSError:

@@ -1,4 +1,4 @@
-"""What the mechanism costs in a real mission, beside the experts, the camera and the wheels."""
+"""Cost of scheduler, board and journal in a real mission, beside its knowledge sources."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ from sim.stage import set_stage
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Of one mission's cycles.
+    """Counts and processor times of one mission.
 
     Attributes:
-        cycles, activations, obviated: how many.
-        experts_s: processor time in ratings and acts.
-        engine_s: in everything else of the cycles: board, indexes, agenda, choice, forgetting.
-        lines_s: in making the journal's lines.
-        most_pending: activations that waited at once.
-        entries: on the board in the end.
+        cycles, activations, obviated: counts.
+        sources_s: time in the knowledge sources' ``rate`` and ``act``.
+        scheduler_s: time in the rest of the cycles: board, indexes, agenda, choice, retention.
+        lines_s: time to make the journal's lines.
+        max_pending: most activations pending at once.
+        entries: entries on the board at the end.
     """
 
     cycles: int
     activations: int
     obviated: int
-    experts_s: float
-    engine_s: float
+    sources_s: float
+    scheduler_s: float
     lines_s: float
-    most_pending: int
+    max_pending: int
     entries: int
 
     @property
     def overhead(self) -> float:
-        """What part of a cycle's time is not the experts'."""
-        return (self.engine_s + self.lines_s) / (self.engine_s + self.lines_s + self.experts_s)
+        """Share of the time that is not the knowledge sources'."""
+        return (self.scheduler_s + self.lines_s) / (self.scheduler_s + self.lines_s + self.sources_s)
 
 
 class _Timed(KnowledgeSource):
-    """An expert with a stopwatch."""
+    """A knowledge source with a stopwatch."""
 
     def __init__(self, inner: KnowledgeSource) -> None:
         self._inner = inner
@@ -75,16 +75,16 @@ class _Timed(KnowledgeSource):
 
 
 def mission_cost(cycles: int | None, seed: int) -> Cost:
-    """Run the laboratory's mission, then decide it once more from its observations with a stopwatch."""
+    """Run the laboratory's mission, then replay its observations with a stopwatch."""
     scenario = load_scenario("lab-to-allens-office")
     if cycles is not None:
         scenario = replace(scenario, limits=replace(scenario.limits, max_cycles=cycles))
     recorded: list[Decision] = []
     run_mission(set_stage(scenario), seed, sinks=[recorded.append])
-    return _decided_again(scenario, recorded)
+    return _replay_timed(scenario, recorded)
 
 
-def _decided_again(scenario: Scenario, recorded: list[Decision]) -> Cost:
+def _replay_timed(scenario: Scenario, recorded: list[Decision]) -> Cost:
     timed = [_Timed(source) for source in knowledge_sources(robot_model(scenario))]
     scheduler = Scheduler(timed, servoing=servoing(scenario.servo), retention=RETENTION)
     lines, lines_s, steps_s = JournalLines(), 0.0, 0.0
@@ -99,8 +99,8 @@ def _decided_again(scenario: Scenario, recorded: list[Decision]) -> Cost:
         began_s = time.process_time()
         lines(again)
         lines_s += time.process_time() - began_s
-    experts_s = math.fsum(source.spent_s for source in timed)
+    sources_s = math.fsum(source.spent_s for source in timed)
     return Cost(
         len(recorded), sum(len(d.activated) for d in recorded), sum(len(d.obviated) for d in recorded),
-        experts_s, steps_s - experts_s, lines_s, max(d.pending for d in recorded), len(scheduler.view),
+        sources_s, steps_s - sources_s, lines_s, max(d.pending for d in recorded), len(scheduler.view),
     )

@@ -1,4 +1,4 @@
-"""Peers for the agenda: py_trees, which has none, and CLIPS, whose agenda is in C; both write a line for each step."""
+"""Peers of the agenda: py_trees, which has none, and CLIPS, whose agenda is in C; each step writes a line."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ def has(peer: str) -> bool:
 
 
 def clips_s(pending: int, steps: int) -> float:
-    """Processor time of one firing, with as many activations of a lower salience on the agenda; best of PARTS [s].
+    """Measure one firing with this many activations of lower salience on the agenda; best of PARTS [s].
 
-    The rule takes its fact back, has Python write a line, and asserts the fact that activates it again. It runs in a
-    process of its own, because CLIPS prints what it thinks of its memory when it ends.
+    The rule retracts its fact, has Python write a line, and asserts the fact that activates it again. It runs in a
+    process of its own, because CLIPS prints remarks on its memory when it ends. Times are of the processor.
     """
-    asked = [sys.executable, "-m", __name__, str(pending), str(steps)]
-    said = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
-    return float(said.partition(TOOK)[2].split()[0])
+    command = [sys.executable, "-m", __name__, str(pending), str(steps)]
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    return float(output.partition(TOOK)[2].split()[0])
 
 
-def _clips_here_s(pending: int, steps: int) -> float:
+def _clips_in_process_s(pending: int, steps: int) -> float:
     clips: Any = importlib.import_module("clips")
     environment = clips.Environment()
     with _Journal() as journal:
@@ -51,7 +51,7 @@ def _clips_here_s(pending: int, steps: int) -> float:
 
 
 def py_trees_s(pending: int, steps: int) -> float:
-    """Processor time of one tick that ends in an act, with as many behaviours before it that cannot act now [s]."""
+    """Measure the processor time of one tick in which this many behaviours fail before one succeeds [s]."""
     py_trees: Any = importlib.import_module("py_trees")
     with _Journal() as journal:
 
@@ -82,7 +82,7 @@ def _best_s(run: Callable[[], object], steps: int) -> float:
 
 
 class _Journal:
-    """A line for each step, with the operating system before the call returns, as ours."""
+    """Writes a line for each step; the operating system has it before the call returns, as with ours."""
 
     def __enter__(self) -> _Journal:
         self._folder = TemporaryDirectory()
@@ -98,4 +98,4 @@ class _Journal:
 
 
 if __name__ == "__main__":
-    print(f"{TOOK}{_clips_here_s(int(sys.argv[1]), int(sys.argv[2]))}")
+    print(f"{TOOK}{_clips_in_process_s(int(sys.argv[1]), int(sys.argv[2]))}")

@@ -8,10 +8,10 @@ import pytest
 from blackboard.effect import Post
 from blackboard.scheduler import Scheduler
 from experiments.scale import agenda, agenda_memory, agenda_peers
-from experiments.scale.agenda_load import ALL, AS_IN_MISSIONS, ONE, PART_CYCLES, Load, Task, measure
+from experiments.scale.agenda_load import ALL, AS_IN_MISSIONS, PART_CYCLES, SINGLE, Load, Speed, Task, measure
 
 
-@pytest.mark.parametrize("load", [ONE, AS_IN_MISSIONS, ALL], ids=lambda load: load.name)
+@pytest.mark.parametrize("load", [SINGLE, AS_IN_MISSIONS, ALL], ids=lambda load: load.name)
 def test_a_load_wakes_as_many_as_it_says_and_each_comes_to_its_end(load: Load) -> None:
     scheduler = Scheduler(load.sources())
     draws = np.random.default_rng(1).integers(1 << 31, size=20)
@@ -19,7 +19,7 @@ def test_a_load_wakes_as_many_as_it_says_and_each_comes_to_its_end(load: Load) -
     first = scheduler.step()
     decisions = [scheduler.step() for _ in range(2000)]
     activated = sum(len(d.activated) for d in decisions)
-    assert activated / len(decisions) == pytest.approx(load.a_cycle, rel=0.05)
+    assert activated / len(decisions) == pytest.approx(load.per_cycle, rel=0.05)
     ended = sum(1 for d in decisions if d.chosen) + sum(len(d.obviated) for d in decisions)
     assert activated - ended == decisions[-1].pending - first.pending
     assert all(d.chosen and not d.refused for d in decisions)
@@ -27,9 +27,9 @@ def test_a_load_wakes_as_many_as_it_says_and_each_comes_to_its_end(load: Load) -
 
 
 def test_a_measurement_fills_the_agenda_first() -> None:
-    few, more = measure(ONE, [10, 50], 2, 0)
+    few, more = measure(SINGLE, [10, 50], 2, 0)
     assert (few.pending, more.pending) == (10, 50)
-    assert 0.0 < few.best_s <= few.usual_s < 1.0 and 0.0 < more.best_s <= more.usual_s < 1.0
+    assert 0.0 < few.best_s <= few.median_s < 1.0 and 0.0 < more.best_s <= more.median_s < 1.0
     assert PART_CYCLES >= 1000
 
 
@@ -41,8 +41,10 @@ def test_with_forgetting_the_board_stays_small() -> None:
 
 def test_a_peer_that_is_not_installed_leaves_its_column_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(agenda_peers, "has", lambda _peer: False)
-    assert agenda._clips(10) is None and agenda._py_trees(10, 5) is None
-    assert any("py_trees is not installed" in note for note in agenda._notes(1, ""))
+    speeds = {SINGLE.name: [Speed(10, 1e-5, 1e-5)]}
+    assert agenda._peers(10) == (None, None)
+    assert [row[2:5] for row in agenda._speed_rows(speeds, {10: (None, None)})] == [(57_600.0, None, None)]
+    assert any("py_trees is not installed" in note for note in agenda._notes(1, speeds))
 
 
 @pytest.mark.skipif(not agenda_peers.has("clips"), reason="clipspy is not installed: pip install '.[peers]'")
