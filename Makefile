@@ -17,7 +17,7 @@ export OMP_NUM_THREADS := 1
 
 help:
 	@echo "make run          prepare everything, then drive: harvey run $(SCENARIO)"
-	@echo "make test         ruff, mypy, import contracts, pytest"
+	@echo "make test         ruff, mypy, import contracts, pytest; installs every extra, and says what was skipped and why"
 	@echo "make environment  only prepare $(VENV), for running and for testing"
 	@echo "make lock         write requirements.lock and requirements-dev.lock anew from pyproject.toml"
 	@echo "make clean        remove environments and caches; recordings in runs/ stay"
