@@ -68,9 +68,9 @@ def run(name: str, *, quick: bool = False, seed: int = 0) -> Report:
         BadInput: there is no such experiment; near ones are named.
     """
     if name not in names():
-        from world_models.files.toml.settings import near
+        from world_models.files.toml.settings import suggest_keys
 
-        raise BadInput(f"expected an experiment: {near(name, names())}, got {name!r}")
+        raise BadInput(f"expected an experiment: {suggest_keys(name, names())}, got {name!r}")
     report: Report = importlib.import_module(_module(name)).run(quick, seed)
     return report
 

@@ -27,11 +27,11 @@ from harvey.retention import RETENTION
 from harvey.run_files.run_head import RunHead
 from harvey.wiring import knowledge_sources, servoing
 from knowledge_sources.plan.line_finder import LineFinder
-from world_models.building.frame_source import FrameSource, Packet
 from world_models.building.landmarks import Edges
+from world_models.building.locale_source import LocaleGeometry, LocaleSource
 from world_models.building.world import World
 from world_models.entries.percepts import Segments
-from world_models.files.toml.settings import near, parsed
+from world_models.files.toml.settings import parse_value, suggest_keys
 from world_models.frames import frozen
 from world_models.robot import RobotModel
 
@@ -89,10 +89,10 @@ def _servoing(head: RunHead, levels: dict[str, str]) -> Servoing:
     servo = head.servo_settings()
     for level, value in levels.items():
         if level not in servo.__slots__:
-            raise BadInput(f"--set {SERVO}{level}: expected {near(level, servo.__slots__)}, got {level!r}")
-        if not isinstance(parsed(value), bool):
+            raise BadInput(f"--set {SERVO}{level}: expected {suggest_keys(level, servo.__slots__)}, got {level!r}")
+        if not isinstance(parse_value(value), bool):
             raise BadInput(f"--set {SERVO}{level}: expected on or off, got {value!r}")
-        servo = replace(servo, **{level: parsed(value)})
+        servo = replace(servo, **{level: parse_value(value)})
     return servoing(servo)
 
 
@@ -100,12 +100,12 @@ def _lacking(world: World, names: Sequence[str], experts: Sequence[str]) -> Worl
     """The model without some of its landmarks and faces; the building itself stays as it is."""
     if not names:
         return world
-    packets = list(world.frames.all_packets())
+    packets = list(world.locale_source.all_geometry())
     there = {mark.name for p in packets for _, mark in p.landmarks} | {f.name for p in packets for _, f in p.faces}
     for name in names:
         if name not in there:
             raise BadInput(f"--without {name}: expected {_alike(name, experts, there)}, got {name!r}")
-    return World(cast(FrameSource, _Lacking(world.frames, frozenset(names))))
+    return World(cast(LocaleSource, _Lacking(world.locale_source, frozenset(names))))
 
 
 def _alike(name: str, experts: Sequence[str], elements: Set[str]) -> str:
@@ -119,19 +119,19 @@ def _alike(name: str, experts: Sequence[str], elements: Set[str]) -> str:
 class _Lacking:
     """Frames without some of their faces; a landmark that is to lack keeps its number, but has no lines any more."""
 
-    def __init__(self, frames: FrameSource, names: frozenset[str]) -> None:
+    def __init__(self, frames: LocaleSource, names: frozenset[str]) -> None:
         self._frames, self._names = frames, names
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._frames, name)
 
-    def packets(self, locale: str) -> tuple[Packet, ...]:
-        return tuple(self._without(packet) for packet in self._frames.packets(locale))
+    def geometry(self, locale: str) -> tuple[LocaleGeometry, ...]:
+        return tuple(self._without(packet) for packet in self._frames.geometry(locale))
 
-    def all_packets(self) -> Iterator[Packet]:
-        return (self._without(packet) for packet in self._frames.all_packets())
+    def all_geometry(self) -> Iterator[LocaleGeometry]:
+        return (self._without(packet) for packet in self._frames.all_geometry())
 
-    def _without(self, packet: Packet) -> Packet:
+    def _without(self, packet: LocaleGeometry) -> LocaleGeometry:
         landmarks = ((n, replace(m, edges=Edges.of(())) if m.name in self._names else m) for n, m in packet.landmarks)
         faces = (pair for pair in packet.faces if pair[1].name not in self._names)
         return replace(packet, faces=tuple(faces), landmarks=tuple(landmarks))

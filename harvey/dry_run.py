@@ -127,10 +127,10 @@ def _prospects(robot: RobotModel, view: View, made: Sequence[Change]) -> list[Mi
 def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Milestone) -> MilestonePreview:
     lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
     pose = belief.world_from_robot(robot.world)
-    mount = robot.standing_in(belief.locale).mount
+    mount = robot.on_floor_of(belief.locale).mount
     quality = compute_view_quality(lines, robot.camera, mount.camera_from_robot, pose, SIGMA_ACROSS_PX)
     sharp = quality.sigma_m <= GOOD_PART * _tolerance_m(view, milestone) and quality.sigma_rad <= GOOD_RAD
-    standing = robot.standing_in(belief.locale)
+    standing = robot.on_floor_of(belief.locale)
     seen = len(lines) >= LEAST_ACCOUNTED
     p_false = predict_p_false(standing, pose, lines, np.array(diagonal(SEEN_M, SEEN_RAD))) if seen else 1.0
     other = find_alias(standing, belief.locale, pose, lines) if seen else None

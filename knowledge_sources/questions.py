@@ -34,7 +34,7 @@ def held(view: View) -> Entry[Hypothesis] | None:
 def standing_in(view: View, robot: RobotModel, locale: str) -> RobotModel:
     """The robot on the floor of a locale, behind whatever is known to stand before its camera."""
     obstruction = view.latest(Obstruction)
-    return robot.behind(None if obstruction is None else obstruction.value).standing_in(locale)
+    return robot.with_obstruction(None if obstruction is None else obstruction.value).on_floor_of(locale)
 
 
 def has_followed(view: View) -> bool:

@@ -8,7 +8,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.camera import NEAR_M
+from world_models.camera import NEAR_PLANE_M
 from world_models.entries.location import Hypothesis
 from world_models.robot import RobotModel
 
@@ -29,7 +29,7 @@ def action_px(robot: RobotModel, belief: Hypothesis, points_world: Floats) -> fl
     correlation itself may be wrong by.
     """
     pose = belief.world_from_robot(robot.world)
-    ahead_m = robot.standing_in(belief.locale).camera_from_world(pose).apply(points_world.reshape(-1, 3))[:, 2]
-    near = ahead_m[ahead_m > NEAR_M]
+    ahead_m = robot.on_floor_of(belief.locale).camera_from_world(pose).apply(points_world.reshape(-1, 3))[:, 2]
+    near = ahead_m[ahead_m > NEAR_PLANE_M]
     spread = math.hypot(belief.sigma_rad, belief.sigma_m / median(near.tolist()) if len(near) else 0.0)
     return min(FLOOR_PX + SIGMAS * robot.camera.fx * spread, PLAN_PX)

@@ -19,7 +19,7 @@ from sim.render.sensor import SensorParameters
 from world_models.bounds import Bounds, check_bounds
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.mission import ROOT, TABLES, Limits, Mission, MissionFormat, named_file
-from world_models.files.toml.settings import MOST, near, read_settings
+from world_models.files.toml.settings import MAX_NUMBER, read_settings, suggest_keys
 from world_models.files.toml.source import Key, Source, WorldError
 
 SCENARIOS = ROOT / "sim" / "scenarios"
@@ -84,7 +84,7 @@ class ScenarioLimits(Limits):
 
     def __post_init__(self) -> None:
         Limits.__post_init__(self)
-        check_bounds(self, {"max_path_m": Bounds(0.0, MOST, above=True), "max_collisions": Bounds(0, MOST)})
+        check_bounds(self, {"max_path_m": Bounds(0.0, MAX_NUMBER, above=True), "max_collisions": Bounds(0, MAX_NUMBER)})
 
 
 FORMAT = MissionFormat(
@@ -135,7 +135,8 @@ def load_scenario(path_or_name: str | Path) -> Scenario:
     if path.suffix != ".toml":
         path = SCENARIOS / f"{path_or_name}.toml"
         if str(path_or_name) not in list_scenarios():
-            raise ScenarioError(f"scenario: expected {near(str(path_or_name), list_scenarios())}, got {path_or_name!r}")
+            near = suggest_keys(str(path_or_name), list_scenarios())
+            raise ScenarioError(f"scenario: expected {near}, got {path_or_name!r}")
     try:
         return _scenario(Source.read(path), path.stem, path.parent)
     except WorldError as error:

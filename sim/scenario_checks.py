@@ -15,7 +15,7 @@ from world_models.building.faces import Face
 from world_models.building.outlines import inside_polygon
 from world_models.building.world import World
 from world_models.entries.location import Place
-from world_models.files.toml.settings import near
+from world_models.files.toml.settings import suggest_keys
 from world_models.units import FOOT_M
 
 STICKS_OUT_M = 0.15
@@ -40,7 +40,8 @@ def check_names(scenario: Scenario, world: World) -> None:
     for i, fault in enumerate(scenario.faults):
         for key, name in _named_by(fault):
             if name not in world.locales:
-                raise scenario.refused(("faults", i, key), f"expected {near(name, world.locales)}, got {name!r}")
+                near = suggest_keys(name, world.locales)
+                raise scenario.refused(("faults", i, key), f"expected {near}, got {name!r}")
     if not scenario.rides:
         return
     rides = {link.name: link.between for link in world.links if link.kind == "elevator"}
@@ -48,7 +49,7 @@ def check_names(scenario: Scenario, world: World) -> None:
     for i, helper in enumerate(scenario.rides):
         for key, name, known in (("passage", helper.passage, list(rides)), ("presses", helper.presses, landings)):
             if name and name not in known:
-                raise scenario.refused(("rides", i, key), f"expected {near(name, known)}, got {name!r}")
+                raise scenario.refused(("rides", i, key), f"expected {suggest_keys(name, known)}, got {name!r}")
 
 
 def faces_of(scenario: Scenario, world: World, faces: Sequence[Face]) -> Sequence[Face]:

@@ -21,10 +21,10 @@ from world_models.building.faces import Face
 from world_models.building.locales import Link
 from world_models.building.outlines import inside_polygon
 from world_models.building.world import World
+from world_models.commands import parse_command
 from world_models.entries.location import Place
-from world_models.files.store import WorldError, load_world
+from world_models.files.world_files import WorldError, load_world
 from world_models.frames import Pose2
-from world_models.phrases import places_of
 
 SAME_FLOOR_M = 0.5
 """Rooms whose floors differ by less are on one floor."""
@@ -101,7 +101,7 @@ def _world(scenario: Scenario) -> World:
 def _ends(scenario: Scenario, world: World) -> tuple[Place, Place]:
     """Where a scenario's mission begins and ends. Raises ScenarioError where the world has no such place."""
     try:
-        return places_of(scenario.goal, world)
+        return parse_command(scenario.goal, world)
     except ValueError as error:
         raise scenario.refused(("goal",), str(error)) from None
 

@@ -24,8 +24,8 @@ from world_models.entries.body import Frame, Look, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
 from world_models.entries.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch, Subgoal
-from world_models.files.store import read_world
 from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
 from world_models.frames import Pose2
 
 HOUSE = """

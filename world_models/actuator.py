@@ -1,7 +1,7 @@
-"""The actuator model (§3.2): what Harvey knows of how TURN and MOVE deviate from what is intended.
+"""The actuator model (§3.2): motion model of the primitives TURN and MOVE, with covariances.
 
-A MOVE drifts along a circular arc, tangent to the intended line at the start, and falls short by a factor that Table 1
-gives as constant "to 3 decimal places": 228.3 in of 240 in.
+A MOVE drifts along a circular arc, tangent to the intended line at its start, and falls short by a constant factor:
+228.3 in of 240 in (Table 1, constant "to 3 decimal places").
 """
 
 from __future__ import annotations
@@ -29,24 +29,29 @@ BOUNDS: Mapping[str, Bounds] = {
     "speed_m_per_s": Bounds(0.001, 10.0),
     "brake_m_per_s2": Bounds(0.001, 100.0),
 }
-"""Far beyond any wheels, but such that what is computed with them is finite and a leg comes to its end."""
-STRANGE = 4.0
+"""Wide enough for any wheels, narrow enough that all results are finite and every leg ends."""
+
+MAX_INNOVATION_SIGMAS = 4.0
+"""Gate of the drift filter: a curvature further off than this is a push or a slip and is ignored."""
 
 
 @dataclass(frozen=True, slots=True)
 class ActuatorModel:
-    """Standard deviations of one motion; OutOfBoundsError for what no wheels do.
+    """Motion model of one kind of wheels; all sigmas are standard deviations.
 
     Attributes:
-        reach: metres gone per metre commanded (Table 1: 228.3 / 240).
+        reach: metres driven per metre commanded (Table 1: 228.3 / 240).
         reach_sigma: of that factor, between robots and moves.
-        curvature_sigma_per_m: of the arc; a foot of drift in 20 ft (§5) is 0.016 per metre.
-        bend_sigma_per_m: of the arc of one move, round what the same wheels do in others.
-        turn_sigma: of a turn's error as a part of the turn; turn_sigma_rad: of the rest.
-        skitter_m: sideways motion of the tyres in a turn, along each axis.
-        increment_m: two feet, the increment between corrections (§5).
-        turn_increment_rad: the largest turn between corrections.
-        speed_m_per_s: of a motion that is corrected on the move; brake_m_per_s2: how it comes to a stand at the least.
+        curvature_sigma_per_m: of the arc of a MOVE; a foot of drift in 20 ft (§5) is 0.016 per metre.
+        bend_sigma_per_m: of one move's curvature round the mean curvature of the same wheels.
+        turn_sigma: of a turn's error, as a fraction of the turn; turn_sigma_rad: constant part of that error.
+        skitter_m: sideways slip of the tyres in a turn, along each axis.
+        increment_m: distance between corrections; two feet (§5).
+        turn_increment_rad: largest turn between corrections.
+        speed_m_per_s: of a motion corrected on the move; brake_m_per_s2: smallest deceleration when stopping.
+
+    Raises:
+        OutOfBoundsError: a value outside BOUNDS.
     """
 
     reach: float = 228.3 / 240.0
@@ -64,23 +69,26 @@ class ActuatorModel:
     def __post_init__(self) -> None:
         check_bounds(self, BOUNDS)
 
-    def commanded_m(self, distance_m: float) -> float:
-        """What to command so that about this distance is gone."""
+    def compute_command_m(self, distance_m: float) -> float:
+        """The MOVE to command [m] so that about ``distance_m`` is driven."""
         return distance_m / self.reach
 
-    def expected(self, turn_rad: float, move_m: float, curvature_per_m: float = 0.0) -> Pose2:
-        """Where a TURN and a MOVE are expected to lead, in the robot's frame before them; positive bends to the left.
+    def predict_motion(self, turn_rad: float, move_m: float, curvature_per_m: float = 0.0) -> Pose2:
+        """Expected pose after a TURN and a MOVE, in the robot's frame before them.
+
+        Positive curvature bends to the left.
         """
         return Pose2(0.0, 0.0, turn_rad) @ arc(self.reach * move_m, curvature_per_m)
 
     def turn_variance(self, turn_rad: float) -> float:
-        """Of a TURN's error [rad^2]."""
+        """Variance of a TURN's error [rad^2]."""
         return (self.turn_sigma * turn_rad) ** 2 + (self.turn_sigma_rad**2 if turn_rad else 0.0)
 
-    def spread(self, turn_rad: float, move_m: float) -> NDArray[np.float64]:
+    def motion_covariance(self, turn_rad: float, move_m: float) -> NDArray[np.float64]:
         """(3, 3) covariance of (x, y, heading) after a TURN and a MOVE, in the robot's frame before them.
 
-        An arc of curvature c ends c d^2 / 2 beside the line with its heading off by c d: the two errors go together.
+        An arc of length d and curvature c ends c d^2 / 2 beside the line, with heading error c d: the two errors
+        are correlated.
         """
         gone = self.reach * move_m
         turn_var = self.turn_variance(turn_rad)
@@ -93,53 +101,61 @@ class ActuatorModel:
         rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return np.asarray(rotation @ local @ rotation.T + np.diag([skitter**2, skitter**2, 1e-8]))
 
-    def stopping_m(self) -> float:
-        """The way in which it comes to a stand."""
+    def stopping_distance_m(self) -> float:
+        """Distance from full speed to standstill [m]."""
         return self.speed_m_per_s**2 / (2.0 * self.brake_m_per_s2)
 
-    def rolled(
+    def propagate_course(
         self, pose: Pose2, covariance: NDArray[np.float64], turn_rad: float, move_m: float, curvature_per_m: float
     ) -> tuple[Pose2, NDArray[np.float64]]:
-        """Pose and covariance (3, 3), both in one fixed frame, after a claimed part of a motion that goes on.
+        """Pose and covariance (3, 3) after one reported part of a continuous motion, in the frame they are given in.
 
-        The parts of one increment err alike, so that they add up to what :meth:`spread` says of the whole: the variance
-        of each is the increment's, by its share of the way.
+        The errors of the parts of one increment are fully correlated and add up to :meth:`motion_covariance` of the
+        whole: the variance of each part is the increment's, times its share of the distance.
         """
         gone = self.reach * move_m
         after = pose @ arc(gone, curvature_per_m + (turn_rad / gone if gone > 0.0 else 0.0))
         share = self.increment_m * gone
         along, turned = self.reach_sigma**2 * share, self.curvature_sigma_per_m**2 * share
         turned += (self.turn_sigma * turn_rad) ** 2
-        lever = np.eye(3)
-        lever[0, 2], lever[1, 2] = -(after.y_m - pose.y_m), after.x_m - pose.x_m
-        c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        spread = np.diag([along, turned * gone**2 / 4.0, turned]) + np.diag([1e-9, 1e-9, 1e-9])
-        return after, np.asarray(lever @ covariance @ lever.T + turn @ spread @ turn.T)
+        own = np.diag([along, turned * gone**2 / 4.0, turned]) + np.diag([1e-9, 1e-9, 1e-9])
+        return after, _propagate_covariance(pose, after, covariance, own)
 
-    def moved(
+    def propagate_move(
         self, pose: Pose2, covariance: NDArray[np.float64], turn_rad: float, move_m: float,
         curvature_per_m: float = 0.0,
     ) -> tuple[Pose2, NDArray[np.float64]]:
-        """Pose and covariance (3, 3), both in one fixed frame, after a claimed TURN and MOVE of a known drift."""
-        after = pose @ self.expected(turn_rad, move_m, curvature_per_m)
-        lever = np.eye(3)
-        lever[0, 2], lever[1, 2] = -(after.y_m - pose.y_m), after.x_m - pose.x_m
-        c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return after, np.asarray(lever @ covariance @ lever.T + turn @ self.spread(turn_rad, move_m) @ turn.T)
+        """Pose and covariance (3, 3) after a reported TURN and MOVE, in the frame they are given in.
+
+        ``curvature_per_m`` is the known drift.
+        """
+        after = pose @ self.predict_motion(turn_rad, move_m, curvature_per_m)
+        return after, _propagate_covariance(pose, after, covariance, self.motion_covariance(turn_rad, move_m))
+
+
+def _propagate_covariance(
+    before: Pose2, after: Pose2, covariance: NDArray[np.float64], motion_covariance: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """First-order propagation J P J^T + R Q R^T; Q (3, 3) is in the robot's frame before the motion."""
+    jacobian = np.eye(3)
+    jacobian[0, 2], jacobian[1, 2] = -(after.y_m - before.y_m), after.x_m - before.x_m
+    c, s = math.cos(before.heading_rad), math.sin(before.heading_rad)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(jacobian @ covariance @ jacobian.T + turn @ motion_covariance @ turn.T)
 
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """How this run's wheels bend a MOVE, as far as it is known, and the stretch of way from which more is learnt.
+    """Online estimate of the wheels' curvature bias: a one-dimensional Kalman filter.
+
+    One measurement is the change of heading over a stretch of way, from :meth:`restart` to :meth:`update`.
 
     Attributes:
-        curvature_per_m: of the arc that a MOVE is; positive drifts to the left.
+        curvature_per_m: of a MOVE; positive drifts to the left.
         sigma_per_m: its standard deviation.
-        heading_rad: believed at the beginning of the stretch [world].
-        turned_rad, turned_variance: what was commanded since, and how well that is carried out.
-        gone_m: metres since.
+        heading_rad: believed at the start of the stretch [rad, world].
+        turned_rad, turned_variance: turns commanded since, and the variance of their execution.
+        gone_m: metres driven since.
     """
 
     curvature_per_m: float
@@ -151,42 +167,45 @@ class Drift:
 
     @staticmethod
     def unknown(actuator: ActuatorModel, heading_rad: float) -> Drift:
-        """Before anything is seen of it."""
+        """The prior: zero curvature, the actuator model's standard deviation."""
         return Drift(0.0, actuator.curvature_sigma_per_m, heading_rad)
 
-    def rolled(self, actuator: ActuatorModel, turn_rad: float, move_m: float, *, on_the_spot: bool = True) -> Drift:
-        """After a claimed TURN, on the spot or as a part of an arc that is steered, and MOVE."""
+    def after_motion(
+        self, actuator: ActuatorModel, turn_rad: float, move_m: float, *, on_the_spot: bool = True
+    ) -> Drift:
+        """The stretch extended by a reported TURN and MOVE; ``on_the_spot=False`` for a turn steered along an arc."""
         variance = actuator.turn_variance(turn_rad) if on_the_spot else (actuator.turn_sigma * turn_rad) ** 2
         return replace(
             self, turned_rad=self.turned_rad + turn_rad, gone_m=self.gone_m + actuator.reach * move_m,
             turned_variance=self.turned_variance + variance,
         )
 
-    def begun(self, heading_rad: float) -> Drift:
-        """A stretch begins here."""
+    def restart(self, heading_rad: float) -> Drift:
+        """The same estimate; a new stretch starts here."""
         return Drift(self.curvature_per_m, self.sigma_per_m, heading_rad)
 
-    def learnt(self, actuator: ActuatorModel, heading_rad: float, sigma_rad: float) -> Drift:
-        """At the end of a stretch, whose heading is seen: what it bent by is one more measurement (Kalman).
+    def update(self, actuator: ActuatorModel, heading_rad: float, sigma_rad: float) -> Drift:
+        """Kalman update with the heading measured at the end of a stretch; a new stretch starts here.
 
-        What wheels cannot well have done (``STRANGE`` deviations), as when somebody pushed the robot, teaches nothing.
+        An innovation above MAX_INNOVATION_SIGMAS, as after a push, leaves the estimate as it was.
 
         Args:
-            sigma_rad: of the change of heading as it was seen.
+            heading_rad: measured [rad, world].
+            sigma_rad: standard deviation of the measured change of heading.
         """
         if self.gone_m <= 0.0:
-            return self.begun(heading_rad)
+            return self.restart(heading_rad)
         bent = wrap_angle(heading_rad - self.heading_rad - self.turned_rad) / self.gone_m
         noise = (self.turned_variance + sigma_rad**2) / self.gone_m**2 + actuator.bend_sigma_per_m**2
-        if (bent - self.curvature_per_m) ** 2 > STRANGE**2 * (self.sigma_per_m**2 + noise):
-            return self.begun(heading_rad)
+        if (bent - self.curvature_per_m) ** 2 > MAX_INNOVATION_SIGMAS**2 * (self.sigma_per_m**2 + noise):
+            return self.restart(heading_rad)
         gain = self.sigma_per_m**2 / (self.sigma_per_m**2 + noise)
         curvature = self.curvature_per_m + gain * (bent - self.curvature_per_m)
         return Drift(curvature, math.sqrt(1.0 - gain) * self.sigma_per_m, heading_rad)
 
 
 def arc(length_m: float, curvature_per_m: float) -> Pose2:
-    """Along a circular arc, tangent to x at its start; positive curvature bends to the left (§3.2)."""
+    """The pose at the end of a circular arc that starts along x; positive curvature bends to the left (§3.2)."""
     turn = length_m * curvature_per_m
     if abs(turn) < 1e-9:
         return Pose2(length_m, 0.5 * length_m * turn, turn)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from world_models.entries.obstruction import Obstruction
 from world_models.frames import Pose, frozen
 
-NEAR_M = 0.05
+NEAR_PLANE_M = 0.05
 """Nothing nearer than this to the optical centre is projected [m]."""
 
 UNDONE_STEPS, UNDONE_END, LEAST_RADIAL = 300, 1e-12, 0.2
@@ -132,9 +132,9 @@ class Camera:
             return out, np.zeros(0, bool)
         # Near plane: move the end that is behind it along the segment.
         z = p[..., 2]
-        front = z > NEAR_M
+        front = z > NEAR_PLANE_M
         dz = z[:, 1] - z[:, 0]
-        t = (NEAR_M - z[:, 0]) / np.where(np.abs(dz) < 1e-12, 1.0, dz)
+        t = (NEAR_PLANE_M - z[:, 0]) / np.where(np.abs(dz) < 1e-12, 1.0, dz)
         cut = p[:, 0] + t[:, None] * (p[:, 1] - p[:, 0])
         for end in (0, 1):
             move = ~front[:, end] & front[:, 1 - end]

@@ -42,7 +42,7 @@ class RobotModel:
             object.__setattr__(self, "lens", self.camera)
         object.__setattr__(self, "camera", self.lens.pinhole)
 
-    def standing_in(self, locale: str) -> RobotModel:
+    def on_floor_of(self, locale: str) -> RobotModel:
         """The robot on the floor of a locale. Poses are told on the plan of the world: one floor up, its camera is as
         much higher above that plan, as if it were mounted there."""
         height_m = self.world.floor_m(locale)
@@ -54,7 +54,7 @@ class RobotModel:
             self._raised[height_m] = raised
         return self._raised[height_m]
 
-    def behind(self, obstruction: Obstruction | None) -> RobotModel:
+    def with_obstruction(self, obstruction: Obstruction | None) -> RobotModel:
         """The robot, who knows that something stands before its camera: it expects to see nothing there."""
         if obstruction == self.camera.obstruction:
             return self

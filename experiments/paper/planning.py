@@ -92,8 +92,8 @@ def sum_of(clock: Clock) -> float:
 
 
 def _planned(known: RobotModel, scenario: Scenario) -> Clock:
-    world = World(known.world.frames)
-    world.memo["looks"] = known.world.memo.setdefault("looks", {})  # surfaces in arrays, laid out once
+    world = World(known.world.locale_source)
+    world.cache["looks"] = known.world.cache.setdefault("looks", {})  # surfaces in arrays, laid out once
     return planned(replace(known, world=world), scenario)
 
 

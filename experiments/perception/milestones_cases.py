@@ -252,7 +252,8 @@ def _spread(actuator: ActuatorModel, pose: Pose2, rng: np.random.Generator) -> F
     at = pose
     for _ in range(int(rng.integers(1, 4))):
         turn = float(rng.uniform(-1.0, 1.0)) * actuator.turn_increment_rad * float(rng.random() < 0.5)
-        at, covariance = actuator.moved(at, covariance, turn, float(rng.uniform(0.2, 1.0)) * actuator.increment_m)
+        move = float(rng.uniform(0.2, 1.0)) * actuator.increment_m
+        at, covariance = actuator.propagate_move(at, covariance, turn, move)
     return covariance
 
 

@@ -21,8 +21,8 @@ from sim.render.rasterizer import sample_offsets, visible_patches
 from world_models.building.outlines import inside_polygon
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
-from world_models.files.store import read_world
 from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
 from world_models.frames import Pose, Pose2
 from world_models.visibility.lines_and_points import hidden
 

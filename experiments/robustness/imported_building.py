@@ -20,11 +20,12 @@ from experiments.report import Cell, Report
 from experiments.trials import found_by_all
 from harvey.campaign.campaign import Task, run_task
 from harvey.run_files.run_directory import RUNS
+from world_models.building.checks import check_world
 from world_models.building.outlines import distance_to_border
 from world_models.building.world import World
+from world_models.commands import find_open_point
 from world_models.files.importers import import_building
-from world_models.files.store import load_world
-from world_models.phrases import middle_of
+from world_models.files.world_files import load_world
 
 if TYPE_CHECKING:
     from harvey.simulation.referee import MissionResult
@@ -91,7 +92,7 @@ def run(quick: bool, seed: int) -> Report:
               if not _arrived(end) or end.collisions),
         ),
         claims=(
-            ("the imported house is a world without faults", not world.check()),
+            ("the imported house is a world without faults", not check_world(world)),
             (f"at least {_least(len(ends))} of {len(ends)} missions reach their goals, and truly are within"
              f" {1000.0 * NEAR_M:.0f} mm of them", sum(map(_arrived, ends)) >= _least(len(ends))),
             ("every other one ends in a declared outcome", all(_arrived(r) or _declared(r) for r in ends)),
@@ -124,7 +125,7 @@ def _groups(world: World) -> Mapping[str, tuple[str, ...]]:
 
 def _room_m(world: World, room: str) -> float:
     """How far the middle of a room is from its walls and from what stands in it [m]."""
-    middle = middle_of(world, room).in_world(world).position
+    middle = find_open_point(world, room).in_world(world).position
     return min(distance_to_border(middle, border) for border in (world.outline(room), *world.obstacles(room)))
 
 

@@ -16,10 +16,11 @@ import numpy as np
 
 from experiments.building_files import UNIVERSITY, building_file, where_it_should_be
 from experiments.report import Cell, Report
-from world_models.building.passages import passable
+from world_models.building.checks import check_world
+from world_models.building.passages import drivable_passages
 from world_models.building.world import World
 from world_models.files.importers import Network, import_building
-from world_models.files.store import load_world
+from world_models.files.world_files import load_world
 
 DEEPEST = 20
 """No route is refined more often."""
@@ -56,7 +57,7 @@ def run(quick: bool, seed: int) -> Report:
         (Path(folder) / "university.toml").write_text(made.text, encoding="utf-8")
         world = load_world(Path(folder) / "university.toml")
         pairs = pairs_of(world, made.network)
-        faults = world.check()
+        faults = check_world(world)
     floors = sorted({pair.floors for pair in pairs})
     rows = [_row(" and ".join(both), [pair for pair in pairs if pair.floors == both]) for both in floors]
     return Report(
@@ -119,7 +120,7 @@ def refined(world: World, origin: str, destination: str, depth: int = 0) -> list
 
 def _passages(world: World) -> set[frozenset[str]]:
     """The pairs of rooms that are joined for wheels."""
-    return {frozenset((a, b)) for _, a, b in passable((*world.doorways, *world.links))}
+    return {frozenset((a, b)) for _, a, b in drivable_passages((*world.doorways, *world.links))}
 
 
 def _hangs_together(world: World, pair: Pair) -> bool:

@@ -30,9 +30,10 @@ from experiments.report import Report
 from experiments.robustness.malformed_buildings_text import GML, IFC
 from experiments.robustness.malformed_worlds_text import SMALL
 from harvey.campaign.worker_pool import by_workers
+from world_models.building.checks import check_world
 from world_models.files.importers import BuildingError, import_building
-from world_models.files.store import compile_file, load_world, read_world
 from world_models.files.toml.source import Source, WorldError
+from world_models.files.world_files import compile_file, load_world, read_world
 
 FILES, QUICK_FILES = 10_000, 400
 CHUNK, QUICK_CHUNK = 100, 20
@@ -165,13 +166,13 @@ def _read(content: str | bytes, path: Path) -> str:
         path.write_bytes(content)
         world = load_world(path)
         world.locales.values()
-        faces, faults = world.faces, world.check()
+        faces, faults = world.faces, check_world(world)
         assert faces is not None
     elif path.suffix == ".toml":
-        faults = read_world(Source.parse(content, path.name)).check()
+        faults = check_world(read_world(Source.parse(content, path.name)))
     else:
         path.write_text(content, encoding="utf-8")
-        faults = read_world(Source.parse(import_building(path).text, "world.toml")).check()
+        faults = check_world(read_world(Source.parse(import_building(path).text, "world.toml")))
     unclear = [str(f) for f in faults if "expected" not in f.what or "got" not in f.what or not f.source]
     if unclear and not isinstance(content, bytes):
         return f"unclear: {unclear[0]}"

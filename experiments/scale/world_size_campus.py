@@ -20,15 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from world_models.building.faces import Face, painted
-from world_models.building.frame_source import Packet
+from world_models.building.faces import Face, build_barrier
 from world_models.building.landmarks import Edges, Landmark
+from world_models.building.locale_source import LocaleGeometry
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.regions import Finish, level
+from world_models.building.regions import Finish, expected_brightness
 from world_models.building.world import World
-from world_models.files.compiled.packing import packed, packed_array
-from world_models.files.compiled.writer import StoreWriter
-from world_models.files.store import WORLDS, load_world
+from world_models.files.compiled.packing import pack_array, packed
+from world_models.files.compiled.writer import WorldWriter
+from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose
 
 DETAILS = Path(__file__).parents[2] / "sim" / "buildings" / "research_center_details.toml"
@@ -62,18 +62,18 @@ def make_campus(locales: int, folder: Path) -> Made:
         partial = path.with_name(f"{path.name}.{os.getpid()}")
         try:
             with closing(sqlite3.connect(partial)) as file:
-                _Campus(StoreWriter(file, "campus", [DETAILS.stem])).write(buildings)
+                _Campus(WorldWriter(file, "campus", [DETAILS.stem])).write(buildings)
             os.replace(partial, path)
         finally:
             partial.unlink(missing_ok=True)
-    frames = load_world(path).frames
+    frames = load_world(path).locale_source
     return Made(path, frames.counts()["locale"], frames.counts()["face"])
 
 
 class _Campus:
     """The campus while it is written."""
 
-    def __init__(self, writer: StoreWriter) -> None:
+    def __init__(self, writer: WorldWriter) -> None:
         self._writer = writer
         self._counts = {"locale": 0, "room": 0, "open doorway": 0, "thing": 0, "face": 0, "landmark": 0}
 
@@ -114,7 +114,7 @@ class _Campus:
             self._writer.add_doorway(doorway)
         faces, marks = len(model.faces), len(model.landmarks)
         for layer, world in enumerate((model, detailed)):
-            for packet in world.frames.all_packets():
+            for packet in world.locale_source.all_geometry():
                 kept = packet if layer == 0 else replace(
                     packet, faces=tuple(p for p in packet.faces if p[0] >= faces),
                     landmarks=tuple(p for p in packet.landmarks if p[0] >= marks))
@@ -145,14 +145,14 @@ class _Campus:
             for doorway in template.doorways(prefix, x, y + 8.0):
                 self._writer.add_doorway(doorway)
                 self._counts["open doorway"] += 1
-            self._packets(template, prefix, x, y + 8.0, building)
+            self._geometry(template, prefix, x, y + 8.0, building)
             bar.update()
         return grounds
 
     def _link(self, name: str, a: str, b: str, at: tuple[float, float]) -> None:
         self._writer.add_link(Link(name, "elevator", (a, b), np.array([(*at, 0.0)] * 2)))
 
-    def _packets(self, template: _Template, prefix: str, x: float, y: float, building: int) -> None:
+    def _geometry(self, template: _Template, prefix: str, x: float, y: float, building: int) -> None:
         first = 10_000 + building * (template.faces + template.landmarks)
         for packet in template.packets:
             self._writer.add_packed(f"{prefix}-{packet.locale}", packet.neighbour and f"{prefix}-{packet.neighbour}",
@@ -178,7 +178,7 @@ class _Moulded:
         return json.dumps(rows, separators=(",", ":")).replace('"@', f'"{prefix}-')
 
     def numbers_at(self, x: float, y: float) -> bytes:
-        return packed_array(self.numbers + x * self.moves_x + y * self.moves_y)
+        return pack_array(self.numbers + x * self.moves_x + y * self.moves_y)
 
 
 class _Template:
@@ -250,7 +250,7 @@ def _rooms() -> list[_Room]:
     return rooms
 
 
-def _packets(x: float, y: float) -> list[Packet]:
+def _packets(x: float, y: float) -> list[LocaleGeometry]:
     """The faces and landmarks of the template with its corner at (x, y); names begin with @ for the building's."""
     packets, faces, marks = [], 0, 0
     for floor in range(FLOORS):
@@ -258,11 +258,11 @@ def _packets(x: float, y: float) -> list[Packet]:
         for room in _rooms():
             own = _shell(f"@f{floor}-{room.name}", room, x, base)
             mark = Landmark(f"{own[0].locale}/corners", own[0].locale, "wall", _corners(room, x, base))
-            packets.append(Packet(own[0].locale, None, tuple(enumerate(own, faces)), ((marks, mark),)))
+            packets.append(LocaleGeometry(own[0].locale, None, tuple(enumerate(own, faces)), ((marks, mark),)))
             faces, marks = faces + len(own), marks + 1
             if room.name != "corridor":
                 door = _door(f"@f{floor}", room, x, base)
-                packets.append(Packet(own[0].locale, f"@f{floor}-corridor", tuple(enumerate(door, faces)), ()))
+                packets.append(LocaleGeometry(own[0].locale, f"@f{floor}-corridor", tuple(enumerate(door, faces)), ()))
                 faces += len(door)
     return packets
 
@@ -272,9 +272,10 @@ def _shell(name: str, room: _Room, x: float, y: float) -> list[Face]:
     x1, y1 = x0 + room.width, y0 + room.depth
     floor = [(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)]
     ceiling = [(cx, cy, HEIGHT_M) for cx, cy, _ in reversed(floor)]
-    faces = [painted(f"{name}/floor", name, floor, FLOOR), painted(f"{name}/ceiling", name, ceiling, CEILING)]
+    faces = [build_barrier(f"{name}/floor", name, floor, FLOOR),
+             build_barrier(f"{name}/ceiling", name, ceiling, CEILING)]
     sides = zip(("south", "east", "north", "west"), floor, [*floor[1:], floor[0]], strict=True)
-    return faces + [painted(f"{name}/{side}-wall", name, _upright(b, a, HEIGHT_M), WALL) for side, a, b in sides]
+    return faces + [build_barrier(f"{name}/{side}-wall", name, _upright(b, a, HEIGHT_M), WALL) for side, a, b in sides]
 
 
 def _corners(room: _Room, x: float, y: float) -> Edges:
@@ -284,7 +285,8 @@ def _corners(room: _Room, x: float, y: float) -> Edges:
     rows = []
     for cx, cy, nx, ny in ((x0, y0, 1.0, 1.0), (x1, y0, -1.0, 1.0), (x1, y1, -1.0, -1.0), (x0, y1, 1.0, -1.0)):
         normals = np.array([(nx, 0.0, 0.0), (0.0, ny, 0.0)])
-        rows.append(([(cx, cy, 0.0), (cx, cy, HEIGHT_M)], normals, [level(WALL, n) for n in normals] + [float("nan")]))
+        levels = [*(expected_brightness(WALL, n) for n in normals), float("nan")]
+        rows.append(([(cx, cy, 0.0), (cx, cy, HEIGHT_M)], normals, levels))
     return Edges.of(rows)
 
 
@@ -299,10 +301,10 @@ def _door(prefix: str, room: _Room, x: float, y: float) -> list[Face]:
     more = {"neighbour": corridor, "parent": near.name}
     return [
         near, far,
-        painted(f"{name}/left-jamb", locale, _upright(low[3], low[0], DOOR_HEIGHT_M), FRAME, **more),
-        painted(f"{name}/right-jamb", locale, _upright(low[1], low[2], DOOR_HEIGHT_M), FRAME, **more),
-        painted(f"{name}/soffit", locale, high[::-1], FRAME, **more),
-        painted(f"{name}/threshold", locale, low, FLOOR, **more),
+        build_barrier(f"{name}/left-jamb", locale, _upright(low[3], low[0], DOOR_HEIGHT_M), FRAME, **more),
+        build_barrier(f"{name}/right-jamb", locale, _upright(low[1], low[2], DOOR_HEIGHT_M), FRAME, **more),
+        build_barrier(f"{name}/soffit", locale, high[::-1], FRAME, **more),
+        build_barrier(f"{name}/threshold", locale, low, FLOOR, **more),
     ]
 
 

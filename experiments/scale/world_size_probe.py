@@ -24,7 +24,7 @@ from sim.body.faulty_body import FaultyBody
 from sim.scenario import parse_scenario
 from sim.stage import Stage, set_stage
 from world_models.building.world import World
-from world_models.files.compiled.sqlite_frames import SqliteFrames
+from world_models.files.compiled.sqlite_locales import SqliteLocales
 
 SCENARIO = """
 world = "{world}"
@@ -88,8 +88,8 @@ def _opened(stage: Stage) -> dict[str, Any]:
 
 def _far_ms(world: World) -> float:
     """How long it takes to sketch the way to the last locale, and its first and last stretch."""
-    frames = world.frames
-    assert isinstance(frames, SqliteFrames)
+    frames = world.locale_source
+    assert isinstance(frames, SqliteLocales)
     last = frames.last_room()
     began = time.process_time()
     route = world.route("robot-laboratory", last)
@@ -105,8 +105,8 @@ def _drive(stage: Stage, seed: int) -> dict[str, Any]:
                           servoing=servoing(stage.scenario.servo), sinks=(watcher,))
     scheduler.tell([Post(stage.scenario.command)], "user")
     outcome = until_outcome(scheduler)
-    frames = robot.world.frames
-    assert isinstance(frames, SqliteFrames)
+    frames = robot.world.locale_source
+    assert isinstance(frames, SqliteLocales)
     return {"outcome": outcome.kind, "journal": watcher.journal, "decisions": watcher.decisions,
             "touched": len(frames.touched), "frames": frames.touched}
 

@@ -56,7 +56,7 @@ class Task:
     def stage(self) -> Stage:
         """Raises BadInput where the scenario or a setting cannot be used."""
         from sim.scenario import ScenarioError, load_scenario, with_settings
-        from world_models.files.store import WorldError, fingerprint
+        from world_models.files.world_files import WorldError, fingerprint
 
         try:
             scenario = with_settings(load_scenario(self.scenario), dict(self.settings))

@@ -39,14 +39,14 @@ def _run(args: Namespace) -> int:
 
 
 def _load(file: str, details: list[str]) -> World:
-    from world_models.files.store import load_world
+    from world_models.files.world_files import load_world
 
     return load_world(_path(file), details=details)
 
 
 def _path(file: str) -> Path:
     """A file, or one that comes with the project, by its bare name."""
-    from world_models.files.store import SUFFIXES, WORLDS
+    from world_models.files.world_files import SUFFIXES, WORLDS
 
     shipped = WORLDS / f"{file}.toml"
     if file.endswith((".toml", *SUFFIXES)):
@@ -58,7 +58,7 @@ def _path(file: str) -> Path:
 
 
 def _compile(file: str, details: list[str], out: str | None) -> int:
-    from world_models.files.store import SUFFIXES, compile_file
+    from world_models.files.world_files import SUFFIXES, compile_file
 
     path = _path(file)
     if path.suffix != ".toml":
@@ -73,7 +73,7 @@ def _compile(file: str, details: list[str], out: str | None) -> int:
 
 def _import(file: str, out: str | None) -> int:
     from world_models.files.importers import BuildingError, import_building
-    from world_models.files.store import load_world
+    from world_models.files.world_files import load_world
 
     path = Path(file)
     target = Path(out or path.with_suffix(".toml").name)
@@ -89,7 +89,9 @@ def _import(file: str, out: str | None) -> int:
 
 
 def _check(world: World, file: str) -> int:
-    faults = world.check()
+    from world_models.building.checks import check_world
+
+    faults = check_world(world)
     for fault in faults:
         print(fault)
     if faults:

@@ -20,13 +20,14 @@ from harvey.hardware.mission import HardwareMission
 from harvey.units import count
 from knowledge_sources.methods.features.images import decode
 from knowledge_sources.plan.milestone_judge import DARK
+from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
+from world_models.commands import parse_command
 from world_models.entries.location import Place
-from world_models.files.store import load_world
 from world_models.files.toml.camera_file import load_camera
 from world_models.files.toml.source import WorldError
-from world_models.phrases import places_of
+from world_models.files.world_files import load_world
 from world_models.robot import RobotModel
 
 ROOM_BYTES = 500_000_000
@@ -109,7 +110,7 @@ class Preflight:
             world = load_world(self._mission.world)
         except WorldError as error:
             return None, Check("world", str(error), "correct the world file: harvey world check FILE")
-        faults = world.check()
+        faults = check_world(world)
         if faults:
             found = f"{faults[0]}" + (f" (and {len(faults) - 1} more)" if len(faults) > 1 else "")
             return world, Check("world", found, f"harvey world check {self._mission.world}")
@@ -134,7 +135,7 @@ class Preflight:
 
     def _plan(self, robot: RobotModel) -> Iterator[Check]:
         try:
-            origin, destination = places_of(self._mission.goal, robot.world)
+            origin, destination = parse_command(self._mission.goal, robot.world)
         except ValueError as error:
             yield Check("goal", str(error), "name one room for each end: harvey world show")
             return

@@ -15,7 +15,7 @@ from unittest.mock import patch
 
 import knowledge_sources
 from harvey.errors import BadInput
-from world_models.files.toml.settings import near, parsed
+from world_models.files.toml.settings import parse_value, suggest_keys
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +63,9 @@ def set_for_a_while(settings: Sequence[tuple[str, str]]) -> Iterator[None]:
 def _number(key: str, value: str) -> float:
     known = constants()
     if key not in known:
-        raise BadInput(f"--set {key}: expected servo.action, servo.plan, servo.goal or {near(key, known)}, got {key!r}")
-    number = parsed(value)
+        raise BadInput(f"--set {key}: expected servo.action, servo.plan, servo.goal or {suggest_keys(key, known)}, "
+                       f"got {key!r}")
+    number = parse_value(value)
     if isinstance(number, bool) or not isinstance(number, int | float) or not math.isfinite(number):
         raise BadInput(f"--set {key}: expected a number as {known[key].value:g}, got {value!r}")
     return int(number) if isinstance(known[key].value, int) and number == int(number) else float(number)

@@ -20,8 +20,8 @@ from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries.task import Command
-from world_models.files.store import fingerprint, load_world
 from world_models.files.toml.mission import ROOT, Servo
+from world_models.files.world_files import fingerprint, load_world
 from world_models.robot import RobotModel
 
 SIMULATOR, HARDWARE = "simulator", "hardware"

@@ -30,7 +30,7 @@ from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Outcome
-from world_models.files.store import load_world
+from world_models.files.world_files import load_world
 from world_models.robot import RobotModel
 
 Around = Callable[[Body, Callable[[], bool]], Body]

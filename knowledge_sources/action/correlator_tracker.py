@@ -146,7 +146,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         drift = view.latest(Drift)
         if drift is not None:
             heading = fresh.hypothesis.world_from_robot(self._robot.world).heading_rad
-            yield Revise(drift, drift.value.begun(heading), (tracks,))
+            yield Revise(drift, drift.value.restart(heading), (tracks,))
         if fresh.hypothesis is not belief.value:
             yield Revise(belief, fresh.hypothesis, (frame, belief, tracks))
 
@@ -156,7 +156,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         if drift is None or drift.value.gone_m < STRETCH_M:
             return
         heading = belief.world_from_robot(self._robot.world).heading_rad
-        told = drift.value.learnt(self._robot.actuator, heading, math.sqrt(2.0) * belief.sigma_rad)
+        told = drift.value.update(self._robot.actuator, heading, math.sqrt(2.0) * belief.sigma_rad)
         yield Revise(drift, told, (drift, correction))
 
     def _followed(self, view: View, tracks: Tracks | None, image: Image, belief: Hypothesis) -> list[TrackUpdate]:
@@ -175,7 +175,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         """The belief after the landmarks were found."""
         world = self._robot.world
         pose, covariance, agreeing = correct_pose(
-            self._robot.standing_in(belief.locale), seen, anchors, belief.world_from_robot(world),
+            self._robot.on_floor_of(belief.locale), seen, anchors, belief.world_from_robot(world),
             belief.covariance_world(world),
         )
         hypothesis = Hypothesis.of_world(world, belief.locale, pose, covariance, "tracks", motion=belief.motion)

@@ -51,7 +51,7 @@ class DeadReckoner(RobotKnowledgeSource):
         drift = Drift.unknown(actuator, before.heading_rad) if known is None else known.value
         request = view.get(trigger.entry.because[0].id)
         on_the_move = request is not None and isinstance(request.value, Course)
-        pose, covariance = (actuator.rolled if on_the_move else actuator.moved)(
+        pose, covariance = (actuator.propagate_course if on_the_move else actuator.propagate_move)(
             before, belief.value.covariance_world(world), report.turn_rad, report.move_m, drift.curvature_per_m
         )
         there = world.locale_at([*pose.position, world.floor_m(belief.value.locale)])
@@ -62,7 +62,7 @@ class DeadReckoner(RobotKnowledgeSource):
         moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=trigger.entry.id)
         step = Revise(belief, moved, (trigger.entry, belief) if fault is None else (trigger.entry, belief, fault))
         yield step
-        rolled = drift.rolled(actuator, report.turn_rad, report.move_m, on_the_spot=not on_the_move)
+        rolled = drift.after_motion(actuator, report.turn_rad, report.move_m, on_the_spot=not on_the_move)
         yield Post(rolled, (trigger.entry,)) if known is None else Revise(known, rolled, (trigger.entry, known))
         if on_the_move and fault is None:
             return  # the picture is there: it was taken on the move
@@ -77,7 +77,7 @@ class DeadReckoner(RobotKnowledgeSource):
     def _lacking(self, request: MotorCommand | Course, report: MotionReport) -> tuple[float, float]:
         """What may have been done beyond what is claimed: (turn [rad], move [m])."""
         if isinstance(request, Course):
-            return 0.0, self._robot.actuator.stopping_m()
+            return 0.0, self._robot.actuator.stopping_distance_m()
         return request.turn_rad - report.turn_rad, request.move_m - report.move_m
 
 

@@ -141,7 +141,7 @@ class Motor(RobotKnowledgeSource):
         if abs(turn) > FACING_RAD:
             return MotorCommand(self._bounded(turn), 0.0)
         actuator = self._robot.actuator
-        distance = min(actuator.increment_m, actuator.commanded_m(away))
+        distance = min(actuator.increment_m, actuator.compute_command_m(away))
         turn = compute_chord_turn(turn, curvature_per_m, actuator.reach * distance)
         return MotorCommand(turn if abs(turn) > AIM_RAD / 10 else 0.0, distance)
 

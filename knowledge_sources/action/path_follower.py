@@ -120,7 +120,7 @@ class PathFollower(RobotKnowledgeSource):
 
     def _is_worth_it(self, leg: Leg, here: Pose2) -> bool:
         """Whether there is way enough to come to a stand before the end of the leg."""
-        return measure_progress(leg, here)[0] > self._robot.actuator.stopping_m() + ROLL_M
+        return measure_progress(leg, here)[0] > self._robot.actuator.stopping_distance_m() + ROLL_M
 
 
 def _off(leg: Leg, here: Pose2) -> float:

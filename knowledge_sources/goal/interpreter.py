@@ -10,10 +10,10 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.commands import parse_command
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.task import Command, Goal, Outcome
 from world_models.frames import Pose2
-from world_models.phrases import places_of
 
 
 class Interpreter(RobotKnowledgeSource):
@@ -40,5 +40,5 @@ class Interpreter(RobotKnowledgeSource):
         yield Post(Goal(origin, destination), (trigger.entry,))
 
     def _places(self, command: Command) -> tuple[Place, Place]:
-        origin, destination = places_of(command.text, self._robot.world)
+        origin, destination = parse_command(command.text, self._robot.world)
         return origin, replace(destination, heading_rad=command.arrival_heading_rad)

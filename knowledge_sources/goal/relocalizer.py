@@ -95,7 +95,7 @@ class Relocalizer(RobotKnowledgeSource):
             yield change
         if obstruction is not None:
             because = (segments, lost, hidden if change is None else change)
-        robot = self._robot.behind(obstruction).standing_in(belief.value.locale)
+        robot = self._robot.with_obstruction(obstruction).on_floor_of(belief.value.locale)
         result = localize(robot, looks, self._rooms(belief.value))
         if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or len(glimpses) >= PROBES:
             result = self._within_reach(result, belief.value.locale)
@@ -135,7 +135,7 @@ class Relocalizer(RobotKnowledgeSource):
 
     def _moved(self, glimpse: Glimpse, report: MotionReport) -> Glimpse:
         actuator, claim = self._robot.actuator, (report.turn_rad, report.move_m)
-        step, spread = actuator.expected(*claim), actuator.spread(*claim)
+        step, spread = actuator.predict_motion(*claim), actuator.motion_covariance(*claim)
         pose, covariance = propagate_pose(glimpse.now_from_then, np.array(glimpse.covariance), step, spread)
         return replace(glimpse, now_from_then=pose, covariance=covariance_tuple(covariance))
 

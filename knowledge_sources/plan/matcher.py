@@ -73,7 +73,7 @@ class Matcher(RobotKnowledgeSource):
         if self._robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / NEAR_M) <= RIGID_PX:
             model_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
             return match_lines(model_px, data_px, pair_px=PAIR_PX, objective="likelihood")
-        robot = self._robot.standing_in(belief.locale)
+        robot = self._robot.on_floor_of(belief.locale)
         return match_on_floor(
             lines_world, data_px, robot.camera, robot.mount.camera_from_robot,
             belief.world_from_robot(self._robot.world), belief.covariance_world(self._robot.world),

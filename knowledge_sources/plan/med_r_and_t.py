@@ -49,7 +49,7 @@ class MedRAndT(RobotKnowledgeSource):
             match.value.lines_world,
             match.value.segments_px,
             self._robot.camera,
-            self._robot.standing_in(belief.value.locale).mount.camera_from_robot,
+            self._robot.on_floor_of(belief.value.locale).mount.camera_from_robot,
             belief.value.world_from_robot(self._robot.world),
             prior_covariance=prior,
             landmark_ids=[m.landmark_of[i] for i in match.value.pairs[:, 0]],

@@ -20,8 +20,8 @@ import numpy as np
 from sim.made_up.generated_floors_text import Table, as_toml, scaled, tinted
 from sim.render.renderer import illumination
 from world_models.building.world import World
-from world_models.files.store import WORLDS, read_world
 from world_models.files.toml.source import Source
+from world_models.files.world_files import WORLDS, read_world
 
 SOURCE = WORLDS / "parts" / "standard.toml"
 DETAILS = Path(__file__).parents[1] / "buildings" / "research_center_details.toml"

@@ -1,9 +1,8 @@
-"""What is wrong with a world that could be read: rooms that overlap, leak or cannot be reached, things misplaced."""
+"""Checks of a world that could be read: rooms that overlap, leak or cannot be reached; misplaced things."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import networkx as nx
 import numpy as np
@@ -11,76 +10,75 @@ from numpy.typing import NDArray
 
 from world_models.building.locales import Locale
 from world_models.building.outlines import distance_to_border, inside_polygon
-from world_models.building.things import STEP_M
-
-if TYPE_CHECKING:
-    from world_models.building.world import World
-
-Finding = tuple[str, str]
-"""(file:line, what is wrong)."""
+from world_models.building.things import STEP_M, Finding
+from world_models.building.world import World
 
 TOLERANCE_M = 0.01
-IN_DOORWAY_M = 0.05
-"""What is nearer than this to the opening is in it."""
+"""Overlaps and overhangs up to this are not reported."""
 
-UNDER_WALLS_M = 0.3
-"""Outdoors nobody looks over walls that are higher than this."""
+DOORWAY_CLEARANCE_M = 0.05
+"""A thing nearer than this to an opening stands in it."""
+
+OUTDOOR_EYE_M = 0.3
+"""Outdoors rays start this low: walls under the sky may be low."""
 
 
-def faults_of(world: World) -> list[Finding]:
-    """All findings, each kind in the order of the file."""
-    return [*_unclosed(world), *_overlapping(world), *_stepped(world), *_obstructed(world), *_unreachable(world),
-            *_misplaced(world)]
+def check_world(world: World) -> list[Finding]:
+    """All findings, each kind in the order of the file; empty for a sound world."""
+    return [*world.building_faults, *_unclosed(world), *_overlapping(world), *_stepped(world), *_obstructed(world),
+            *_unreachable(world), *_misplaced(world)]
 
 
 def _unclosed(world: World) -> Iterator[Finding]:
-    """Rooms that one can look out of other than through a doorway: surfaces of the room must shut in its middle."""
+    """Rooms with a gap: from a point inside, some ray meets neither a surface nor a doorway of the room."""
     for name in world.rooms:
         locale = world.locales[name]
         faces = world.faces_of(name)
         polygons = [r.polygon_world for f in faces for r in f.front]
         openings = [f.polygon_world for f in faces if f.kind == "doorway"]
-        if not polygons or not _shut_in(world, name, [*polygons, *openings]):
+        if not polygons or not _is_enclosed(world, name, [*polygons, *openings]):
             shut = "floor and walls" if _is_outdoors(locale) else "floor, ceiling, walls and doors"
-            yield locale.source, f"{name}: expected a room closed by {shut}, got a gap"
+            yield Finding(locale.source, f"{name}: expected a room closed by {shut}, got a gap")
 
 
-def _shut_in(world: World, name: str, polygons: list[NDArray[np.float64]]) -> bool:
-    """Whether every ray from a point in the room meets the front of one of these polygons; those downward, outdoors."""
-    centre = _inner_point(world.outline(name))
+def _is_enclosed(world: World, name: str, polygons: list[NDArray[np.float64]]) -> bool:
+    """Whether every ray from a point in the room meets the front of a polygon; outdoors, every downward ray."""
+    centre = _find_inner_point(world.outline(name))
     base = world.world_from_locale(name).translation[2]
-    locale, rays = world.locales[name], _rays()
+    locale, rays = world.locales[name], _build_rays()
     eye = np.array([*centre, base + 0.55 * locale.height_m])
     if _is_outdoors(locale):
-        eye, rays = np.array([*centre, base + UNDER_WALLS_M]), rays[rays[:, 2] < 0.0]
+        eye, rays = np.array([*centre, base + OUTDOOR_EYE_M]), rays[rays[:, 2] < 0.0]
     hit = np.zeros(len(rays), bool)
     for polygon in polygons:
-        hit |= _hit(eye, rays, polygon)
+        hit |= _hits(eye, rays, polygon)
     return bool(hit.all())
 
 
-def _rays() -> NDArray[np.float64]:
+def _build_rays() -> NDArray[np.float64]:
+    """(n, 3) directions all round and from steeply down to steeply up."""
     turn, lift = np.meshgrid(np.linspace(0.0, 2 * np.pi, 47, endpoint=False) + 0.01, np.linspace(-1.4, 1.4, 9))
     return np.stack([np.cos(turn) * np.cos(lift), np.sin(turn) * np.cos(lift), np.sin(lift)], axis=-1).reshape(-1, 3)
 
 
-def _hit(eye: NDArray[np.float64], rays: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _hits(eye: NDArray[np.float64], rays: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(n,) which rays (n, 3) from ``eye`` meet the front of a convex polygon (k, 3), its border included."""
     spokes = polygon - eye
     return np.asarray(np.all(rays @ np.cross(spokes, np.roll(spokes, -1, axis=0)).T <= 1e-9, axis=1))
 
 
-def _inner_point(outline: NDArray[np.float64]) -> NDArray[np.float64]:
+def _find_inner_point(outline: NDArray[np.float64]) -> NDArray[np.float64]:
     """A point well inside a simple polygon (k, 2): the best of a grid."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     xs, ys = (np.linspace(low[i], high[i], 12)[1:-1] for i in (0, 1))
     points = [np.array([x, y]) for x in xs for y in ys]
-    return max(points, key=lambda p: _clearance(p, outline))
+    return max(points, key=lambda p: _clearance_m(p, outline))
 
 
-def _clearance(point: NDArray[np.float64], outline: NDArray[np.float64]) -> float:
-    away = distance_to_border(point, outline)
-    return away if inside_polygon(point, outline) else -away
+def _clearance_m(point: NDArray[np.float64], outline: NDArray[np.float64]) -> float:
+    """Distance from the border; negative outside."""
+    distance = distance_to_border(point, outline)
+    return distance if inside_polygon(point, outline) else -distance
 
 
 def _overlapping(world: World) -> Iterator[Finding]:
@@ -88,7 +86,7 @@ def _overlapping(world: World) -> Iterator[Finding]:
     for i, j in _near_pairs(outlines):
         a, b = world.rooms[i], world.rooms[j]
         if _share_height(world, a, b) and _overlap(outlines[i], outlines[j]):
-            yield world.locales[b].source, f"{b}: expected a room apart from others, got one that overlaps {a}"
+            yield Finding(world.locales[b].source, f"{b}: expected a room apart from others, got one that overlaps {a}")
 
 
 def _share_height(world: World, *names: str) -> bool:
@@ -107,8 +105,8 @@ def _stepped(world: World) -> Iterator[Finding]:
     for doorway in world.doorways:
         step_m = abs(world.floor_m(doorway.between[0]) - world.floor_m(doorway.between[1]))
         if step_m > STEP_M:
-            yield doorway.source, (f"{doorway.name}: expected {' and '.join(doorway.between)} on one level, "
-                                   f"got a step of {step_m:.2f} m")
+            yield Finding(doorway.source, f"{doorway.name}: expected {' and '.join(doorway.between)} on one level, "
+                                          f"got a step of {step_m:.2f} m")
 
 
 def _obstructed(world: World) -> Iterator[Finding]:
@@ -121,8 +119,10 @@ def _obstructed(world: World) -> Iterator[Finding]:
                 sideways = (thing.footprint_world - left) @ across
                 away_m = float(-((thing.footprint_world - left) @ outward).max())
                 beside = sideways.max() < TOLERANCE_M or sideways.min() > doorway.width_m - TOLERANCE_M
-                if not beside and away_m < IN_DOORWAY_M and thing.high_m > STEP_M and thing.low_m < doorway.height_m:
-                    yield thing.source, f"{thing.name}: expected the doorway {doorway.name} free, got it in there"
+                at_height = thing.high_m > STEP_M and thing.low_m < doorway.height_m
+                if not beside and away_m < DOORWAY_CLEARANCE_M and at_height:
+                    what = f"{thing.name}: expected the doorway {doorway.name} free, got it in there"
+                    yield Finding(thing.source, what)
 
 
 def _near_pairs(outlines: list[NDArray[np.float64]]) -> Iterator[tuple[int, int]]:
@@ -141,11 +141,11 @@ def _overlap(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
 
 
 def _reaches_into(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    points = [_inner_point(one)]
+    points = [_find_inner_point(one)]
     for a, b in zip(one, np.roll(one, -1, axis=0), strict=True):
         inward = np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a)
         points += [a + t * (b - a) + 2 * TOLERANCE_M * inward for t in np.linspace(0.01, 0.99, 25)]
-    return any(_clearance(point, other) > TOLERANCE_M for point in points)
+    return any(_clearance_m(point, other) > TOLERANCE_M for point in points)
 
 
 def _unreachable(world: World) -> Iterator[Finding]:
@@ -155,15 +155,17 @@ def _unreachable(world: World) -> Iterator[Finding]:
     joined.add_edges_from(link.between for link in world.links)
     reached = nx.node_connected_component(joined, world.rooms[0])
     for name in world.rooms:
-        if name not in reached and not world.locales[name].properties.get("unreachable"):
-            yield world.locales[name].source, f"{name}: expected open doorways from {world.rooms[0]}, got none"
+        locale = world.locales[name]
+        if name not in reached and not locale.properties.get("unreachable"):
+            yield Finding(locale.source, f"{name}: expected open doorways from {world.rooms[0]}, got none")
 
 
 def _misplaced(world: World) -> Iterator[Finding]:
     for thing in world.things:
         outline, locale = world.outline(thing.locale), world.locales[thing.locale]
         if not all(inside_polygon(corner, outline, TOLERANCE_M) for corner in thing.footprint_world):
-            yield thing.source, f"{thing.name}: expected it inside {thing.locale}, got a corner outside"
+            yield Finding(thing.source, f"{thing.name}: expected it inside {thing.locale}, got a corner outside")
         if thing.low_m < -TOLERANCE_M or thing.high_m > locale.height_m + TOLERANCE_M:
-            yield thing.source, (f"{thing.name}: expected it between floor and ceiling (0 .. {locale.height_m:.2f} m), "
-                                 f"got {thing.low_m:.2f} .. {thing.high_m:.2f} m")
+            what = (f"{thing.name}: expected it between floor and ceiling (0 .. {locale.height_m:.2f} m), "
+                    f"got {thing.low_m:.2f} .. {thing.high_m:.2f} m")
+            yield Finding(thing.source, what)

@@ -55,6 +55,6 @@ def area_vector(polygon_world: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(0.5 * np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1).sum(axis=0))
 
 
-def painted(name: str, locale: str, polygon_world: Any, finish: Finish, **more: Any) -> Face:
+def build_barrier(name: str, locale: str, polygon_world: Any, finish: Finish, **more: Any) -> Face:
     """A barrier with one region over all of its front."""
     return Face(name, locale, polygon_world, front=(region(name, polygon_world, finish),), **more)

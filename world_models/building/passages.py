@@ -13,11 +13,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from world_models.building.frame_source import Arc
+from world_models.building.locale_source import Arc
 from world_models.building.locales import Doorway, Link
 
 if TYPE_CHECKING:
-    from world_models.building.frame_source import FrameSource
+    from world_models.building.locale_source import LocaleSource
 
 Part = tuple[str, int]
 """A locale and the number of one of its components."""
@@ -31,7 +31,7 @@ class Network:
     components: Mapping[Part, int]
 
 
-def passable(passages: Iterable[Doorway | Link]) -> list[tuple[str, str, str]]:
+def drivable_passages(passages: Iterable[Doorway | Link]) -> list[tuple[str, str, str]]:
     """(name, one locale, the other) of those that a robot on wheels can use."""
     return [(p.name, *p.between) for p in passages if isinstance(p, Doorway) or p.kind != "stairs"]
 
@@ -109,7 +109,7 @@ def _numbered(parts: list[Part], arcs: list[Arc]) -> dict[Part, int]:
     return {part: numbers.setdefault(found(part), len(numbers)) for part in parts}
 
 
-def parts_above(frames: FrameSource, room: str) -> list[Part]:
+def parts_above(frames: LocaleSource, room: str) -> list[Part]:
     """The parts that a room belongs to, from itself up to the root."""
     parts: list[Part] = [(room, 0)]
     while (locale := frames.locale(parts[-1][0])) is not None and locale.parent is not None:
@@ -139,7 +139,7 @@ class Route:
     steps: tuple[Step, ...]
 
 
-def find_route(frames: FrameSource, origin: str, destination: str) -> Route | None:
+def find_route(frames: LocaleSource, origin: str, destination: str) -> Route | None:
     """The route with the fewest passages in the smallest locale that holds one; None where no passage leads there."""
     if origin == destination:
         return Route(origin, ())
@@ -152,7 +152,7 @@ def find_route(frames: FrameSource, origin: str, destination: str) -> Route | No
     return None
 
 
-def _step(frames: FrameSource, name: str, side: int) -> Step:
+def _step(frames: LocaleSource, name: str, side: int) -> Step:
     passage = frames.passage(name)
     assert passage is not None
     return Step(passage, passage.between[side], passage.between[1 - side])

@@ -63,6 +63,6 @@ def region(name: str, polygon_world: Any, finish: Finish) -> Region:
     return Region(name, polygon, finish.colour, finish.texture, finish.texture_scale_m, seed)
 
 
-def level(finish: Finish, normal_world: Any) -> float:
+def expected_brightness(finish: Finish, normal_world: Any) -> float:
     """The brightness, 0..1, that the model expects of a surface with this normal (3,)."""
     return float(finish.luma * (AMBIENT + 0.25 * np.dot(TOWARDS_LAMP, normal_world)))

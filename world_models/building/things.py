@@ -18,7 +18,7 @@ FLUSH_M = 0.06
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class Finding:
     """Something wrong with a world that could be read: where (file:line) and what."""
 
     source: str

@@ -1,7 +1,7 @@
 """The world (§3.4): locales in a contained-by hierarchy, their doorways, faces and landmarks, and questions on them.
 
-A world takes its frames from a :class:`~world_models.building.frame_source.FrameSource`, one locale at a time and only
-when they are asked for, so that a robot in a room touches the room. The attributes that name everything (``faces``,
+A world takes its frames from a :class:`~world_models.building.locale_source.LocaleSource`, one locale at a time and
+only when asked, so that a robot in a room touches the room. The attributes that name everything (``faces``,
 ``things``, ``scene``, ...) are for drawing and checking.
 """
 
@@ -15,17 +15,14 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building import checks
 from world_models.building.faces import Face
-from world_models.building.frame_source import FrameSource, Packet
 from world_models.building.landmarks import Landmark
+from world_models.building.locale_source import LocaleGeometry, LocaleSource
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.passages import Route, find_route
 from world_models.building.scene import Scene, build_scene, joined_scene
-from world_models.building.things import Fault, Thing
+from world_models.building.things import Finding, Thing
 from world_models.frames import Pose, frozen
-
-__all__ = ["Fault", "Thing", "World"]
 
 T = TypeVar("T")
 
@@ -45,17 +42,17 @@ class World:
         memo: what others work out of it once, and keep with it.
     """
 
-    def __init__(self, frames: FrameSource) -> None:
-        self.frames = frames
-        self.name = frames.name
+    def __init__(self, locale_source: LocaleSource) -> None:
+        self.locale_source = locale_source
+        self.name = locale_source.name
         self._poses: dict[str, tuple[Pose, Pose]] = {}
         self._landmarks: dict[int, Landmark] = {}
         self._scenes: dict[tuple[str, ...], Scene] = {}
-        self.memo: dict[str, Any] = {}
+        self.cache: dict[str, Any] = {}
 
-    def remembered(self, what: str, most: int, key: Hashable, make: Callable[[], T]) -> T:
+    def cached(self, what: str, most: int, key: Hashable, make: Callable[[], T]) -> T:
         """What was made for a key, made now unless it is among the last ``most`` of its kind."""
-        known: dict[Hashable, T] = self.memo.setdefault(what, {})
+        known: dict[Hashable, T] = self.cache.setdefault(what, {})
         if key not in known:
             if len(known) >= most:
                 del known[next(iter(known))]
@@ -71,21 +68,21 @@ class World:
 
     def locale(self, name: str) -> Locale:
         """Raises ValueError where no locale has this name."""
-        found = self.frames.locale(name)
+        found = self.locale_source.locale(name)
         if found is None:
-            names = self.frames.names()
+            names = self.locale_source.names()
             shown = ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
             raise ValueError(f"expected a locale of {self.name} ({shown}), got {name!r}")
         return found
 
     def is_room(self, name: str) -> bool:
         """Whether this is a locale that contains no other."""
-        return self.frames.is_room(name)
+        return self.locale_source.is_room(name)
 
     def children_of(self, name: str) -> tuple[str, ...]:
         """The locales that this one directly contains."""
         self.locale(name)
-        return self.frames.children(name)
+        return self.locale_source.children(name)
 
     def rooms_in(self, name: str) -> Iterator[str]:
         """The locales within this one that contain no other; itself where it is such a one."""
@@ -130,17 +127,17 @@ class World:
     def doorways_of(self, locale: str) -> tuple[Doorway, ...]:
         """The open doorways of a locale."""
         self.locale(locale)
-        return self.frames.doorways(locale)
+        return self.locale_source.doorways(locale)
 
     def links_of(self, locale: str) -> tuple[Link, ...]:
         """The elevators and stairs that stop in a locale."""
         self.locale(locale)
-        return self.frames.links(locale)
+        return self.locale_source.links(locale)
 
     def things_of(self, locale: str) -> tuple[Thing, ...]:
         """What stands in a locale."""
         self.locale(locale)
-        return self.frames.things(locale)
+        return self.locale_source.things(locale)
 
     def outline(self, locale: str) -> NDArray[np.float64]:
         """(k, 2) the free extent of a locale on the floor, counter-clockwise [m, world]."""
@@ -159,7 +156,7 @@ class World:
         if p.shape not in ((2,), (3,)):
             raise ValueError(f"expected a point (2,) or (3,), got shape {p.shape}")
         best: tuple[int, str] | None = None
-        for name in self.frames.near(float(p[0]), float(p[1]), 0.0):
+        for name in self.locale_source.near(float(p[0]), float(p[1]), 0.0):
             world_from_locale, locale_from_world = self._pose(name)
             lifted = p if p.size == 3 else np.array([*p, world_from_locale.translation[2]])
             depth = len(self.path_of(name))
@@ -170,7 +167,7 @@ class World:
     def rooms_near(self, point_world: Any, margin_m: float) -> tuple[str, ...]:
         """The rooms whose rectangle on the plan is at most so far from a point (2,) or (3,) [m, world]."""
         x, y, *z = (float(value) for value in np.asarray(point_world, float))
-        rooms = (name for name in self.frames.near(x, y, margin_m) if self.is_room(name))
+        rooms = (name for name in self.locale_source.near(x, y, margin_m) if self.is_room(name))
         return tuple(name for name in rooms if not z or self._reaches(name, z[0]))
 
     def _reaches(self, name: str, z_m: float) -> bool:
@@ -182,7 +179,7 @@ class World:
         """The way from room to room, at the highest level at which they differ; None where there is none."""
         for name in (origin, destination):
             self.locale(name)
-        return find_route(self.frames, origin, destination)
+        return find_route(self.locale_source, origin, destination)
 
     def walk(self, origin: str, destination: str) -> list[str] | None:
         """The rooms of the way with the fewest passages for people, who can use stairs too; None where there is none.
@@ -199,7 +196,7 @@ class World:
 
     def passage(self, name: str) -> Doorway | Link:
         """Raises ValueError where no doorway or link has this name."""
-        found = self.frames.passage(name)
+        found = self.locale_source.passage(name)
         if found is None:
             raise ValueError(f"expected a passage of {self.name}, got {name!r}")
         return found
@@ -216,13 +213,17 @@ class World:
         return self._scenes[names]
 
     def _joined(self, locales: Sequence[str]) -> Scene:
-        packets = {(p.locale, p.neighbour): p for name in locales for p in self.frames.packets(name)}
-        parts = [self._part(packets[key]) for key in sorted(packets, key=str)]
-        return joined_scene(parts) if parts else build_scene((), ())
+        parts = self._geometry_of(locales)
+        scenes = [self._scene_part(parts[key]) for key in sorted(parts, key=str)]
+        return joined_scene(scenes) if scenes else build_scene((), ())
 
-    def _part(self, packet: Packet) -> Scene:
-        self._landmarks.update(packet.landmarks)
-        return packet.scene
+    def _geometry_of(self, locales: Iterable[str]) -> dict[tuple[str, str | None], LocaleGeometry]:
+        """The geometry of several locales, each part once, by (locale, neighbour)."""
+        return {(part.locale, part.neighbour): part for name in locales for part in self.locale_source.geometry(name)}
+
+    def _scene_part(self, part: LocaleGeometry) -> Scene:
+        self._landmarks.update(part.landmarks)
+        return part.scene
 
     @cached_property
     def landmarks(self) -> Sequence[Landmark]:
@@ -241,51 +242,49 @@ class World:
     @cached_property
     def locales(self) -> Mapping[str, Locale]:
         """All by name, root first, then in the order of the file; a locale is loaded when it is asked for."""
-        return _Locales(self.frames)
+        return _Locales(self.locale_source)
 
     @cached_property
     def rooms(self) -> tuple[str, ...]:
         """The locales that contain no other, in order."""
-        return tuple(name for name in self.frames.names() if self.is_room(name))
+        return tuple(name for name in self.locale_source.names() if self.is_room(name))
 
     @property
     def doorways(self) -> tuple[Doorway, ...]:
         """The open ones, through which one can pass."""
-        return self.frames.all_doorways()
+        return self.locale_source.all_doorways()
 
     @property
     def links(self) -> tuple[Link, ...]:
         """All elevators and stairs."""
-        return self.frames.all_links()
+        return self.locale_source.all_links()
 
     @property
     def things(self) -> tuple[Thing, ...]:
         """What stands in the rooms."""
-        return self.frames.all_things()
+        return self.locale_source.all_things()
 
     @cached_property
     def faces(self) -> tuple[Face, ...]:
         """Barriers and doorways; what is drawn are their regions."""
-        numbered = sorted((pair for p in self.frames.all_packets() for pair in p.faces), key=lambda pair: pair[0])
-        return tuple(face for _, face in numbered)
+        return _in_order(pair for part in self.locale_source.all_geometry() for pair in part.faces)
 
     def faces_within(self, name: str) -> tuple[Face, ...]:
         """The faces of all rooms in a locale and of the next rooms beyond its doorways, in order."""
         inside = tuple(self.rooms_in(name))
-        beyond = [doorway.other(room) for room in inside for doorway in self.frames.doorways(room)]
-        packets = {(p.locale, p.neighbour): p for room in dict.fromkeys((*inside, *beyond))
-                   for p in self.frames.packets(room)}
-        numbered = sorted((pair for p in packets.values() for pair in p.faces), key=lambda pair: pair[0])
-        return tuple(face for _, face in numbered)
+        beyond = [doorway.other(room) for room in inside for doorway in self.locale_source.doorways(room)]
+        parts = self._geometry_of(dict.fromkeys((*inside, *beyond)))
+        return _in_order(pair for part in parts.values() for pair in part.faces)
 
     def faces_of(self, name: str) -> tuple[Face, ...]:
         """The faces of a locale, without those that belong to its neighbours."""
-        return tuple(face for p in self.frames.packets(name) if p.locale == name for _, face in p.faces)
+        return tuple(face for p in self.locale_source.geometry(name) if p.locale == name for _, face in p.faces)
 
     @cached_property
     def scene(self) -> Scene:
         """Model lines and surfaces of the whole world."""
-        return joined_scene([self._part(packet) for packet in self.frames.all_packets()] or [build_scene((), ())])
+        scenes = [self._scene_part(part) for part in self.locale_source.all_geometry()]
+        return joined_scene(scenes or [build_scene((), ())])
 
     @cached_property
     def passages(self) -> nx.Graph:
@@ -300,38 +299,39 @@ class World:
 
     def counts(self) -> Mapping[str, int]:
         """How many rooms, open doorways, things, faces and landmarks there are."""
-        return self.frames.counts()
+        return self.locale_source.counts()
 
     @property
-    def building_faults(self) -> tuple[Fault, ...]:
+    def building_faults(self) -> tuple[Finding, ...]:
         """What could not be built."""
-        return self.frames.faults()
+        return self.locale_source.faults()
 
-    def check(self) -> list[Fault]:
-        """What is wrong with this world, in the order of the file; empty for a sound one."""
-        return [*self.building_faults, *(Fault(source, what) for source, what in checks.faults_of(self))]
+
+def _in_order(numbered: Iterable[tuple[int, T]]) -> tuple[T, ...]:
+    """Items by their number in the world."""
+    return tuple(item for _, item in sorted(numbered, key=lambda pair: pair[0]))
 
 
 class _Locales(Mapping[str, Locale]):
     """Locales by name, each loaded when it is asked for."""
 
-    def __init__(self, frames: FrameSource) -> None:
-        self._frames = frames
+    def __init__(self, locale_source: LocaleSource) -> None:
+        self._locale_source = locale_source
 
     def __getitem__(self, name: str) -> Locale:
-        found = self._frames.locale(name)
+        found = self._locale_source.locale(name)
         if found is None:
             raise KeyError(name)
         return found
 
     def __contains__(self, name: object) -> bool:
-        return isinstance(name, str) and self._frames.locale(name) is not None
+        return isinstance(name, str) and self._locale_source.locale(name) is not None
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._frames.names())
+        return iter(self._locale_source.names())
 
     def __len__(self) -> int:
-        return len(self._frames.names())
+        return len(self._locale_source.names())
 
 
 class _Landmarks(Sequence[Landmark]):
@@ -345,7 +345,7 @@ class _Landmarks(Sequence[Landmark]):
             return [self[i] for i in range(*number.indices(len(self)))]
         known = self._world._landmarks
         if number not in known:
-            for packet in self._world.frames.all_packets():
+            for packet in self._world.locale_source.all_geometry():
                 known.update(packet.landmarks)
         if number not in known:
             raise IndexError(f"expected the number of one of {len(self)} landmarks, got {number}")

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.scene import Scene
-from world_models.camera import NEAR_M, Camera
+from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose
-from world_models.visibility.portals import Window, image_window, windows_of
+from world_models.visibility.portals import Window, find_visible_locales, image_window
 from world_models.visibility.shadows import (
     SHORTEST_PIECE,
     Shadows,
@@ -120,7 +120,7 @@ def visible_lines(
     wanted = None if locales is None else tuple(sorted(locales))
     key = (camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes(), wanted,
            min_length_px, min_contrast, min_separation_px, max_distance_m)
-    return world.remembered(
+    return world.cached(
         "visible lines", KEPT_VIEWS, key,
         lambda: _visible_lines(world, camera, camera_from_world, locales, min_length_px, min_contrast,
                                min_separation_px, max_distance_m))
@@ -175,7 +175,7 @@ def visible_points(
     near = np.linalg.norm(scene.corners_world - centre, axis=1) < max_distance_m
     index = np.flatnonzero(_named(scene, scene.corner_locales, locales) & near & (contrast >= min_contrast))
     points = camera_from_world.apply(scene.corners_world[index]).reshape(-1, 3)
-    ahead = points[:, 2] > NEAR_M
+    ahead = points[:, 2] > NEAR_PLANE_M
     index, points = index[ahead], points[ahead]
     pixels = camera.project(points)
     keep = camera.inside(pixels, margin_px)
@@ -198,7 +198,7 @@ class _View:
     def __init__(self, world: World, camera: Camera, camera_from_world: Pose) -> None:
         self.camera_from_world = camera_from_world
         self.window = _image_window(world, camera)
-        seen = windows_of(world, self.window, camera_from_world)
+        seen = find_visible_locales(world, self.window, camera_from_world)
         self.scene: Scene = world.scene_of(seen)
         nowhere: Window = (np.inf, np.inf, -np.inf, -np.inf)
         self.windows = np.array([seen.get(name, nowhere) for name in self.scene.locales]).reshape(-1, 4)
@@ -214,7 +214,7 @@ class _View:
         facing = scene.planes_world[:, :3] @ centre - scene.planes_world[:, 3] > 1e-6
         index = np.flatnonzero(facing)
         depths = scene.polygons_world[index] @ pose.rotation[2]
-        index = index[depths.max(axis=1, initial=-np.inf) + pose.translation[2] > NEAR_M]
+        index = index[depths.max(axis=1, initial=-np.inf) + pose.translation[2] > NEAR_PLANE_M]
         polygons = pose.apply(scene.polygons_world[index])
         windows = rectangles(polygons)
         keep = overlap(windows, self.windows_for(scene.surface_locales[index]))
@@ -226,7 +226,7 @@ class _View:
 
 def _image_window(world: World, camera: Camera) -> Window:
     """As :func:`image_window`, worked out once for a world and camera."""
-    known: list[tuple[Camera, Window]] = world.memo.setdefault("image windows", [])
+    known: list[tuple[Camera, Window]] = world.cache.setdefault("image windows", [])
     for other, window in known:
         if other is camera:
             return window

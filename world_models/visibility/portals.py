@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.locales import Doorway
-from world_models.camera import NEAR_M, Camera
+from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def image_window(camera: Camera) -> Window:
     return float(left.max()), float(top.max()), float(right.min()), float(bottom.min())
 
 
-def windows_of(world: World, window: Window, camera_from_world: Pose) -> dict[str, Window]:
+def find_visible_locales(world: World, window: Window, camera_from_world: Pose) -> dict[str, Window]:
     """The locales in view, each with the rectangle through which it is seen; the camera's own one fills the image."""
     centre = camera_from_world.inverse().translation
     seen = dict.fromkeys(locales_at_camera(world, centre), window)
@@ -75,7 +75,7 @@ class Portal:
 
 def portals_of(world: World, locale: str) -> tuple[Portal, ...]:
     """The open doorways of a locale; made once."""
-    made: dict[str, tuple[Portal, ...]] = world.memo.setdefault("portals", {})
+    made: dict[str, tuple[Portal, ...]] = world.cache.setdefault("portals", {})
     if locale not in made:
         base = float(world.world_from_locale(locale).translation[2])
         made[locale] = tuple(_portal(doorway, locale, base) for doorway in world.doorways_of(locale))
@@ -133,10 +133,10 @@ def near_clipped(polygon_camera: Sequence[Point]) -> list[Point]:
     out: list[Point] = []
     for index, b in enumerate(polygon_camera):
         a = polygon_camera[index - 1]
-        if (a[2] >= NEAR_M) != (b[2] >= NEAR_M):
-            t = (NEAR_M - a[2]) / (b[2] - a[2])
-            out.append((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), NEAR_M))
-        if b[2] >= NEAR_M:
+        if (a[2] >= NEAR_PLANE_M) != (b[2] >= NEAR_PLANE_M):
+            t = (NEAR_PLANE_M - a[2]) / (b[2] - a[2])
+            out.append((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), NEAR_PLANE_M))
+        if b[2] >= NEAR_PLANE_M:
             out.append(b)
     return out
 

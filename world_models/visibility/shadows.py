@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometer import left_over
-from world_models.camera import NEAR_M
+from world_models.building.intervals import subtract_intervals
+from world_models.camera import NEAR_PLANE_M
 from world_models.visibility.portals import Window
 
 Floats = NDArray[np.float64]
@@ -54,7 +54,7 @@ def clipped_spans(lines: Floats, window: Window) -> Floats:
     """(n, 2) the part of each segment (n, 2, 3) of the camera frame that is in front and within the window."""
     x0, y0, x1, y1 = window
     x, y, z = (lines[..., i].T for i in range(3))
-    values = np.stack([z - NEAR_M, x - x0 * z, x1 * z - x, y - y0 * z, y1 * z - y])
+    values = np.stack([z - NEAR_PLANE_M, x - x0 * z, x1 * z - x, y - y0 * z, y1 * z - y])
     return _interval(values[:, 0], values[:, 1])
 
 
@@ -85,7 +85,7 @@ def rectangles(points: Floats) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         x, y = x / z, y / z
     found = np.stack([x.min(axis=0), y.min(axis=0), x.max(axis=0), y.max(axis=0)], axis=1)
-    found[z.min(axis=0) < 0.99 * NEAR_M] = (-np.inf, -np.inf, np.inf, np.inf)
+    found[z.min(axis=0) < 0.99 * NEAR_PLANE_M] = (-np.inf, -np.inf, np.inf, np.inf)
     return found
 
 
@@ -111,7 +111,7 @@ def visible_spans(lines: Floats, shadows: Shadows) -> tuple[NDArray[np.int64], F
         taken[number].append((low, high))
     whole = [(0.0, 1.0)]
     rows = [(number, *span) for number, parts in enumerate(taken)
-            for span in (left_over((0.0, 1.0), parts, SHORTEST_PIECE) if parts else whole)]
+            for span in (subtract_intervals((0.0, 1.0), parts, SHORTEST_PIECE) if parts else whole)]
     table = np.array(rows, float).reshape(-1, 3)
     return table[:, 0].astype(np.int64), table[:, 1:]
 

@@ -100,7 +100,7 @@ def _seen_near(robot: RobotModel, pose: Pose2) -> Floats:
     turned = round(pose.heading_rad / GRID_RAD) % round(math.tau / GRID_RAD)
     nearest = (round(pose.x_m / GRID_M), round(pose.y_m / GRID_M), turned)
     of_grid = Pose2(nearest[0] * GRID_M, nearest[1] * GRID_M, nearest[2] * GRID_RAD)
-    return robot.world.remembered("views of a grid", KEPT_VIEWS, (robot.camera, robot.mount.height_m, nearest),
+    return robot.world.cached("views of a grid", KEPT_VIEWS, (robot.camera, robot.mount.height_m, nearest),
                                   lambda: view(robot, of_grid).lines_world)
 
 

@@ -58,7 +58,7 @@ class VisibilityMap:
 
 def get_visibility_map(world: World, room: str, eye_m: float) -> VisibilityMap:
     """What is in sight from a room's places for an eye at so high above the world's zero. Kept with the world."""
-    known: dict[tuple[str, float], VisibilityMap] = world.memo.setdefault("vantages", {})
+    known: dict[tuple[str, float], VisibilityMap] = world.cache.setdefault("vantages", {})
     key = room, eye_m
     if key not in known:
         known[key] = _vantage(world, room, eye_m)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching.pose_parameters import Array, PoseParameters
 from knowledge_sources.methods.pose.line_set import LineSet, build_line_set
-from world_models.camera import NEAR_M, Camera
+from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose
 
 Index = NDArray[np.intp]
@@ -125,14 +125,14 @@ def _projected(
     px, lengths, visible = np.empty((len(points), 2, 2)), np.ones(len(points)), np.ones(len(points), np.bool_)
     for m in range(len(points)):
         first, second = turn @ points[m, 0] + shift, turn @ points[m, 1] + shift
-        visible[m] = first[2] >= NEAR_M or second[2] >= NEAR_M
+        visible[m] = first[2] >= NEAR_PLANE_M or second[2] >= NEAR_PLANE_M
         if not visible[m]:
             px[m, :, 0], px[m, :, 1] = cx, cy
             continue
-        if first[2] < NEAR_M:
-            first = second + (second[2] - NEAR_M) / (second[2] - first[2]) * (first - second)
-        elif second[2] < NEAR_M:
-            second = first + (first[2] - NEAR_M) / (first[2] - second[2]) * (second - first)
+        if first[2] < NEAR_PLANE_M:
+            first = second + (second[2] - NEAR_PLANE_M) / (second[2] - first[2]) * (first - second)
+        elif second[2] < NEAR_PLANE_M:
+            second = first + (first[2] - NEAR_PLANE_M) / (first[2] - second[2]) * (second - first)
         px[m, 0, 0], px[m, 0, 1] = fx * first[0] / first[2] + cx, fy * first[1] / first[2] + cy
         px[m, 1, 0], px[m, 1, 1] = fx * second[0] / second[2] + cx, fy * second[1] / second[2] + cy
         lengths[m] = max(math.hypot(px[m, 1, 0] - px[m, 0, 0], px[m, 1, 1] - px[m, 0, 1]), 1.0)

@@ -17,7 +17,7 @@ from knowledge_sources.methods.pose.planar import (
     mounted,
     pose2,
 )
-from world_models.camera import NEAR_M, Camera
+from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2
 
 HUBER = 1.5
@@ -77,23 +77,24 @@ class _Points:
 
     def descend(self, state: Array, chosen: Mask, huber: float) -> Descent[Array]:
         at, hessian, cost = point_kernels.descend(
-            *self.measured, *self.belief.arrays, NEAR_M, np.array(state), chosen, huber, 20
+            *self.measured, *self.belief.arrays, NEAR_PLANE_M, np.array(state), chosen, huber, 20
         )
         return Descent(at, Normal(cost, hessian, np.zeros(3)), 0)
 
     def near(self, state: Array, cutoff: float) -> Mask:
         depth, residuals, _ = self.scaled(state)
-        return np.asarray((depth > NEAR_M) & (np.sum(residuals**2, axis=1) <= cutoff**2))
+        return np.asarray((depth > NEAR_PLANE_M) & (np.sum(residuals**2, axis=1) <= cutoff**2))
 
     def loss(self, state: Array, chosen: Mask) -> float:
         """Huber's, of the chosen points, and the prior's share."""
-        found = point_kernels.descend(*self.measured, *self.belief.arrays, NEAR_M, np.array(state), chosen, HUBER, 0)
+        found = point_kernels.descend(*self.measured, *self.belief.arrays, NEAR_PLANE_M, np.array(state), chosen,
+                                      HUBER, 0)
         return float(found[2])
 
     def estimate(self, state: Array, near: Mask) -> PlanarEstimate:
         depth, residuals, jacobian = self.scaled(state)
         rejected = tuple(
-            None if n else (BEHIND if d <= NEAR_M else TOO_FAR) for n, d in zip(near, depth, strict=True)
+            None if n else (BEHIND if d <= NEAR_PLANE_M else TOO_FAR) for n, d in zip(near, depth, strict=True)
         )
         j = jacobian[near].reshape(-1, 3)
         few = not self.belief.given and int(np.count_nonzero(near)) < 2

@@ -19,7 +19,7 @@ from knowledge_sources.methods.features.correlation import (
 )
 from knowledge_sources.methods.pose.planar import compute_point_jacobian
 from knowledge_sources.methods.pose.planar_from_points import planar_from_points
-from world_models.camera import NEAR_M
+from world_models.camera import NEAR_PLANE_M
 from world_models.entries.percepts import Anchor, Track
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
@@ -82,8 +82,8 @@ def follow_landmarks(
     out = []
     for track, z, at, sigma, is_hidden in zip(
             tracks, depth.tolist(), predicted, spread.tolist(), hidden.tolist(), strict=True):
-        scale = track.template_depth_m / max(z, NEAR_M)
-        in_view = z > NEAR_M and not is_hidden and lies_inside(image.shape, at, HALF_PX + 2)
+        scale = track.template_depth_m / max(z, NEAR_PLANE_M)
+        in_view = z > NEAR_PLANE_M and not is_hidden and lies_inside(image.shape, at, HALF_PX + 2)
         expected = in_view and SCALES[0] <= scale <= SCALES[1]
         found = None
         if expected:
@@ -140,7 +140,7 @@ def _predicted(
     state = np.array([pose.x_m, pose.y_m, pose.heading_rad])
     focal = np.array([robot.camera.fx, robot.camera.fy])
     p, _, jacobian = compute_point_jacobian(points, focal, state, robot.mount.camera_from_robot)
-    ahead = np.where(p[:, 2:] > NEAR_M, p, [0.0, 0.0, 1.0])
+    ahead = np.where(p[:, 2:] > NEAR_PLANE_M, p, [0.0, 0.0, 1.0])
     spread = np.einsum("nij,jk,nik->ni", jacobian, covariance, jacobian)
     return p[:, 2], robot.camera.project(ahead), np.sqrt(np.max(spread, axis=1))
 

@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.features.regions import segment_regions
 from world_models.building.faces import area_vector
-from world_models.building.frame_source import Packet
-from world_models.building.regions import Finish, level
-from world_models.camera import NEAR_M, Camera
+from world_models.building.locale_source import LocaleGeometry
+from world_models.building.regions import Finish, expected_brightness
+from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
-from world_models.visibility.portals import Window, image_window, windows_of
+from world_models.visibility.portals import Window, find_visible_locales, image_window
 
 Floats = NDArray[np.float64]
 Look = tuple[tuple[float, ...], tuple[tuple[float, ...], ...]]
@@ -79,24 +79,24 @@ def predict_face_colors(robot: RobotModel, pose: Pose2) -> tuple[Look, ...]:
     """The faces in view from a pose, those first of which most is seen; asked again soon, the answer is at hand."""
     camera, camera_from_world = robot.camera, robot.camera_from_world(pose)
     key = camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes()
-    return robot.world.remembered(
+    return robot.world.cached(
         "expected looks", KEPT_VIEWS, key, lambda: _expected_looks(robot, camera, camera_from_world))
 
 
 def _expected_looks(robot: RobotModel, camera: Camera, camera_from_world: Pose) -> tuple[Look, ...]:
     rays, (left, top, right, bottom), window = _rays(camera)
-    rooms = sorted(windows_of(robot.world, window, camera_from_world))
-    packets = {(p.locale, p.neighbour or ""): p for room in rooms for p in robot.world.frames.packets(room)}
+    rooms = sorted(find_visible_locales(robot.world, window, camera_from_world))
+    packets = {(p.locale, p.neighbour or ""): p for room in rooms for p in robot.world.locale_source.geometry(room)}
     if not packets:
         return ()
-    parts = [_surfaces(robot.world.memo, packets[key]) for key in sorted(packets)]
+    parts = [_surfaces(robot.world.cache, packets[key]) for key in sorted(packets)]
     corners, colours, normals = (np.concatenate([part[i] for part in parts]) for i in range(3))
     centre = camera_from_world.inverse().translation
     facing = np.flatnonzero(np.einsum("ij,ij->i", normals, centre - corners[:, 0]) > 1e-6)
     near = camera_from_world.apply(corners[facing].reshape(-1, 3)).reshape(-1, CORNERS, 3)
     boxes = _boxes(near)
-    in_view = np.flatnonzero(np.any(near[..., 2] > NEAR_M, axis=1) & (boxes[:, 0] <= right) & (boxes[:, 2] >= left)
-                             & (boxes[:, 1] <= bottom) & (boxes[:, 3] >= top))
+    in_view = np.flatnonzero(np.any(near[..., 2] > NEAR_PLANE_M, axis=1) & (boxes[:, 0] <= right)
+                             & (boxes[:, 2] >= left) & (boxes[:, 1] <= bottom) & (boxes[:, 3] >= top))
     facing = facing[in_view]
     turned = normals[facing] @ camera_from_world.rotation.T
     surface, depth = _first_hits(near[in_view], turned, boxes[in_view], rays)
@@ -140,7 +140,7 @@ def check_colors(robot: RobotModel, pose: Pose2, image: NDArray[np.uint8], looks
         return NOT_TESTED
     face = np.repeat(np.arange(len(looks)), [len(points) for _, points in looks])
     points = robot.camera_from_world(pose).apply(np.array([p for _, points in looks for p in points]))
-    ahead = points[:, 2] > NEAR_M
+    ahead = points[:, 2] > NEAR_PLANE_M
     pixels = robot.lens.project(np.where(ahead[:, None], points, (0.0, 0.0, 1.0)))
     inside = ahead & robot.lens.inside(pixels, MARGIN_PX)
     if not inside.any():
@@ -222,7 +222,7 @@ def _look(colour: Floats, points: Floats) -> Look:
     return (red, green, blue), tuple(map(tuple, points[some].round(3).tolist()))
 
 
-def _surfaces(memo: dict[str, Any], packet: Packet) -> tuple[Floats, Floats, Floats]:
+def _surfaces(memo: dict[str, Any], packet: LocaleGeometry) -> tuple[Floats, Floats, Floats]:
     """Corners (m, CORNERS, 3), colours in the model's light (m, 3) and normals (m, 3) of a packet's regions; made once.
     """
     known: dict[object, tuple[Floats, Floats, Floats]] = memo.setdefault("looks", {})
@@ -234,7 +234,7 @@ def _surfaces(memo: dict[str, Any], packet: Packet) -> tuple[Floats, Floats, Flo
                             for r in regions]).reshape(-1, CORNERS, 3)
         normals = np.array([area_vector(region.polygon_world) for region in regions]).reshape(-1, 3)
         normals = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
-        light = np.array([level(WHITE, normal) for normal in normals]).reshape(-1, 1)
+        light = np.array([expected_brightness(WHITE, normal) for normal in normals]).reshape(-1, 1)
         known[key] = corners, np.array([region.colour for region in regions]).reshape(-1, 3) * light, normals
     return known[key]
 
@@ -242,10 +242,10 @@ def _surfaces(memo: dict[str, Any], packet: Packet) -> tuple[Floats, Floats, Flo
 def _boxes(corners: Floats) -> Floats:
     """(m, 4) the rectangle x / z, y / z (low, high) round polygons (m, k, 3); everything where one is partly behind."""
     across, down, deep = np.ascontiguousarray(corners.transpose(2, 1, 0))
-    depth = np.maximum(deep, NEAR_M)
+    depth = np.maximum(deep, NEAR_PLANE_M)
     x, y = across / depth, down / depth  # (k, m): numpy takes the least of many rows faster than of many short ones
     box = np.column_stack([x.min(axis=0), y.min(axis=0), x.max(axis=0), y.max(axis=0)])
-    box[deep.min(axis=0) <= NEAR_M] = (-np.inf, -np.inf, np.inf, np.inf)
+    box[deep.min(axis=0) <= NEAR_PLANE_M] = (-np.inf, -np.inf, np.inf, np.inf)
     return np.asarray(box)
 
 
@@ -281,7 +281,7 @@ def _first_hits(corners: Any, normals: Any, boxes: Any, rays: Any) -> Any:
                 if slope >= -1e-12:
                     continue
                 far = ahead / slope
-                if far <= NEAR_M or far >= depth[i]:
+                if far <= NEAR_PLANE_M or far >= depth[i]:
                     continue
                 low, high = 0.0, 0.0
                 for k in range(sides):

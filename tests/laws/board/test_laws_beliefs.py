@@ -59,7 +59,7 @@ def test_a_place_is_there_and_back(frame: Pose2, x: float, y: float, heading: fl
 @given(pose=poses, turn=st.floats(-3.0, 3.0), move=st.floats(0.0, 2.0), sigma=st.floats(0.001, 0.3))
 def test_moving_never_makes_surer(pose: Pose2, turn: float, move: float, sigma: float) -> None:
     before = np.array(diagonal(sigma, sigma))
-    after, covariance = ActuatorModel().moved(pose, before, turn, move)
+    after, covariance = ActuatorModel().propagate_move(pose, before, turn, move)
     assert np.allclose(covariance, covariance.T)
     assert np.linalg.eigvalsh(covariance)[0] > 0.0
     assert np.linalg.det(covariance) >= np.linalg.det(before)
@@ -71,7 +71,7 @@ def test_moving_never_makes_surer(pose: Pose2, turn: float, move: float, sigma: 
 @given(length=st.floats(0.0, 5.0))
 def test_what_is_commanded_is_what_is_gone(length: float) -> None:
     model = ActuatorModel()
-    assert model.expected(0.0, model.commanded_m(length)).x_m == pytest.approx(length)
+    assert model.predict_motion(0.0, model.compute_command_m(length)).x_m == pytest.approx(length)
 
 
 @given(x=st.integers(-50, 50), y=st.integers(-50, 50))

@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -21,11 +22,16 @@ from world_models.building.world import World
 from world_models.entries.body import Ride
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.task import Command, Outcome, PlanSketch, Subgoal
-from world_models.files.store import read_world
 from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
 from world_models.frames import Pose2
-from world_models.levels import Location, raised, seen_from
 from world_models.robot import RobotModel
+
+
+def in_locale(world: World, belief: Hypothesis, locale: str) -> Hypothesis:
+    """The same hypothesis in the frame of another locale."""
+    return Hypothesis.of_world(world, locale, belief.world_from_robot(world), belief.covariance_world(world),
+                               belief.basis)
 
 
 @st.composite
@@ -98,15 +104,16 @@ def test_sketches_pass_no_barrier_on_any_floor_and_keep_what_is_verified(world: 
 
 @settings(deadline=None, max_examples=20)
 @given(towers(), st.floats(-3.0, 3.0), st.floats(0.0, 0.3))
-def test_a_location_told_on_another_floor_comes_back_no_surer(world: World, heading: float, sigma: float) -> None:
-    here = Location("car-1", Pose2(1.0, 0.9, heading), diagonal(sigma, 0.1))
-    for there in world.rooms:
-        back = seen_from(world, seen_from(world, here, there), here.locale)
-        assert back.pose.distance_to(here.pose) < 1e-9 and back.sigma_m >= here.sigma_m - 1e-12
-    above = here
-    while world.locale(above.locale).parent is not None:
-        above = raised(world, above)
-        assert above.sigma_m >= here.sigma_m - 1e-12
+def test_a_hypothesis_in_the_frame_of_another_floor_comes_back_the_same(
+    world: World, heading: float, sigma: float
+) -> None:
+    here = Hypothesis("car-1", Pose2(1.0, 0.9, heading), diagonal(sigma, 0.1), "command")
+    for name in world.locales:
+        there = in_locale(world, here, name)
+        back = in_locale(world, there, here.locale)
+        assert back.locale_from_robot.distance_to(here.locale_from_robot) < 1e-9
+        assert there.sigma_m == pytest.approx(here.sigma_m) and back.sigma_m == pytest.approx(here.sigma_m)
+        assert np.allclose(back.covariance, here.covariance)
 
 
 @settings(deadline=None, max_examples=10)
@@ -115,8 +122,8 @@ def test_a_robot_one_floor_up_sees_from_one_floor_up(world: World, x: float, y: 
     robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel())
     belief = Hypothesis("car-2", Pose2(x, y, heading), diagonal(0.01, 0.01), "command")
     pose = belief.world_from_robot(world)
-    eye = robot.standing_in("car-2").camera_from_world(pose).inverse().translation
+    eye = robot.on_floor_of("car-2").camera_from_world(pose).inverse().translation
     assert np.allclose(eye[:2], robot.camera_from_world(pose).inverse().translation[:2])
     assert abs(eye[2] - MOUNT.height_m - world.floor_m("car-2")) < 1e-9
     assert world.locale_at([*pose.position, world.floor_m("car-2")]) == "car-2"
-    assert robot.standing_in("car-1") is robot and robot.standing_in("car-2") is robot.standing_in("car-2")
+    assert robot.on_floor_of("car-1") is robot and robot.on_floor_of("car-2") is robot.on_floor_of("car-2")

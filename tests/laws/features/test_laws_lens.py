@@ -101,7 +101,7 @@ def test_a_robot_sees_in_straightened_pixels(world_of_nothing: RobotModel) -> No
 @pytest.fixture
 def world_of_nothing() -> RobotModel:
     from world_models.actuator import ActuatorModel
-    from world_models.files.store import WORLDS, load_world
+    from world_models.files.world_files import WORLDS, load_world
 
     lens = replace(PLAIN, distortion=(-0.2, 0.05, 0.0, 0.0))
     return RobotModel(load_world(WORLDS / "research_center.toml"), lens, CameraMount(1.0), ActuatorModel())

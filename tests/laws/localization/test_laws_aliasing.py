@@ -23,7 +23,7 @@ from knowledge_sources.methods.localization.aliasing import (
 from knowledge_sources.methods.verification.agreement import compute_coverage
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.files.store import WORLDS, load_world
+from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

@@ -30,7 +30,7 @@ from knowledge_sources.methods.localization.visibility_map import get_visibility
 from sim.made_up.generated_floors import generated_floor
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.files.store import WORLDS, load_world
+from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import hidden
@@ -166,10 +166,10 @@ def test_a_probing_move_stays_free_from_every_place_that_is_kept(seed: int) -> N
 def test_looks_are_composed_as_the_robot_moved(steps: list[tuple[float, float]], start: Pose2) -> None:
     actuator, now, then, spread = ActuatorModel(), start, HERE, np.zeros((3, 3))
     for turn, way in steps:
-        step = actuator.expected(turn, way)
+        step = actuator.predict_motion(turn, way)
         now = now @ step
         before = np.trace(spread)
-        then, spread = propagate_pose(then, spread, step, actuator.spread(turn, way))
+        then, spread = propagate_pose(then, spread, step, actuator.motion_covariance(turn, way))
         assert np.linalg.eigvalsh(spread)[0] >= -1e-12 and np.trace(spread) >= before - 1e-9
     back = now @ then
     assert back.distance_to(start) < 1e-9

@@ -22,7 +22,7 @@ from knowledge_sources.methods.verification.color_check import predict_face_colo
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries.obstruction import MOST_HIDDEN, Obstruction
-from world_models.files.store import WORLDS, load_world
+from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_points
@@ -118,7 +118,7 @@ def test_what_is_hidden_of_a_line_does_not_depend_on_its_direction(seed: int) ->
 def test_behind_something_the_robot_expects_what_it_did_but_for_what_is_hidden(seed: int) -> None:
     rng = np.random.default_rng(seed)
     told, pose = outline(rng), somewhere(rng)
-    robot = ROBOT.behind(told)
+    robot = ROBOT.with_obstruction(told)
     before, after = predict_lines(ROBOT, pose).segments_px, predict_lines(robot, pose).segments_px
     assert np.array_equal(before[told.shows(before)], after)
     points = visible_points(WORLD, robot.camera, robot.camera_from_world(pose)).points_px
@@ -126,8 +126,8 @@ def test_behind_something_the_robot_expects_what_it_did_but_for_what_is_hidden(s
     for _, at in predict_face_colors(robot, pose):
         pixels = robot.camera.project(robot.camera_from_world(pose).apply(np.array(at)))
         assert not np.any(told.covers(pixels))
-    assert robot.behind(None).camera.obstruction is None
-    assert robot.behind(told) is robot
+    assert robot.with_obstruction(None).camera.obstruction is None
+    assert robot.with_obstruction(told) is robot
 
 
 # -- how it is known -------------------------------------------------------------------------------------------------

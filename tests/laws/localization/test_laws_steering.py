@@ -88,7 +88,7 @@ def test_how_wheels_drift_is_learnt_from_how_the_heading_changes(drift: float, t
     before = known.sigma_per_m
     for turn in turns:
         heading += turn + drift * STEP_M
-        known = known.rolled(ACTUATOR, turn, ACTUATOR.increment_m).learnt(ACTUATOR, heading, 3e-4)
+        known = known.after_motion(ACTUATOR, turn, ACTUATOR.increment_m).update(ACTUATOR, heading, 3e-4)
         assert known.sigma_per_m <= before
         before = known.sigma_per_m
     assert abs(known.curvature_per_m - drift) <= 0.35 * abs(drift) + 1e-9
@@ -96,7 +96,7 @@ def test_how_wheels_drift_is_learnt_from_how_the_heading_changes(drift: float, t
 
 
 def test_a_push_teaches_nothing_about_the_wheels() -> None:
-    known = Drift.unknown(ACTUATOR, 0.0).rolled(ACTUATOR, 0.0, ACTUATOR.increment_m)
-    pushed = known.learnt(ACTUATOR, 0.3, 3e-4)
+    known = Drift.unknown(ACTUATOR, 0.0).after_motion(ACTUATOR, 0.0, ACTUATOR.increment_m)
+    pushed = known.update(ACTUATOR, 0.3, 3e-4)
     assert pushed.curvature_per_m == 0.0 and pushed.sigma_per_m == ACTUATOR.curvature_sigma_per_m
     assert pushed.heading_rad == 0.3 and pushed.gone_m == 0.0

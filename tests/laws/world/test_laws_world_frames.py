@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from world_models.building.locales import Doorway
 from world_models.building.outlines import distance_to_border
 from world_models.building.world import World
-from world_models.files.store import WORLDS, load_world, read_world
 from world_models.files.toml.source import Source
+from world_models.files.world_files import WORLDS, load_world, read_world
 
 WORLD = load_world(WORLDS / "research_center.toml")
 

@@ -11,10 +11,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from experiments.robustness.malformed_buildings_text import GML, IFC
+from world_models.building.checks import check_world
 from world_models.files.importers import BuildingError, import_building
 from world_models.files.importers.ifc.read_ifc import Next, heard
-from world_models.files.store import read_world
 from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
 
 SPOILT = ("0", "-1.0", "nan", "inf", "1e300", "1e-300", "#1", "#nothing", "", "'", '"', "$", "*", "()", "<", ">",
           "&b;", "3.5")
@@ -27,7 +28,7 @@ def _judged(path: Path, text: str) -> str:
     except BuildingError as error:
         assert path.name in str(error)
         return "error"
-    return "faults" if read_world(Source.parse(made.text)).check() else "sound"
+    return "faults" if check_world(read_world(Source.parse(made.text))) else "sound"
 
 
 def _spoil(text: str, changes: list[tuple[int, int]]) -> str:

@@ -8,7 +8,7 @@ import pytest
 from experiments.robustness.malformed_buildings_text import GML
 from experiments.robustness.malformed_worlds import SPOILERS, judged, judged_all
 from experiments.robustness.malformed_worlds_text import SMALL
-from world_models.files.store import compile_file
+from world_models.files.world_files import compile_file
 
 
 @pytest.fixture(scope="module")

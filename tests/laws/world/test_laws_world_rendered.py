@@ -5,8 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.perception.visibility import LEAST, agreement, house
-from world_models.files.store import read_world
+from world_models.building.checks import check_world
 from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
 
 POINTS = 4_000
 """In all: enough that a part of a thousandth is several points."""
@@ -24,5 +25,5 @@ def test_the_model_agrees_with_the_renderer_on_what_is_hidden() -> None:
 @settings(deadline=None, max_examples=6)
 @given(st.integers(0, 10_000))
 def test_made_up_houses_are_sound_but_for_things_that_stand_through_walls(seed: int) -> None:
-    faults = read_world(Source.parse(house(np.random.default_rng(seed)), "house.toml")).check()
+    faults = check_world(read_world(Source.parse(house(np.random.default_rng(seed)), "house.toml")))
     assert all("expected it inside" in fault.what for fault in faults), faults

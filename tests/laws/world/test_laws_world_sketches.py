@@ -19,8 +19,8 @@ from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command, Outcome, PlanSketch, Subgoal
-from world_models.files.store import read_world
 from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
 from world_models.robot import RobotModel
 from world_models.units import FOOT_M
 

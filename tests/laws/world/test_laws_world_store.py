@@ -12,13 +12,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from world_models.building.frame_source import Packet
+from world_models.building.checks import check_world
+from world_models.building.locale_source import LocaleGeometry
 from world_models.building.passages import find_route
 from world_models.building.world import World
-from world_models.files.compiled.sqlite_frames import SqliteFrames
+from world_models.files.compiled.sqlite_locales import SqliteLocales
 from world_models.files.compiled.writer import compile_world
-from world_models.files.store import WORLDS, compile_file, load_world, read_world
 from world_models.files.toml.source import Source, WorldError
+from world_models.files.world_files import WORLDS, compile_file, load_world, read_world
 
 DETAILS = WORLDS.parent.parent / "sim" / "buildings" / "research_center_details.toml"
 ARRAYS = ("polygons_world", "planes_world", "line_landmark", "line_index", "corners_world", "corner_landmark",
@@ -43,7 +44,7 @@ def same(one: World, other: World) -> None:
         assert one.locale(name).properties == other.locale(name).properties
         assert [d.name for d in one.doorways_of(name)] == [d.name for d in other.doorways_of(name)]
         assert [t.name for t in one.things_of(name)] == [t.name for t in other.things_of(name)]
-        assert one.frames.arcs(name) == other.frames.arcs(name)
+        assert one.locale_source.arcs(name) == other.locale_source.arcs(name)
 
 
 @pytest.mark.parametrize("details", [[], [DETAILS]])
@@ -53,8 +54,8 @@ def test_a_compiled_world_answers_as_its_text(compiled: Path, details: list[Path
 
 def test_a_robot_in_a_room_touches_the_room(compiled: Path) -> None:
     world = load_world(compiled)
-    frames = world.frames
-    assert isinstance(frames, SqliteFrames) and frames.touched == []
+    frames = world.locale_source
+    assert isinstance(frames, SqliteLocales) and frames.touched == []
     world.scene_of(["mail-room"])
     world.obstacles("mail-room")
     assert {name for _, name in frames.touched} == {"mail-room"}
@@ -74,9 +75,9 @@ def test_what_is_no_compiled_world_is_told(compiled: Path, tmp_path: Path) -> No
             everything(load_world(tmp_path / "bad.world"))
 
 
-def everything(world: World) -> list[Packet]:
-    world.check()
-    return list(world.frames.all_packets())
+def everything(world: World) -> list[LocaleGeometry]:
+    check_world(world)
+    return list(world.locale_source.all_geometry())
 
 
 @settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -115,7 +116,7 @@ def networks(draw: st.DrawFn) -> World:
 
 def walked(world: World, origin: str, destination: str, depth: int = 0) -> list[str] | None:
     """The rooms of a route, refined until nothing is left to refine."""
-    route = find_route(world.frames, origin, destination)
+    route = find_route(world.locale_source, origin, destination)
     if route is None or depth > 20:
         return None
     rooms, here = [origin], origin

@@ -6,9 +6,10 @@ import tomllib
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from world_models.building.checks import check_world
 from world_models.building.world import World
-from world_models.files.store import WORLDS, read_world
 from world_models.files.toml.source import Source, WorldError, line_numbers
+from world_models.files.world_files import WORLDS, read_world
 
 SMALL = """\
 name = "cottage"
@@ -80,14 +81,14 @@ def read(text: str) -> World | None:
         assert re.match(r"cottage\.toml:\d+: ", str(error)), error
         assert "expected" in str(error) and "got" in str(error)
         return None
-    for fault in world.check():
+    for fault in check_world(world):
         assert re.match(r"cottage\.toml:\d+$", fault.source) and "expected" in fault.what and "got" in fault.what
     return world
 
 
 def test_the_text_itself_is_a_sound_world() -> None:
     world = read(SMALL)
-    assert world is not None and not world.check() and len(world.doorways) == 1
+    assert world is not None and not check_world(world) and len(world.doorways) == 1
 
 
 @settings(deadline=None, max_examples=250)

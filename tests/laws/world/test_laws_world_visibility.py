@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from world_models.building.outlines import inside_polygon
 from world_models.camera import Camera, CameraMount
-from world_models.files.store import WORLDS, load_world
+from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose, Pose2
 from world_models.visibility.lines_and_points import VisibleLines, visible_lines, visible_points
 from world_models.visibility.shadows import TOUCHING_M

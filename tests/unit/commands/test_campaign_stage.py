@@ -12,7 +12,7 @@ from harvey.campaign.campaign import Task
 from harvey.errors import BadInput
 from harvey.simulation.run import head_of
 from sim.made_up.short_missions import OFFICE
-from world_models.files.store import WORLDS
+from world_models.files.world_files import WORLDS
 
 
 @pytest.fixture

@@ -16,8 +16,8 @@ from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command
-from world_models.files.store import WORLDS, load_world
 from world_models.files.toml.mission import Servo
+from world_models.files.world_files import WORLDS, load_world
 from world_models.robot import RobotModel
 
 WORLD = WORLDS / "research_center.toml"

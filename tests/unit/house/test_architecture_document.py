@@ -11,8 +11,9 @@ import pytest
 
 from harvey.cli import parser
 from sim.scenario import parse_scenario
-from world_models.files.store import read_world
+from world_models.building.checks import check_world
 from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
 
 ROOT = Path(__file__).parents[3]
 FOLDERS = (ROOT, ROOT / "knowledge_sources", ROOT / "world_models")
@@ -38,7 +39,7 @@ def test_every_toml_example_is_a_scenario_or_a_world_without_faults() -> None:
     assert scenarios
     assert worlds
     assert all(parse_scenario(text).world.is_file() for text in scenarios)
-    assert [fault for text in worlds for fault in read_world(Source.parse(text, "README.md"), []).check()] == []
+    assert [fault for text in worlds for fault in check_world(read_world(Source.parse(text, "README.md"), []))] == []
 
 
 @pytest.mark.parametrize("document", ["README.md", "ARCHITECTURE.md"])

@@ -11,7 +11,8 @@ import pytest
 from sim.made_up.generated_floors import generated_floor
 from sim.render.renderer import Renderer
 from sim.scenario import CameraSettings
-from world_models.files.store import load_world
+from world_models.building.checks import check_world
+from world_models.files.world_files import load_world
 from world_models.frames import Pose2
 
 
@@ -24,7 +25,7 @@ def test_the_same_seed_gives_the_same_floor_and_another_another() -> None:
 def test_it_has_the_rooms_that_were_asked_for_and_its_doors_fit() -> None:
     floor = generated_floor(1, 6, open_share=1.0)
     assert len(floor.rooms) == 6 and len(floor.world.doorways) == 6
-    assert floor.world.check() == []
+    assert check_world(floor.world) == []
     assert len(floor.building.things) > len(floor.world.things)
     assert len(floor.altered(0.3).things) < len(floor.building.things)
 

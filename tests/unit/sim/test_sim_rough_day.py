@@ -18,7 +18,7 @@ from sim.render.occluder import Occluder
 from sim.scenario import SCENARIOS, ScenarioError, load_scenario, parse_scenario
 from sim.stage import set_stage
 from world_models.camera import Camera, CameraMount
-from world_models.files.store import load_world
+from world_models.files.world_files import load_world
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)

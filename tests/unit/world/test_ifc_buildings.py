@@ -12,14 +12,15 @@ import shapely
 
 from harvey.cli import main
 from ifc_house import House, box, flat
+from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.files.importers import BuildingError, import_building
 from world_models.files.importers.curves import straight_at
 from world_models.files.importers.ifc.things import climbed
 from world_models.files.importers.outlines import Floats, apart, outline_of
 from world_models.files.importers.plan import Space
-from world_models.files.store import read_world
 from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
 
 pytestmark = pytest.mark.skipif(find_spec("ifcopenshell") is None, reason="needs ifcopenshell (the extra ifc)")
 
@@ -28,7 +29,7 @@ def imported(house: House, folder: Path) -> tuple[World, str]:
     """The world of a house, which must be without faults, and what the import tells."""
     made = import_building(house.write(folder / "house.ifc"))
     world = read_world(Source.parse(made.text))
-    assert world.check() == []
+    assert check_world(world) == []
     return world, str(made.account)
 
 

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from harvey.plan_picture import draw_plan
+from world_models.building.checks import check_world
 from world_models.building.plan_view import plan_of, plan_svg
 from world_models.building.world import World
-from world_models.entries.location import diagonal
-from world_models.files.store import WORLDS, load_world
-from world_models.frames import Pose2
-from world_models.levels import Location, seen_from
-from world_models.phrases import places_of, room_named
+from world_models.commands import find_room, parse_command
+from world_models.entries.location import Place
+from world_models.files.world_files import WORLDS, load_world
 
 SHA256 = "722e9bfe70cb0a61dac131aa283fddbaadf91d0ec70bc84b775f939012a26072"
 """Of that floor's faces and landmarks."""
@@ -53,7 +52,7 @@ def test_the_research_centers_floor_is_what_it_was_before_it_was_written_shorter
 
 
 def test_the_campus_is_sound_and_has_figure_8s_hierarchy(campus: World) -> None:
-    assert campus.check() == []
+    assert check_world(campus) == []
     assert campus.children_of("campus") == ("research-center", "court", "engineering")
     assert set(campus.children_of("research-center")) == {*FLOORS_M, "elevator", "stairwell"}
     assert {name: round(campus.floor_m(name), 4) for name in FLOORS_M} == FLOORS_M
@@ -98,10 +97,14 @@ def test_a_point_is_in_the_room_of_its_own_floor(campus: World) -> None:
 
 
 @pytest.mark.parametrize("there", ["hallway", "third-classroom", "court", "hansons-office", "car-4"])
-def test_a_location_goes_through_the_floors_and_back(campus: World, there: str) -> None:
-    here = Location("first-hallway", Pose2(3.0, 1.0, 0.5), diagonal(0.1, 0.02))
-    back = seen_from(campus, seen_from(campus, here, there), here.locale)
-    assert back.pose.distance_to(here.pose) < 1e-9 and back.sigma_m >= here.sigma_m - 1e-12
+def test_a_place_goes_through_the_floors_and_back(campus: World, there: str) -> None:
+    here = Place("first-hallway", 3.0, 1.0, 0.5)
+    pose = here.in_world(campus)
+    across = Place.of_world(campus, there, pose.x_m, pose.y_m, pose.heading_rad)
+    assert across.in_world(campus).distance_to(pose) < 1e-9
+    again = across.in_world(campus)
+    back = Place.of_world(campus, here.locale, again.x_m, again.y_m, again.heading_rad)
+    assert (back.x_m, back.y_m, back.heading_rad) == pytest.approx((here.x_m, here.y_m, here.heading_rad))
 
 
 @pytest.mark.parametrize(("words", "room"), [
@@ -110,7 +113,7 @@ def test_a_location_goes_through_the_floors_and_back(campus: World, there: str) 
     ("the laboratory", "robot-laboratory"), ("the classroom of the first floor", "first-classroom"),
 ])
 def test_rooms_are_found_by_where_they_are(campus: World, words: str, room: str) -> None:
-    assert room_named(words, campus) == room
+    assert find_room(words, campus) == room
 
 
 @pytest.mark.parametrize(("words", "message"), [
@@ -121,11 +124,11 @@ def test_rooms_are_found_by_where_they_are(campus: World, words: str, room: str)
 ])
 def test_what_is_not_one_room_is_refused(campus: World, words: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        room_named(words, campus)
+        find_room(words, campus)
 
 
 def test_bring_this_to_somebody_across_the_campus(campus: World) -> None:
-    origin, destination = places_of("Bring this from the laboratory to Hanson", campus)
+    origin, destination = parse_command("Bring this from the laboratory to Hanson", campus)
     assert (origin.locale, destination.locale) == ("robot-laboratory", "hansons-office")
 
 

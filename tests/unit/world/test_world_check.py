@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from world_models.building.memory_frames import MemoryFrames
+from world_models.building.checks import check_world
+from world_models.building.memory_locales import MemoryLocales
 from world_models.building.world import World
-from world_models.files.store import WORLDS, load_world, read_world
 from world_models.files.toml.source import Source
+from world_models.files.world_files import WORLDS, load_world, read_world
 
 HOUSE = """\
 name = "house"
@@ -32,7 +33,7 @@ back = { between = ["kitchen"], wall = "west", along = 1.5 }
 
 def faults(old: str = "", new: str = "") -> list[str]:
     assert old in HOUSE
-    return [str(fault) for fault in read_world(Source.parse(HOUSE.replace(old, new, 1), "house.toml")).check()]
+    return [str(fault) for fault in check_world(read_world(Source.parse(HOUSE.replace(old, new, 1), "house.toml")))]
 
 
 def test_a_sound_house_has_no_faults() -> None:
@@ -64,13 +65,13 @@ def test_faults_are_told_with_their_line(old: str, new: str, expected: str) -> N
 
 def test_a_room_with_a_hole_is_not_closed() -> None:
     world = read_world(Source.parse(HOUSE, "house.toml"))
-    frames = world.frames
-    assert isinstance(frames, MemoryFrames)
+    frames = world.locale_source
+    assert isinstance(frames, MemoryLocales)
     leaky = World(replace(frames, every_face=tuple(f for f in world.faces if f.name != "kitchen/north-wall")))
-    assert [str(f) for f in leaky.check()] == [
+    assert [str(f) for f in check_world(leaky)] == [
         "house.toml:7: kitchen: expected a room closed by floor, ceiling, walls and doors, got a gap"]
 
 
 def test_the_shipped_world_and_its_details_are_sound() -> None:
     details = WORLDS.parent.parent / "sim" / "buildings" / "research_center_details.toml"
-    assert load_world(WORLDS / "research_center.toml", details=[details]).check() == []
+    assert check_world(load_world(WORLDS / "research_center.toml", details=[details])) == []

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from world_models.building.faces import area_vector
-from world_models.building.geometer import Box, Solid, Surface, left_over
+from world_models.building.intervals import subtract_intervals
 from world_models.building.outlines import convex_pieces
 from world_models.building.regions import Finish
+from world_models.building.solids import Box, Solid, Surface
 from world_models.building.world import World
-from world_models.files.store import WORLDS, load_world
+from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose
 
 GREY, DARK = Finish((0.5, 0.5, 0.5)), Finish((0.1, 0.1, 0.1))
@@ -72,9 +73,9 @@ def test_a_line_shows_when_the_side_that_stands_out_does() -> None:
 
 
 def test_left_over_pieces() -> None:
-    assert left_over((0.0, 10.0), [(4.0, 5.0), (2.0, 4.5)], 0.1) == [(0.0, 2.0), (5.0, 10.0)]
-    assert left_over((0.0, 1.0), [(-1.0, 2.0)], 0.1) == []
-    assert left_over((0.0, 1.0), [(0.05, 1.0)], 0.1) == []
+    assert subtract_intervals((0.0, 10.0), [(4.0, 5.0), (2.0, 4.5)], 0.1) == [(0.0, 2.0), (5.0, 10.0)]
+    assert subtract_intervals((0.0, 1.0), [(-1.0, 2.0)], 0.1) == []
+    assert subtract_intervals((0.0, 1.0), [(0.05, 1.0)], 0.1) == []
 
 
 def test_an_l_shaped_floor_is_cut_into_convex_pieces_of_the_same_area() -> None:

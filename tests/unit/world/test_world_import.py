@@ -11,13 +11,14 @@ import pytest
 from experiments.robustness.imported_building import drawn
 from experiments.robustness.imported_floors import pairs_of
 from harvey.cli import main
+from world_models.building.checks import check_world
 from world_models.building.world import World
-from world_models.files.importers import BuildingError, Imported, import_building
+from world_models.files.importers import BuildingError, ImportedBuilding, import_building
 from world_models.files.importers.cuts import door_between, wide_opening
 from world_models.files.importers.outlines import apart, cleaned, facing, squared
 from world_models.files.importers.plan import Furnishing, Gap, Names, Space, slug
 from world_models.files.importers.things import bounding_steps, put_inside
-from world_models.files.store import load_world
+from world_models.files.world_files import load_world
 
 DATA = Path(__file__).parents[4] / "shared" / "data" / "buildings"
 DUPLEX, UNIVERSITY = DATA / "Ifc2x3_Duplex_Architecture.ifc", DATA / "pnu_abc.gml"
@@ -25,11 +26,14 @@ no_ifc = pytest.mark.skipif(find_spec("ifcopenshell") is None or not DUPLEX.is_f
                             reason="needs ifcopenshell (the extra ifc) and the Duplex apartment")
 no_gml = pytest.mark.skipif(not UNIVERSITY.is_file(), reason="needs the university building")
 
+Building = tuple[ImportedBuilding, World]
+"""A building file as imported, and the world read from its text."""
+
 ROOM = np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)])
 
 
 @pytest.fixture(scope="module")
-def duplex(tmp_path_factory: pytest.TempPathFactory) -> tuple[Imported, World]:
+def duplex(tmp_path_factory: pytest.TempPathFactory) -> Building:
     made = import_building(DUPLEX)
     path = tmp_path_factory.mktemp("duplex") / "duplex.toml"
     path.write_text(made.text, encoding="utf-8")
@@ -37,7 +41,7 @@ def duplex(tmp_path_factory: pytest.TempPathFactory) -> tuple[Imported, World]:
 
 
 @pytest.fixture(scope="module")
-def university(tmp_path_factory: pytest.TempPathFactory) -> tuple[Imported, World]:
+def university(tmp_path_factory: pytest.TempPathFactory) -> Building:
     made = import_building(UNIVERSITY)
     path = tmp_path_factory.mktemp("university") / "university.toml"
     path.write_text(made.text, encoding="utf-8")
@@ -45,9 +49,9 @@ def university(tmp_path_factory: pytest.TempPathFactory) -> tuple[Imported, Worl
 
 
 @no_ifc
-def test_the_duplex_apartment_is_a_world_without_faults(duplex: tuple[Imported, World]) -> None:
+def test_the_duplex_apartment_is_a_world_without_faults(duplex: Building) -> None:
     made, world = duplex
-    assert world.check() == []
+    assert check_world(world) == []
     assert len(world.rooms) == 21
     between_rooms = {d.between for d in world.doorways if d.name.startswith("door")}
     assert len(between_rooms) == 10
@@ -55,7 +59,7 @@ def test_the_duplex_apartment_is_a_world_without_faults(duplex: tuple[Imported, 
 
 
 @no_ifc
-def test_rooms_of_the_duplex_are_as_large_as_the_file_says(duplex: tuple[Imported, World]) -> None:
+def test_rooms_of_the_duplex_are_as_large_as_the_file_says(duplex: Building) -> None:
     world = duplex[1]
     low, high = (bound(world.locale("a203-bedroom-2").outline, axis=0) for bound in (np.min, np.max))
     assert high - low == pytest.approx([3.708, 6.249], abs=0.01)
@@ -63,7 +67,7 @@ def test_rooms_of_the_duplex_are_as_large_as_the_file_says(duplex: tuple[Importe
 
 
 @no_ifc
-def test_the_duplex_says_what_cannot_be_reached_and_why(duplex: tuple[Imported, World]) -> None:
+def test_the_duplex_says_what_cannot_be_reached_and_why(duplex: Building) -> None:
     world = duplex[1]
     assert "out of doors" in world.locale("b103-kitchen").properties["unreachable"]
     assert world.route("a102-living-room", "a104-bathroom-1") is not None
@@ -73,28 +77,28 @@ def test_the_duplex_says_what_cannot_be_reached_and_why(duplex: tuple[Imported, 
 
 
 @no_ifc
-def test_the_two_apartments_of_the_duplex_have_the_same_doors(duplex: tuple[Imported, World]) -> None:
+def test_the_two_apartments_of_the_duplex_have_the_same_doors(duplex: Building) -> None:
     widths = {side: sorted(d.width_m for d in duplex[1].doorways if d.between[0].startswith(side))
               for side in "ab"}
     assert widths["a"] == pytest.approx(widths["b"], abs=0.025)
 
 
 @no_ifc
-def test_a_wall_beside_a_virtual_boundary_stays(duplex: tuple[Imported, World]) -> None:
+def test_a_wall_beside_a_virtual_boundary_stays(duplex: Building) -> None:
     opening, = (d for d in duplex[1].doorways if set(d.between) == {"a102-living-room", "a101-foyer"})
     assert opening.width_m == pytest.approx(0.915), "0.09 m of partition stand beside it in the file"
 
 
 @no_gml
-def test_the_university_is_a_world_without_faults(university: tuple[Imported, World]) -> None:
+def test_the_university_is_a_world_without_faults(university: Building) -> None:
     world = university[1]
-    assert world.check() == []
+    assert check_world(world) == []
     assert len(world.rooms) == 23 and not any(world.locale(r).properties.get("unreachable") for r in world.rooms)
     assert [round(world.locale(f).properties["elevation_m"], 2) for f in ("f2", "f3", "f4")] == [0.0, 3.5, 7.0]
 
 
 @no_gml
-def test_the_university_plans_between_any_two_rooms_of_different_floors(university: tuple[Imported, World]) -> None:
+def test_the_university_plans_between_any_two_rooms_of_different_floors(university: Building) -> None:
     made, world = university
     network = made.network
     assert network is not None and network.layer == "network"
@@ -108,7 +112,7 @@ def test_the_university_plans_between_any_two_rooms_of_different_floors(universi
 
 
 @no_gml
-def test_a_wheeled_robot_changes_floors_of_the_university_by_elevator(university: tuple[Imported, World]) -> None:
+def test_a_wheeled_robot_changes_floors_of_the_university_by_elevator(university: Building) -> None:
     world = university[1]
     route = world.route("room1-deans-office", "restroom4")
     assert route is not None
@@ -116,7 +120,7 @@ def test_a_wheeled_robot_changes_floors_of_the_university_by_elevator(university
 
 
 @no_gml
-def test_between_floors_of_the_university_only_stairs_are_not_for_wheels(university: tuple[Imported, World]) -> None:
+def test_between_floors_of_the_university_only_stairs_are_not_for_wheels(university: Building) -> None:
     world = university[1]
     pairs = pairs_of(world, university[0].network)
     assert len(pairs) == 166 and all(pair.walked and pair.length_m for pair in pairs)
@@ -127,7 +131,7 @@ def test_between_floors_of_the_university_only_stairs_are_not_for_wheels(univers
 
 
 @no_ifc
-def test_errands_in_the_duplex_are_between_rooms_that_wheels_can_reach(duplex: tuple[Imported, World]) -> None:
+def test_errands_in_the_duplex_are_between_rooms_that_wheels_can_reach(duplex: Building) -> None:
     world = duplex[1]
     errands = list(drawn(world, 50, 0))
     assert [e.number for e in errands] == list(range(50)) and errands == list(drawn(world, 50, 0))

@@ -11,7 +11,7 @@ from world_models.building.outlines import distance_to_border, inside_polygon
 from world_models.building.plan_view import plan_svg
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
-from world_models.files.store import WORLDS, load_world
+from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
 from world_models.visibility.lines_and_points import visible_lines, visible_points
 

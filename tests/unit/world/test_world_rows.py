@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from world_models.building.checks import check_world
 from world_models.building.world import World
-from world_models.files.store import WorldError, load_world, read_world
-from world_models.files.toml.includes import digest_of
+from world_models.files.toml.includes import compute_digest
 from world_models.files.toml.source import Source
+from world_models.files.world_files import WorldError, load_world, read_world
 
 HEAD = """\
 name = "house"
@@ -39,7 +40,7 @@ SHORT = """things = [ ["chest", "north", 1, 3, "big"], ["chest", "south", { from
 def test_rows_are_the_same_things_as_tables() -> None:
     short, long = house(SHORT), house(LONG)
     assert [t.name for t in short.things] == [t.name for t in long.things]
-    assert len(short.things) == 7 and short.check() == long.check() == []
+    assert len(short.things) == 7 and check_world(short) == check_world(long) == []
     for one, other in zip(short.faces, long.faces, strict=True):
         assert one.name == other.name and one.polygon_world.tolist() == other.polygon_world.tolist()
 
@@ -89,10 +90,10 @@ def test_a_file_includes_others_and_its_fingerprint_tells(tmp_path: Path) -> Non
     parts.write_text('units = "feet"\n[finishes]\noak = { colour = [0.5, 0.4, 0.3] }\n[defaults]\nheight = 10\n')
     house_file.write_text('include = ["mine.toml"]\nname = "house"\nunits = "metres"\n'
                           '[locales.hall]\nkind = "room"\nsize = [4, 3]\nwalls = "oak"\n')
-    world, before = load_world(house_file), digest_of(house_file)
-    assert world.check() == [] and world.locale("hall").height_m == pytest.approx(3.048)
+    world, before = load_world(house_file), compute_digest(house_file)
+    assert check_world(world) == [] and world.locale("hall").height_m == pytest.approx(3.048)
     parts.write_text(parts.read_text().replace("0.3]", "0.4]"))
-    assert digest_of(house_file) != before
+    assert compute_digest(house_file) != before
 
 
 @pytest.mark.parametrize(("included", "message"), [
@@ -113,12 +114,12 @@ def test_a_world_is_not_made_from_itself(tmp_path: Path) -> None:
     path.write_text('name = "h"\nunits = "metres"\n[locales.top]\nfrom = "house.toml"\n')
     with pytest.raises(WorldError, match=r"expected another world file, that is not made from this one"):
         load_world(path)
-    assert digest_of(path)
+    assert compute_digest(path)
 
 
 def test_outdoors_has_no_ceiling_and_a_skyline() -> None:
     court = house("sky = true\nwall_heights = { north = 2, south = 1 }\n")
-    assert court.check() == []
+    assert check_world(court) == []
     assert not any(face.name == "hall/ceiling" for face in court.faces)
     tops = {round(float(z), 2) for mark in court.landmarks for z in mark.lines_world[..., 2].ravel()}
     assert {1.0, 2.0, 2.7} <= tops
@@ -127,12 +128,12 @@ def test_outdoors_has_no_ceiling_and_a_skyline() -> None:
 def test_a_board_across_a_doorway_is_a_fault() -> None:
     more = ('things = [ ["chest", "east", 2.4] ]\n[locales.den]\nkind = "room"\nat = [9.2, 0]\nsize = [3, 5]\n'
             '[doors]\nd = { between = ["hall", "den"], wall = "east", along = 2, open = true }\n')
-    assert [str(f) for f in house(more).check()] == [
+    assert [str(f) for f in check_world(house(more))] == [
         "house.toml:10: hall/chest-1: expected the doorway d free, got it in there"]
 
 
 def test_a_step_in_a_doorway_is_a_fault() -> None:
     more = ('[locales.den]\nkind = "room"\nat = [9.2, 0, 0.2]\nsize = [3, 5]\n'
             '[doors]\nd = { between = ["hall", "den"], wall = "east", along = 2, open = true }\n')
-    assert [str(f) for f in house(more).check()] == [
+    assert [str(f) for f in check_world(house(more))] == [
         "house.toml:15: d: expected hall and den on one level, got a step of 0.20 m"]

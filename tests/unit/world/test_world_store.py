@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from world_models.building.checks import check_world
 from world_models.building.world import World
-from world_models.files.store import WORLDS, WorldError, load_world, read_world
 from world_models.files.toml.source import Source
+from world_models.files.world_files import WORLDS, WorldError, load_world, read_world
 
 HEAD = 'name = "cottage"\nunits = "feet"\n'
 KITCHEN = '[locales.kitchen]\nkind = "room"\nsize = [10, 8]\n'
@@ -132,7 +133,7 @@ def test_details_only_add_things() -> None:
     plain, detailed = read(HEAD + KITCHEN), read(HEAD + KITCHEN, DETAIL)
     assert [thing.name for thing in detailed.things] == ["kitchen/socket-1"] and not plain.things
     assert [f.name for f in detailed.faces[: len(plain.faces)]] == [f.name for f in plain.faces]
-    assert detailed.things[0].source == "more.toml:7" and not detailed.check()
+    assert detailed.things[0].source == "more.toml:7" and not check_world(detailed)
 
 
 @pytest.mark.parametrize(

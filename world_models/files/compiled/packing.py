@@ -10,25 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.faces import Face
-from world_models.building.frame_source import Packet
 from world_models.building.landmarks import Edges, Landmark
+from world_models.building.locale_source import LocaleGeometry
 from world_models.building.regions import Region
 from world_models.frames import frozen
 
 Floats = NDArray[np.float64]
 
 
-def packed_array(array: Any) -> bytes:
+def pack_array(array: Any) -> bytes:
     """Little-endian float64."""
     return np.ascontiguousarray(array, "<f8").tobytes()
 
 
-def unpacked_array(data: bytes, shape: tuple[int, ...]) -> Floats:
+def unpack_array(data: bytes, shape: tuple[int, ...]) -> Floats:
     """Raises ValueError where the bytes are not so many numbers."""
     return frozen(np.frombuffer(data, "<f8").reshape(shape))
 
 
-def packed(packet: Packet) -> tuple[str, bytes]:
+def packed(packet: LocaleGeometry) -> tuple[str, bytes]:
     """The words of a packet as JSON, and its numbers."""
     faces = [[number, f.name, f.kind, f.parent, dict(f.properties), len(f.polygon_world),
               [_words(r) for r in f.front], [_words(r) for r in f.back]] for number, f in packet.faces]
@@ -39,14 +39,14 @@ def packed(packet: Packet) -> tuple[str, bytes]:
     for _, mark in packet.landmarks:
         arrays += [mark.edges.lines_world, mark.edges.normals_world, mark.edges.levels]
     flat = np.concatenate([np.zeros(0), *(array.ravel() for array in arrays)])
-    return json.dumps([faces, marks], separators=(",", ":")), packed_array(flat)
+    return json.dumps([faces, marks], separators=(",", ":")), pack_array(flat)
 
 
 def _words(r: Region) -> list[Any]:
     return [r.name, len(r.polygon_world), list(r.colour), r.texture, r.texture_scale_m, r.seed]
 
 
-def unpacked(locale: str, neighbour: str | None, rows: Iterable[tuple[str, bytes]]) -> Packet:
+def unpacked(locale: str, neighbour: str | None, rows: Iterable[tuple[str, bytes]]) -> LocaleGeometry:
     """One packet of one or several rows: the model's, and those of details that were compiled with it.
 
     Raises ValueError, TypeError or LookupError where the bytes are not what was packed.
@@ -63,7 +63,7 @@ def unpacked(locale: str, neighbour: str | None, rows: Iterable[tuple[str, bytes
         for number, name, kind, source, lines in mark_rows:
             edges = Edges(reader.take(lines, 2, 3), reader.take(lines, 2, 3), reader.take(lines, 3))
             marks.append((number, Landmark(name, locale, kind, edges, neighbour, source)))
-    return Packet(locale, neighbour, tuple(faces), tuple(marks))
+    return LocaleGeometry(locale, neighbour, tuple(faces), tuple(marks))
 
 
 def _region(row: list[Any], reader: _Reader) -> Region:

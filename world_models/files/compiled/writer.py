@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from world_models.building.frame_source import Packet
+from world_models.building.locale_source import LocaleGeometry
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.memory_frames import extent_of, words_about
-from world_models.building.passages import network, passable
-from world_models.building.things import Fault, Thing
+from world_models.building.memory_locales import extent_of, words_about
+from world_models.building.passages import drivable_passages, network
+from world_models.building.things import Finding, Thing
 from world_models.building.world import World
-from world_models.files.compiled.packing import packed, packed_array
+from world_models.files.compiled.packing import pack_array, packed
 from world_models.files.compiled.schema import FORMAT, INDICES, SCHEMA
 from world_models.files.toml.source import WorldError
 from world_models.frames import Pose
@@ -40,7 +40,7 @@ def compile_world(layers: Sequence[World], out: Path, details: Sequence[str] = (
     try:
         partial.unlink(missing_ok=True)
         with closing(sqlite3.connect(partial)) as file:
-            writer = StoreWriter(file, layers[0].name, details)
+            writer = WorldWriter(file, layers[0].name, details)
             _write(writer, layers)
         os.replace(partial, out)
     except (OSError, sqlite3.Error) as error:
@@ -49,9 +49,9 @@ def compile_world(layers: Sequence[World], out: Path, details: Sequence[str] = (
         partial.unlink(missing_ok=True)
 
 
-def _write(writer: StoreWriter, layers: Sequence[World]) -> None:
+def _write(writer: WorldWriter, layers: Sequence[World]) -> None:
     world = layers[-1]
-    for name in dict.fromkeys(step for each in world.frames.names() for step in world.path_of(each)):
+    for name in dict.fromkeys(step for each in world.locale_source.names() for step in world.path_of(each)):
         writer.add_locale(world.locale(name))
     for doorway in world.doorways:
         writer.add_doorway(doorway)
@@ -59,7 +59,7 @@ def _write(writer: StoreWriter, layers: Sequence[World]) -> None:
         writer.add_link(link)
     known = 0, 0, 0
     for layer, built in enumerate(layers):
-        for packet in built.frames.all_packets():
+        for packet in built.locale_source.all_geometry():
             writer.add_packet(_beyond(packet, known[0], known[1]), layer)
         for thing in built.things[known[2] :]:
             writer.add_thing(thing, layer)
@@ -69,13 +69,13 @@ def _write(writer: StoreWriter, layers: Sequence[World]) -> None:
     writer.finish(layers[-1].building_faults)
 
 
-def _beyond(packet: Packet, faces: int, landmarks: int) -> Packet:
+def _beyond(packet: LocaleGeometry, faces: int, landmarks: int) -> LocaleGeometry:
     """What a packet has that is not in an earlier layer."""
-    return Packet(packet.locale, packet.neighbour, tuple(pair for pair in packet.faces if pair[0] >= faces),
+    return LocaleGeometry(packet.locale, packet.neighbour, tuple(pair for pair in packet.faces if pair[0] >= faces),
                   tuple(pair for pair in packet.landmarks if pair[0] >= landmarks))
 
 
-class StoreWriter:
+class WorldWriter:
     """Writes frames as they come; containers before what they contain."""
 
     def __init__(self, file: sqlite3.Connection, name: str, details: Sequence[str] = ()) -> None:
@@ -105,10 +105,10 @@ class StoreWriter:
         pose = locale.frame if parent is None else self._poses[parent] @ locale.frame
         self._poses[locale.name], self._parents[locale.name] = pose, parent
         x0, y0, x1, y1 = (float(v) for v in extent_of(locale, pose))
-        frame = packed_array(np.column_stack([locale.frame.rotation, locale.frame.translation]))
+        frame = pack_array(np.column_stack([locale.frame.rotation, locale.frame.translation]))
         self._insert("insert into locale values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 1)", (
             number, locale.name, locale.kind, None if parent is None else self._ids[parent], frame,
-            packed_array(locale.outline), locale.height_m, locale.floor_m, json.dumps(dict(locale.properties)),
+            pack_array(locale.outline), locale.height_m, locale.floor_m, json.dumps(dict(locale.properties)),
             locale.survey_m, locale.survey_rad, locale.source))
         self._file.execute("insert into extent values (?, ?, ?, ?, ?)", (number, x0, x1, y0, y1))
         self._words += [(word, number) for word in sorted(words_about(locale))]
@@ -116,18 +116,18 @@ class StoreWriter:
     def add_doorway(self, doorway: Doorway) -> None:
         """An open doorway between locales that were added before."""
         a, b = (self._ids[name] for name in doorway.between)
-        self._passages += passable([doorway])
+        self._passages += drivable_passages([doorway])
         self._insert("insert into doorway (name, a, b, thresholds, height_m, source) values (?, ?, ?, ?, ?, ?)", (
-            doorway.name, a, b, packed_array(doorway.thresholds_world), doorway.height_m, doorway.source))
+            doorway.name, a, b, pack_array(doorway.thresholds_world), doorway.height_m, doorway.source))
 
     def add_link(self, link: Link) -> None:
         """An elevator or a flight of stairs between locales that were added before."""
         a, b = (self._ids[name] for name in link.between)
-        self._passages += passable([link])
+        self._passages += drivable_passages([link])
         self._insert("insert into link (name, kind, a, b, stops, source) values (?, ?, ?, ?, ?, ?)", (
-            link.name, link.kind, a, b, packed_array(link.stops_world), link.source))
+            link.name, link.kind, a, b, pack_array(link.stops_world), link.source))
 
-    def add_packet(self, packet: Packet, layer: int = 0) -> None:
+    def add_packet(self, packet: LocaleGeometry, layer: int = 0) -> None:
         """Faces and landmarks; empty ones are left out."""
         if packet.faces or packet.landmarks:
             self.add_packed(packet.locale, packet.neighbour, *packed(packet), layer)
@@ -141,14 +141,14 @@ class StoreWriter:
         self._insert(
             "insert into thing (locale, layer, name, kind, footprint, low_m, high_m, proud_m, source)"
             " values (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-            (self._ids[thing.locale], layer, thing.name, thing.kind, packed_array(thing.footprint_world), thing.low_m,
+            (self._ids[thing.locale], layer, thing.name, thing.kind, pack_array(thing.footprint_world), thing.low_m,
              thing.high_m, thing.proud_m, thing.source))
 
     def count(self, layer: int, counts: object) -> None:
         """How many of everything there are with so many layers."""
         self._meta(f"counts {layer}", json.dumps(counts))
 
-    def finish(self, faults: Iterable[Fault] = ()) -> None:
+    def finish(self, faults: Iterable[Finding] = ()) -> None:
         """Find the passages of every container, index everything and write it out."""
         ids = self._ids
         found = network(self._parents, self._passages)

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.faces import Face
-from world_models.building.geometer import Solid
 from world_models.building.landmarks import Landmark
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.memory_frames import MemoryFrames
-from world_models.building.things import ROBOT_TOP_M, Fault, Thing
+from world_models.building.memory_locales import MemoryLocales
+from world_models.building.solids import Solid
+from world_models.building.things import ROBOT_TOP_M, Finding, Thing
 from world_models.building.world import World
 from world_models.files.construction.blueprint import Blueprint, DoorSpec, LinkSpec, LocaleSpec, ThingSpec
 from world_models.files.construction.doors import LEAF_DEPTH_M, DoorSide, closed_door, open_door
@@ -36,7 +36,7 @@ def build_world(blueprint: Blueprint) -> World:
     site.raise_shells()
     site.hang_doors()
     site.furnish()
-    return World(MemoryFrames(
+    return World(MemoryLocales(
         name=blueprint.name,
         locales=MappingProxyType(_locales(blueprint, site.poses)),
         every_doorway=tuple(site.doorways),
@@ -75,7 +75,7 @@ class _Site:
     faces: list[Face] = field(default_factory=list)
     landmarks: list[Landmark] = field(default_factory=list)
     things: list[Thing] = field(default_factory=list)
-    faults: list[Fault] = field(default_factory=list)
+    faults: list[Finding] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         locales = self.blueprint.locales
@@ -83,12 +83,12 @@ class _Site:
         self.walls = {name: {w.name: w for w in walls_of(spec, self.poses[name])} for name, spec in locales.items()}
 
     def cut_doors(self) -> None:
-        """Make the holes of all doors, before any wall is painted."""
+        """Make the holes of all doors, before any wall is build_barrier."""
         for door in self.blueprint.doors:
             try:
                 holes = self._holes(door)
             except _Unbuildable as problem:
-                self.faults.append(Fault(door.source, f"door {door.name}: {problem}"))
+                self.faults.append(Finding(door.source, f"door {door.name}: {problem}"))
                 continue
             for room, wall, opening in holes:
                 self.walls[room][wall] = self.walls[room][wall].with_opening(opening)
@@ -172,7 +172,7 @@ class _Site:
         wall = self.walls[spec.locale][str(spec.wall)]
         across = _coordinate_along(wall.name, wall.world_from_wall.inverse() @ world_from_locale, spec.along_m)
         if not 0 <= across <= wall.length_m:
-            self.faults.append(Fault(
+            self.faults.append(Finding(
                 spec.source, f"{spec.name}: expected a place on the {wall.name} wall of {spec.locale}, "
                              f"got one {across:.2f} m along its {wall.length_m:.2f} m"))
         return wall.world_from_wall @ Pose(np.eye(3), np.array([across, 0.0, spec.up_m]))

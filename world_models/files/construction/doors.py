@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.faces import Face, painted
-from world_models.building.geometer import Box, Range, Solid, Surface, surface_of
+from world_models.building.faces import Face, build_barrier
 from world_models.building.landmarks import Edges, Landmark
-from world_models.building.regions import Finish, level
+from world_models.building.regions import Finish, expected_brightness
+from world_models.building.solids import Box, Range, Solid, Surface, surface_of
 from world_models.files.construction.blueprint import DoorSpec
 from world_models.files.construction.shells import CASING_M, CASING_PROUD_M, Opening, Wall
 from world_models.frames import Pose
@@ -84,7 +84,7 @@ class DoorSide:
     def leaf(self) -> tuple[list[Face], Edges]:
         """The closed leaf and what stands on it."""
         polygon = self.wall.rectangle(self.x, (0.0, self.opening.top_m), -self.depth_m)
-        face = painted(f"{self.name}/leaf", self.wall.locale, polygon, self.spec.leaf, parent=self.wall.face_name)
+        face = build_barrier(f"{self.name}/leaf", self.wall.locale, polygon, self.spec.leaf, parent=self.wall.face_name)
         middle = self.wall.world_from_wall @ _moved((self.x[0] + self.x[1]) / 2, -self.depth_m)
         surface = surface_of(polygon, self.spec.leaf)
         panel = Solid(f"{self.name}/panel", self.spec.panel, middle, (*self._ground, surface))
@@ -130,11 +130,12 @@ class DoorSide:
     def _ground(self) -> tuple[Surface, ...]:
         up = np.array([0.0, 0.0, 1.0])
         base = float(self.wall.world_from_wall.translation[2])
-        return Surface(up, base, level(self.floor, up)), surface_of(self.wall.polygon_world, self.wall.finish)
+        floor = Surface(up, base, expected_brightness(self.floor, up))
+        return floor, surface_of(self.wall.polygon_world, self.wall.finish)
 
     def _painted(self, name: str, corners: Sequence[Sequence[float]], finish: Finish) -> Face:
         polygon = self.wall.world_from_wall.apply(corners)
-        return painted(f"{self.name}/{name}", self.wall.locale, polygon, finish,
+        return build_barrier(f"{self.name}/{name}", self.wall.locale, polygon, finish,
                        neighbour=self.opening.neighbour, parent=self.wall.face_name)
 
     def _line(
@@ -143,8 +144,8 @@ class DoorSide:
     ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]], list[float]]:
         """A row of :class:`Edges`; sides are named ``+x`` .. ``-z``, and a ground shows when the first side does."""
         normals = [self._direction(first), self._direction(second)]
-        levels = [level(finish, normals[0]), level(other, normals[1])]
-        levels.append(float("nan") if behind is None else level(behind, self.wall.inward_world))
+        levels = [expected_brightness(finish, normals[0]), expected_brightness(other, normals[1])]
+        levels.append(float("nan") if behind is None else expected_brightness(behind, self.wall.inward_world))
         return self.wall.world_from_wall.apply([start, end]), [normals[0], normals[0 if ground else 1]], levels
 
     def _direction(self, side: str) -> NDArray[np.float64]:

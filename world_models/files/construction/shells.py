@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.faces import Face
-from world_models.building.geometer import SHORTEST_LINE_M, Box, Range, Solid, Surface, left_over, surface_of
+from world_models.building.intervals import subtract_intervals
 from world_models.building.landmarks import Edges, Landmark
 from world_models.building.outlines import convex_pieces
-from world_models.building.regions import Finish, level, region
+from world_models.building.regions import Finish, expected_brightness, region
+from world_models.building.solids import SHORTEST_LINE_M, Box, Range, Solid, Surface, surface_of
 from world_models.files.construction.blueprint import LocaleSpec, RoomLook
 from world_models.frames import Pose
 
@@ -70,8 +71,8 @@ class Wall:
         return np.asarray(self.world_from_wall.rotation[:, 1])
 
     @property
-    def level(self) -> float:
-        return level(self.finish, self.inward_world)
+    def brightness(self) -> float:
+        return expected_brightness(self.finish, self.inward_world)
 
     @property
     def polygon_world(self) -> NDArray[np.float64]:
@@ -84,7 +85,7 @@ class Wall:
     def free_of_openings(self, margin_m: float = 0.0) -> list[Range]:
         """The stretches between its openings, which are taken to be wider by the margin on both sides."""
         taken = [(o.left_m - margin_m, o.right_m + margin_m) for o in self.openings]
-        return left_over((0.0, self.length_m), taken, shortest=1e-3)
+        return subtract_intervals((0.0, self.length_m), taken, 1e-3)
 
     def with_opening(self, opening: Opening) -> Wall:
         return replace(self, openings=tuple(sorted((*self.openings, opening), key=lambda o: o.left_m)))
@@ -121,9 +122,9 @@ class Shell:
     def surfaces(self) -> tuple[Surface, ...]:
         """What things in the room stand on or against."""
         look, up = self.spec.look, self.world_from_locale.apply([(0.0, 0.0, 0.0), (0.0, 0.0, self.spec.height_m)])[:, 2]
-        above = [Surface(-UP, -float(up[1]), level(look.ceiling, -UP))] if look.ceiling else []
+        above = [Surface(-UP, -float(up[1]), expected_brightness(look.ceiling, -UP))] if look.ceiling else []
         return (
-            Surface(UP, float(up[0]), level(look.floor, UP)), *above,
+            Surface(UP, float(up[0]), expected_brightness(look.floor, UP)), *above,
             *(surface_of(wall.polygon_world, wall.finish) for wall in self.walls),
         )
 
@@ -187,7 +188,7 @@ class Shell:
         low, high = trim_heights(look, min(wall.height_m, before.height_m))
         nan = float("nan")
         rows.append((wall.world_from_wall.apply([(0, 0, low), (0, 0, high)]),
-                     (wall.inward_world, before.inward_world), (wall.level, before.level, nan)))
+                     (wall.inward_world, before.inward_world), (wall.brightness, before.brightness, nan)))
         flats = [(0.0, look.floor, UP, look.baseboard)]
         if look.ceiling is None:
             rows += self._skyline(wall, before)
@@ -196,8 +197,9 @@ class Shell:
         for z, finish, normal, board in flats:
             for x in wall.free_of_openings(CASING_M) if board is None and z == 0.0 else [(0.0, wall.length_m)]:
                 if board is None and x[1] - x[0] >= SHORTEST_LINE_M:
-                    rows.append((wall.world_from_wall.apply([(x[0], 0, z), (x[1], 0, z)]),
-                                 (wall.inward_world, normal), (wall.level, level(finish, normal), nan)))
+                    line = wall.world_from_wall.apply([(x[0], 0, z), (x[1], 0, z)])
+                    brightness = (wall.brightness, expected_brightness(finish, normal), nan)
+                    rows.append((line, (wall.inward_world, normal), brightness))
         return Edges.joined([Edges.of(rows), *(solid.edges() for solid in self._trim(index))])
 
 
@@ -212,7 +214,7 @@ class Shell:
             tops.append((before, [(end, 0.0, wall.height_m), (end, 0.0, before.height_m)]))
         for seen, line in tops:
             normals = (seen.inward_world, seen.inward_world)
-            rows.append((seen.world_from_wall.apply(line), normals, (seen.level, SKY, nan)))
+            rows.append((seen.world_from_wall.apply(line), normals, (seen.brightness, SKY, nan)))
         return rows
 
 

@@ -10,13 +10,13 @@ from world_models.files.importers.layout import Layout, lay_out
 from world_models.files.importers.plan import Account, BuildingError, Plan
 from world_models.files.importers.world_text import world_text
 
-__all__ = ["FORMATS", "Account", "BuildingError", "Imported", "Network", "import_building", "read_plan"]
+__all__ = ["FORMATS", "Account", "BuildingError", "ImportedBuilding", "Network", "import_building", "read_plan"]
 
 FORMATS = (".ifc", ".gml", ".xml")
 
 
 @dataclass(frozen=True, eq=False)
-class Imported:
+class ImportedBuilding:
     """A building as a world file: its text, how it was laid out, and the graph that came with it, where one did."""
 
     text: str
@@ -29,11 +29,11 @@ class Imported:
         return self.layout.plan.account
 
 
-def import_building(path: Path) -> Imported:
+def import_building(path: Path) -> ImportedBuilding:
     """Read a building file and lay it out as a world. Raises BuildingError where that cannot be."""
     plan, network = read_plan(path)
     layout = lay_out(plan)
-    return Imported(world_text(layout), layout, network)
+    return ImportedBuilding(world_text(layout), layout, network)
 
 
 def read_plan(path: Path) -> tuple[Plan, Network | None]:

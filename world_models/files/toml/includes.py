@@ -53,7 +53,7 @@ def files_of(source: Source) -> Iterator[Source]:
             yield from files_of(named_file(root["locales"][name]["from"]))
 
 
-def digest_of(path: Path) -> str:
+def compute_digest(path: Path) -> str:
     """SHA-256 of a world file, and of what it is made of where there is such. Raises OSError or WorldError."""
     own = path.read_bytes()
     try:

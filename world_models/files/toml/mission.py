@@ -12,13 +12,20 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from world_models.bounds import Bounds, check_bounds
+from world_models.commands import check_command
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command
 from world_models.files.compiled.schema import SUFFIXES
 from world_models.files.toml.includes import WORLDS
-from world_models.files.toml.settings import MOST, known_keys, merged, near, parsed, read_settings
+from world_models.files.toml.settings import (
+    MAX_NUMBER,
+    known_keys,
+    parse_value,
+    read_settings,
+    replace_value,
+    suggest_keys,
+)
 from world_models.files.toml.source import Node, Source, WorldError
-from world_models.phrases import check_command
 
 ROOT = WORLDS.parents[1]
 """The folder of the packages: files that come with the project are named relative to it."""
@@ -79,7 +86,7 @@ class Limits:
     max_cycles: int = 20000
 
     def __post_init__(self) -> None:
-        some = Bounds(0.0, MOST, above=True)
+        some = Bounds(0.0, MAX_NUMBER, above=True)
         check_bounds(self, {"max_time_s": some, "max_cycles": some})
 
 
@@ -145,10 +152,10 @@ class MissionFormat:
         """
         for key, value in settings.items():
             if key not in self.keys():
-                raise WorldError(f"--set {key}: expected {near(key, self.keys())}, got {key!r}")
+                raise WorldError(f"--set {key}: expected {suggest_keys(key, self.keys())}, got {key!r}")
             path = tuple(key.split("."))
-            new = value if self._is_text(path) or not isinstance(value, str) else parsed(value)
-            data = merged(self._without_other_spellings(source.data, path), path, new)
+            new = value if self._is_text(path) or not isinstance(value, str) else parse_value(value)
+            data = replace_value(self._without_other_spellings(source.data, path), path, new)
             source = replace(source, data=data, settings=source.settings | {path})
         return source
 

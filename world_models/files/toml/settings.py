@@ -17,7 +17,7 @@ from world_models.files.toml.source import Node, WorldError
 from world_models.units import FOOT_M, INCH_M
 
 T = TypeVar("T")
-MOST = 10**9
+MAX_NUMBER = 10**9
 """No setting is larger."""
 
 
@@ -48,7 +48,7 @@ def read_settings(node: Node, kind: type[T]) -> T:
     written: dict[str, str] = {}
     for key, item in node.entries():
         if key not in known:
-            raise item.fail(f"{near(key, known)}", f"the key {key!r}")
+            raise item.fail(f"{suggest_keys(key, known)}", f"the key {key!r}")
         name, factor = known[key]
         if name in values:
             raise item.fail(f"only one of {written[name]} and {key}", "both")
@@ -73,26 +73,26 @@ def _value(item: Node, hint: Any, factor: float) -> Any:
     if hint is int:
         if isinstance(item.value, bool) or not isinstance(item.value, int):
             raise item.fail("a whole number")
-        if abs(item.value) > MOST:
-            raise item.fail(f"a whole number from {-MOST} to {MOST}")
+        if abs(item.value) > MAX_NUMBER:
+            raise item.fail(f"a whole number from {-MAX_NUMBER} to {MAX_NUMBER}")
         return item.value
     if hint == tuple[float, ...]:
-        return tuple(number.number(-MOST, MOST) for number in item.items())
-    return item.number(-MOST, MOST) * factor
+        return tuple(number.number(-MAX_NUMBER, MAX_NUMBER) for number in item.items())
+    return item.number(-MAX_NUMBER, MAX_NUMBER) * factor
 
 
 FEW = 12
 """So many keys are named where none is similar."""
 
 
-def near(key: str, known: Iterable[str]) -> str:
+def suggest_keys(key: str, known: Iterable[str]) -> str:
     """What to say was expected instead of an unknown key: the most similar ones, or all, or how many there are."""
     names = list(known)
     alike = difflib.get_close_matches(key, names, n=4, cutoff=0.5) or names[:FEW]
     return "one of " + ", ".join(alike) + (f" ... ({len(names)} in all)" if len(names) > len(alike) == FEW else "")
 
 
-def parsed(text: str) -> Any:
+def parse_value(text: str) -> Any:
     """The value of a ``--set key=value``: on/off, a TOML value, or else the text itself."""
     if text.lower() in ("on", "off"):
         return text.lower() == "on"
@@ -102,8 +102,8 @@ def parsed(text: str) -> Any:
         return text
 
 
-def merged(data: Mapping[str, Any], path: tuple[str, ...], value: Any) -> dict[str, Any]:
+def replace_value(data: Mapping[str, Any], path: tuple[str, ...], value: Any) -> dict[str, Any]:
     """A copy of nested tables with the value at ``path`` replaced or added."""
     head, rest = path[0], path[1:]
     inner = data.get(head, {})
-    return {**data, head: merged(inner if isinstance(inner, Mapping) else {}, rest, value) if rest else value}
+    return {**data, head: replace_value(inner if isinstance(inner, Mapping) else {}, rest, value) if rest else value}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.faces import Face, painted
+from world_models.building.faces import Face, build_barrier
+from world_models.building.intervals import subtract_intervals
 from world_models.building.landmarks import Edges
-from world_models.building.regions import Finish, level
+from world_models.building.regions import Finish, expected_brightness
 from world_models.frames import Pose
 
 CONTACT_M = 1.5e-3
@@ -85,7 +86,7 @@ def surface_of(polygon_world: NDArray[np.float64], finish: Finish) -> Surface:
     """The plane of a flat polygon (k, 3), seen from its front."""
     normal = np.cross(polygon_world[1] - polygon_world[0], polygon_world[2] - polygon_world[1])
     normal = normal / np.linalg.norm(normal)
-    return Surface(normal, float(normal @ polygon_world[0]), level(finish, normal))
+    return Surface(normal, float(normal @ polygon_world[0]), expected_brightness(finish, normal))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +108,7 @@ class Solid:
     def faces(self, locale: str, **more: Any) -> list[Face]:
         """The sides that can be seen, each a face with one region."""
         return [
-            painted(f"{self.name}/{index}{'xyz'[axis]}{'-+'[end]}", locale,
+            build_barrier(f"{self.name}/{index}{'xyz'[axis]}{'-+'[end]}", locale,
                     self.world_from_part.apply(box.side((axis, end))), box.finish, **more)
             for index, box in enumerate(self.boxes)
             for axis, end in SIDES
@@ -123,7 +124,7 @@ class Solid:
                 place = (float(axis), *(round(box.ranges[a][e], 3) for a, e in (first, second)), float(first[0]))
                 known = taken.setdefault(place, [])
                 for whole, look in self._looks(index, axis, first, second):
-                    for extent in left_over(whole, known):
+                    for extent in subtract_intervals(whole, known, SHORTEST_LINE_M):
                         rows.append((self.world_from_part.apply(_edge(box, axis, extent, first, second)), *look))
                 known.append(box.ranges[axis])
         return Edges.of(rows)
@@ -218,7 +219,7 @@ class Solid:
     def _level(self, finish: Finish, side: Side) -> float:
         """The brightness of a finish on a side, worked out once."""
         if (finish, side) not in self._levels:
-            self._levels[finish, side] = level(finish, self._normal(side))
+            self._levels[finish, side] = expected_brightness(finish, self._normal(side))
         return self._levels[finish, side]
 
     def _behind(self, index: int) -> float:
@@ -228,17 +229,6 @@ class Solid:
             if high - low <= THIN_M:
                 return ground
         return float("nan")
-
-
-def left_over(whole: Range, taken: Sequence[Range], shortest: float = SHORTEST_LINE_M) -> list[Range]:
-    """The pieces of an interval that the taken ones leave, those that are long enough, in order."""
-    pieces, at = [], whole[0]
-    for low, high in sorted(taken):
-        if low > at:
-            pieces.append((at, min(low, whole[1])))
-        at = max(at, high)
-    pieces.append((at, whole[1]))
-    return [(low, high) for low, high in pieces if high - low >= shortest]
 
 
 def _opposite(side: Side) -> Side:

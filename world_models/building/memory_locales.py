@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.faces import Face
-from world_models.building.frame_source import Arc, Packet
 from world_models.building.landmarks import Landmark
+from world_models.building.locale_source import Arc, LocaleGeometry
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.passages import Network, network, passable
-from world_models.building.things import Fault, Thing
+from world_models.building.passages import Network, drivable_passages, network
+from world_models.building.things import Finding, Thing
 from world_models.frames import Pose
 
 K = TypeVar("K")
@@ -24,8 +24,8 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
-class MemoryFrames:
-    """All frames of a world; see :class:`world_models.building.frame_source.FrameSource` for the questions."""
+class MemoryLocales:
+    """All frames of a world; see :class:`world_models.building.locale_source.LocaleSource` for the questions."""
 
     name: str
     locales: Mapping[str, Locale]
@@ -34,7 +34,7 @@ class MemoryFrames:
     every_landmark: tuple[Landmark, ...]
     every_thing: tuple[Thing, ...] = ()
     every_link: tuple[Link, ...] = ()
-    building_faults: tuple[Fault, ...] = ()
+    building_faults: tuple[Finding, ...] = ()
 
     def names(self) -> Sequence[str]:
         return tuple(self.locales)
@@ -59,8 +59,8 @@ class MemoryFrames:
     def links(self, locale: str) -> tuple[Link, ...]:
         return tuple(link for link in self.every_link if locale in link.between)
 
-    def packets(self, locale: str) -> tuple[Packet, ...]:
-        return self._packets.get(locale, ())
+    def geometry(self, locale: str) -> tuple[LocaleGeometry, ...]:
+        return self._geometry.get(locale, ())
 
     def things(self, locale: str) -> tuple[Thing, ...]:
         return self._things.get(locale, ())
@@ -84,8 +84,8 @@ class MemoryFrames:
     def all_links(self) -> tuple[Link, ...]:
         return self.every_link
 
-    def all_packets(self) -> Sequence[Packet]:
-        return self._all_packets
+    def all_geometry(self) -> Sequence[LocaleGeometry]:
+        return self._all_geometry
 
     def all_things(self) -> tuple[Thing, ...]:
         return self.every_thing
@@ -94,7 +94,7 @@ class MemoryFrames:
         return {"room": len(self.locales) - len(self._children), "open doorway": len(self.every_doorway),
                 "thing": len(self.every_thing), "face": len(self.every_face), "landmark": len(self.every_landmark)}
 
-    def faults(self) -> tuple[Fault, ...]:
+    def faults(self) -> tuple[Finding, ...]:
         return self.building_faults
 
     # -- indices ---------------------------------------------------------------------------------------------------
@@ -120,18 +120,18 @@ class MemoryFrames:
     @cached_property
     def _network(self) -> Network:
         parents = {name: locale.parent for name, locale in self.locales.items()}
-        return network(parents, passable((*self.every_doorway, *self.every_link)))
+        return network(parents, drivable_passages((*self.every_doorway, *self.every_link)))
 
     @cached_property
-    def _all_packets(self) -> tuple[Packet, ...]:
+    def _all_geometry(self) -> tuple[LocaleGeometry, ...]:
         faces = _grouped([((face.locale, face.neighbour), (i, face)) for i, face in enumerate(self.every_face)])
         marks = _grouped([((mark.locale, mark.neighbour), (i, mark)) for i, mark in enumerate(self.every_landmark)])
         keys = list(dict.fromkeys([*faces, *marks]))
-        return tuple(Packet(*key, faces.get(key, ()), marks.get(key, ())) for key in keys)
+        return tuple(LocaleGeometry(*key, faces.get(key, ()), marks.get(key, ())) for key in keys)
 
     @cached_property
-    def _packets(self) -> dict[str, tuple[Packet, ...]]:
-        return _grouped([(name, packet) for packet in self._all_packets
+    def _geometry(self) -> dict[str, tuple[LocaleGeometry, ...]]:
+        return _grouped([(name, packet) for packet in self._all_geometry
                          for name in dict.fromkeys((packet.locale, packet.neighbour)) if name is not None])
 
     @cached_property

@@ -11,11 +11,11 @@ from world_models.building.faces import Face
 from world_models.building.landmarks import Landmark
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.scene import Scene, build_scene
-from world_models.building.things import Fault, Thing
+from world_models.building.things import Finding, Thing
 
 
 @dataclass(frozen=True, eq=False)
-class Packet:
+class LocaleGeometry:
     """The faces and landmarks of a locale, or those that it shares with one neighbour (the frame of an open door).
 
     Attributes:
@@ -51,7 +51,7 @@ class Arc:
     between: tuple[tuple[str, int], tuple[str, int]]
 
 
-class FrameSource(Protocol):
+class LocaleSource(Protocol):
     """What a world needs of its memory. Names that it does not know give None or nothing."""
 
     @property
@@ -78,7 +78,7 @@ class FrameSource(Protocol):
     def links(self, locale: str, /) -> tuple[Link, ...]:
         """Elevators and stairs that stop in it."""
 
-    def packets(self, locale: str, /) -> tuple[Packet, ...]:
+    def geometry(self, locale: str, /) -> tuple[LocaleGeometry, ...]:
         """Its own packet and those that it shares."""
 
     def things(self, locale: str, /) -> tuple[Thing, ...]: ...
@@ -98,12 +98,12 @@ class FrameSource(Protocol):
 
     def all_links(self) -> tuple[Link, ...]: ...
 
-    def all_packets(self) -> Iterable[Packet]: ...
+    def all_geometry(self) -> Iterable[LocaleGeometry]: ...
 
     def all_things(self) -> tuple[Thing, ...]: ...
 
     def counts(self) -> Mapping[str, int]:
         """How many rooms, doorways, things, faces and landmarks there are."""
 
-    def faults(self) -> tuple[Fault, ...]:
+    def faults(self) -> tuple[Finding, ...]:
         """What could not be built."""

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from world_models.building.outlines import distance_to_border, inside_polygon
-from world_models.files.store import WORLDS, load_world
-from world_models.phrases import check_command, middle_of, places_of, room_named
+from world_models.commands import check_command, find_open_point, find_room, parse_command
+from world_models.files.world_files import WORLDS, load_world
 
 WORLD = load_world(WORLDS / "research_center.toml")
 
@@ -16,12 +16,12 @@ WORLD = load_world(WORLDS / "research_center.toml")
 ])
 def test_a_sentence_means_two_rooms(text: str) -> None:
     check_command(text)
-    origin, destination = places_of(text, WORLD)
+    origin, destination = parse_command(text, WORLD)
     assert (origin.locale, destination.locale) == ("robot-laboratory", "allens-office")
 
 
 def test_a_ptrans_is_read_as_ever() -> None:
-    origin, destination = places_of("(ptrans (hallway (4,4,0)) (library (5,6,0)))", WORLD)
+    origin, destination = parse_command("(ptrans (hallway (4,4,0)) (library (5,6,0)))", WORLD)
     assert (origin.locale, destination.locale, origin.x_m) == ("hallway", "library", pytest.approx(4 * 0.3048))
 
 
@@ -36,16 +36,16 @@ def test_a_ptrans_is_read_as_ever() -> None:
 ])
 def test_what_is_not_understood_is_refused_with_its_reason(text: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        places_of(text, WORLD)
+        parse_command(text, WORLD)
 
 
 @pytest.mark.parametrize("room", WORLD.rooms)
 def test_the_middle_of_a_room_is_free(room: str) -> None:
-    place = middle_of(WORLD, room)
+    place = find_open_point(WORLD, room)
     point = np.array(place.in_world(WORLD).position)
     assert inside_polygon(point, WORLD.outline(room))
     assert min(distance_to_border(point, border) for border in (WORLD.outline(room), *WORLD.obstacles(room))) > 0.6
 
 
 def test_a_full_name_is_preferred_to_words() -> None:
-    assert room_named("Mail room", WORLD) == "mail-room"
+    assert find_room("Mail room", WORLD) == "mail-room"

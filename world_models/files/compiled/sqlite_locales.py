@@ -10,11 +10,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from world_models.building.frame_source import Arc, Packet
+from world_models.building.locale_source import Arc, LocaleGeometry
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.memory_frames import words_of
-from world_models.building.things import Fault, Thing
-from world_models.files.compiled.packing import unpacked, unpacked_array
+from world_models.building.memory_locales import words_of
+from world_models.building.things import Finding, Thing
+from world_models.files.compiled.packing import unpack_array, unpacked
 from world_models.files.compiled.schema import FORMAT
 from world_models.files.toml.source import WorldError
 from world_models.frames import Pose
@@ -31,8 +31,8 @@ THING = "select t.name, la.name, t.kind, footprint, low_m, high_m, proud_m, t.so
         " join locale la on la.id = t.locale"
 
 
-class SqliteFrames:
-    """The frames of a compiled world; see :class:`world_models.building.frame_source.FrameSource` for the questions.
+class SqliteLocales:
+    """The frames of a compiled world; see :class:`world_models.building.locale_source.LocaleSource` for the questions.
 
     Attributes:
         name: of the world.
@@ -109,8 +109,8 @@ class SqliteFrames:
                 raise WorldError(f"{self._path.name}: expected a sound world, got one whose index lacks {name!r}")
             return None
         kind, parent, frame, outline, height_m, floor_m, properties, source, survey_m, survey_rad = rows[0]
-        matrix = unpacked_array(frame, (3, 4))
-        return Locale(name, kind, parent, Pose(matrix[:, :3], matrix[:, 3]), unpacked_array(outline, (-1, 2)),
+        matrix = unpack_array(frame, (3, 4))
+        return Locale(name, kind, parent, Pose(matrix[:, :3], matrix[:, 3]), unpack_array(outline, (-1, 2)),
                       height_m, json.loads(properties), source, floor_m, survey_m, survey_rad)
 
     def children(self, name: str) -> tuple[str, ...]:
@@ -138,13 +138,13 @@ class SqliteFrames:
             f"{LINK} where k.a = (select id from locale where name = ?1)"
             " or k.b = (select id from locale where name = ?1) order by k.id", locale)))
 
-    def packets(self, locale: str) -> tuple[Packet, ...]:
-        return self._once("faces", locale, lambda: self._packets(
+    def geometry(self, locale: str) -> tuple[LocaleGeometry, ...]:
+        return self._once("faces", locale, lambda: self._geometry(
             f"{PACKET} where (p.locale = (select id from locale where name = ?1)"
             " or p.neighbour = (select id from locale where name = ?1)) and layer <= ?2 order by p.id",
             locale, self._layer))
 
-    def _packets(self, query: str, *values: Any) -> tuple[Packet, ...]:
+    def _geometry(self, query: str, *values: Any) -> tuple[LocaleGeometry, ...]:
         rows: dict[tuple[str, str | None], list[tuple[str, bytes]]] = {}
         for locale, neighbour, words, numbers in self._rows(query, *values):
             rows.setdefault((locale, neighbour), []).append((words, numbers))
@@ -196,9 +196,9 @@ class SqliteFrames:
         with self._sound():
             return tuple(_link(row) for row in self._rows(f"{LINK} order by k.id"))
 
-    def all_packets(self) -> tuple[Packet, ...]:
+    def all_geometry(self) -> tuple[LocaleGeometry, ...]:
         with self._sound():
-            return self._packets(f"{PACKET} where layer <= ? order by p.id", self._layer)
+            return self._geometry(f"{PACKET} where layer <= ? order by p.id", self._layer)
 
     def all_things(self) -> tuple[Thing, ...]:
         with self._sound():
@@ -218,21 +218,21 @@ class SqliteFrames:
         with self._sound():
             return str(self._rows("select value from meta where key = 'sha256'")[0][0])
 
-    def faults(self) -> tuple[Fault, ...]:
+    def faults(self) -> tuple[Finding, ...]:
         with self._sound():
-            return tuple(Fault(source, what) for source, what in self._rows("select source, what from fault"))
+            return tuple(Finding(source, what) for source, what in self._rows("select source, what from fault"))
 
 
 def _doorway(row: tuple[Any, ...]) -> Doorway:
     name, a, b, thresholds, height_m, source = row
-    return Doorway(name, (a, b), unpacked_array(thresholds, (2, 2, 2)), height_m, source)
+    return Doorway(name, (a, b), unpack_array(thresholds, (2, 2, 2)), height_m, source)
 
 
 def _link(row: tuple[Any, ...]) -> Link:
     name, kind, a, b, stops, source = row
-    return Link(name, kind, (a, b), unpacked_array(stops, (2, 3)), source)
+    return Link(name, kind, (a, b), unpack_array(stops, (2, 3)), source)
 
 
 def _thing(row: tuple[Any, ...]) -> Thing:
     name, locale, kind, footprint, low_m, high_m, proud_m, source = row
-    return Thing(name, locale, kind, unpacked_array(footprint, (-1, 2)), low_m, high_m, proud_m, source)
+    return Thing(name, locale, kind, unpack_array(footprint, (-1, 2)), low_m, high_m, proud_m, source)

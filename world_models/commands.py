@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from world_models.building.memory_frames import words_of
+from world_models.building.memory_locales import words_of
 from world_models.building.outlines import distance_to_border, inside_polygon
 from world_models.building.world import World
 from world_models.entries.location import Place
@@ -35,7 +35,7 @@ def check_command(text: str) -> None:
         _ends(text)
 
 
-def places_of(text: str, world: World) -> tuple[Place, Place]:
+def parse_command(text: str, world: World) -> tuple[Place, Place]:
     """From where to where a command leads.
 
     Raises:
@@ -46,8 +46,8 @@ def places_of(text: str, world: World) -> tuple[Place, Place]:
         for place in places:
             world.locale(place.locale)
         return places
-    origin, destination = (room_named(words, world) for words in _ends(text))
-    return middle_of(world, origin), middle_of(world, destination)
+    origin, destination = (find_room(words, world) for words in _ends(text))
+    return find_open_point(world, origin), find_open_point(world, destination)
 
 
 def _ends(text: str) -> tuple[str, str]:
@@ -63,7 +63,7 @@ def _ends(text: str) -> tuple[str, str]:
     return found["origin"], found["destination"]
 
 
-def room_named(words: str, world: World) -> str:
+def find_room(words: str, world: World) -> str:
     """The one room that answers to these words, as "Hanson's office in Engineering", where it is said in which part
     of the world. Raises ValueError where there is none, or more than one."""
     inside = INSIDE.fullmatch(words)
@@ -76,13 +76,13 @@ def room_named(words: str, world: World) -> str:
 def _parts_named(words: str, world: World) -> list[str]:
     """The parts of the world, of more than one room, that answer to these words; of what is nested the smallest."""
     asked = " ".join(sorted(words_of(words) - EMPTY))
-    found = [name for name in world.frames.named(asked) if not world.is_room(name)] if asked else []
+    found = [name for name in world.locale_source.named(asked) if not world.is_room(name)] if asked else []
     return [name for name in found if not any(name in world.path_of(other)[:-1] for other in found)]
 
 
 def _one_of(asked_words: str, words: str, world: World, within: Sequence[str]) -> str:
     asked = " ".join(sorted(words_of(asked_words) - EMPTY))
-    rooms = [name for name in world.frames.named(asked) if world.is_room(name)] if asked else []
+    rooms = [name for name in world.locale_source.named(asked) if world.is_room(name)] if asked else []
     rooms = [name for name in rooms if set(within) & set(world.path_of(name))]
     exact = [name for name in rooms if words_of(name) == words_of(asked)]
     if len(exact) == 1:
@@ -96,7 +96,7 @@ def _one_of(asked_words: str, words: str, world: World, within: Sequence[str]) -
                      f" {', '.join(rooms[:SHOWN])}{more}")
 
 
-def middle_of(world: World, room: str) -> Place:
+def find_open_point(world: World, room: str) -> Place:
     """The point of a grid over a room that is furthest from its walls and from what stands in it."""
     outline, solid = world.outline(room), world.obstacles(room)
     low, high = outline.min(axis=0), outline.max(axis=0)

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from world_models.building.world import World
 from world_models.files.compiled.schema import SUFFIXES
-from world_models.files.compiled.sqlite_frames import SqliteFrames
+from world_models.files.compiled.sqlite_locales import SqliteLocales
 from world_models.files.compiled.writer import compile_world
 from world_models.files.construction.builder import build_world
 from world_models.files.toml.drafting import Draft
-from world_models.files.toml.includes import WORLDS, digest_of
+from world_models.files.toml.includes import WORLDS, compute_digest
 from world_models.files.toml.source import Source, WorldError
 
 __all__ = ["SUFFIXES", "WORLDS", "WorldError", "compile_file", "fingerprint", "load_world", "read_world"]
@@ -31,14 +31,14 @@ def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[st
     """
     path = Path(path)
     if path.suffix in SUFFIXES:
-        return World(SqliteFrames(path, [Path(detail).stem for detail in details]))
+        return World(SqliteLocales(path, [Path(detail).stem for detail in details]))
     return read_world(Source.read(path), [Source.read(Path(detail)) for detail in details])
 
 
 def fingerprint(path: str | PathLike[str]) -> str:
     """SHA-256 of a world file, or of what a compiled one was made of. Raises OSError or WorldError."""
     path = Path(path)
-    return SqliteFrames(path).sha256 if path.suffix in SUFFIXES else digest_of(path)
+    return SqliteLocales(path).sha256 if path.suffix in SUFFIXES else compute_digest(path)
 
 
 def compile_file(path: str | PathLike[str], out: str | PathLike[str],
