@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
-from blackboard.change import Change, Posted, Retracted, Revised, always
+from blackboard.change import Change, Posted, Retracted, Revised
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref, new_tuple
 from blackboard.index import Index
+from blackboard.kinds import always
 from blackboard.shelf import Shelf
 
 T = TypeVar("T")

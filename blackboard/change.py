@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from blackboard.entry import Entry, Ref
+from blackboard.kinds import always, observation
 
 
 class _Happened(NamedTuple):
@@ -52,6 +53,7 @@ class Retracted(Change):
     __slots__ = ()
 
 
+@observation(keep=1)
 @dataclass(frozen=True, slots=True)
 class Quiescence:
     """The value of an entry that is posted when nothing is left to do: stillness is a change too.
@@ -62,9 +64,8 @@ class Quiescence:
 
     cycle: int
 
-
-def always(_value: Any) -> bool:
-    return True
+    def sentence(self) -> str:
+        return f"nothing was left to do after cycle {self.cycle}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,6 +41,6 @@ def to_say(known: Entry[Any] | None, value: Any | None, because: tuple[Any, ...]
     return None if known.value == value else Revise(known, value, because)
 
 
-def kind_of(effect: Effect) -> type[Any]:
+def type_of(effect: Effect) -> type[Any]:
     """The class of the value that an effect touches."""
     return type(effect.value if isinstance(effect, Post) else effect.entry.value)

@@ -1,90 +1,72 @@
 """Retention: which entries leave memory, so that a board does not grow with the time that it runs.
 
-What is forgotten was posted, seen and journalled long ago, and nobody can need it any more: the rules that say so are
-handed over by who wires the experts. The law (tests/laws/board/test_laws_retention.py): with and without them the
-decisions are the same, to the byte. A forgotten revision can still be read in the archive.
+How long entries of a kind stay is said where the kind is defined (:class:`blackboard.kinds.Kind`). What leaves was
+posted, seen and journalled long ago, and no decision can need it any more. The law
+(tests/laws/board/test_laws_retention.py): with and without retention the decisions are the same, to the byte. A
+revision that left can still be read in the journal.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from blackboard.agenda import Agenda
-from blackboard.board import Blackboard, View
-from blackboard.change import Change, Posted, always
+from blackboard.board import Blackboard
+from blackboard.change import Change, Posted
 from blackboard.entry import Entry
-
-T_contra = TypeVar("T_contra", contravariant=True)
-
-
-def never(_view: View, _entry: Entry[Any]) -> bool:
-    return False
-
-
-@dataclass(frozen=True, slots=True)
-class Forget(Generic[T_contra]):
-    """Lets go of entries of a type.
-
-    An entry that a pending activation was triggered by always stays; so do types for which there is no rule.
-
-    Attributes:
-        kind: the class of the values.
-        keep: the newest postings, so many, stay.
-        when: of the older ones only those go of which this holds; pure.
-        unless: those stay that something else on the board still needs; pure, and asked anew until it does not.
-    """
-
-    kind: type[Any]
-    keep: int = 1
-    when: Callable[[T_contra], bool] = always
-    unless: Callable[[View, Entry[Any]], bool] = never
+from blackboard.kinds import Kind, nothing
 
 
 class Retention:
-    """Carries out the rules, a little in each cycle."""
+    """Removes from memory what may leave, a little in each cycle."""
 
-    def __init__(self, rules: Sequence[Forget[Any]]) -> None:
-        """Raises ValueError where two rules are for one type."""
-        self._shelves = {rule.kind: _Aging(rule) for rule in rules}
-        if len(self._shelves) != len(rules):
-            raise ValueError(f"expected one rule for each type, got {[rule.kind.__name__ for rule in rules]}")
+    def __init__(self, kinds: Mapping[type[Any], Kind]) -> None:
+        self._ages = {value_type: _Ages(kind.keep) for value_type, kind in kinds.items() if kind.keep is not None}
+        self._kinds = kinds
+        self._needing = tuple(value_type for value_type, kind in kinds.items() if kind.needs is not nothing)
 
     def sweep(self, seen: Iterable[Change], board: Blackboard, agenda: Agenda) -> None:
-        """Take note of what was posted, and forget what is due. Takes as long as there are changes."""
+        """Note what was posted, and remove what is due. Its time follows the number of changes."""
         for change in seen:
-            aging = self._shelves.get(type(change.entry.value)) if isinstance(change, Posted) else None
-            if aging is not None:
-                aging.sweep(change.entry.id, board, agenda)
+            ages = self._ages.get(type(change.entry.value)) if isinstance(change, Posted) else None
+            if ages is None:
+                continue
+            for id in ages.due(change.entry.id):
+                entry = board.view.get(id)
+                if entry is None:
+                    continue
+                if self._may_leave(entry, board, agenda):
+                    board.forget(id)
+                else:
+                    ages.put_back(id)
+
+    def _may_leave(self, entry: Entry[Any], board: Blackboard, agenda: Agenda) -> bool:
+        kind, view = self._kinds[type(entry.value)], board.view
+        if not kind.when(entry.value) or agenda.triggered_by(entry.id) or kind.unless(view, entry):
+            return False
+        return not any(entry.id in self._kinds[value_type].needs(other.value)
+                       for value_type in self._needing for other in view.all(value_type))
 
 
-class _Aging:
-    """The entries of one type, by age: the newest, and those that go when nobody needs them.
+class _Ages:
+    """The entries of one kind by age: the newest, which stay, and the older ones.
 
-    Two of the older ones are looked at for each one that is posted, so they never are many more than those in need.
+    Two of the older ones are looked at for each that is posted, so there are never many more of them than must stay.
     """
 
-    def __init__(self, rule: Forget[Any]) -> None:
-        self._rule = rule
+    def __init__(self, keep: int) -> None:
+        self._keep = keep
         self._newest: deque[str] = deque()
         self._older: deque[str] = deque()
 
-    def sweep(self, posted: str, board: Blackboard, agenda: Agenda) -> None:
+    def due(self, posted: str) -> list[str]:
+        """The ids to look at now that one more was posted."""
         self._newest.append(posted)
-        if len(self._newest) > self._rule.keep:
+        if len(self._newest) > self._keep:
             self._older.append(self._newest.popleft())
-        for _ in range(min(2, len(self._older))):
-            id = self._older.popleft()
-            entry = board.view.get(id)
-            if entry is None:
-                continue
-            if self._may_go(entry, board.view, agenda):
-                board.forget(id)
-            else:
-                self._older.append(id)
+        return [self._older.popleft() for _ in range(min(2, len(self._older)))]
 
-    def _may_go(self, entry: Entry[Any], view: View, agenda: Agenda) -> bool:
-        rule = self._rule
-        return rule.when(entry.value) and not agenda.triggered_by(entry.id) and not rule.unless(view, entry)
+    def put_back(self, id: str) -> None:
+        self._older.append(id)

@@ -9,33 +9,35 @@ not depend on how much is pending.
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from itertools import chain
 from typing import Any, Protocol
 
 from blackboard.activation import Activation, Obviated
 from blackboard.agenda import Agenda
 from blackboard.board import Blackboard, StaleError, View
-from blackboard.change import Change, Posted, Retracted, always
-from blackboard.effect import Effect, kind_of
+from blackboard.change import Change, Posted, Quiescence, Retracted
+from blackboard.effect import Effect, type_of
 from blackboard.entry import new_tuple
 from blackboard.journal import Decision, Sink
+from blackboard.kinds import Kind, Registry, always, is_request
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from blackboard.retention import Forget, Retention
-from blackboard.servoing import Groups, Servoing
+from blackboard.retention import Retention
+from blackboard.servoing import Discrepancy, Groups, Servoing
 
 RAISED = "raised: "
 """How the refusal of an act begins whose knowledge source raised an exception; its traceback follows."""
 
 
 class Port(Protocol):
-    """The way to the world outside: told of each change, it answers with what was observed."""
+    """The way to the world outside: it is given each change of a request, and answers with what was observed."""
 
     @property
     def name(self) -> str: ...
 
     def answer(self, change: Change) -> Iterable[Effect]:
-        """The observations that follow from a change; nothing for changes that do not concern it."""
+        """The observations that follow from a change of a request; nothing for requests that do not concern it."""
 
 
 Watchers = tuple[tuple[KnowledgeSource, tuple[Callable[[Any], bool], ...]], ...]
@@ -52,8 +54,19 @@ class Scheduler:
         ports: Sequence[Port] = (),
         servoing: Servoing | None = None,
         sinks: Sequence[Sink] = (),
-        retention: Sequence[Forget[Any]] = (),
+        retention: Mapping[type[Any], Kind] | None = None,
+        kinds: Iterable[type[Any]] = (),
     ) -> None:
+        """A scheduler with an empty board.
+
+        Args:
+            retention: how long entries stay, by the type of their value; None: as the kinds themselves say.
+            kinds: kinds that none of the sources watches or writes, but that ports may post.
+
+        Raises:
+            NotAKindError: a source watches or writes what is not marked as a kind of entry.
+            ValueError: two sources, or two kinds, of one name.
+        """
         names = [source.name for source in sources]
         if len(set(names)) != len(names):
             raise ValueError(f"expected knowledge sources of different names, got {names}")
@@ -67,7 +80,9 @@ class Scheduler:
         self._ports = tuple(ports)
         self._sinks = tuple(sinks)
         self._agenda = Agenda()
-        self._retention = Retention(retention) if retention else None
+        self.kinds = registry_of(sources, kinds)
+        self._requests = frozenset(filter(is_request, self.kinds.values()))
+        self._retention = Retention(self.kinds.marks() if retention is None else retention)
         self._numbers = 0
         self._unseen: tuple[Change, ...] = ()
         self._observed: tuple[Change, ...] = ()
@@ -89,8 +104,7 @@ class Scheduler:
         obviated: list[Obviated] = []
         activated: list[Activation] = []
         fault = self._hear_bids(seen, activated, obviated)
-        if self._retention is not None:
-            self._retention.sweep(seen, self.board, agenda)
+        self._retention.sweep(seen, self.board, agenda)
         focus = self._servoing.focus(self.view)
         chosen, runner_up, fault = (None, None, fault) if fault else self._two_best(focus, obviated)
         made, refused = self._execute(chosen) if chosen else ((), fault)
@@ -217,16 +231,28 @@ class Scheduler:
             return (), RAISED + traceback.format_exc(limit=-4)
 
     def _tell_ports(self, made: tuple[Change, ...]) -> None:
+        """Only requests reach a port, and each is in the journal by now: sinks come first."""
         for change in made:
-            for port in self._ports:
-                self.tell(port.answer(change), port.name)
+            if type(change.entry.value) in self._requests:
+                for port in self._ports:
+                    self.tell(port.answer(change), port.name)
+
+
+def registry_of(sources: Iterable[KnowledgeSource], kinds: Iterable[type[Any]] = ()) -> Registry:
+    """The kinds that knowledge sources watch and write, with some more.
+
+    Raises:
+        NotAKindError: one of them is not marked; ValueError: two are of one name.
+    """
+    of_sources = ((*(watch.value_type for watch in s.watches), *s.writes) for s in sources)
+    return Registry((Discrepancy, Quiescence, *kinds, *chain.from_iterable(of_sources)))
 
 
 def aliens(effects: Iterable[Effect], writes: Collection[type[Any]]) -> list[str]:
     """The types that effects touch and may not, by name."""
     names: list[str] = []
     for effect in effects:
-        kind = kind_of(effect)
-        if kind not in writes:
-            names.append(kind.__name__)
+        value_type = type_of(effect)
+        if value_type not in writes:
+            names.append(value_type.__name__)
     return sorted(set(names)) if names else names

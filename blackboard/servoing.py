@@ -15,10 +15,23 @@ from dataclasses import dataclass, field, replace
 from itertools import groupby
 
 from blackboard.board import View
+from blackboard.entry import Entry
 from blackboard.index import Index
+from blackboard.kinds import inference
 from blackboard.level import Level
 
 
+def is_closed(discrepancy: Discrepancy) -> bool:
+    return not discrepancy.is_open
+
+
+def is_last_of_its_level(view: View, discrepancy: Entry[Discrepancy]) -> bool:
+    """Whether it is the last that its level escalated: by it is counted how often the level does."""
+    last = last_escalated(view, discrepancy.value.level)
+    return last is not None and last.id == discrepancy.id
+
+
+@inference(keep=2, when=is_closed, unless=is_last_of_its_level)
 @dataclass(frozen=True, slots=True)
 class Discrepancy:
     """A difference between what was expected and what was perceived.
@@ -73,6 +86,19 @@ class Discrepancy:
         if not self.exceeds:
             raise ValueError(f"expected more than the bound of {self.bound} {self.unit}, got {self.magnitude}")
         return replace(self, status="escalated"), replace(self, level=self.level.above, magnitude=None)
+
+    def sentence(self) -> str:
+        if self.magnitude is None:
+            size = "not yet measured there"
+        else:
+            size = f"{self.magnitude:.2f} {self.unit}" if math.isfinite(self.magnitude) else "too large to be measured"
+        bound = "" if self.level is Level.GOAL else f", where up to {self.bound:.2f} {self.unit} may be corrected"
+        return f"{self.level}-level discrepancy, {self.what}: {size}{bound}; {self.status}"
+
+
+def last_escalated(view: View, level: Level) -> Entry[Discrepancy] | None:
+    """The last discrepancy that a level passed up."""
+    return view.latest(Discrepancy, lambda found: found.level is level and found.status == "escalated")
 
 
 OPEN: Index[Discrepancy] = Index(Discrepancy, lambda found: found.level if found.is_open else None)

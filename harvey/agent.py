@@ -18,18 +18,19 @@ import numpy as np
 from blackboard.board import View
 from blackboard.change import Change
 from blackboard.effect import Effect, Post
+from blackboard.kinds import Registry
 from blackboard.knowledge_source import KnowledgeSource
-from blackboard.scheduler import Scheduler
+from blackboard.scheduler import Scheduler, registry_of
 from blackboard.servoing import Servoing
 from harvey.errors import BadInput
 from harvey.replay.constants import set_for_a_while
-from harvey.retention import RETENTION
 from harvey.run_files.run_head import RunHead
 from harvey.wiring import knowledge_sources, servoing
 from knowledge_sources.plan.line_finder import LineFinder
 from world_models.building.landmarks import Edges
 from world_models.building.locale_source import LocaleGeometry, LocaleSource
 from world_models.building.world import World
+from world_models.entries import KINDS
 from world_models.entries.percepts import Segments
 from world_models.files.toml.settings import parse_value, suggest_keys
 from world_models.frames import frozen
@@ -55,9 +56,14 @@ class Agent:
     sources: tuple[KnowledgeSource, ...]
     servoing: Servoing
 
+    @property
+    def kinds(self) -> Registry:
+        """The kinds of entries that may be on its board."""
+        return registry_of(self.sources, KINDS)
+
     def scheduler(self, **more: Any) -> Scheduler:
         """The experts round an empty board; ``more``: ports and sinks."""
-        return Scheduler(self.sources, servoing=self.servoing, **{"retention": RETENTION, **more})
+        return Scheduler(self.sources, servoing=self.servoing, kinds=KINDS, **more)
 
 
 @contextmanager

@@ -63,11 +63,6 @@ def unmeasured_doubt(view: View) -> Entry[Discrepancy] | None:
     return doubt if doubt is not None and doubt.value.magnitude is None else None
 
 
-def last_escalated(view: View, level: Level) -> Entry[Discrepancy] | None:
-    """The last discrepancy that a level passed up."""
-    return view.latest(Discrepancy, lambda found: found.level is level and found.status == "escalated")
-
-
 def deepest_sketch(view: View) -> Entry[PlanSketch] | None:
     """The most detailed active sketch for the active goal: the one that is being carried out (Figure 3)."""
     goal = active_goal(view)

@@ -7,28 +7,22 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from blackboard.journal import Decision, JournalLines
+from blackboard.journal import Decision, decision_line
+from blackboard.kinds import is_request
 from logs.disk import Appended
-from world_models.entries.body import Course, Look, MotorCommand, Recovery, Ride
 
 
 class JournalError(ValueError):
     """A journal that cannot be read; names file and line."""
 
 
-ACTED_ON = (MotorCommand, Course, Look, Ride, Recovery)
-"""What the ports act on."""
-
 HELD_LINES = 64
 """So many decisions on which nothing rests outside the board are written together."""
 
 
 def is_acted_on(decision: Decision) -> bool:
-    """Whether a port will act on what a decision made."""
-    for change in decision.made:  # noqa: SIM110 - asked of every decision; any() takes about twice as long
-        if isinstance(change.entry.value, ACTED_ON):
-            return True
-    return False
+    """Whether a decision made or changed a request, on which a port will act."""
+    return any(is_request(type(change.entry.value)) for change in decision.made)
 
 
 class JournalFile:
@@ -57,9 +51,7 @@ class JournalFile:
             OSError: the file cannot be written, or another process is writing it.
         """
         self._forced = forced
-        self._lines = JournalLines()
-        self._held: list[Decision] = []
-        self._made: list[str] = []
+        self._held: list[str] = []
         self._last: tuple[Decision, str] | None = None
         self._file = Appended(path, "journal", keep=keep)
 
@@ -69,33 +61,24 @@ class JournalFile:
         Raises:
             CannotWriteError: the file cannot be written any more, as when the disk is full; names the file.
         """
-        self._held.append(decision)
+        self._held.append(self.line(decision))
         if self._forced(decision):
             self.flush()
             self._file.sync()
-        elif decision.observed or len(self._held) + len(self._made) >= HELD_LINES:
+        elif decision.observed or len(self._held) >= HELD_LINES:
             self.flush()
 
     def line(self, decision: Decision) -> str:
         """A decision's line, without its newline; the last one is remembered."""
-        self._make()
         if self._last is None or self._last[0] is not decision:
-            self._last = decision, self._lines(decision)
+            self._last = decision, decision_line(decision)
         return self._last[1]
 
     def flush(self) -> None:
         """Hand over what is held back to the operating system. Raises CannotWriteError; then it is held no more."""
-        self._make()
-        lines, self._made = self._made, []
+        lines, self._held = self._held, []
         if lines:
             self._file.append("\n".join([*lines, ""]).encode())
-
-    def _make(self) -> None:
-        """Make the lines of what is held back: many at once take half the time of one now and one then."""
-        if self._held:
-            self._made.extend(map(self._lines, self._held))
-            self._last = self._held[-1], self._made[-1]
-            self._held.clear()
 
     def close(self) -> None:
         """No more decisions. Raises CannotWriteError where the last ones cannot be written."""

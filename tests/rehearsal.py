@@ -14,6 +14,7 @@ from blackboard.board import View
 from blackboard.change import Change, Watch
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.journal import Sink
+from blackboard.kinds import inference
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
@@ -69,6 +70,7 @@ def house() -> World:
     return read_world(Source.parse(HOUSE, "house.toml"))
 
 
+@inference()
 @dataclass(frozen=True, slots=True)
 class Cue:
     """Tells an expert to say a line of the play."""

@@ -12,16 +12,19 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect
 from blackboard.journal import Decision
+from blackboard.kinds import inference, request
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 
 
+@inference()
 @dataclass(frozen=True, slots=True)
 class Note:
     text: str
 
 
+@request()
 @dataclass(frozen=True, slots=True)
 class Tally:
     count: int

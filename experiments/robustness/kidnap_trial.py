@@ -14,7 +14,6 @@ from blackboard.effect import Post
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy, Servoing
-from harvey.retention import RETENTION
 from harvey.runner.ports import BodyPort
 from harvey.runner.run import until_outcome
 from knowledge_sources.action.dead_reckoner import DeadReckoner
@@ -31,6 +30,7 @@ from sim.made_up.generated_floors import Floor, generated_floor
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
+from world_models.entries import KINDS
 from world_models.entries.body import BodyFault, Frame
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.percepts import Panorama
@@ -158,7 +158,7 @@ class _Watch(FaultyBody):
 def _lost(robot: RobotModel, body: FaultyBody, belief: Place) -> Scheduler:
     """The experts round a board on which the goal level is in doubt."""
     sources = (LineFinder(robot), DeadReckoner(robot), Relocalizer(robot), MissionMonitor(robot))
-    scheduler = Scheduler(sources, ports=(BodyPort(body),), servoing=Servoing(), retention=RETENTION)
+    scheduler = Scheduler(sources, ports=(BodyPort(body),), servoing=Servoing(), kinds=KINDS)
     held = Hypothesis(belief.locale, Pose2(belief.x_m, belief.y_m, belief.heading_rad or 0.0), diagonal(0.05, 0.02),
                       "milestone")
     doubt = Discrepancy(Level.GOAL, "somebody carried the robot off", None, (PLAN_PX, PLAN_PX), "px")

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import os
 import resource
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post, Revise
+from blackboard.kinds import inference
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from blackboard.retention import Forget
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
 from logs.journal_file import JournalFile
@@ -24,6 +23,7 @@ DOUBT_EVERY = 20
 PIXELS = 256
 
 
+@inference(keep=2)
 @dataclass(frozen=True, slots=True)
 class Picture:
     """An observation with enough bytes for a leak to show."""
@@ -32,6 +32,7 @@ class Picture:
     pixels: bytes
 
 
+@inference()
 @dataclass(frozen=True, slots=True)
 class Belief:
     """Follows from all observations; one entry, revised for ever."""
@@ -73,12 +74,6 @@ class Corrector(KnowledgeSource):
         yield Revise(trigger.entry, trigger.entry.value.corrected(), (trigger.entry,))
 
 
-RETENTION: tuple[Forget[Any], ...] = (
-    Forget(Picture, keep=2),
-    Forget(Discrepancy, keep=2, when=lambda found: not found.is_open),
-)
-
-
 @dataclass(frozen=True, slots=True)
 class Memory:
     """Memory after a tenth of the cycles and after all of them.
@@ -102,10 +97,10 @@ class Memory:
         return (self.late_bytes - self.early_bytes) / (self.cycles - self.cycles // 10)
 
 
-def long_run(cycles: int, retention: Sequence[Forget[Any]]) -> Memory:
-    """Run a number of cycles; the journal's lines are written to the null device."""
+def long_run(cycles: int, *, forgetting: bool) -> Memory:
+    """Run a number of cycles, with retention as the kinds say or with none; the journal goes to the null device."""
     journal = JournalFile(Path(os.devnull))
-    scheduler = Scheduler([Seer(), Corrector()], sinks=[journal], retention=retention)
+    scheduler = Scheduler([Seer(), Corrector()], sinks=[journal], retention=None if forgetting else {})
     scheduler.tell([Post(Picture(0, bytes(PIXELS)))], "user")
     early_bytes = 0
     while scheduler.cycle < cycles:

@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 from blackboard.board import View
 from blackboard.change import Change
 from blackboard.effect import Effect, Post
-from blackboard.journal import Decision, JournalLines
+from blackboard.journal import Decision, decision_line
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Scheduler
-from harvey.retention import RETENTION
 from harvey.simulation.run import robot_model, run_mission
 from harvey.wiring import knowledge_sources, servoing
 from sim.scenario import Scenario, load_scenario
 from sim.stage import set_stage
+from world_models.entries import KINDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +86,8 @@ def mission_cost(cycles: int | None, seed: int) -> Cost:
 
 def _replay_timed(scenario: Scenario, recorded: list[Decision]) -> Cost:
     timed = [_Timed(source) for source in knowledge_sources(robot_model(scenario))]
-    scheduler = Scheduler(timed, servoing=servoing(scenario.servo), retention=RETENTION)
-    lines, lines_s, steps_s = JournalLines(), 0.0, 0.0
+    scheduler = Scheduler(timed, servoing=servoing(scenario.servo), kinds=KINDS)
+    lines_s, steps_s = 0.0, 0.0
     for decision in recorded:
         for change in decision.observed:
             scheduler.tell([Post(change.entry.value, change.entry.because)], change.entry.author)
@@ -97,7 +97,7 @@ def _replay_timed(scenario: Scenario, recorded: list[Decision]) -> Cost:
         if again is None:
             break
         began_s = time.process_time()
-        lines(again)
+        decision_line(again)
         lines_s += time.process_time() - began_s
     sources_s = math.fsum(source.spent_s for source in timed)
     return Cost(

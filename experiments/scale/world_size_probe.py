@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from blackboard.effect import Post
-from blackboard.journal import Decision, JournalLines
+from blackboard.journal import Decision, decision_line
 from blackboard.scheduler import Scheduler
 from harvey.runner.ports import BodyPort
 from harvey.runner.run import until_outcome
@@ -43,11 +43,11 @@ class _Watcher:
 
     def __init__(self) -> None:
         self.decisions = 0
-        self._line, self._digest = JournalLines(), hashlib.sha256()
+        self._digest = hashlib.sha256()
 
     def __call__(self, decision: Decision) -> None:
         self.decisions += 1
-        self._digest.update(self._line(decision).encode())
+        self._digest.update(decision_line(decision).encode())
 
     @property
     def journal(self) -> str:

@@ -8,13 +8,14 @@ itself; a run on hardware ends there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, replace
 
 from blackboard.change import Change
 from blackboard.effect import Post
 from blackboard.encoding import plain
 from blackboard.journal import Decision, decision_line, decision_record
+from blackboard.kinds import Registry, Role, is_request
 from blackboard.scheduler import Scheduler
 from harvey.agent import agent_of
 from harvey.campaign.campaign import room_for
@@ -31,18 +32,19 @@ from harvey.runner.run import Over, endless, until_outcome
 from harvey.simulation.body_replay import RESUME, BodyReplay
 from harvey.simulation.referee import MissionResult
 from harvey.simulation.run import UNFINISHED, Mission
-from logs.journal_file import ACTED_ON
 from world_models.entries.task import Outcome
-
-ASKED = frozenset(kind.__name__ for kind in ACTED_ON)
 
 
 @dataclass(frozen=True, slots=True)
 class Parting:
-    """Where the changed agent asked its body for something else; None where one of them asked for nothing any more."""
+    """Where the changed agent asked its body for something else; None where one of them asked for nothing any more.
+
+    ``requests`` names the kinds of entries that ask the body for something.
+    """
 
     then: DecisionRecord | None
     now: DecisionRecord | None
+    requests: frozenset[str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,9 +90,9 @@ def what_if(
     """
     then = RunHead.read(run.path)
     head = replace(then.here(), without=(*then.without, *without), constants=(*then.constants, *constants))
-    player = _Player(run)
-    check_segments(player.records, without, then.without)
     with agent_of(head) as agent:
+        player = _Player(run, agent.kinds)
+        check_segments(player.records, without, then.without)
         if out is not None:
             room_for(out.path, head.name, head.seed)
         recorder = RunRecorder(out, head, agent.robot)
@@ -134,10 +136,11 @@ class _Step:
 class _Player:
     """Answers a agent by the record of a run, as long as it asks for the same."""
 
-    def __init__(self, run: RunDirectory) -> None:
+    def __init__(self, run: RunDirectory, kinds: Registry) -> None:
         self.pictures = pictures_of(run)
         self.records = list(read_records(run.journal))
-        self._steps = _steps(self.records)
+        self._requests = frozenset(kind.__name__ for kind in kinds.of_role(Role.REQUEST))
+        self._steps = _steps(self.records, self._requests)
         self._agreed, self._differs = 0, False
         self._first: tuple[DecisionRecord | None, DecisionRecord] | None = None
         self._answered = 0
@@ -187,25 +190,25 @@ class _Player:
         if step is None or step.asked != tuple(as_line(plain(change.entry.value)) for change in made):
             self.open = made
             now = decision_of(decision_record(self.last)) if self.last else None
-            self.parting = Parting(None if step is None else step.decision, now)
+            self.parting = Parting(None if step is None else step.decision, now, self._requests)
             raise _PartedError
         self._answered += 1
         live(made, step.answers)
         for record in step.answers:
-            effect = effect_of(record, self.pictures, scheduler.view.get)
+            effect = effect_of(record, self.pictures, scheduler.view, scheduler.kinds)
             recorder.keep(effect)
             scheduler.tell([effect], record.author)
 
 
 def is_asked(change: Change) -> bool:
     """Whether a port acts on a change."""
-    return isinstance(change.entry.value, ACTED_ON)
+    return is_request(type(change.entry.value))
 
 
-def _steps(records: Sequence[DecisionRecord]) -> list[_Step]:
+def _steps(records: Sequence[DecisionRecord], requests: Set[str]) -> list[_Step]:
     steps = []
     for decision, after in zip(records, [*records[1:], None], strict=True):
-        asked = tuple(as_line(entry.value) for entry in decision.made if entry.type in ASKED)
+        asked = tuple(as_line(entry.value) for entry in decision.made if entry.type in requests)
         if asked and after is not None:
             answers = tuple(entry for entry in after.observed if entry.author in (BodyPort.name, RESUME))
             steps.append(_Step(decision, asked, answers))

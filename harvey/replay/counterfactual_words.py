@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 
 from harvey.campaign.summary import millimetres
 from harvey.diff.first_difference import describe, differing_leaves
-from harvey.replay.counterfactual import ASKED, Answer, Parting
+from harvey.replay.counterfactual import Answer, Parting
 from harvey.run_files.records import DecisionRecord
 from harvey.run_files.run_directory import RunDirectory
 from harvey.simulation.run import UNFINISHED
@@ -33,8 +33,8 @@ def _parting(answer: Answer) -> Iterator[str]:
         return
     held = count(answer.answered, "request")
     yield f"What was observed holds for {held} to the body, which are the same. Then it asks for something else:"
-    yield f"  as recorded:              {_asked(answer.parting.then)}"
-    yield f"  as it would have been:    {_asked(answer.parting.now)}"
+    yield f"  as recorded:              {_asked(answer.parting.then, answer.parting.requests)}"
+    yield f"  as it would have been:    {_asked(answer.parting.now, answer.parting.requests)}"
     yield from _leaves(answer.parting)
     if answer.outcome.kind == UNFINISHED:
         yield "From there the record cannot tell what it would have observed."
@@ -42,17 +42,18 @@ def _parting(answer: Answer) -> Iterator[str]:
         yield "From there the record cannot tell what it would have observed; the simulated robot went on by itself."
 
 
-def _asked(decision: DecisionRecord | None) -> str:
+def _asked(decision: DecisionRecord | None, requests: Set[str]) -> str:
     if decision is None:
         return "nothing any more"
-    asked = "; ".join(f"{entry.ref}, {sentence(entry)}" for entry in decision.made if entry.type in ASKED)
+    asked = "; ".join(f"{entry.ref}, {sentence(entry)}" for entry in decision.made if entry.type in requests)
     return f"cycle {decision.cycle}: {asked}"
 
 
 def _leaves(parting: Parting) -> Iterator[str]:
     """The values in which the requests differ, in full: what is rounded in words may look the same."""
     if parting.then is not None and parting.now is not None:
-        then, now = ([entry.value for entry in d.made if entry.type in ASKED] for d in (parting.then, parting.now))
+        then, now = ([entry.value for entry in decision.made if entry.type in parting.requests]
+                     for decision in (parting.then, parting.now))
         for path, x, y in differing_leaves(then, now):
             yield f"    {path}: {x} against {y}"
 

@@ -59,7 +59,7 @@ def replayed(
     for recorded, line in zip(read_records(run.journal), _lines(run), strict=False):
         live(made, recorded.observed)
         for observation in recorded.observed:
-            scheduler.tell([effect_of(observation, pictures, scheduler.view.get)], observation.author)
+            scheduler.tell([effect_of(observation, pictures, scheduler.view, scheduler.kinds)], observation.author)
         before()
         told = Told(recorded, line, scheduler.step())
         made = () if told.now is None else told.now.made

@@ -2,84 +2,50 @@
 
 from __future__ import annotations
 
-import collections.abc
-import dataclasses
 import hashlib
-import types
-import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from blackboard.change import Quiescence
+from blackboard.board import View
 from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.encoding import NOT_FINITE
 from blackboard.entry import Entry, Ref
+from blackboard.kinds import Registry
 from harvey.errors import BadInput
+from harvey.run_files.decoding import decoded
 from harvey.run_files.records import EntryRecord
 from logs.camera_file import Pictures
-from world_models.entries.body import BodyFault, Frame, MotionReport, Recovery, RideReport
-from world_models.entries.task import Command, Outcome, Resumed
-
-OBSERVED: Mapping[str, type[Any]] = {
-    t.__name__: t
-    for t in (Command, MotionReport, RideReport, Frame, BodyFault, Recovery, Quiescence, Outcome, Resumed)
-}
-"""The types of value that come from outside."""
-
-WORDS: Mapping[type[Any], str] = {
-    float: "a number", int: "a whole number", str: "a text", bool: "true or false", dict: "an object", list: "a list"}
-"""What a user calls a type."""
 
 
-class MisfitError(ValueError):
-    """A value that is not of the type that it is to have.
-
-    Attributes:
-        path: where it stands, as ``camera.fx``; what: what was expected there and what came.
-    """
-
-    def __init__(self, path: str, what: str) -> None:
-        super().__init__(f"{path}: {what}")
-        self.path, self.what = path, what
-
-    @staticmethod
-    def within(name: str, error: Exception) -> MisfitError:
-        """The same, seen from what holds it under a name."""
-        if isinstance(error, MisfitError):
-            return MisfitError(f"{name}.{error.path}", error.what)
-        return MisfitError(name, str(error))
-
-
-def effect_of(record: EntryRecord, frames: Mapping[int, bytes], current: Callable[[str], Entry[Any] | None]) -> Effect:
+def effect_of(record: EntryRecord, frames: Mapping[int, bytes], view: View, kinds: Registry) -> Effect:
     """The effect that brought about an observed change.
 
     Args:
         frames: number -> JPEG bytes of the pictures.
-        current: the current revision of an entry.
+        view: the board as it is before the effect.
+        kinds: the kinds of entries of that board.
 
     Raises:
-        BadInput: the value is of no type that is observed, its fields are not the type's, or its picture is lacking.
+        BadInput: the value is of a kind that is not known, its fields are not the kind's, or its picture is missing.
     """
-    because = tuple(_ref(text) for text in record.because)
+    because = refs_of(record.because)
     if record.change == "Posted":
-        return Post(value_of(record, frames), because)
-    entry = current(record.id)
+        return Post(value_of(record, frames, kinds), because)
+    entry = view.get(record.id)
     if entry is None:
         raise BadInput(f"{record.ref}: expected an entry on the board, got none")
     if record.change == "Retracted":
-        return Retract(entry, tuple(_ref(text) for text in record.retracted_because))
-    return Revise(entry, value_of(record, frames), because)
+        return Retract(entry, refs_of(record.retracted_because))
+    return Revise(entry, value_of(record, frames, kinds), because)
 
 
-def value_of(record: EntryRecord, frames: Mapping[int, bytes]) -> Any:
+def value_of(record: EntryRecord, frames: Mapping[int, bytes], kinds: Registry) -> Any:
     """The value itself. Raises BadInput as :func:`effect_of` does."""
-    if record.type not in OBSERVED:
-        raise BadInput(f"{record.ref}: expected an observation ({', '.join(OBSERVED)}), got a {record.type}")
+    kind = kind_named(record, kinds)
     value = dict(record.value) if isinstance(record.value, dict) else record.value
     if record.type == "Frame" and isinstance(value, dict):
         value["jpeg"] = _picture(record, value, frames)
     try:
-        return decoded(value, OBSERVED[record.type])
+        return decoded(value, kind)
     except (ValueError, TypeError) as error:
         raise BadInput(f"{record.ref}: {error}") from None
 
@@ -97,68 +63,41 @@ def _picture(record: EntryRecord, value: Mapping[str, Any], frames: Mapping[int,
     return jpeg
 
 
-def decoded(value: Any, hint: Any) -> Any:
-    """A value of the type that a hint names, from JSON types. Numbers stay as they were written.
+def kind_named(record: EntryRecord, kinds: Registry) -> type[Any]:
+    """The type of a record's value. Raises BadInput where it is not known here."""
+    if record.type not in kinds:
+        raise BadInput(f"{record.ref}: expected a kind of entry that is known here ({', '.join(sorted(kinds))}), got a "
+                       f"{record.type}: is the package that brings it installed?")
+    return kinds[record.type]
+
+
+def entry_of(record: EntryRecord, kinds: Registry) -> Entry[Any]:
+    """An entry as it stood on the board, but for the bytes of a picture, which the journal does not keep.
 
     Raises:
-        ValueError: it is of another type; names the field, what was expected and what came.
+        BadInput: the value is of a kind that is not known, or does not fit it.
     """
-    if hint is Any:
-        return value
-    origin = typing.get_origin(hint)
-    if origin in (types.UnionType, typing.Union):
-        return None if value is None else decoded(value, next(a for a in typing.get_args(hint) if a is not type(None)))
-    if origin is collections.abc.Mapping:
-        if not isinstance(value, dict):
-            raise ValueError(f"expected an object, got {_brief(value)}")
-        return value
-    if origin is tuple:
-        return _tuple(value, typing.get_args(hint))
-    if dataclasses.is_dataclass(hint) and isinstance(hint, type):
-        return _dataclass(value, hint)
-    if hint is float and isinstance(value, str) and value in NOT_FINITE:
-        return float(value)
-    fits = isinstance(value, (int, float) if hint is float else hint)
-    if not fits or (isinstance(value, bool) and hint is not bool):
-        raise ValueError(f"expected {WORDS.get(hint, hint.__name__)}, got {_brief(value)}")
-    return value
+    value = {**record.value, "jpeg": b""} if record.type == "Frame" and isinstance(record.value, dict) else record.value
+    try:
+        restored = decoded(value, kind_named(record, kinds))
+    except (ValueError, TypeError) as error:
+        raise BadInput(f"{record.ref}: expected a {record.type} as this version has it, got another: {error}") from None
+    ref = ref_of(record.ref)
+    return Entry(ref.id, ref.revision, restored, record.author, written_in(record), refs_of(record.because))
 
 
-def _tuple(value: Any, hints: tuple[Any, ...]) -> tuple[Any, ...]:
-    if not isinstance(value, list):
-        raise ValueError(f"expected a list, got {_brief(value)}")
-    kinds = hints[:1] * len(value) if Ellipsis in hints else hints
-    if len(kinds) != len(value):
-        raise ValueError(f"expected {len(kinds)} items, got {_brief(value)}")
-    return tuple(decoded(item, kind) for item, kind in zip(value, kinds, strict=True))
+def written_in(record: EntryRecord) -> int:
+    """In which cycle it was put on the board; what comes from outside is taken up in the next."""
+    return record.cycle - record.observed
 
 
-def _dataclass(value: Any, kind: type[Any]) -> Any:
-    names = [field.name for field in dataclasses.fields(kind)]
-    if not isinstance(value, dict) or sorted(value) != sorted(names):
-        raise ValueError(f"expected {kind.__name__} with {', '.join(names)}, got {_brief(value)}")
-    return kind(**fields_of(value, kind))
+def refs_of(texts: Iterable[str]) -> tuple[Ref, ...]:
+    """Revisions by their names. Raises BadInput."""
+    return tuple(ref_of(text) for text in texts)
 
 
-def fields_of(value: Mapping[str, Any], kind: type[Any]) -> dict[str, Any]:
-    """The fields of a dataclass that JSON types tell, each of its type. Raises ValueError as :func:`decoded` does."""
-    hints, fields = typing.get_type_hints(kind), dict[str, Any]()
-    for name, item in value.items():
-        if name not in hints:
-            raise ValueError(f"expected {', '.join(field.name for field in dataclasses.fields(kind))}, got {name!r}")
-        try:
-            fields[name] = decoded(item, hints[name])
-        except (ValueError, TypeError) as error:
-            raise MisfitError.within(name, error) from None
-    return fields
-
-
-def _brief(value: Any) -> str:
-    text = f"the keys {', '.join(value)}" if isinstance(value, dict) else repr(value)
-    return text if len(text) < 300 else text[:297] + "..."
-
-
-def _ref(text: str) -> Ref:
+def ref_of(text: str) -> Ref:
+    """A revision by its name, as ``Goal-1.0``. Raises BadInput."""
     id, _, revision = text.rpartition(".")
     if not revision.isdecimal():
         raise BadInput(f"expected a revision as Goal-1.0, got {text!r}")

@@ -15,7 +15,7 @@ from blackboard.encoding import plain
 from harvey.arithmetic import arithmetic
 from harvey.errors import BadInput
 from harvey.run_files.deciding_code import deciding_code
-from harvey.run_files.observations import MisfitError, decoded, fields_of
+from harvey.run_files.decoding import MisfitError, decoded, fields_of
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount

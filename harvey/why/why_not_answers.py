@@ -74,7 +74,7 @@ def _asked_again(run: RunDirectory, history: History, source: str, cycle: int) -
         if not agent.servoing.allows(expert.closes):
             yield f"The {expert.closes} level of servoing was off, and the {words(source)} closes it."
         else:
-            yield from why_absent(history, expert, cycle)
+            yield from why_absent(history, expert, cycle, agent.kinds)
 
 
 def _named(source: str, sources: tuple[KnowledgeSource, ...]) -> KnowledgeSource:

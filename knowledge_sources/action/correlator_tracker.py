@@ -36,10 +36,10 @@ from knowledge_sources.methods.tracking.template_tracking import (
 from knowledge_sources.questions import held, open_discrepancy, standing_in, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.tolerances import PLAN_PX, action_px
-from world_models.actuator import Drift
 from world_models.entries.body import Frame
 from world_models.entries.location import Hypothesis, covariance_tuple
 from world_models.entries.percepts import Anchor, Track, Tracks
+from world_models.entries.wheels import Drift
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_lines
 

@@ -16,9 +16,9 @@ from blackboard.servoing import Discrepancy
 from knowledge_sources.questions import held
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.tolerances import PLAN_PX
-from world_models.actuator import Drift
 from world_models.entries.body import BodyFault, Course, Look, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis
+from world_models.entries.wheels import Drift
 from world_models.frames import Pose2
 
 STOPPED = 0.7

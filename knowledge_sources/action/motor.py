@@ -32,10 +32,10 @@ from knowledge_sources.questions import (
     unmeasured_doubt,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.actuator import Drift
 from world_models.entries.body import BodyFault, MotorCommand
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Leg, Milestone, PlanSketch
+from world_models.entries.wheels import Drift
 from world_models.frames import Pose2, wrap_angle
 
 LOOKAHEAD_M = 1.2

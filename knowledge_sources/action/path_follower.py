@@ -32,10 +32,10 @@ from knowledge_sources.questions import (
     under_way,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.actuator import Drift
 from world_models.entries.body import Course
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Leg, Milestone, PlanSketch
+from world_models.entries.wheels import Drift
 from world_models.frames import Pose2
 
 LOOKAHEAD_M = 0.75

@@ -9,8 +9,8 @@ from blackboard.board import View
 from blackboard.change import Change, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from knowledge_sources.questions import deepest_sketch, is_over, last_escalated
+from blackboard.servoing import Discrepancy, last_escalated
+from knowledge_sources.questions import deepest_sketch, is_over
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.task import Outcome
 

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from blackboard.change import Change, Retracted, always
+from blackboard.change import Change, Retracted
 from blackboard.entry import Entry
 from blackboard.journal import Decision
+from blackboard.kinds import always
 from world_models.frames import Pose2
 
 T = TypeVar("T")

@@ -9,7 +9,6 @@ from typing import Any
 from blackboard.change import Change, Quiescence, Retracted, Revised
 from blackboard.servoing import Discrepancy
 from logs.recording import words
-from world_models.actuator import Drift
 from world_models.entries.body import (
     BodyFault,
     Course,
@@ -25,6 +24,7 @@ from world_models.entries.location import Hypothesis
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
 from world_models.entries.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch, Resumed
+from world_models.entries.wheels import Drift
 
 PURPOSES: Mapping[str, str] = {
     "track": "to follow landmarks by", "milestone": "to check a milestone", "probe": "to find out where he is",

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from blackboard.knowledge_source import KnowledgeSource
+from blackboard.scheduler import registry_of
 from experiments.scale.long_journal import write_hour
 from harvey.agent import agent_of
 from harvey.campaign.campaign import Task, run_task
@@ -30,8 +31,10 @@ from harvey.why.reach import check
 from harvey.why.story import decided, lines_of, story
 from harvey.why.why_not import in_cycle
 from sim.made_up.short_missions import OFFICE, fault
+from world_models.entries import KINDS
 
 BUMPED = OFFICE + fault("bump", "allens-office", 3.0, left_m=0.3, turn_deg=10.0)
+KNOWN = registry_of((), KINDS)
 MOTION = re.compile(
     r"Harvey was told to .+ because the line to follow lay .+ (left|right) of where it believed that it faced,"
     r" because in camera frame \d+ .+ px (left|right|above|below).* its prediction at .+ \(Tracks-1\.\d+\),"
@@ -133,17 +136,17 @@ def test_who_is_not_named_could_not_act_and_who_is_says_so_again(
     """The journal and the experts, asked again on a board that is put together from it, agree in every cycle."""
     asked = 0
     for cycle in history.cycles:
-        board, decision = board_at(history, cycle), history.decision(cycle)
+        board, decision = board_at(history, cycle, KNOWN), history.decision(cycle)
         ratings = {(c.source, c.trigger): c.rating for c in decision.activated}
         for expert in experts:
-            for change in changes(history, cycle):
+            for change in changes(history, cycle, KNOWN):
                 key = (expert.name, str(change.entry.ref))
                 if any(watch.sees(change) for watch in expert.watches) and board.view.is_current(change.entry):
                     assert expert.rate(AskedView(board), change) == ratings.get(key)
                     asked += 1
         absent = [e for e in experts if not in_cycle(history, e.name, cycle)]
         for expert in absent[:: len(absent) // 2 or 1]:
-            assert "could have acted" not in "\n".join(why_absent(history, expert, cycle))
+            assert "could have acted" not in "\n".join(why_absent(history, expert, cycle, KNOWN))
     assert asked > 100
 
 

@@ -4,7 +4,33 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from blackboard.board import View
+from blackboard.entry import Entry
+from blackboard.kinds import observation, request
+from world_models import words
 
+LAST_REQUESTS = 8
+"""The newest requests and faults that stay on the board: the fault handler looks back over a few of them."""
+
+
+def is_closed(fault: BodyFault) -> bool:
+    return not fault.is_open
+
+
+def has_its_request(view: View, fault: Entry[BodyFault]) -> bool:
+    """Whether the request that a fault interrupted is still on the board."""
+    return view.get(fault.value.request) is not None
+
+
+def request_of_open_fault(fault: BodyFault) -> tuple[str, ...]:
+    return (fault.request,) if fault.is_open else ()
+
+
+def is_recovered(recovery: Recovery) -> bool:
+    return recovery.status == "over"
+
+
+@request(keep=LAST_REQUESTS)
 @dataclass(frozen=True, slots=True)
 class MotorCommand:
     """The two primitive motions, one after the other: TURN on the spot, then MOVE straight ahead.
@@ -21,7 +47,11 @@ class MotorCommand:
         if not self.move_m >= 0.0:
             raise ValueError(f"expected a move forward (>= 0 m), got {self.move_m}")
 
+    def sentence(self) -> str:
+        return words.motion(self.turn_rad, self.move_m)
 
+
+@request(keep=LAST_REQUESTS)
 @dataclass(frozen=True, slots=True)
 class Course:
     """A motion that goes on until it is told otherwise; each revision is a correction in mid-move (§5).
@@ -47,7 +77,13 @@ class Course:
     def is_rolling(self) -> bool:
         return self.speed_m_per_s > 0.0
 
+    def sentence(self) -> str:
+        if not self.is_rolling:
+            return "come to a stand"
+        return f"roll on at {self.speed_m_per_s:.2f} m/s, bending by {words.bend(self.curvature_per_m)}"
 
+
+@observation(keep=2)
 @dataclass(frozen=True, slots=True)
 class MotionReport:
     """What the wheel encoders claim was done, and how long it took."""
@@ -57,7 +93,12 @@ class MotionReport:
     duration_s: float
     sim_time_s: float
 
+    def sentence(self) -> str:
+        done = words.motion(self.turn_rad, self.move_m)
+        return f"the wheels claim: {done}; in {self.duration_s:.1f} s, at {self.sim_time_s:.1f} s"
 
+
+@request(keep=LAST_REQUESTS)
 @dataclass(frozen=True, slots=True)
 class Ride:
     """A request to be carried: somebody may press the button.
@@ -73,7 +114,11 @@ class Ride:
     origin: str
     destination: str
 
+    def sentence(self) -> str:
+        return f"asks for a ride in {self.passage} from {self.origin} to {self.destination}"
 
+
+@observation(keep=2)
 @dataclass(frozen=True, slots=True)
 class RideReport:
     """What was told when the doors opened: where this is, and how long it took."""
@@ -83,7 +128,11 @@ class RideReport:
     duration_s: float
     sim_time_s: float
 
+    def sentence(self) -> str:
+        return f"the elevator doors opened at {self.destination}; after {self.duration_s:.0f} s"
 
+
+@request(keep=LAST_REQUESTS)
 @dataclass(frozen=True, slots=True)
 class Look:
     """A request for a picture.
@@ -94,7 +143,11 @@ class Look:
 
     purpose: str
 
+    def sentence(self) -> str:
+        return f"asks for a picture {words.purpose(self.purpose)}"
 
+
+@observation(keep=2)
 @dataclass(frozen=True, slots=True)
 class Frame:
     """A picture as the camera delivers it: compressed.
@@ -110,6 +163,9 @@ class Frame:
     number: int
     sim_time_s: float
     purpose: str = ""
+
+    def sentence(self) -> str:
+        return f"camera frame at {self.sim_time_s:.1f} s; {words.purpose(self.purpose)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +187,7 @@ STOP_KEY = "stop key"
 """What a fault is called that is none: somebody wanted the robot to stand still."""
 
 
+@observation(keep=LAST_REQUESTS, when=is_closed, unless=has_its_request, needs=request_of_open_fault)
 @dataclass(frozen=True, slots=True)
 class BodyFault:
     """Something is wrong between the agent and the body: a request stays unanswered until it is over.
@@ -158,7 +215,14 @@ class BodyFault:
     def is_open(self) -> bool:
         return self.status == "open"
 
+    def sentence(self) -> str:
+        state = "is at fault" if self.is_open else "was at fault"
+        claims = words.motion(self.turn_rad or 0.0, self.move_m or 0.0)
+        done = f"; of {self.request} the wheels claim: {claims}" if self.turn_rad or self.move_m else ""
+        return f"the {self.part} {state} since {self.when_s:.1f} s: {self.what} ({self.detail}){done}; {self.status}"
 
+
+@request(keep=LAST_REQUESTS, when=is_recovered)
 @dataclass(frozen=True, slots=True)
 class Recovery:
     """The wish that a fault be over: wait, then try to have the request answered after all.
@@ -182,3 +246,10 @@ class Recovery:
     status: str = "asked"
     what: str = ""
     detail: str = ""
+
+    def sentence(self) -> str:
+        if self.status == "asked":
+            tries = words.count(self.tries, "try", "tries")
+            return f"waits {self.wait_s:.2f} s and tries again; to have {self.request} answered, {tries} so far"
+        ended = "it worked" if self.status == "over" else f"in vain: {self.what} ({self.detail})"
+        return f"tried again: {ended}; to have {self.request} answered after {self.fault}, {self.waited_s:.1f} s in all"

@@ -9,6 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from blackboard.kinds import inference
+from world_models import words
 from world_models.frames import Pose, Pose2, flattened
 
 
@@ -54,10 +56,15 @@ class Place:
         own = flattened(world.world_from_locale(locale)).inverse() @ Pose2(x_m, y_m, heading_rad or 0.0)
         return Place(locale, own.x_m, own.y_m, None if heading_rad is None else own.heading_rad)
 
+    def words(self) -> str:
+        """``allens-office (3.96, 3.66) m``."""
+        return f"{self.locale} {words.point(self.x_m, self.y_m)}"
+
     def __str__(self) -> str:
-        return f"({self.locale} ({self.x_m:.2f}, {self.y_m:.2f}) m)"
+        return f"({self.words()})"
 
 
+@inference()
 @dataclass(frozen=True, slots=True)
 class Hypothesis:
     """Where the robot believes it is.
@@ -115,6 +122,14 @@ class Hypothesis:
         own = turn @ np.asarray(covariance_world, float) @ turn.T
         pose = locale_from_world @ world_from_robot
         return Hypothesis(locale, pose, covariance_tuple(own), basis, status, weight, motion, evidence)
+
+    def sentence(self) -> str:
+        pose = self.locale_from_robot
+        evidence = f"; {self.evidence}" if self.evidence else ""
+        sure = words.sigma(self.covariance)
+        likely = f" (weight {self.weight:.2f})" if self.status == "candidate" else ""
+        return (f"{self.status}: in {self.locale} at {words.point(pose.x_m, pose.y_m)}, heading"
+                f" {words.degrees(pose.heading_rad)}{likely}; {sure}, by {self.basis}{evidence}")
 
 
 def _turn(angle_rad: float) -> NDArray[np.float64]:

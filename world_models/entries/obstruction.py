@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from blackboard.kinds import inference
+
 Floats = NDArray[np.float64]
 SAMPLES = (np.arange(16) + 0.5) / 16.0
 """Where on a line it is asked whether it is hidden: parts of its length."""
@@ -18,6 +20,7 @@ ROUND_PX = 2.5
 """What lies no further outside belongs to the outline."""
 
 
+@inference()
 @dataclass(frozen=True, slots=True)
 class Obstruction:
     """A convex part of the picture that something hides which moves with the camera.
@@ -51,3 +54,7 @@ class Obstruction:
     def without_its_own(self, segments_px: Floats) -> Floats:
         """Of segments (n, 2, 2) those that are not its outline, nor lie within it."""
         return np.asarray(segments_px[self.hidden_part(segments_px, ROUND_PX) < 1.0])
+
+    def sentence(self) -> str:
+        corners = ", ".join(f"({u:.0f}, {v:.0f})" for u, v in self.outline_px)
+        return f"something before the camera hides a part of every picture; within {corners} px"

@@ -2,13 +2,44 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from blackboard.board import View
+from blackboard.entry import Entry
+from blackboard.kinds import inference
+from blackboard.level import Level
+from blackboard.servoing import OPEN
+from world_models import words
 from world_models.entries.location import Covariance
 from world_models.frames import Pose2
+
+LAST_SEGMENTS = 8
+"""The newest segments that stay on the board: the obstruction finder compares several looks."""
+
+
+def template_frames(tracks: Tracks) -> tuple[str, ...]:
+    return tuple(track.template_frame for track in tracks.items)
+
+
+def may_be_of_a_probe(view: View, segments: Entry[Segments]) -> bool:
+    """Whether segments may be of a probe that counts while the robot is lost."""
+    return segments.value.milestone == "" and view.newest(OPEN, Level.GOAL) is not None
+
+
+def milestone_sought(segments: Segments) -> tuple[str, ...]:
+    return (segments.milestone,) if segments.milestone else ()
+
+
+def milestone_and_segments(match: LineMatch) -> tuple[str, ...]:
+    return (match.milestone, match.segments)
+
+
+def match_solved(fix: PoseFix) -> tuple[str, ...]:
+    return (fix.match,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +69,18 @@ class Track:
     sigma_px: float
     misses: int = 0
 
+    @property
+    def shift_px(self) -> tuple[float, float]:
+        """How far right of and below its prediction it was found; (0, 0) where it was not."""
+        u, v = self.found_px or self.predicted_px
+        return u - self.predicted_px[0], v - self.predicted_px[1]
+
+    def sentence(self) -> str:
+        right, below = self.shift_px
+        return (f"{words.landmark(self.landmark)} {abs(right):.1f} px {'right' if right >= 0 else 'left'} and"
+                f" {abs(below):.1f} px {'below' if below >= 0 else 'above'} its prediction"
+                f" (correlation {self.peak:.2f})")
+
 
 @dataclass(frozen=True, slots=True)
 class Anchor:
@@ -55,6 +98,7 @@ class Anchor:
     covariance: Covariance
 
 
+@inference(needs=template_frames)
 @dataclass(frozen=True, slots=True)
 class Tracks:
     """All landmarks that are followed, as of one frame.
@@ -73,7 +117,21 @@ class Tracks:
     anchors: tuple[Anchor, ...] = ()
     taken: int = 0
 
+    def sentence(self) -> str:
+        cut = [track for track in self.items if track.template_frame == self.frame]
+        found, followed = self.found_again(), len(self.items) - len(cut)
+        parts = [f"{len(found)} of {words.count(followed, 'landmark')} found again"] if followed else []
+        parts += [f"{words.count(len(cut), 'landmark')} newly chosen"] if cut else []
+        head = " and ".join(parts) or "no landmark is followed"
+        return f"{head}; in {self.frame}" + "".join(f"; {track.sentence()}" for track in found[:3])
 
+    def found_again(self) -> list[Track]:
+        """The landmarks that were found again, the one furthest from its prediction first."""
+        again = (t for t in self.items if t.found_px is not None and t.template_frame != self.frame)
+        return sorted(again, key=lambda track: -math.hypot(*track.shift_px))
+
+
+@inference(keep=LAST_SEGMENTS, unless=may_be_of_a_probe, needs=milestone_sought)
 @dataclass(frozen=True, slots=True, eq=False)
 class Segments:
     """Line segments found in a frame (§1.2).
@@ -93,7 +151,13 @@ class Segments:
     contrast: float
     brightness: float = 128.0
 
+    def sentence(self) -> str:
+        purpose = f" for {self.milestone}" if self.milestone else ""
+        found = words.count(len(self.segments_px), "line segment")
+        return f"{found} found; in {self.frame}{purpose}, contrast {self.contrast:.0f} of 255"
 
+
+@inference(keep=2, needs=milestone_and_segments)
 @dataclass(frozen=True, slots=True, eq=False)
 class LineMatch:
     """Which segment belongs to which model line (§6.1).
@@ -114,7 +178,13 @@ class LineMatch:
     error: float
     coverage: NDArray[np.float64]
 
+    def sentence(self) -> str:
+        lines, segments = (len(set(column.tolist())) for column in self.pairs.reshape(-1, 2).T)
+        return (f"{words.count(segments, 'segment')} matched to {lines} of {len(self.coverage)} expected model lines;"
+                f" {self.segments} against {self.milestone}, match error {self.error:.3g}")
 
+
+@inference(keep=2, needs=match_solved)
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseFix:
     """The robot's pose from matched lines (§6.2).
@@ -135,6 +205,12 @@ class PoseFix:
     residuals_px: NDArray[np.float64]
     rejected: tuple[str, ...]
 
+    def sentence(self) -> str:
+        pose = self.world_from_robot
+        agree = f"{int(self.inliers.sum())} of {words.count(len(self.inliers), 'matched pair')} agree on one pose"
+        return (f"{agree}; from {self.match} the robot stands at {words.point(pose.x_m, pose.y_m)}, heading"
+                f" {words.degrees(pose.heading_rad)} in the world ({words.sigma(self.covariance.tolist())})")
+
 
 @dataclass(frozen=True, slots=True)
 class Glimpse:
@@ -151,6 +227,7 @@ class Glimpse:
     covariance: Covariance
 
 
+@inference(keep=2)
 @dataclass(frozen=True, slots=True)
 class Panorama:
     """All looks since the robot is lost, composed by the motions between them.
@@ -162,3 +239,6 @@ class Panorama:
 
     glimpses: tuple[Glimpse, ...]
     found: str = ""
+
+    def sentence(self) -> str:
+        return f"after {words.count(len(self.glimpses), 'look')} round: {self.found or 'nothing is concluded yet'}"

@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
+from blackboard.kinds import inference, observation
+from world_models import words
 from world_models.entries.location import Covariance, Place
 
 
+def is_inactive(task: Goal | PlanSketch) -> bool:
+    return not task.is_active
+
+
+def is_closed(milestone: Milestone) -> bool:
+    return not milestone.is_open
+
+
+def fix_judged(certificate: Certificate) -> tuple[str, ...]:
+    return (certificate.fix,)
+
+
+@observation()
 @dataclass(frozen=True, slots=True)
 class Command:
     """What the user asks for, and how the robot was put down.
@@ -23,7 +39,14 @@ class Command:
     arrival_heading_rad: float | None
     start_covariance: Covariance
 
+    def sentence(self) -> str:
+        arrival = "" if self.arrival_heading_rad is None else (
+            f"; to arrive at heading {words.degrees(self.arrival_heading_rad)}")
+        start = f"{words.degrees(self.start_heading_rad)} ({words.sigma(self.start_covariance)})"
+        return f"the user asked for {self.text}; the robot was put down at heading {start}{arrival}"
 
+
+@inference(keep=2, when=is_inactive)
 @dataclass(frozen=True, slots=True)
 class Goal:
     """A top-level goal: ptrans from one place to another.
@@ -39,6 +62,9 @@ class Goal:
     @property
     def is_active(self) -> bool:
         return self.status == "active"
+
+    def sentence(self) -> str:
+        return f"goal: from {self.origin.words()} to {self.destination.words()}; {self.status}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +92,7 @@ class Subgoal:
         return f"(ptrans {self.origin} {self.destination})"
 
 
+@inference(keep=2, when=is_inactive)
 @dataclass(frozen=True, slots=True)
 class PlanSketch:
     """(M0 (ptrans a b) M1 (ptrans b c) ... Mg), approximate, abstract and tentative (§3.3).
@@ -107,7 +134,20 @@ class PlanSketch:
         """The current subgoal is done; its milestone is yet to be verified."""
         return replace(self, at=self.at + 1, verified=False)
 
+    def sentence(self) -> str:
+        where = f"through {self.locale}" if self.locale else "from locale to locale"
+        if self.status != "active":
+            progress = f"{self.status} at milestone M{self.at}"
+        else:
+            state = "verified" if self.verified else "yet to be verified"
+            progress = f"milestone M{self.at} of M{len(self.subgoals)} {state}"
+        steps = " then ".join(step.destination.words() + (f" by {step.passage}" if step.passage else "")
+                              for step in self.subgoals)
+        adjusted = f", adjusted {words.count(self.adjustments, 'time')}" if self.adjustments else ""
+        return f"plan sketch {where}: {progress}; to {steps}{adjusted}"
 
+
+@inference(keep=2)
 @dataclass(frozen=True, slots=True)
 class Leg:
     """A primitive subgoal under execution: a straight line in the world frame.
@@ -138,7 +178,15 @@ class Leg:
     left_m: float | None = None
     aim_rad: float | None = None
 
+    def sentence(self) -> str:
+        length_m = math.hypot(self.x1_m - self.x0_m, self.y1_m - self.y0_m)
+        return (f"straight leg of {words.metres(length_m)}, {self.status} after"
+                f" {words.count(self.increments, 'increment')}; from {words.point(self.x0_m, self.y0_m)} to"
+                f" {words.point(self.x1_m, self.y1_m)} in the world (subgoal {self.index} of {self.sketch}, near enough"
+                f" within {words.metres(self.tolerance_m)})")
 
+
+@inference(keep=2, when=is_closed)
 @dataclass(frozen=True, slots=True)
 class Milestone:
     """A perceptual event that should be seen at a place (§3.3, §4), and what has become of it.
@@ -173,7 +221,16 @@ class Milestone:
     def is_open(self) -> bool:
         return self.status in ("turning", "expected")
 
+    def sentence(self) -> str:
+        names = [words.landmark(name) for name in self.landmarks]
+        lines = words.count(len(self.expected), "model line")
+        seen = f"; should show {lines} of {words.listed(names, 4)}" if names else ""
+        of = f"of {self.sketch}" if self.sketch else "in between"
+        return (f"milestone {self.what} is {self.status}; {of}, looking along"
+                f" {words.degrees(self.look_heading_rad)}{seen}")
 
+
+@inference(keep=2, needs=fix_judged)
 @dataclass(frozen=True, slots=True)
 class Certificate:
     """The verdict on a milestone, with its evidence.
@@ -209,7 +266,17 @@ class Certificate:
     faces: int = 0
     faces_alike: float = 0.0
 
+    def sentence(self) -> str:
+        agree = (f"{words.count(self.inliers, 'segment')} agree to {words.quantity(self.residual_px, 'px')} with"
+                 f" {words.count(self.matched, 'matched line')} of {self.expected} expected")
+        shift = (f"{words.quantity(self.deviation_px, 'px')} of the {words.quantity(self.tolerance_px, 'px')} that may"
+                 " be corrected")
+        return (f"{self.milestone} is {self.verdict}: {self.reason}; {agree}; {words.metres(self.deviation_m)} and"
+                f" {words.degrees(self.deviation_rad)} from the belief, {shift}; probability of a wrong pose"
+                f" {self.p_false:.2g}")
 
+
+@inference()
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """How the mission ended: reached, lost, blocked, failed or stopped (somebody wanted it to), and why."""
@@ -217,7 +284,11 @@ class Outcome:
     kind: str
     reason: str
 
+    def sentence(self) -> str:
+        return f"the mission ended: {self.kind}, because {self.reason}"
 
+
+@observation()
 @dataclass(frozen=True, slots=True)
 class Resumed:
     """A run that was cut off goes on; the robot was stopped in between.
@@ -230,3 +301,8 @@ class Resumed:
 
     after_cycle: int
     interrupted: tuple[str, ...] = ()
+
+    def sentence(self) -> str:
+        heard = "".join(f"; how far {ref} was carried out is not known" for ref in self.interrupted)
+        where = f"the run was cut off after cycle {self.after_cycle} and goes on"
+        return f"{where}; the robot was stopped in between{heard}"

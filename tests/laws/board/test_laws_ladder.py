@@ -24,7 +24,6 @@ from blackboard.journal import Decision
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
-from harvey.retention import RETENTION
 from harvey.simulation.run import robot_model
 from harvey.wiring import KNOWLEDGE_SOURCES
 from knowledge_sources.plan.escalator import MOST_CHECKS, MOST_LOST
@@ -40,6 +39,7 @@ from knowledge_sources.questions import (
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.tolerances import PLAN_PX
 from sim.scenario import load_scenario, with_settings
+from world_models.entries import KINDS
 from world_models.entries.body import Course, Frame, Look, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.percepts import PoseFix
@@ -183,7 +183,7 @@ class Ladder:
         self.body = ScriptedBody()
         self.seen: dict[Ref, Discrepancy] = {}
         self.scheduler = Scheduler(
-            [*(e for e in real if e.name not in PERCEIVERS), *scripted], ports=[self.body], retention=RETENTION)
+            [*(e for e in real if e.name not in PERCEIVERS), *scripted], ports=[self.body], kinds=KINDS)
         task = with_settings(load_scenario("lab-to-allens-office"), {
             "goal": "(ptrans (allens-office (7,4,0)) (allens-office (13,12,0)))"}).command
         self.scheduler.tell([Post(task)], "user")

@@ -17,8 +17,9 @@ from knowledge_sources.methods.motion.pure_pursuit import (
     find_aim_point,
     measure_progress,
 )
-from world_models.actuator import ActuatorModel, Drift, arc
+from world_models.actuator import ActuatorModel, arc
 from world_models.entries.task import Leg
+from world_models.entries.wheels import Drift
 from world_models.frames import Pose2
 
 ACTUATOR = ActuatorModel()

@@ -14,14 +14,18 @@ from hypothesis import strategies as st
 from blackboard.board import Blackboard
 from blackboard.change import Quiescence
 from blackboard.effect import Post
+from blackboard.encoding import plain
 from blackboard.entry import Ref
-from blackboard.journal import change_record, plain
+from blackboard.journal import change_record
+from blackboard.scheduler import registry_of
 from harvey.errors import BadInput
 from harvey.run_files.observations import effect_of, value_of
 from harvey.run_files.records import EntryRecord
+from world_models.entries import KINDS
 from world_models.entries.body import Frame, MotionReport, RideReport
 from world_models.entries.task import Command, Outcome
 
+KNOWN = registry_of((), KINDS)
 numbers = st.floats(allow_nan=False) | st.integers(-3, 3)
 headings = st.floats(-7.0, 7.0)
 covariances = st.tuples(*[st.tuples(numbers, numbers, numbers)] * 3)
@@ -50,10 +54,10 @@ def pictures(value: Any) -> dict[int, bytes]:
 @settings(deadline=None, max_examples=200)
 @given(observations)
 def test_an_observation_comes_back_as_it_was(value: Any) -> None:
-    again = value_of(recorded(value), pictures(value))
+    again = value_of(recorded(value), pictures(value), KNOWN)
     assert type(again) is type(value)
     assert json.dumps(plain(again)) == json.dumps(plain(value))
-    effect = effect_of(recorded(value), pictures(value), lambda _id: None)
+    effect = effect_of(recorded(value), pictures(value), Blackboard().view, KNOWN)
     assert isinstance(effect, Post)
     assert effect.because == (Ref("Leg-2", 3),)
 
@@ -67,16 +71,16 @@ def test_a_value_of_other_fields_is_refused(value: Any, data: st.DataObject) -> 
     lacking = {k: v for k, v in record.value.items() if k != key}
     for broken in (lacking, {**record.value, key: other}, {**record.value, "x": 1}):
         with pytest.raises(BadInput, match="expected"):
-            value_of(replace(record, value=broken), pictures(value))
+            value_of(replace(record, value=broken), pictures(value), KNOWN)
 
 
 @given(st.binary(max_size=9), st.binary(max_size=9))
 def test_a_picture_must_be_the_one_that_was_seen(seen: bytes, kept: bytes) -> None:
     record = recorded(Frame(seen, 7, 0.5))
     if hashlib.sha256(seen).digest() == hashlib.sha256(kept).digest():
-        assert value_of(record, {7: kept}).jpeg == seen
+        assert value_of(record, {7: kept}, KNOWN).jpeg == seen
         return
     with pytest.raises(BadInput, match="another one"):
-        value_of(record, {7: kept})
+        value_of(record, {7: kept}, KNOWN)
     with pytest.raises(BadInput, match="picture 7"):
-        value_of(record, {8: seen})
+        value_of(record, {8: seen}, KNOWN)

@@ -34,7 +34,7 @@ def test_a_measurement_fills_the_agenda_first() -> None:
 
 
 def test_with_forgetting_the_board_stays_small() -> None:
-    assert agenda_memory.long_run(500, agenda_memory.RETENTION).entries < 10
+    assert agenda_memory.long_run(500, forgetting=True).entries < 10
     without = agenda_memory.long_run(500, ())
     assert without.entries > 400 and without.posted > 400 and without.early_bytes > 0
 

@@ -1,0 +1,148 @@
+"""Kinds of entries: what each type of value is to the board, said once, where the type is defined.
+
+``@request``, ``@observation`` and ``@inference`` mark a frozen dataclass as a kind of entry. Everything that differs by
+kind follows from the mark: what ports are asked for, what is on the disk before they are asked, what is read back from
+a journal, how long an entry is kept, and what people are told of it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from blackboard.board import View
+    from blackboard.entry import Entry
+
+T = TypeVar("T")
+
+
+class Role(Enum):
+    """Where entries of a kind come from, and who acts on them."""
+
+    REQUEST = "request"
+    """A knowledge source writes it, and a port acts on it: it is on the disk before the port is asked."""
+    OBSERVATION = "observation"
+    """It comes from outside: from a port, the user, or whoever runs the mission."""
+    INFERENCE = "inference"
+    """A knowledge source concludes it from other entries."""
+
+
+def always(_value: Any) -> bool:
+    return True
+
+
+def never(_view: View, _entry: Entry[Any]) -> bool:
+    return False
+
+
+def nothing(_value: Any) -> Iterable[str]:
+    return ()
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What the board must know of a type of value.
+
+    Attributes:
+        role: request, observation or inference.
+        keep: the newest postings, so many, always stay in memory; None: all of them do.
+        when: of the older ones only those leave for which this holds; pure.
+        unless: and of these, not those that something on the board still needs; pure.
+        needs: ids of the entries that must stay in memory as long as one with this value does; pure.
+    """
+
+    role: Role
+    keep: int | None = None
+    when: Callable[[Any], bool] = always
+    unless: Callable[[View, Entry[Any]], bool] = never
+    needs: Callable[[Any], Iterable[str]] = nothing
+
+
+class NotAKindError(TypeError):
+    """A type that was put on the board, watched or written without being marked as a kind of entry."""
+
+
+def request(**retention: Any) -> Callable[[type[T]], type[T]]:
+    """Marks what ports act on; ``retention`` are the other attributes of :class:`Kind`."""
+    return _mark(Kind(Role.REQUEST, **retention))
+
+
+def observation(**retention: Any) -> Callable[[type[T]], type[T]]:
+    """Marks what comes from outside."""
+    return _mark(Kind(Role.OBSERVATION, **retention))
+
+
+def inference(**retention: Any) -> Callable[[type[T]], type[T]]:
+    """Marks what knowledge sources conclude."""
+    return _mark(Kind(Role.INFERENCE, **retention))
+
+
+def kind_of(value_type: type[Any]) -> Kind:
+    """The mark of a type. Raises NotAKindError."""
+    kind = value_type.__dict__.get("KIND")
+    if not isinstance(kind, Kind):
+        raise NotAKindError(f"expected a kind of entry, got {value_type.__name__}: mark it with @request, @observation "
+                            "or @inference (blackboard.kinds)")
+    return kind
+
+
+def is_kind(value_type: type[Any]) -> bool:
+    """Whether a type is marked."""
+    return isinstance(value_type.__dict__.get("KIND"), Kind)
+
+
+def is_request(value_type: type[Any]) -> bool:
+    """Whether ports act on values of a type."""
+    return kind_of(value_type).role is Role.REQUEST
+
+
+def kinds_in(*modules: ModuleType) -> tuple[type[Any], ...]:
+    """The marked types that modules define, in the order of their definition."""
+    return tuple(value for module in modules for value in vars(module).values()
+                 if isinstance(value, type) and value.__module__ == module.__name__ and is_kind(value))
+
+
+class Registry(Mapping[str, type[Any]]):
+    """The kinds of entries of one board, by name: as the journal names them."""
+
+    def __init__(self, kinds: Iterable[type[Any]]) -> None:
+        """Raises NotAKindError for an unmarked type, ValueError for two types of one name."""
+        self._kinds: dict[str, type[Any]] = {}
+        for value_type in kinds:
+            kind_of(value_type)
+            known = self._kinds.setdefault(value_type.__name__, value_type)
+            if known is not value_type:
+                raise ValueError(f"expected kinds of different names, got {known.__module__}.{known.__name__} and "
+                                 f"{value_type.__module__}.{value_type.__name__}")
+
+    def of_role(self, role: Role) -> tuple[type[Any], ...]:
+        """The kinds of a role."""
+        return tuple(value_type for value_type in self.values() if kind_of(value_type).role is role)
+
+    def marks(self) -> Mapping[type[Any], Kind]:
+        """What each type is marked with."""
+        return {value_type: kind_of(value_type) for value_type in self.values()}
+
+    def __getitem__(self, name: str) -> type[Any]:
+        return self._kinds[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._kinds)
+
+    def __len__(self) -> int:
+        return len(self._kinds)
+
+
+def _mark(kind: Kind) -> Callable[[type[T]], type[T]]:
+    def mark(value_type: type[T]) -> type[T]:
+        if not (dataclasses.is_dataclass(value_type) and value_type.__dataclass_params__.frozen):  # type: ignore[attr-defined]
+            raise TypeError(f"expected a frozen dataclass, got {value_type.__name__}")
+        value_type.KIND = kind  # type: ignore[attr-defined]
+        return value_type
+
+    return mark
