@@ -21,13 +21,11 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.features.correlation import Template, extract_template
 from knowledge_sources.methods.features.rectification import Rectifier
 from knowledge_sources.methods.tracking.edge_alignment import align_to_edges
 from knowledge_sources.methods.tracking.template_tracking import (
-    HALF_PX,
-    TRACKS,
-    Image,
     TrackUpdate,
     correct_pose,
     follow_landmarks,
@@ -35,6 +33,7 @@ from knowledge_sources.methods.tracking.template_tracking import (
 )
 from knowledge_sources.questions import held, open_discrepancy, standing_in, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.settings import DEFAULT
 from knowledge_sources.tolerances import PLAN_PX, action_px
 from world_models.entries.body import Frame
 from world_models.entries.location import Hypothesis, covariance_tuple
@@ -90,7 +89,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
     def __init__(self, robot: RobotModel) -> None:
         super().__init__(robot)
         self._picture = Rectifier(robot.lens, robot.camera)
-        self._template = lru_cache(maxsize=4 * TRACKS)(self._cut)
+        self._template = lru_cache(maxsize=4 * DEFAULT.tracking.max_tracks)(self._cut)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         if held(view) is None or view.latest(Frame) is None or open_discrepancy(view, Level.GOAL) is not None:
@@ -116,7 +115,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         if expected >= LEAST and agreeing < LOST_PART * expected:
             what = f"{expected - agreeing} of {expected} landmarks are not where they were expected{_furthest(seen)}"
             yield from self._told(view, what, math.inf, belief.value, [f.track for f in followed], because)
-            yield self._kept(old, Tracks(frame.id, HALF_PX, ()), because)
+            yield self._kept(old, Tracks(frame.id, DEFAULT.tracking.template_half_px, ()), because)
             return
         now = belief.value if corrected is None else corrected.hypothesis
         anchors = () if old is None else old.value.anchors
@@ -169,7 +168,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
 
     def _cut(self, jpeg: bytes, at_px: tuple[float, float]) -> Template:
         """The template round a pixel of a picture; the last ones are remembered, as they serve for many frames."""
-        return extract_template(self._picture(jpeg), at_px, HALF_PX)
+        return extract_template(self._picture(jpeg), at_px, DEFAULT.tracking.template_half_px)
 
     def _corrected(self, belief: Hypothesis, seen: list[Track], anchors: tuple[Anchor, ...]) -> Corrected:
         """The belief after the landmarks were found."""
@@ -215,7 +214,8 @@ class CorrelatorTracker(RobotKnowledgeSource):
         pose = belief.world_from_robot(self._robot.world)
         here = Anchor(frame.id, pose.x_m, pose.y_m, covariance_tuple(belief.covariance_world(self._robot.world)))
         used = {t.template_frame for t in items}
-        return Tracks(frame.id, HALF_PX, items, tuple(a for a in (*anchors, here) if a.frame in used), taken)
+        half_px = DEFAULT.tracking.template_half_px
+        return Tracks(frame.id, half_px, items, tuple(a for a in (*anchors, here) if a.frame in used), taken)
 
     def _told(
         self, view: View, what: str, magnitude_px: float, belief: Hypothesis, tracks: list[Track],

@@ -1,4 +1,4 @@
-"""Chessboards in pictures: the inner corners to a few hundredths of a pixel, or why a picture is of no use."""
+"""Chessboard corners in a picture, to a few hundredths of a pixel, or the reason why the picture cannot be used."""
 
 from __future__ import annotations
 
@@ -7,19 +7,13 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-LEAST_SQUARE_PX = 5.0
-"""Squares smaller than this do not let their corners be told apart."""
-MOST_RISE_PX = 5.0
-"""Edges that take longer than this from black to white are blurred: out of focus, or moved."""
-UNKNOWN_PX = 1000.0
-"""What OpenCV answers from here on means that it could not tell, as for squares seen at a flat angle."""
-WINDOW = 0.4
-"""Half the side of the window in which a corner is refined, as part of the distance to the next corner: the larger the
-better while no other corner is in it. On rendered boards: 0.048 px RMS with 3 px, 0.035 px with 8 px."""
-LARGEST_WINDOW_PX = 11
-STEPS = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 60, 1e-4)
+from knowledge_sources.methods.arrays import Floats, Floats32
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.calibration import CalibrationSettings
+
+_UNKNOWN_PX = 1000.0
+"""OpenCV's sharpness from here on means that it could not measure it, as for squares seen at a flat angle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +30,20 @@ class Pattern:
                              f"{self.columns} x {self.rows} and {self.square_m} m")
 
     @property
-    def points(self) -> NDArray[np.float64]:
+    def points(self) -> Floats:
         """(columns rows, 3) inner corners, row by row, in the board's plane z = 0 [m]."""
         y, x = np.divmod(np.arange(self.columns * self.rows), self.columns)
         return np.stack([x, y, np.zeros_like(x)], axis=1) * self.square_m
 
 
-def find_corners(image: Any, pattern: Pattern) -> NDArray[np.float64] | str:
-    """The inner corners (columns rows, 2) of a board in a grey picture (h, w) uint8 [px], row by row; or why not."""
+def find_corners(
+    image: Any, pattern: Pattern, settings: CalibrationSettings = DEFAULT.calibration
+) -> Floats | str:
+    """Find the inner corners of a board in a grey picture (h, w) uint8.
+
+    Returns:
+        (columns rows, 2) corners, row by row [px]; or the reason why the picture cannot be used.
+    """
     grey = np.ascontiguousarray(image, np.uint8)
     size = (pattern.columns, pattern.rows)
     found, corners = cv2.findChessboardCorners(grey, size)
@@ -52,20 +52,21 @@ def find_corners(image: Any, pattern: Pattern) -> NDArray[np.float64] | str:
     if not found:
         return f"no board of {pattern.columns} x {pattern.rows} inner corners in it"
     rough = np.asarray(corners, np.float32).reshape(-1, 2)
-    spacing = _spacing_px(rough, pattern)
-    if spacing < LEAST_SQUARE_PX:
+    spacing = _measure_spacing_px(rough, pattern)
+    if spacing < settings.min_square_px:
         return f"the board's squares are only {spacing:.1f} px wide"
     rise = float(np.ravel(cv2.estimateChessboardSharpness(grey, size, rough)[0])[0])
-    if MOST_RISE_PX < rise < UNKNOWN_PX:
+    if settings.max_edge_rise_px < rise < _UNKNOWN_PX:
         return f"blurred: edges take {rise:.1f} px from black to white"
-    half = min(max(2, int(WINDOW * spacing)), LARGEST_WINDOW_PX)
-    fine = cv2.cornerSubPix(grey, rough.reshape(-1, 1, 2).copy(), (half, half), (-1, -1), STEPS).reshape(-1, 2)
+    half = min(max(2, int(settings.corner_window_share * spacing)), settings.max_corner_window_px)
+    criteria = cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, settings.corner_iterations, settings.corner_tolerance_px
+    fine = cv2.cornerSubPix(grey, rough.reshape(-1, 1, 2).copy(), (half, half), (-1, -1), criteria).reshape(-1, 2)
     moved = float(np.max(np.linalg.norm(fine - rough, axis=1)))
     return f"a corner is not clear to {moved:.1f} px" if moved > half else np.asarray(fine, np.float64)
 
 
-def _spacing_px(corners: NDArray[Any], pattern: Pattern) -> float:
-    """The least distance between neighbours."""
+def _measure_spacing_px(corners: Floats32, pattern: Pattern) -> float:
+    """The least distance between neighbouring corners [px]."""
     grid = corners.reshape(pattern.rows, pattern.columns, 2)
     steps = [np.linalg.norm(np.diff(grid, axis=axis), axis=-1).min() for axis in (0, 1)]
     return float(min(steps))

@@ -1,7 +1,7 @@
-"""Calibration of a camera from views of a chessboard: intrinsics, distortion, and how sure each of them is.
+"""Camera calibration from views of a chessboard: intrinsics, distortion, and their covariance.
 
 Source: Z. Zhang, A flexible new technique for camera calibration, PAMI 22(11), 2000, as OpenCV implements it. The
-covariance is worked out here, as OpenCV tells deviations only, and no correlations.
+covariance is computed here, as OpenCV gives standard deviations only.
 """
 
 from __future__ import annotations
@@ -11,23 +11,21 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.calibration.chessboard import Pattern
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.calibration import CalibrationSettings
 from world_models.camera import Camera
 from world_models.frames import frozen
 
 PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-LEAST_VIEWS = 4
-OUTLYING = 3.0
-"""A view whose RMS error is so many times the median view's is left out."""
-STEPS = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-10)
-Floats = NDArray[np.float64]
+"""Names of the parameters, in OpenCV's order."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoardView:
-    """A board as it was seen: name of the picture, and inner corners (n, 2) [px]."""
+    """One view of a board: name of the picture, and inner corners (n, 2) [px]."""
 
     name: str
     corners_px: Floats
@@ -35,10 +33,10 @@ class BoardView:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What is known of a camera.
+    """A calibrated camera.
 
     Attributes:
-        camera: with its distortion.
+        camera: intrinsics and distortion.
         covariance: (p, p) of the first p of :data:`PARAMETERS`.
         views: those that were used.
         residuals_px: for each view, (n, 2) found minus projected [px].
@@ -61,61 +59,70 @@ class Calibration:
 
     @property
     def deviations(self) -> Floats:
-        """(p,) their standard deviations."""
+        """(p,) standard deviations of the parameters."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def view_rms_px(self) -> Floats:
-        """For each view the root mean square distance between found and projected corners."""
-        return np.array([_rms(r) for r in self.residuals_px])
+        """For each view the RMS distance between found and projected corners."""
+        return np.array([_compute_rms(r) for r in self.residuals_px])
 
     @property
     def rms_px(self) -> float:
-        """Over all corners."""
-        return _rms(np.concatenate(self.residuals_px))
+        """The RMS distance over all corners."""
+        return _compute_rms(np.concatenate(self.residuals_px))
 
 
 def calibrate(
-    views: Sequence[BoardView], pattern: Pattern, size: tuple[int, int], *, with_k3: bool = False
+    views: Sequence[BoardView], pattern: Pattern, size: tuple[int, int], *, with_k3: bool = False,
+    settings: CalibrationSettings = DEFAULT.calibration,
 ) -> Calibration:
-    """The camera that explains the views best, without those that stand out from the others.
+    """Estimate the camera from views of a board, and reject views whose error is an outlier.
 
     Args:
         size: (width, height) of the pictures [px].
-        with_k3: find the sixth-order term of the distortion too; wide lenses need it, others are known worse by it.
+        with_k3: estimate the sixth-order term of the distortion too; wide lenses need it, others lose accuracy by it.
 
     Raises:
         ValueError: too few views, or no camera explains them.
     """
     used, rejected = list(views), dict[str, str]()
     while True:
-        if len(used) < LEAST_VIEWS:
-            raise ValueError(f"expected at least {LEAST_VIEWS} views of the board that can be used, got {len(used)}")
-        fit = _fitted(used, pattern, size, with_k3)
-        rms = np.array([_rms(r) for r in fit.residuals])
+        if len(used) < settings.min_views:
+            raise ValueError(
+                f"expected at least {settings.min_views} views of the board that can be used, got {len(used)}")
+        fit = _fit_camera(used, pattern, size, with_k3, settings)
+        rms = np.array([_compute_rms(r) for r in fit.residuals])
         worst, usual = int(np.argmax(rms)), float(np.median(rms))
-        if rms[worst] <= OUTLYING * usual:
-            return _told(fit, used, rejected, size)
+        if rms[worst] <= settings.max_view_rms_ratio * usual:
+            return _to_calibration(fit, used, rejected, size)
         why = f"its corners are off by {rms[worst]:.2f} px, {usual:.2f} px are usual here"
         rejected[used.pop(worst).name] = why
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
+    """Camera matrix (3, 3), distortion (5,), and for each view the residuals (n, 2) [px] and their derivative
+    (2 n, 6 + p) by the view's pose and by the intrinsics.
+    """
+
     matrix: Floats
     distortion: Floats
     residuals: tuple[Floats, ...]
     jacobians: tuple[Floats, ...]
-    """For each view (2 n, 6 + p), by its pose and by the intrinsics."""
 
 
-def _fitted(views: Sequence[BoardView], pattern: Pattern, size: tuple[int, int], with_k3: bool) -> _Fit:
+def _fit_camera(
+    views: Sequence[BoardView], pattern: Pattern, size: tuple[int, int], with_k3: bool, settings: CalibrationSettings
+) -> _Fit:
     points = pattern.points.astype(np.float32)
     flags = 0 if with_k3 else cv2.CALIB_FIX_K3
     corners = [view.corners_px.astype(np.float32) for view in views]
+    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, settings.calibration_iterations,
+                settings.calibration_tolerance)
     try:
         _, matrix, distortion, turns, places = cv2.calibrateCamera(
-            [points] * len(views), corners, size, np.eye(3), np.zeros(5), flags=flags, criteria=STEPS
+            [points] * len(views), corners, size, np.eye(3), np.zeros(5), flags=flags, criteria=criteria
         )
     except cv2.error as error:
         raise ValueError(f"expected views that a camera explains, got: {error.err}") from None
@@ -129,22 +136,24 @@ def _fitted(views: Sequence[BoardView], pattern: Pattern, size: tuple[int, int],
 
 
 def project_board(pattern: Pattern, turn: Floats, place: Floats, matrix: Floats, k: Floats) -> tuple[Floats, Floats]:
-    """Corners (n, 2) [px], and their derivative (2 n, 15) by rotation vector, place, and :data:`PARAMETERS`."""
+    """Project the corners (n, 2) [px], with the derivative (2 n, 15) by rotation vector, place, :data:`PARAMETERS`."""
     px, jacobian = cv2.projectPoints(pattern.points, turn, place, matrix, k)
     return np.asarray(px, float).reshape(-1, 2), np.asarray(jacobian, float)[:, :15]
 
 
-def _told(fit: _Fit, used: Sequence[BoardView], rejected: Mapping[str, str], size: tuple[int, int]) -> Calibration:
+def _to_calibration(
+    fit: _Fit, used: Sequence[BoardView], rejected: Mapping[str, str], size: tuple[int, int]
+) -> Calibration:
     m = fit.matrix
     camera = Camera(float(m[0, 0]), float(m[1, 1]), float(m[0, 2]), float(m[1, 2]), *size, tuple(fit.distortion))
     free = 2 * len(np.concatenate(fit.residuals)) - 6 * len(used) - (fit.jacobians[0].shape[1] - 6)
     variance = float(np.sum(np.concatenate(fit.residuals) ** 2)) / free
-    covariance = variance * np.linalg.inv(_information(fit.jacobians))
+    covariance = variance * np.linalg.inv(_compute_information(fit.jacobians))
     return Calibration(camera, frozen(covariance), tuple(used), fit.residuals, rejected, variance**0.5)
 
 
-def _information(jacobians: Sequence[Floats]) -> Floats:
-    """(p, p) of the intrinsics, each view's pose being unknown as well (Schur complement)."""
+def _compute_information(jacobians: Sequence[Floats]) -> Floats:
+    """Information matrix (p, p) of the intrinsics with each view's pose marginalized (Schur complement)."""
     parts = []
     for jacobian in jacobians:
         pose, inner = jacobian[:, :6], jacobian[:, 6:]
@@ -153,5 +162,5 @@ def _information(jacobians: Sequence[Floats]) -> Floats:
     return np.asarray(np.sum(parts, axis=0))
 
 
-def _rms(residuals: Floats) -> float:
+def _compute_rms(residuals: Floats) -> float:
     return float(np.sqrt(np.mean(np.sum(residuals**2, axis=1))))

@@ -1,7 +1,8 @@
-"""Template correlation (§1.2, §5): where in this image is the patch that was seen there?
+"""Template correlation (§1.2, §5): locate in one image a patch that was cut from another.
 
-Normalised cross-correlation finds the place to a pixel and says how sure and how unique it is; a least-squares
-alignment (gain and brightness free) finishes to a few hundredths of a pixel and gives a covariance, large along edges.
+Normalised cross-correlation finds the place to a pixel and measures how good and how unique it is. A least-squares
+alignment with free gain and brightness (Lucas-Kanade) refines it to a few hundredths of a pixel and gives its
+covariance, which is large along edges.
 """
 
 from __future__ import annotations
@@ -12,37 +13,39 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from knowledge_sources.methods.features import correlation_kernels as kernels
-from knowledge_sources.methods.features.correlation_peak import LOBE_PX, located, second_best
+from knowledge_sources.methods.arrays import Floats, Floats32
+from knowledge_sources.methods.features.correlation_peak import find_peak, find_second_peak
 from knowledge_sources.methods.features.images import estimate_noise_sigma, require_grey
+from knowledge_sources.methods.features.patch_kernels import compute_corner_strengths, resample_patch
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.features import FeaturesSettings
 
 _MARGIN_PX = 4
+"""Kept round a patch beyond twice its half-width, for the cubic interpolation of a patch shrunk to half."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Template:
-    """A square patch of an image, with what is around it.
+    """A square patch of an image, with its surroundings.
 
     Attributes:
-        pixels: (p, p) float32, the patch with a margin.
+        pixels: (p, p) the patch with a margin.
         centre: (2,) (u, v) of the template's centre in `pixels`, not whole in general [px].
         half_px: the patch reaches from -half_px to +half_px round its centre, at the scale at which it was seen.
         noise: standard deviation of the pixel noise of its image [grey levels].
     """
 
-    pixels: NDArray[np.float32]
-    centre: NDArray[np.float64]
+    pixels: Floats32
+    centre: Floats
     half_px: int
     noise: float
 
-    def patch(self, scale: float = 1.0, border: int = 0) -> NDArray[np.float32]:
-        """(2 half + 1 + 2 border) squared float32, enlarged by `scale`, its middle cell exactly at the centre."""
-        cut: NDArray[np.float32] = kernels.patch(
-            self.pixels, float(self.centre[0]), float(self.centre[1]), self.half_px, border, float(scale)
-        )
-        return cut
+    def resample(self, scale: float = 1.0, border: int = 0) -> Floats32:
+        """The patch (2 half + 1 + 2 border) squared, enlarged by `scale`, its middle cell exactly at the centre."""
+        u, v = self.centre.tolist()
+        patch: Floats32 = resample_patch(self.pixels, u, v, self.half_px, border, float(scale))
+        return patch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,12 +61,12 @@ class Correlation:
         moved_px: (2,) position minus prediction [px].
     """
 
-    position_px: NDArray[np.float64]
-    covariance_px: NDArray[np.float64]
+    position_px: Floats
+    covariance_px: Floats
     peak: float
     second_peak: float
     at_border: bool
-    moved_px: NDArray[np.float64]
+    moved_px: Floats
 
     @property
     def sigma_px(self) -> float:
@@ -77,18 +80,14 @@ class Correlation:
         return self.peak - self.second_peak
 
 
-def extract_template(image: Any, centre_px: Any, half_px: int = 12) -> Template:
-    """The patch (2 half_px + 1 squared) of an image (h, w) round a centre (u, v) [px], which need not be whole.
+def extract_template(
+    image: Any, centre_px: Any, half_px: int, settings: FeaturesSettings = DEFAULT.features
+) -> Template:
+    """Cut a template from an image (h, w) round a centre (u, v) [px], which need not be whole.
 
     Raises:
-        ValueError: the patch does not lie in the image, or half_px < 2.
+        ValueError: the patch (2 half_px + 1 squared) does not lie in the image, or half_px < 2.
     """
-    window, centre = _cut_out(image, centre_px, half_px)
-    return Template(window, centre, int(half_px), estimate_noise_sigma(window))
-
-
-def _cut_out(image: Any, centre_px: Any, half_px: int) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-    """The pixels round a patch, enough for it to shrink to half, and its centre among them."""
     pixels = require_grey(image)
     centre = np.asarray(centre_px, float).reshape(-1)
     height, width = pixels.shape
@@ -99,7 +98,8 @@ def _cut_out(image: Any, centre_px: Any, half_px: int) -> tuple[NDArray[np.float
     reach = 2 * half_px + _MARGIN_PX
     u, v = (math.floor(c) for c in centre)
     left, top = max(u - reach, 0), max(v - reach, 0)
-    return np.array(pixels[top : v + reach + 2, left : u + reach + 2], np.float32, order="C"), centre - (left, top)
+    window = np.array(pixels[top : v + reach + 2, left : u + reach + 2], np.float32, order="C")
+    return Template(window, centre - (left, top), int(half_px), estimate_noise_sigma(window, settings))
 
 
 def lies_inside(shape: tuple[int, ...], centre_px: Any, half_px: float) -> bool:
@@ -109,12 +109,14 @@ def lies_inside(shape: tuple[int, ...], centre_px: Any, half_px: float) -> bool:
 
 
 def correlate(
-    template: Template, image: Any, predicted_px: Any, search_px: float, *, scale: float = 1.0
+    template: Template, image: Any, predicted_px: Any, search_px: float, *, scale: float = 1.0,
+    settings: FeaturesSettings = DEFAULT.features,
 ) -> Correlation | None:
-    """Find a template within `search_px` of a prediction (u, v) [px] in each direction.
+    """Find a template in an image (h, w) near a prediction (u, v) [px].
 
     Args:
-        scale: how much larger the patch is expected here than where it was taken (old depth / new depth).
+        search_px: half-width of the window round the prediction [px].
+        scale: expected size of the patch over its size in the template (old depth / new depth).
 
     Returns:
         None where no place of the window holds the whole template inside the image.
@@ -130,24 +132,27 @@ def correlate(
     if pixels.ndim != 2:
         raise ValueError(f"expected a grey image of shape (h, w), got shape {pixels.shape}")
     predicted = np.asarray(predicted_px, float)
-    window = _window(pixels.shape, predicted, search_px, template.half_px)
-    if window is None:
+    bounds = _compute_bounds(pixels.shape, predicted, search_px, template.half_px)
+    if bounds is None:
         return None
-    u0, u1, v0, v1 = window
+    u0, u1, v0, v1 = bounds
     half = template.half_px
-    patch = template.patch(scale, border=1)
+    patch = template.resample(scale, border=1)
     view = np.ascontiguousarray(pixels[v0 - half : v1 + half + 1, u0 - half : u1 + half + 1], np.float32)
-    score = _scores(np.ascontiguousarray(patch[1:-1, 1:-1]), view)
-    u, v, uu, uv, vv, peak, second, at_border = located(patch, view, score, template.noise, float(search_px))
+    score = _compute_scores(np.ascontiguousarray(patch[1:-1, 1:-1]), view)
+    u, v, uu, uv, vv, peak, second, at_border = find_peak(
+        patch, view, score, template.noise, float(search_px),
+        settings.alignment_steps, settings.gradient_leak, settings.position_floor_px, settings.peak_lobe_px,
+    )
     position = np.array([u + u0, v + v0])
     covariance = np.array([[uu, uv], [uv, vv]])
     return Correlation(position, covariance, peak, second, bool(at_border), position - predicted)
 
 
-def corner_strengths(image: Any, centres_px: Any, half_px: int = 12) -> NDArray[np.float64]:
-    """(n,) how much of a corner the patches round centres (n, 2) are, to the next pixel [grey levels / px].
+def measure_corner_strengths(image: Any, centres_px: Any, half_px: int) -> Floats:
+    """Shi-Tomasi corner strength (n,) of the patches round centres (n, 2), to the next pixel [grey levels/px].
 
-    The root of the smaller eigenvalue of the mean squared gradient: 0 on a wall or along an edge.
+    It is the root of the smaller eigenvalue of the mean structure tensor: 0 on a wall or along an edge.
 
     Raises:
         ValueError: a patch does not lie in the image.
@@ -157,45 +162,49 @@ def corner_strengths(image: Any, centres_px: Any, half_px: int = 12) -> NDArray[
     last = np.array(pixels.shape[::-1]) - 1 - half_px
     if np.any((centres < half_px) | (centres > last)):
         raise ValueError(f"expected patches of half-width {half_px} inside the image, got centres {centres_px!r}")
-    strengths: NDArray[np.float64] = kernels.corner_strengths(pixels, centres, half_px)
+    strengths: Floats = compute_corner_strengths(pixels, centres, half_px)
     return strengths
 
 
-def compute_second_peak(image: Any, centre_px: Any, half_px: int, search_px: float) -> float:
-    """How well, -1 to 1, the patch round a centre (u, v), to the next pixel, correlates with the best other place.
+def compute_second_peak(
+    image: Any, centre_px: Any, half_px: int, search_px: float, settings: FeaturesSettings = DEFAULT.features
+) -> float:
+    """Correlation, -1 to 1, of the patch round a centre (u, v), to the next pixel, with the best other place near it.
 
-    The quick form of :func:`self_correlation` for choosing landmarks.
+    The quick form of :func:`self_correlate` for choosing landmarks.
 
     Raises:
         ValueError: the patch does not lie in the image.
     """
     pixels, centre = require_grey(image), np.rint(np.asarray(centre_px, float))
-    window = _window(pixels.shape, centre, search_px, half_px)
-    if window is None or not lies_inside(pixels.shape, centre, half_px):
+    bounds = _compute_bounds(pixels.shape, centre, search_px, half_px)
+    if bounds is None or not lies_inside(pixels.shape, centre, half_px):
         raise ValueError(f"expected a patch of half-width {half_px} inside the image, got centre {centre_px!r}")
-    u0, u1, v0, v1 = window
+    u0, u1, v0, v1 = bounds
     view = np.ascontiguousarray(pixels[v0 - half_px : v1 + half_px + 1, u0 - half_px : u1 + half_px + 1], np.float32)
     row, column = int(centre[1]) - v0, int(centre[0]) - u0
     size = 2 * half_px + 1
-    score = _scores(np.ascontiguousarray(view[row : row + size, column : column + size]), view)
-    return float(second_best(score, row, column, LOBE_PX, half_px // 2))
+    score = _compute_scores(np.ascontiguousarray(view[row : row + size, column : column + size]), view)
+    return float(find_second_peak(score, row, column, settings.peak_lobe_px, half_px // 2))
 
 
-def self_correlation(image: Any, centre_px: Any, half_px: int, search_px: float) -> Correlation:
-    """How a patch would be found in its own image: its `distinctiveness` and `covariance_px` rate it as a landmark.
+def self_correlate(
+    image: Any, centre_px: Any, half_px: int, search_px: float, settings: FeaturesSettings = DEFAULT.features
+) -> Correlation:
+    """Correlate a patch with its own image: `distinctiveness` and `covariance_px` rate it as a landmark.
 
     Raises:
         ValueError: the patch does not lie in the image.
     """
-    template = extract_template(image, centre_px, half_px)
-    found = correlate(template, image, np.rint(np.asarray(centre_px, float)), search_px)
+    template = extract_template(image, centre_px, half_px, settings)
+    found = correlate(template, image, np.rint(np.asarray(centre_px, float)), search_px, settings=settings)
     if found is None:
         raise ValueError(f"expected a patch of half-width {half_px} inside the image, got centre {centre_px!r}")
     return found
 
 
-def _window(
-    shape: tuple[int, ...], predicted: NDArray[np.float64], search: float, half: int
+def _compute_bounds(
+    shape: tuple[int, ...], predicted: Floats, search: float, half: int
 ) -> tuple[int, int, int, int] | None:
     """First and last column and row of the centres searched, all of whose patches lie in the image."""
     if predicted.shape != (2,) or not all(map(math.isfinite, predicted.tolist())):
@@ -206,8 +215,8 @@ def _window(
     return (u0, u1, v0, v1) if u0 <= u1 and v0 <= v1 else None
 
 
-def _scores(patch: NDArray[np.float32], view: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Normalised correlation of a patch at every place of a window; -1 on what is plain."""
+def _compute_scores(patch: Floats32, view: Floats32) -> Floats32:
+    """Normalised correlation of a patch at every place of a window; -1 where there is no contrast."""
     score = np.asarray(cv2.matchTemplate(view, patch, cv2.TM_CCOEFF_NORMED), np.float32)
     score[~np.isfinite(score)] = -1.0
     return score

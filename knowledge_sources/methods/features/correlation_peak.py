@@ -1,4 +1,4 @@
-"""What a window's scores say, compiled: the best place, aligned by least squares, its covariance and its rival."""
+"""Compiled kernels on a window of correlation scores: peak, sub-pixel alignment, covariance, second peak."""
 
 from __future__ import annotations
 
@@ -10,82 +10,79 @@ from numba import njit
 
 compiled = njit(cache=True, error_model="numpy")
 
-_STEPS = 2
-
-_DIRECTION_LEAK = 3e-4
-"""Share of an edge's gradient energy that seems to lie along it."""
-
-_FLOOR_PX = 0.02
-"""What interpolation and rounding leave in a position [px]."""
-
-LOBE_PX = 2
-"""Up to here from the best place, another local maximum is the same place."""
-
-Place = tuple[float, float, float, float, float, float, float, bool]
+Peak = tuple[float, float, float, float, float, float, float, bool]
 
 
 @compiled
-def located(patch: Any, view: Any, score: Any, noise: float, search: float) -> Place:
-    """The best place of a window.
+def find_peak(
+    patch: Any, view: Any, score: Any, noise: float, search: float, steps: int, leak: float, floor: float, lobe: int
+) -> Peak:
+    """Find the best place of a window, align it by least squares, and compute its covariance.
 
     Args:
-        patch: (s + 2, s + 2) template with a border of one. view: the window. score: the correlation at each place of
-            the template's top-left cell in it.
+        patch: (s + 2, s + 2) template with a border of one.
+        view: the window.
+        score: the correlation at each place of the template's top-left cell in the window.
         noise: standard deviation of the pixel noise [grey levels].
-        search: half-width of the window, the most that is ever unknown [px].
+        search: half-width of the window, the largest possible error [px].
+        steps, leak, floor, lobe: ``alignment_steps``, ``gradient_leak``, ``position_floor_px`` and ``peak_lobe_px`` of
+            the settings.
 
     Returns:
-        The place (u, v), its covariance (uu, uv, vv) [px^2], the correlation there, the best at another place, and
-        whether the place lies at the window's border, beyond which nothing has been looked at.
+        The place (u, v), its covariance (uu, uv, vv) [px^2], the correlation there, the second peak, and whether the
+        place lies at the window's border, so that the true one may be outside.
     """
     at = np.argmax(score)
     row, column = at // score.shape[1], at % score.shape[1]
-    du, dv = summit(score, row, column)
+    du, dv = _fit_quadric(score, row, column)
     start_u, start_v = column + du, row + dv
-    u, v, correlation, squares = aligned(patch, view, start_u, start_v, _STEPS)
+    u, v, correlation, squares = _align(patch, view, start_u, start_v, steps)
     uu, uv, vv = search**2 / 3.0, 0.0, search**2 / 3.0
     if correlation > -1.0:
-        uu, uv, vv = _covariance(patch, squares, noise, search)
+        uu, uv, vv = _compute_covariance(patch, squares, noise, search, leak, floor)
     last_u, last_v = score.shape[1] - 1, score.shape[0] - 1
     border = row == 0 or row == last_v or column == 0 or column == last_u
     border = border or u < 0.0 or u > last_u or v < 0.0 or v > last_v
     if border:
         u, v, correlation = start_u, start_v, -1.0
-    second = second_best(score, row, column, LOBE_PX, (patch.shape[0] - 3) // 4)
+    second = find_second_peak(score, row, column, lobe, (patch.shape[0] - 3) // 4)
     return u, v, uu, uv, vv, max(float(score[row, column]), correlation), second, border
 
 
 @compiled
-def _covariance(cut: Any, squares: float, noise: float, search: float) -> tuple[float, float, float]:
+def _compute_covariance(
+    cut: Any, squares: float, noise: float, search: float, leak: float, floor: float
+) -> tuple[float, float, float]:
     """Covariance (uu, uv, vv) of the place: residual variance over the gradients' energy, less the noise's share of it.
 
-    Central differences of noise of variance s^2 have variance s^2 / 2, so a blank wall has gradients, no information;
-    and because their own direction is off by a per cent or two, a strong edge seems to know a little of its length.
+    Central differences of noise of variance s^2 have variance s^2 / 2, so a blank wall has gradients but no
+    information. The gradients' own directions err by one or two per cent, so a strong edge seems to have a little
+    information along its length; ``leak`` takes it off.
     """
     cells, widest = (cut.shape[0] - 2) ** 2, search**2 / 3.0
     residual = max(squares / max(cells - 4, 1), 2.0 * noise**2)
-    uu, uv, vv = gradient_energy(cut)
+    uu, uv, vv = _compute_structure_tensor(cut)
     mean, radius = 0.5 * (uu + vv), math.hypot(0.5 * (uu - vv), uv)
     large, small = mean + radius, mean - radius
     blank, scatter = 0.5 * cells * noise**2, math.sqrt(3.0 / cells) + 0.03
-    across = min(residual / max(_information(large, blank, scatter), 1e-9) + _FLOOR_PX**2, widest)
-    known = _information(small - _DIRECTION_LEAK * large, blank, scatter)
-    along = min(residual / max(known, 1e-9) + _FLOOR_PX**2, widest)
+    across = min(residual / max(_compute_information(large, blank, scatter), 1e-9) + floor**2, widest)
+    known = _compute_information(small - leak * large, blank, scatter)
+    along = min(residual / max(known, 1e-9) + floor**2, widest)
     angle = 0.5 * math.atan2(2.0 * uv, uu - vv)  # of the stronger gradient, from u towards v
     c, s = math.cos(angle), math.sin(angle)
     return across * c * c + along * s * s, (across - along) * c * s, across * s * s + along * c * c
 
 
 @compiled
-def _information(energy: float, blank: float, scatter: float) -> float:
-    """Gradient energy beyond that of noise; none where it is within three times noise's own relative scatter."""
+def _compute_information(energy: float, blank: float, scatter: float) -> float:
+    """Gradient energy beyond that of noise; zero within three standard deviations of the noise's own energy."""
     certainty = min(max(0.5 * ((energy / blank - 1.0) / scatter - 3.0), 0.0), 1.0)
     return (energy - blank) * certainty
 
 
 @compiled
-def gradient_energy(cut: Any) -> tuple[float, float, float]:
-    """Sums of squares and products (uu, uv, vv) of the gradient, free of its mean, of a patch with a border of one."""
+def _compute_structure_tensor(cut: Any) -> tuple[float, float, float]:
+    """Sums (uu, uv, vv) of products of the gradient, less its mean, of a patch with a border of one."""
     side = cut.shape[0] - 2
     su = sv = uu = uv = vv = 0.0
     for r in range(1, side + 1):
@@ -97,11 +94,11 @@ def gradient_energy(cut: Any) -> tuple[float, float, float]:
 
 
 @compiled
-def aligned(cut: Any, view: Any, start_u: float, start_v: float, steps: int) -> tuple[float, float, float, float]:
-    """Least-squares alignment, gain and brightness free, of a patch with a border of one.
+def _align(cut: Any, view: Any, start_u: float, start_v: float, steps: int) -> tuple[float, float, float, float]:
+    """Align a patch with a border of one by least squares, with free gain and brightness (Lucas-Kanade).
 
     Args:
-        view: the window searched; (start_u, start_v) is a place in it of the patch's top-left cell, within a pixel.
+        view: the window; (start_u, start_v) is a place in it of the patch's top-left cell, within a pixel.
 
     Returns:
         The place (u, v), the normalised correlation there and the sum of squared residuals; a correlation of -1 for a
@@ -119,23 +116,23 @@ def aligned(cut: Any, view: Any, start_u: float, start_v: float, steps: int) -> 
     for r in range(side):
         for c in range(side):
             energy += (cut[r + 1, c + 1] - mean) ** 2
-    uu, uv, vv = gradient_energy(cut)
+    uu, uv, vv = _compute_structure_tensor(cut)
     if energy <= 0.0 or uu + vv <= 0.0:
         return start_u, start_v, -1.0, 0.0
     extra = 1e-3 * (uu + vv)
     determinant = (uu + extra) * (vv + extra) - uv * uv
     seen = np.empty((side, side))
-    still_u, still_v, _ = _products(cut, cut[1:-1, 1:-1], mean, uu + extra, uv, vv + extra, determinant)
+    still_u, still_v, _ = _compute_step(cut, cut[1:-1, 1:-1], mean, uu + extra, uv, vv + extra, determinant)
     u, v = start_u, start_v
     for _ in range(steps):
-        _sample(view, u, v, seen)
-        du, dv, gain = _products(cut, seen, mean, uu + extra, uv, vv + extra, determinant)
+        _sample_window(view, u, v, seen)
+        du, dv, gain = _compute_step(cut, seen, mean, uu + extra, uv, vv + extra, determinant)
         gain = max(gain / energy, 0.05)
         u -= min(max(du / gain - still_u, -0.5), 0.5)
         v -= min(max(dv / gain - still_v, -0.5), 0.5)
     if abs(u - start_u) > 1.0 or abs(v - start_v) > 1.0:
-        u, v = start_u, start_v  # it wandered off: the correlation's own peak stands
-    _sample(view, u, v, seen)
+        u, v = start_u, start_v  # diverged: keep the correlation's own peak
+    _sample_window(view, u, v, seen)
     level = seen.mean()
     product = square = 0.0
     for r in range(side):
@@ -150,8 +147,8 @@ def aligned(cut: Any, view: Any, start_u: float, start_v: float, steps: int) -> 
 
 
 @compiled
-def summit(score: Any, row: int, column: int) -> tuple[float, float]:
-    """Offset (u, v) of the top of the quadric through the 3 x 3 scores round a peak, at most half a cell."""
+def _fit_quadric(score: Any, row: int, column: int) -> tuple[float, float]:
+    """Offset (u, v) of the maximum of the quadric through the 3 x 3 scores round a peak, at most half a cell."""
     if not (0 < row < score.shape[0] - 1 and 0 < column < score.shape[1] - 1):
         return 0.0, 0.0
     slope_u = slope_v = xx = yy = 0.0
@@ -171,10 +168,10 @@ def summit(score: Any, row: int, column: int) -> tuple[float, float]:
 
 
 @compiled
-def second_best(score: Any, row: int, column: int, lobe: int, near: int) -> float:
-    """The best score at another place, -1 where there is none.
+def find_second_peak(score: Any, row: int, column: int, lobe: int, near: int) -> float:
+    """The best score at another place than (row, column), -1 where there is none.
 
-    That is a local maximum beyond ``lobe`` cells of the best place, or anything beyond ``near``.
+    Another place is a local maximum beyond ``lobe`` cells, or any cell beyond ``near`` (non-maximum suppression).
     """
     height, width = score.shape
     best = -1.0
@@ -189,8 +186,8 @@ def second_best(score: Any, row: int, column: int, lobe: int, near: int) -> floa
 
 
 @compiled
-def _sample(view: Any, u: float, v: float, out: Any) -> None:
-    """What is seen at a place between pixels, linearly; the border repeats."""
+def _sample_window(view: Any, u: float, v: float, out: Any) -> None:
+    """Write the window at a place between pixels to ``out``, by bilinear interpolation; the border repeats."""
     height, width = view.shape
     left, top = math.floor(u), math.floor(v)
     right_share, low_share = u - left, v - top
@@ -204,10 +201,10 @@ def _sample(view: Any, u: float, v: float, out: Any) -> None:
 
 
 @compiled
-def _products(
+def _compute_step(
     cut: Any, seen: Any, mean: float, uu: float, uv: float, vv: float, determinant: float
 ) -> tuple[float, float, float]:
-    """What is seen against the patch's gradient, as a step (u, v), and against the patch, all free of their means."""
+    """Gauss-Newton step (u, v), and product with the patch, of what is seen; all less their means."""
     side = cut.shape[0] - 2
     by_u = by_v = by_shape = total = su = sv = 0.0
     for r in range(side):

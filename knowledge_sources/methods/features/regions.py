@@ -1,7 +1,8 @@
-"""Regions of like brightness (§1.2).
+"""Regions of like brightness (§1.2), by localized histograms and region merging.
 
-The image is cut into sectors, so that a small thing's mode is not drowned by the rest of the picture; in each, the
-histogram's valleys part the grey levels; what touches across a sector's border and is alike is joined.
+The image is divided into sectors, so that a small thing's mode is not hidden by the rest of the picture. In each sector
+the valleys of the histogram separate the grey levels; connected parts are regions, and those that touch across a
+sector's border and are alike are merged.
 Source: [2]; J. Beveridge et al., Segmenting images using localized histograms and region merging, IJCV 2, 1989.
 """
 
@@ -15,10 +16,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from knowledge_sources.methods.arrays import Floats, Floats32, Image, Ints
 from knowledge_sources.methods.features.images import to_grey_float
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.features import FeaturesSettings
 
-_BINS = 64
-_BIN_WIDTH = 256.0 / _BINS
+Labels = NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,74 +29,70 @@ class Regions:
     """Connected regions of an image.
 
     Attributes:
-        labels: (h, w) int32, 0 .. n - 1.
+        labels: (h, w), 0 .. n - 1.
         areas_px: (n,) pixel counts.
         means: (n,) mean grey level.
         deviations: (n,) standard deviation of the grey level.
     """
 
-    labels: NDArray[np.int32]
-    areas_px: NDArray[np.int64]
-    means: NDArray[np.float64]
-    deviations: NDArray[np.float64]
+    labels: Labels
+    areas_px: Ints
+    means: Floats
+    deviations: Floats
 
     def __len__(self) -> int:
         return len(self.areas_px)
 
 
 def segment_regions(
-    image: Any, *, sector_px: int = 64, min_area_px: int = 60, join_levels: float = 12.0
+    image: Any, *, sector_px: int = 64, min_area_px: int = 60, settings: FeaturesSettings = DEFAULT.features
 ) -> Regions:
-    """Regions of like brightness of an image (h, w) of grey levels.
+    """Segment an image (h, w) of grey levels into regions of like brightness.
 
     Args:
         sector_px: side of the sectors whose histograms are taken [px].
-        min_area_px: smaller regions join the neighbour that is most like them.
-        join_levels: parts of different sectors join where they differ less along their border [grey levels].
+        min_area_px: smaller regions are merged into the most similar neighbour [px].
 
     Raises:
-        ValueError: not a grey image, or a limit is not positive.
+        ValueError: not a grey image, or a limit is too small.
     """
     pixels = to_grey_float(image)
-    if sector_px < 8 or min_area_px < 1 or join_levels <= 0:
-        got = f"{sector_px}, {min_area_px}, {join_levels}"
-        raise ValueError(f"expected sector_px >= 8, min_area_px >= 1, join_levels > 0, got {got}")
+    if sector_px < 8 or min_area_px < 1:
+        raise ValueError(f"expected sector_px >= 8 and min_area_px >= 1, got {sector_px} and {min_area_px}")
     levels = np.clip(np.rint(pixels), 0, 255).astype(np.uint8)
     smooth = np.asarray(cv2.medianBlur(levels, 3), np.uint8)
-    labels = _sector_labels(smooth, sector_px)
-    labels = _joined_sectors(labels, smooth.astype(np.float32), sector_px, join_levels)
-    labels = _absorbed(labels, pixels, min_area_px)
-    areas, means, deviations = _statistics(labels, pixels)
-    return Regions(labels, areas, means, deviations)
+    labels = _label_sectors(smooth, sector_px, settings)
+    labels = _merge_sectors(labels, smooth.astype(np.float32), sector_px, settings.max_border_step)
+    labels = _merge_small(labels, pixels, min_area_px)
+    return Regions(labels, *_compute_statistics(labels, pixels))
 
 
-def find_histogram_valleys(levels: NDArray[np.uint8], least_share: float = 0.02) -> NDArray[np.float64]:
-    """Grey levels that part the modes of a histogram; empty where there is one mode.
+def find_histogram_valleys(levels: Image, settings: FeaturesSettings = DEFAULT.features) -> Floats:
+    """Grey levels (n,) that separate the modes of a histogram; empty where there is one mode.
 
-    A valley counts where it is under 0.6 of the lower of its two peaks and each side holds `least_share` of the pixels.
+    A valley counts where it is low enough against the lower of its two peaks (``max_valley_share``) and each side holds
+    enough pixels (``min_mode_share``).
     """
-    counts = np.histogram(levels, _BINS, (0.0, 256.0))[0].astype(float)
+    bins = settings.histogram_bins
+    counts = np.histogram(levels, bins, (0.0, 256.0))[0].astype(float)
     smooth = np.convolve(np.pad(counts, 3, mode="edge"), np.array([1, 3, 6, 7, 6, 3, 1]) / 27.0, mode="valid")
-    cuts: list[int] = []
+    minima = np.flatnonzero((smooth[1:-1] <= smooth[:-2]) & (smooth[1:-1] < smooth[2:])) + 1
+    valleys: list[int] = []
     start = 0
-    for valley in _minima(smooth):
+    for valley in minima.tolist():
         left, right = smooth[start : valley + 1].max(), smooth[valley:].max()
-        share = counts[start:valley].sum(), counts[valley:].sum()
-        if smooth[valley] < 0.6 * min(left, right) and min(share) >= least_share * levels.size:
-            cuts.append(valley)
+        pixels = min(counts[start:valley].sum(), counts[valley:].sum())
+        is_low = smooth[valley] < settings.max_valley_share * min(left, right)
+        if is_low and pixels >= settings.min_mode_share * levels.size:
+            valleys.append(valley)
             start = valley
-    return (np.array(cuts, float) + 0.5) * _BIN_WIDTH
+    return (np.array(valleys, float) + 0.5) * (256.0 / bins)
 
 
-def _minima(smooth: NDArray[np.float64]) -> list[int]:
-    inner = np.flatnonzero((smooth[1:-1] <= smooth[:-2]) & (smooth[1:-1] < smooth[2:])) + 1
-    return [int(k) for k in inner]
-
-
-def _sector_labels(levels: NDArray[np.uint8], side: int) -> NDArray[np.int32]:
+def _label_sectors(levels: Image, side: int, settings: FeaturesSettings) -> Labels:
     """Connected parts of one histogram mode, each within one sector.
 
-    A sector's histogram is taken a quarter of its side beyond it, lest what only just reaches into it have no mode.
+    A sector's histogram is taken a quarter of its side beyond it, so that what only just reaches into it has a mode.
     """
     margin = side // 4
     height, width = levels.shape
@@ -103,7 +102,7 @@ def _sector_labels(levels: NDArray[np.uint8], side: int) -> NDArray[np.int32]:
         for left in range(0, width, side):
             sector = levels[top : top + side, left : left + side]
             around = levels[max(top - margin, 0) : top + side + margin, max(left - margin, 0) : left + side + margin]
-            modes = np.digitize(sector, find_histogram_valleys(around))
+            modes = np.digitize(sector, find_histogram_valleys(around, settings))
             for mode in range(int(modes.max()) + 1):
                 count, parts = cv2.connectedComponents((modes == mode).astype(np.uint8), connectivity=4)
                 block = labels[top : top + side, left : left + side]
@@ -112,51 +111,46 @@ def _sector_labels(levels: NDArray[np.uint8], side: int) -> NDArray[np.int32]:
     return labels
 
 
-def _joined_sectors(
-    labels: NDArray[np.int32], levels: NDArray[np.float32], side: int, join: float
-) -> NDArray[np.int32]:
-    """Parts that meet at a sector's border join, the most alike first.
+def _merge_sectors(labels: Labels, levels: Floats32, side: int, max_step: float) -> Labels:
+    """Merge parts that meet at a sector's border, the most similar first.
 
-    They must agree along their border, and so must, twice as loosely, the whole regions that they have become part of:
-    otherwise a chain of small steps would join everything.
+    They must agree along their border, and so must, within twice the step, the whole regions that they have become part
+    of: otherwise a chain of small steps would merge everything.
     """
-    edges = [_border_pairs(labels, levels, side), _border_pairs(labels.T, levels.T, side)]
+    edges = [_find_border_pairs(labels, levels, side), _find_border_pairs(labels.T, levels.T, side)]
     a, b, difference = (np.concatenate(parts) for parts in zip(*edges, strict=True))
-    areas, means, _ = _statistics(labels, levels)
+    areas, means, _ = _compute_statistics(labels, levels)
     key, where = np.unique(a.astype(np.int64) * len(areas) + b, return_inverse=True)
     length = np.bincount(where, minlength=len(key))
     step = np.abs(np.bincount(where, difference, len(key))) / np.maximum(length, 1)
-    alike = np.flatnonzero((step < join) & (length >= 3))
+    alike = np.flatnonzero((step < max_step) & (length >= 3))
     alike = alike[np.argsort(step[alike], kind="stable")]
-    root = _agglomerated(key[alike] // len(areas), key[alike] % len(areas), areas, means, 2.0 * join)
-    return _renumbered(labels, root)
+    root = _merge_pairs(key[alike] // len(areas), key[alike] % len(areas), areas, means, 2.0 * max_step)
+    return _renumber(labels, root)
 
 
-def _agglomerated(
-    a: NDArray[np.int64], b: NDArray[np.int64], areas: NDArray[np.int64], means: NDArray[np.float64], limit: float
-) -> NDArray[np.int64]:
-    """Whose region each part is in after joining, in order, pairs whose regions' means differ less than `limit`."""
+def _merge_pairs(a: Ints, b: Ints, areas: Ints, means: Floats, limit: float) -> Ints:
+    """Union-find: the region of each part after merging, in order, pairs whose regions' means differ less than a limit.
+    """
     parent = list(range(len(areas)))
     area, mean = areas.astype(float).tolist(), means.tolist()
 
-    def root(k: int) -> int:
+    def find_root(k: int) -> int:
         while parent[k] != k:
             parent[k] = parent[parent[k]]
             k = parent[k]
         return k
 
     for x, y in zip(a.tolist(), b.tolist(), strict=True):
-        p, q = root(x), root(y)
+        p, q = find_root(x), find_root(y)
         if p != q and abs(mean[p] - mean[q]) < limit:
             mean[p] = (mean[p] * area[p] + mean[q] * area[q]) / (area[p] + area[q])
             area[p] += area[q]
             parent[q] = p
-    return np.array([root(k) for k in range(len(parent))])
+    return np.array([find_root(k) for k in range(len(parent))])
 
 
-def _border_pairs(
-    labels: NDArray[np.int32], levels: NDArray[np.float32], side: int
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32]]:
+def _find_border_pairs(labels: Labels, levels: Floats32, side: int) -> tuple[Labels, Labels, Floats32]:
     """Labels on both sides of each place of the horizontal sector borders, and the step in brightness across it."""
     rows = np.arange(side, labels.shape[0], side)
     return (
@@ -166,27 +160,27 @@ def _border_pairs(
     )
 
 
-def _renumbered(labels: NDArray[np.int32], root: NDArray[np.int64]) -> NDArray[np.int32]:
+def _renumber(labels: Labels, root: Ints) -> Labels:
     """The label image with each label replaced by its root, numbered from 0 without gaps."""
     return np.asarray(np.unique(root, return_inverse=True)[1][labels], np.int32)
 
 
-def _absorbed(labels: NDArray[np.int32], pixels: NDArray[np.float32], min_area: int) -> NDArray[np.int32]:
-    """Regions that are too small join the touching region of nearest brightness, in rounds until none is left."""
-    areas, means, _ = _statistics(labels, pixels)
+def _merge_small(labels: Labels, pixels: Floats32, min_area: int) -> Labels:
+    """Merge regions that are too small into the touching region of nearest brightness, in rounds until none is left."""
+    areas, means, _ = _compute_statistics(labels, pixels)
     while len(areas) > 1 and areas.min() < min_area:
-        a, b = _touching(labels)
+        a, b = _find_touching(labels)
         of_small = areas[a] < min_area
         a, b = a[of_small], b[of_small]
         order = np.lexsort((b, np.abs(means[a] - means[b]), a))
         nearest = order[np.unique(a[order], return_index=True)[1]]
-        labels = _renumbered(labels, _agglomerated(a[nearest], b[nearest], areas, means, math.inf))
-        areas, means, _ = _statistics(labels, pixels)
+        labels = _renumber(labels, _merge_pairs(a[nearest], b[nearest], areas, means, math.inf))
+        areas, means, _ = _compute_statistics(labels, pixels)
     return labels
 
 
-def _touching(labels: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of regions that share a border, both ways round."""
+def _find_touching(labels: Labels) -> tuple[Ints, Ints]:
+    """Pairs of regions that share a border, in both orders."""
     n = int(labels.max()) + 1
     side = [(labels[:, :-1], labels[:, 1:]), (labels[:-1], labels[1:])]
     pairs = np.unique(np.concatenate([(x.astype(np.int64) * n + y)[x != y] for x, y in side]))
@@ -194,9 +188,8 @@ def _touching(labels: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.
     return np.concatenate([a, b]), np.concatenate([b, a])
 
 
-def _statistics(
-    labels: NDArray[np.int32], pixels: NDArray[np.float32]
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+def _compute_statistics(labels: Labels, pixels: Floats32) -> tuple[Ints, Floats, Floats]:
+    """Area, mean and standard deviation of each region."""
     flat, values = labels.ravel(), pixels.ravel().astype(np.float64)
     areas = np.bincount(flat)
     means = np.bincount(flat, values) / areas

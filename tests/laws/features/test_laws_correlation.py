@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.features.correlation import (
     compute_second_peak,
-    corner_strengths,
     correlate,
     extract_template,
-    self_correlation,
+    measure_corner_strengths,
+    self_correlate,
 )
 
 SIZE = 96
@@ -103,7 +103,7 @@ def test_the_peak_is_the_best_of_all_correlations_worked_out_one_by_one(seed: in
     template = extract_template(pattern(seed), middle(), half)
     found = correlate(template, image, middle(), float(search))
     assert found is not None
-    patch = template.patch().astype(float)
+    patch = template.resample().astype(float)
     centre = SIZE // 2
     scores = {
         (u, v): brute_force(patch, image, half, u, v)
@@ -123,13 +123,13 @@ def test_along_an_edge_the_position_is_not_known(angle: float, offset: float) ->
     v, u = np.mgrid[0:SIZE, 0:SIZE] - SIZE / 2.0
     image = 128.0 + 60.0 * np.tanh((u * normal[0] + v * normal[1] - offset) / 1.5)
     image = np.rint(image + 1.5 * np.random.default_rng(3).standard_normal(image.shape))
-    found = self_correlation(image, middle(), 10, 8.0)
+    found = self_correlate(image, middle(), 10, 8.0)
     values, axes = np.linalg.eigh(found.covariance_px)
     assert values[0] < 0.1**2
     assert values[1] > 1.0
     assert abs(axes[:, 0] @ normal) > 0.95
     assert found.distinctiveness < 0.1
-    assert corner_strengths(image, middle(), 10)[0] < 2.0
+    assert measure_corner_strengths(image, middle(), 10)[0] < 2.0
 
 
 @few
@@ -138,10 +138,10 @@ def test_a_corner_is_known_both_ways_and_stands_alone(seed: int) -> None:
     rng = np.random.default_rng(seed)
     image = np.full((SIZE, SIZE), 60.0)
     image[SIZE // 2 :, SIZE // 2 :] = 190.0
-    found = self_correlation(image + 2.0 * rng.standard_normal(image.shape), middle(), 10, 8.0)
+    found = self_correlate(image + 2.0 * rng.standard_normal(image.shape), middle(), 10, 8.0)
     assert found.sigma_px < 0.1
     assert found.distinctiveness > 0.2
-    assert corner_strengths(image, middle(), 10)[0] > 8.0
+    assert measure_corner_strengths(image, middle(), 10)[0] > 8.0
 
 
 @few
@@ -149,8 +149,8 @@ def test_a_corner_is_known_both_ways_and_stands_alone(seed: int) -> None:
 def test_a_repeated_pattern_is_not_distinctive(period: int, phase: float) -> None:
     v, u = np.mgrid[0:SIZE, 0:SIZE]
     image = 128.0 + 50.0 * np.cos(2 * np.pi * (u + phase) / period) * np.cos(2 * np.pi * v / 17.0)
-    alone = self_correlation(image, middle(), 10, period / 2.0 - 0.6)
-    found = self_correlation(image, middle(), 10, period + 2.0)
+    alone = self_correlate(image, middle(), 10, period / 2.0 - 0.6)
+    found = self_correlate(image, middle(), 10, period + 2.0)
     assert found.distinctiveness < 0.02
     assert alone.distinctiveness > found.distinctiveness
 
@@ -179,7 +179,7 @@ def test_a_resampled_patch_keeps_a_linear_shading_exactly(seed: int, scale: floa
     dv, du = np.mgrid[-7:8, -7:8] / scale
     centre = middle(fraction)
     expected = 100.0 + slope[0] * (centre[0] + du) + slope[1] * (centre[1] + dv)
-    np.testing.assert_allclose(template.patch(scale), expected, atol=0.1 if scale < 1.0 else 0.01)
+    np.testing.assert_allclose(template.resample(scale), expected, atol=0.1 if scale < 1.0 else 0.01)
 
 
 @pytest.mark.parametrize("search", [4.0, 10.0, 25.0])
@@ -199,7 +199,7 @@ def test_a_blank_wall_is_known_nowhere(search: float) -> None:
 @given(seeds, st.integers(-20, 20), st.integers(-20, 20))
 def test_the_quick_second_peak_of_a_patch_is_that_of_its_own_correlation(seed: int, du: int, dv: int) -> None:
     image, place = pattern(seed), middle((du, dv))
-    expected = self_correlation(image, place, 8, 12.0).second_peak
+    expected = self_correlate(image, place, 8, 12.0).second_peak
     assert compute_second_peak(image, place, 8, 12.0) == pytest.approx(expected, abs=1e-3)
 
 
@@ -216,10 +216,10 @@ def test_a_repeated_pattern_has_a_second_peak_once_its_period_is_in_the_window(p
 @given(seeds)
 def test_corner_strength_is_the_same_turned_mirrored_and_negated(seed: int) -> None:
     image, places = pattern(seed), np.array([[30.0, 41.0], [48.0, 48.0], [60.0, 33.0]])
-    expected = corner_strengths(image, places, 9)
-    turned = corner_strengths(np.ascontiguousarray(image.T), places[:, ::-1], 9)
-    mirrored = corner_strengths(np.ascontiguousarray(image[:, ::-1]), np.abs(places - (SIZE - 1, 0)), 9)
-    for other in (turned, mirrored, corner_strengths(255.0 - image, places, 9)):
+    expected = measure_corner_strengths(image, places, 9)
+    turned = measure_corner_strengths(np.ascontiguousarray(image.T), places[:, ::-1], 9)
+    mirrored = measure_corner_strengths(np.ascontiguousarray(image[:, ::-1]), np.abs(places - (SIZE - 1, 0)), 9)
+    for other in (turned, mirrored, measure_corner_strengths(255.0 - image, places, 9)):
         np.testing.assert_allclose(other, expected, rtol=1e-9)
 
 
@@ -227,4 +227,4 @@ def test_corner_strength_and_second_peak_need_patches_inside_the_image() -> None
     with pytest.raises(ValueError, match="expected a patch of half-width 10 inside the image"):
         compute_second_peak(pattern(0), [5.0, 40.0], 10, 12.0)
     with pytest.raises(ValueError, match="expected patches of half-width 10 inside the image"):
-        corner_strengths(pattern(0), [[5.0, 40.0]], 10)
+        measure_corner_strengths(pattern(0), [[5.0, 40.0]], 10)

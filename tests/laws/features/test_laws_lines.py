@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -12,8 +13,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.features.lines import LineSegments, find_lines
+from knowledge_sources.settings import DEFAULT
 
 SIZE = 81
+NO_SYSTEMATIC = replace(DEFAULT.features, line_systematic_px=0.005)
 angles = st.floats(0.0, 2.0 * np.pi)
 phases = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
 few = settings(deadline=None, max_examples=25)
@@ -179,7 +182,7 @@ def test_the_standard_deviations_are_true(noise: float, contrast: float, quality
             coded = cv2.imencode(".jpg", seen, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
             seen = np.asarray(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE), np.uint8)
         predicted = prediction(point, normal, rng.uniform(-5, 5), rng.uniform(-0.08, 0.08))
-        found = find_lines(seen, predicted, systematic_px=0.005)
+        found = find_lines(seen, predicted, settings=NO_SYSTEMATIC)
         k = longest(found)
         error = off_line(found, point, normal)
         offsets.append(error.mean() / found.sigma_offset_px[k])

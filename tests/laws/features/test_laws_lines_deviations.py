@@ -5,6 +5,7 @@ Edges and corners are drawn in closed form, seen through a blurring lens and a n
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -14,9 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.features.lines import SIGMA_END_PX, LineSegments, find_lines
+from knowledge_sources.methods.features.lines import LineSegments, find_lines
+from knowledge_sources.settings import DEFAULT
 
 SIZE = 81
+SIGMA_END_PX = DEFAULT.features.sigma_along_px
+NO_SYSTEMATIC = replace(DEFAULT.features, line_systematic_px=0.005)
 Array = NDArray[np.float64]
 LOOKS = [(4.0, 60.0, None), (2.0, 30.0, 90), (6.0, 40.0, None)]
 
@@ -66,7 +70,7 @@ def test_two_thirds_lie_within_one_deviation_and_nearly_all_within_two(
         picture = seen(100.0 + contrast * share_beyond(point, normal), noise, quality, rng)
         along = 28.0 * np.array([-normal[1], normal[0]])
         near = predictions(np.array([[point - along, point + along]]), rng) if focused else None
-        errors.append(off_and_turn(find_lines(picture, near, systematic_px=0.005), point, normal))
+        errors.append(off_and_turn(find_lines(picture, near, settings=NO_SYSTEMATIC), point, normal))
     sizes = np.abs(errors)
     assert np.all(np.abs(np.mean(errors, axis=0)) < 0.35)  # unbiased
     assert np.all((np.mean(sizes < 1.0, axis=0) > 0.5) & (np.mean(sizes < 1.0, axis=0) < 0.88))
@@ -112,7 +116,7 @@ def test_an_end_is_known_across_as_well_as_its_line_is_there() -> None:
     rng = np.random.default_rng(5)
     image, sides = rectangle(rng)
     found = find_lines(seen(image, 2.0, None, rng), sides)
-    along, across = found.sigma_ends_px.T
+    along, across = found.compute_end_sigmas().T
     np.testing.assert_array_equal(along, SIGMA_END_PX)
     assert np.all(across > found.sigma_offset_px)
     lever = 0.5 * found.lengths_px * found.sigma_angle_rad

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from knowledge_sources.methods.features.correlation import correlate, extract_template, self_correlation
+from knowledge_sources.methods.features.correlation import correlate, extract_template, self_correlate
 
 
 def scene() -> np.ndarray:
@@ -17,12 +17,12 @@ def test_a_patch_that_leaves_the_image_is_refused() -> None:
     with pytest.raises(ValueError, match="expected a patch of half-width 8 inside 100 x 80 px"):
         extract_template(scene(), (5.0, 40.0), 8)
     with pytest.raises(ValueError, match="inside"):
-        self_correlation(scene(), (96.0, 40.0), 8, 5.0)
+        self_correlate(scene(), (96.0, 40.0), 8, 5.0)
 
 
 @pytest.mark.parametrize("centre", [(8.0, 8.0), (91.0, 71.0), (8.0, 71.0)])
 def test_a_patch_in_the_corner_of_the_image_is_found(centre: tuple[float, float]) -> None:
-    found = self_correlation(scene(), centre, 8, 6.0)
+    found = self_correlate(scene(), centre, 8, 6.0)
     np.testing.assert_allclose(found.position_px, centre, atol=0.02)
 
 

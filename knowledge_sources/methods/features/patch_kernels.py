@@ -1,4 +1,4 @@
-"""What a patch of pixels is like, compiled: itself between pixels, its noise, how much of a corner it is."""
+"""Compiled kernels on patches of pixels: resampling, corner strength, noise response."""
 
 from __future__ import annotations
 
@@ -12,16 +12,25 @@ compiled = njit(cache=True, error_model="numpy")
 
 
 @compiled
-def patch(pixels: Any, centre_u: float, centre_v: float, half: int, border: int, scale: float) -> Any:
-    """(n, n) float32, n = 2 half + 1 + 2 border, of ``pixels`` (h, w) round a centre, enlarged by ``scale``.
+def resample_patch(pixels: Any, centre_u: float, centre_v: float, half: int, border: int, scale: float) -> Any:
+    """Cut a patch round a centre, enlarged by a scale, by cubic convolution.
 
-    Cubic interpolation along columns, then along rows, widened where the patch shrinks; the border repeats.
+    The kernel is widened where the patch shrinks; the border of the image repeats.
+
+    Args:
+        pixels: (h, w).
+        centre_u, centre_v: centre, not whole in general [px].
+        half, border: the patch has n = 2 half + 1 + 2 border cells a side.
+
+    Returns:
+        (n, n) float32.
+
     Source: R. Keys, Cubic convolution interpolation, 1981, with a = -1/2: exact for polynomials to the second degree.
     """
     side = 2 * (half + border) + 1
     height, width = pixels.shape
     rows = np.empty((side, width))
-    first, weights = _taps(centre_v, half + border, scale, height)
+    first, weights = _compute_taps(centre_v, half + border, scale, height)
     for r in range(side):
         for x in range(width):
             value = 0.0
@@ -30,7 +39,7 @@ def patch(pixels: Any, centre_u: float, centre_v: float, half: int, border: int,
                 if 0 <= y < height:
                     value += weights[r, t] * pixels[y, x]
             rows[r, x] = value
-    first, weights = _taps(centre_u, half + border, scale, width)
+    first, weights = _compute_taps(centre_u, half + border, scale, width)
     out = np.empty((side, side), np.float32)
     for r in range(side):
         for c in range(side):
@@ -44,8 +53,21 @@ def patch(pixels: Any, centre_u: float, centre_v: float, half: int, border: int,
 
 
 @compiled
-def corner_energy(image: Any, u: int, v: int, half: int) -> tuple[float, float, float]:
-    """Sums of squares and products (uu, uv, vv) of an image's gradient round a pixel, free of its mean."""
+def compute_corner_strengths(image: Any, pixels: Any, half: int) -> Any:
+    """Corner strength (n,) of the patches round pixels (n, 2): root of the smaller eigenvalue of the mean structure
+    tensor (Shi-Tomasi) [grey levels/px].
+    """
+    out = np.empty(len(pixels))
+    for i in range(len(pixels)):
+        uu, uv, vv = _compute_structure_tensor(image, pixels[i, 0], pixels[i, 1], half)
+        smaller = 0.5 * (uu + vv) - math.hypot(0.5 * (uu - vv), uv)
+        out[i] = math.sqrt(max(smaller, 0.0)) / (2 * half + 1)
+    return out
+
+
+@compiled
+def _compute_structure_tensor(image: Any, u: int, v: int, half: int) -> tuple[float, float, float]:
+    """Sums (uu, uv, vv) of products of the gradient round a pixel, less its mean."""
     su = sv = uu = uv = vv = 0.0
     for y in range(v - half, v + half + 1):
         for x in range(u - half, u + half + 1):
@@ -58,19 +80,8 @@ def corner_energy(image: Any, u: int, v: int, half: int) -> tuple[float, float, 
 
 
 @compiled
-def corner_strengths(image: Any, pixels: Any, half: int) -> Any:
-    """(n,) root of the smaller eigenvalue of the mean squared gradient round pixels (n, 2)."""
-    out = np.empty(len(pixels))
-    for i in range(len(pixels)):
-        uu, uv, vv = corner_energy(image, pixels[i, 0], pixels[i, 1], half)
-        least = 0.5 * (uu + vv) - math.hypot(0.5 * (uu - vv), uv)
-        out[i] = math.sqrt(max(least, 0.0)) / (2 * half + 1)
-    return out
-
-
-@compiled
-def noise_response(image: Any, step: int) -> float:
-    """Median size of the response to a mask that is blind to plain, linear and straight-edge structure."""
+def compute_noise_response(image: Any, step: int) -> float:
+    """Median absolute response of every ``step``-th row to Immerkaer's noise mask, blind to linear structure."""
     height, width = image.shape
     count = (height - 3) // step + 1
     response = np.empty(count * (width - 2))
@@ -87,7 +98,7 @@ def noise_response(image: Any, step: int) -> float:
 
 
 @compiled
-def _taps(centre: float, reach: int, scale: float, size: int) -> tuple[Any, Any]:
+def _compute_taps(centre: float, reach: int, scale: float, size: int) -> tuple[Any, Any]:
     """For each place of the patch along one axis: the first cell that counts, and the weights from there."""
     shrink = min(scale, 1.0)
     span = math.ceil(2.0 / shrink)
@@ -98,7 +109,7 @@ def _taps(centre: float, reach: int, scale: float, size: int) -> tuple[Any, Any]
         total = 0.0
         for t in range(2 * span + 1):
             if 0 <= first[i] + t < size:
-                weights[i, t] = _cubic(abs(place - (first[i] + t)) * shrink)
+                weights[i, t] = _compute_cubic_weight(abs(place - (first[i] + t)) * shrink)
                 total += weights[i, t]
         for t in range(2 * span + 1):
             weights[i, t] /= total
@@ -106,7 +117,7 @@ def _taps(centre: float, reach: int, scale: float, size: int) -> tuple[Any, Any]
 
 
 @compiled
-def _cubic(distance: float) -> float:
+def _compute_cubic_weight(distance: float) -> float:
     if distance <= 1.0:
         return (1.5 * distance - 2.5) * distance * distance + 1.0
     if distance < 2.0:
