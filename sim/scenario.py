@@ -10,8 +10,8 @@ from typing import Any
 
 from sim.body.actuator import ActuatorParameters
 from sim.body.elevator import Helper
-from sim.faults.fault_table import read_fault
-from sim.faults.faults import Fault
+from sim.faults.fault import Fault
+from sim.faults.registry import read_fault
 from sim.moved_things import Moved
 from sim.render.optics import check_lens
 from sim.render.rasterizer import sample_offsets

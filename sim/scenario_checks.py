@@ -8,7 +8,7 @@ import numpy as np
 
 from sim.body.building import Building
 from sim.body.collision import ROBOT_RADIUS_M
-from sim.faults.faults import Displacement, Fault
+from sim.faults.fault import Fault
 from sim.moved_things import is_of, with_moved
 from sim.scenario import Scenario
 from world_models.building.faces import Face
@@ -29,9 +29,9 @@ def named_in(scenario: Scenario) -> list[str]:
 
 def _named_by(fault: Fault) -> list[tuple[str, str]]:
     """(key, locale)."""
-    named = [("in_locale", fault.moment.in_locale)]
-    if isinstance(fault, Displacement) and fault.place is not None:
-        named.append(("to_locale", fault.place.locale))
+    named = [("in_locale", fault.in_locale)]
+    if fault.destination is not None:
+        named.append(("to_locale", fault.destination.locale))
     return [(key, name) for key, name in named if name]
 
 
@@ -77,8 +77,8 @@ def check_room(
     """Raises ScenarioError where the robot would be put down, at the start or by a fault, where it cannot stand."""
     _check_place(scenario, ("goal",), "start", world, start, building)
     for i, fault in enumerate(scenario.faults):
-        if isinstance(fault, Displacement) and fault.place is not None:
-            there = fault.place
+        there = fault.destination
+        if there is not None:
             storey = on_floor(world.floor_m(there.locale))
             _check_place(scenario, ("faults", i, "to_locale"), "place", world, there, storey)
 

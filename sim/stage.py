@@ -12,7 +12,6 @@ from sim.body.building import Building
 from sim.body.collision import Obstacles
 from sim.body.elevator import Elevators
 from sim.body.simulated_body import SimulatedBody
-from sim.faults.faults import placed
 from sim.render.renderer import Renderer
 from sim.scenario import Scenario
 from sim.scenario_checks import check_names, check_room, faces_of, named_in
@@ -55,7 +54,7 @@ class Stage:
         return SimulatedBody(
             self.building, self.start_world, s.camera.camera, s.camera.mount,
             seed=seed, actuator=s.actuator, sensor=s.sensor,
-            faults=tuple(placed(fault, self.world) for fault in s.faults),
+            faults=s.faults,
             put_down_sigma_m=s.start.put_down_sigma_m, put_down_sigma_rad=s.start.put_down_sigma_rad,
         )
 
@@ -122,8 +121,10 @@ def _storeys(
     def on_floor(floor_m: float) -> Building:
         storey = round(floor_m, 3)
         if storey not in known:
-            known[storey] = Building(renderer, Obstacles.of_faces(faces, floor_m),
-                                     _locale_finder(world, around, floor_m), floor_m, elevators, on_floor)
+            known[storey] = Building(
+                renderer, Obstacles.of_faces(faces, floor_m), _locale_finder(world, around, floor_m),
+                lambda place: place.in_world(world), floor_m, elevators, on_floor,
+            )
         return known[storey]
 
     return on_floor

@@ -18,7 +18,7 @@ from knowledge_sources.methods.features.rectification import Rectifier
 from sim.made_up.box_room import Patch, PatchFace
 from sim.render.optics import Optics
 from sim.render.renderer import Renderer
-from sim.render.sensor import SensorParameters, compressed, exposed
+from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -73,7 +73,7 @@ def _measured(lens: Camera, way: str, rng: np.random.Generator, cards: int) -> F
     for _ in range(cards):
         renderer, corners = _card(rng)
         radiance = optics.radiance(renderer, Pose.identity())
-        raw = decode(compressed(exposed(radiance, SensorParameters(), rng), 92))
+        raw = decode(compress_jpeg(expose(radiance, SensorParameters(), rng), 92))
         segments = find_lines(raw if way == "ends" else rectified.rectify(raw)).segments_px
         if way == "ends":
             segments = pinhole.project(lens.rays(segments))

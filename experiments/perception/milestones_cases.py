@@ -19,7 +19,7 @@ from knowledge_sources.plan.milestone_selector import GLANCES_RAD, best_heading,
 from sim.body.building import Building
 from sim.made_up.generated_floors import Floor, generated_floor
 from sim.render.occluder import Occluder
-from sim.render.sensor import SensorParameters, compressed, exposed
+from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
 from world_models.building.outlines import inside_polygon
@@ -286,7 +286,7 @@ def _picture(
     radiance = building.renderer.radiance(robot.lens, robot.camera_from_world(true))
     hidden = float(rng.uniform(0.05, MOST_HIDDEN)) if rng.random() < OCCLUDED else 0.0
     if hidden:
-        radiance = Occluder.drawn(hidden, math.inf, rng).before(radiance)
+        radiance = Occluder.draw(hidden, math.inf, rng).cover(radiance)
     light = 0.0
     if rng.random() < LIGHT_CHANGED:
         light = float(rng.uniform(math.log(0.35), math.log(1.5)))
@@ -294,4 +294,4 @@ def _picture(
         slope = 1.0 + float(rng.uniform(-0.3, 0.3)) * np.linspace(-1.0, 1.0, radiance.shape[1])
         radiance = np.asarray(radiance * colour * slope[:, None], np.float32)
     sensor = SensorParameters()
-    return compressed(exposed(radiance, sensor, rng), sensor.jpeg_quality), hidden, light
+    return compress_jpeg(expose(radiance, sensor, rng), sensor.jpeg_quality), hidden, light

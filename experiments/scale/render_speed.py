@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from experiments.report import Report
 from sim.made_up.box_room import Patch, PatchFace
 from sim.render.renderer import Renderer
-from sim.render.sensor import compressed, exposed
+from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
 from sim.stage import Stage, set_stage
 from world_models.camera import Camera
@@ -63,7 +63,7 @@ def _frame_times_s(stage: Stage, rng: np.random.Generator, frames: int) -> tuple
             began_s = time.process_time()
             radiance = stage.building.renderer.radiance(camera, camera_from_world)
             drawn_s = time.process_time()
-            compressed(exposed(radiance, sensor, rng), sensor.jpeg_quality)
+            compress_jpeg(expose(radiance, sensor, rng), sensor.jpeg_quality)
             tries_s.append((drawn_s - began_s, time.process_time() - began_s))
         times_s.append(min(tries_s, key=lambda pair: pair[1]))
     ideal_s, whole_s = np.array(times_s[1:]).T  # the first one compiles

@@ -112,12 +112,12 @@ def what_if(
 def _simulated(mission: Mission, player: _Player, head: RunHead, reliving: Live, go_on: bool) -> Outcome:
     """By the record as far as it answers; then by the simulated robot, if it is to go on."""
     mission.kept.closed = True
-    mission.body.recall(player.pictures)
+    mission.body.use_recorded(player.pictures)
     outcome = player.played(
         mission.scheduler, head, mission.recorder, live=reliving, before=mission.tell_truth, over=mission.over)
     if player.parting is None or not go_on:
         return outcome
-    mission.body.recall({})
+    mission.body.use_recorded({})
     mission.kept.closed = False
     for change in player.open:
         mission.scheduler.tell(mission.kept.answer(change), mission.kept.name)

@@ -120,11 +120,11 @@ def relived(run: RunDirectory, mission: Mission, stage: Stage) -> Decision | Non
         BadInput: a decision, or an answer of the body, is not what it was.
     """
     pictures, last = pictures_of(run), None
-    mission.body.recall(pictures)
+    mission.body.use_recorded(pictures)
     reliving = BodyReplay(mission.port, mission.seed, stage.scenario.actuator)
     for told in replayed(run, pictures, mission.scheduler, live=reliving, before=mission.tell_truth):
         last = checked(run, told).now
-    mission.body.recall({})
+    mission.body.use_recorded({})
     return last
 
 

@@ -145,7 +145,7 @@ class Referee(Counts):
             sketches=self.sketches,
             collisions=score.collisions,
             max_cross_track_m=self.max_cross_track_m,
-            amiss=self._body.amiss,
+            amiss=self._body.missed_faults,
         )
 
     def _heading_error(self, wanted_rad: float | None, belief: Hypothesis | None) -> float:

@@ -1,4 +1,4 @@
-"""What the wheels really do (§3.2, Table 1): TURN skitters; MOVE drifts along an arc and falls short.
+"""Error model of the wheels (§3.2, Table 1): a TURN skitters; a MOVE drifts along an arc and falls short.
 
 Sizes: Table 1's unservoed run ends 2.1 in off a 20 ft line and "other runs resulted in as much as a foot", so a run's
 curvature c, with c (5.8 m)^2 / 2 between 2 and 12 in, is 0.003 to 0.018 per metre. It falls short by a constant factor,
@@ -17,7 +17,7 @@ from world_models.bounds import Bounds, check_bounds
 from world_models.frames import Pose2
 
 STEP_M = 0.02
-"""Motion is integrated in steps of at most this."""
+"""Largest step of the integration of a motion [m]."""
 
 BOUNDS: Mapping[str, Bounds] = {
     "turn_scale_sigma": Bounds(0.0, 1.0),
@@ -37,26 +37,26 @@ BOUNDS: Mapping[str, Bounds] = {
     "increment_m": Bounds(0.001, 100.0),
     "command_s": Bounds(0.0, 3600.0),
 }
-"""Far beyond any wheels, but such that a run with them comes to an end."""
+"""Far beyond any real wheels, but a run with them still ends."""
 
 
 @dataclass(frozen=True, slots=True)
 class ActuatorParameters:
-    """Errors of the wheels.
+    """Errors, speeds and encoders of the wheels.
 
     Attributes:
-        turn_scale_sigma: standard deviation of a turn's error as a part of the turn.
-        turn_sigma_rad: standard deviation of a turn's error that does not depend on the turn.
+        turn_scale_sigma: standard deviation of a turn's error, relative to the turn.
+        turn_sigma_rad: standard deviation of a turn's error that does not depend on its size.
         skitter_sigma_m: standard deviation, along x and y, of the sideways motion of a turn of 90 degrees or more.
-        curvature_low_per_m, curvature_high_per_m: bounds of a run's curvature; its sign is drawn too.
-        curvature_sigma_per_m: standard deviation of the curvature of one move round the run's.
-        shortfall_low, shortfall_high: bounds of the part by which a run's moves fall short.
+        curvature_low_per_m, curvature_high_per_m: bounds of a run's curvature, drawn uniformly; its sign is random.
+        curvature_sigma_per_m: standard deviation of one move's curvature about the run's.
+        shortfall_low, shortfall_high: bounds of the part by which a run's moves fall short, drawn uniformly.
         distance_sigma: standard deviation of one move's length, as a part of it.
-        encoder_step_m, encoder_step_rad: what the wheel encoders resolve.
-        speed_m_per_s, turn_speed_rad_per_s: how fast it goes.
-        acceleration_m_per_s2: by how much a motion changes its speed that is steered on the move.
-        increment_m: after so much way on the move the wheels err anew.
-        command_s: time that every command takes besides.
+        encoder_step_m, encoder_step_rad: resolution of the wheel encoders.
+        speed_m_per_s, turn_speed_rad_per_s: of every motion.
+        acceleration_m_per_s2: of a motion that is steered on the move.
+        increment_m: path on the move after which new errors are drawn.
+        command_s: time that every command takes in addition.
     """
 
     turn_scale_sigma: float = 0.02
@@ -87,11 +87,11 @@ class ActuatorParameters:
 
 @dataclass(frozen=True, slots=True)
 class Wheels:
-    """One run's wheels: the parameters, and this run's share of what they leave open.
+    """The wheels of one run: the parameters, and the errors that are constant over the run.
 
     Attributes:
-        length_factor: metres really gone per metre commanded.
-        curvature_per_m: the run's curvature; positive drifts to the left.
+        length_factor: true length over commanded length.
+        curvature_per_m: of the arc that a straight MOVE becomes; positive drifts to the left.
     """
 
     parameters: ActuatorParameters
@@ -99,14 +99,14 @@ class Wheels:
     curvature_per_m: float
 
     @staticmethod
-    def drawn(parameters: ActuatorParameters, rng: np.random.Generator) -> Wheels:
-        """A run's wheels; always three draws from ``rng``."""
+    def draw(parameters: ActuatorParameters, rng: np.random.Generator) -> Wheels:
+        """The wheels of one run. Always takes three numbers from ``rng``."""
         shortfall = rng.uniform(parameters.shortfall_low, parameters.shortfall_high)
         curvature = rng.uniform(parameters.curvature_low_per_m, parameters.curvature_high_per_m)
         return Wheels(parameters, 1.0 - float(shortfall), float(curvature) * (1.0 if rng.random() < 0.5 else -1.0))
 
-    def turned(self, turn_rad: float, rng: np.random.Generator) -> Pose2:
-        """What a TURN does, as a displacement in the robot's frame; nothing is commanded, nothing happens."""
+    def sample_turn(self, turn_rad: float, rng: np.random.Generator) -> Pose2:
+        """What a TURN does, as a displacement in the robot's frame; a turn of 0 does nothing. Four random numbers."""
         scale, offset, x, y = rng.standard_normal(4)
         if turn_rad == 0.0:
             return Pose2(0.0, 0.0, 0.0)
@@ -115,15 +115,15 @@ class Wheels:
         error = float(scale) * p.turn_scale_sigma * turn_rad + float(offset) * p.turn_sigma_rad
         return Pose2(skitter * float(x), skitter * float(y), turn_rad + error)
 
-    def arc(self, move_m: float, rng: np.random.Generator) -> tuple[float, float]:
-        """What a MOVE does: (signed length [m], curvature [1/m]) of an arc that is tangent to the robot's x axis."""
+    def sample_arc(self, move_m: float, rng: np.random.Generator) -> tuple[float, float]:
+        """What a MOVE does: (signed length [m], curvature [1/m]) of an arc tangent to x. Two random numbers."""
         stretch, bend = rng.standard_normal(2)
         p = self.parameters
         length = move_m * self.length_factor * (1.0 + p.distance_sigma * float(stretch))
         return length, self.curvature_per_m + p.curvature_sigma_per_m * float(bend)
 
-    def slip(self, rng: np.random.Generator) -> Slip:
-        """How one motion errs whose length is not known yet; always three draws from ``rng``."""
+    def sample_slip(self, rng: np.random.Generator) -> Slip:
+        """The errors of one motion whose length is not known yet. Always takes three numbers from ``rng``."""
         scale, stretch, bend = rng.standard_normal(3)
         p = self.parameters
         return Slip(
@@ -132,29 +132,29 @@ class Wheels:
             curvature_per_m=self.curvature_per_m + p.curvature_sigma_per_m * float(bend),
         )
 
-    def skittered(self, turn_rad: float, rng: np.random.Generator) -> tuple[float, float]:
-        """Sideways motion (x, y) of a part of a turn; parts add up to what a whole turn of 90 degrees does."""
+    def sample_skitter(self, turn_rad: float, rng: np.random.Generator) -> tuple[float, float]:
+        """Sideways motion (x, y) [m] of a part of a turn; its variance is proportional to the angle."""
         x, y = rng.standard_normal(2)
         size = self.parameters.skitter_sigma_m * math.sqrt(abs(turn_rad) / (math.pi / 2.0))
         return size * float(x), size * float(y)
 
-    def claimed(self, turn_rad: float, move_m: float) -> tuple[float, float]:
-        """What the encoders say of a motion that the wheels, knowing no better, made as commanded."""
+    def quantize(self, turn_rad: float, move_m: float) -> tuple[float, float]:
+        """What the encoders report of a commanded motion: the command, rounded to their resolution."""
         p = self.parameters
-        return _rounded(turn_rad, p.encoder_step_rad), _rounded(move_m, p.encoder_step_m)
+        return _round_to(turn_rad, p.encoder_step_rad), _round_to(move_m, p.encoder_step_m)
 
     def turn_s(self, turn_rad: float) -> float:
-        """Time that a turn takes."""
+        """Duration of a turn [s]."""
         return abs(turn_rad) / self.parameters.turn_speed_rad_per_s
 
     def move_s(self, move_m: float) -> float:
-        """Time that a move takes."""
+        """Duration of a move [s]."""
         return abs(move_m) / self.parameters.speed_m_per_s
 
 
 @dataclass(frozen=True, slots=True)
 class Slip:
-    """How one motion errs, however long it gets: what is really done per part of it that the wheels roll.
+    """The errors of one motion: what is really done for each part that the wheels roll.
 
     Attributes:
         turn_factor: radians per radian.
@@ -168,19 +168,19 @@ class Slip:
 
 
 def arc_steps(length_m: float, curvature_per_m: float) -> Iterator[Pose2]:
-    """The arc as equal displacements of at most ``STEP_M``, each in the frame that the one before it ends in."""
+    """An arc as equal displacements of at most ``STEP_M``, each in the frame at the end of the one before."""
     count = math.ceil(abs(length_m) / STEP_M)
     for _ in range(count):
         yield arc_displacement(length_m / count, curvature_per_m)
 
 
 def arc_displacement(length_m: float, curvature_per_m: float) -> Pose2:
-    """Along an arc tangent to x at its start; positive curvature bends to the left of forward motion."""
+    """The displacement along an arc that is tangent to x at its start; positive curvature bends to the left."""
     turn = length_m * curvature_per_m
     if abs(turn) < 1e-9:
         return Pose2(length_m, 0.5 * length_m * turn, turn)
     return Pose2(math.sin(turn) / curvature_per_m, (1.0 - math.cos(turn)) / curvature_per_m, turn)
 
 
-def _rounded(value: float, step: float) -> float:
+def _round_to(value: float, step: float) -> float:
     return round(value / step) * step if step > 0 else value

@@ -1,84 +1,76 @@
-"""A body of which something is not well: the line to the base, the base itself, or the camera.
+"""The simulated body as it is reached through its devices: their faults answer in its place.
 
-It stands between the agent and the simulated robot, as cables and drivers do, and tells what is wrong with it in the
-words of the real drivers.
+It stands between the agent and the simulated robot, as cables and drivers do, and reports faults in the words of the
+real drivers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
-from sim.body.simulated_body import WATCHDOG_S, SimulatedBody
+from sim.body.simulated_body import SimulatedBody
+from sim.faults.fault import DeviceFault
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
-
-AILMENTS: Mapping[str, tuple[str, str, str]] = {
-    "link_lost": ("base", "link lost", "no answer on the line"),
-    "nonsense": ("base", "base answers nonsense", "what arrives is not the protocol"),
-    "stall": ("base", "stalled", "the wheels do not turn as they were told to"),
-    "camera_unplugged": ("camera", "camera unplugged", "no such device"),
-    "late_frames": ("camera", "frame late", "the newest picture was taken before the robot stood"),
-    "dropped_frames": ("camera", "frame dropped", "no whole picture arrived"),
-}
-"""Kinds of ailment: which part has it, what it is called, and in words."""
 
 
 class FaultyBody:
-    """A simulated robot as far as its line and its camera let it be reached."""
+    """A simulated robot, as far as its base and its camera work."""
 
     def __init__(self, body: SimulatedBody) -> None:
         self._body = body
         self._done: MotionReport | None = None
 
     def execute(self, command: MotorCommand) -> MotionReport | BodyFault:
-        """As the body does; where the line fails on the way its watchdog stops the base, and nobody hears how far."""
-        fault = self._fault_of("base")
+        """As the body does. With a fault of the base nothing moves; one on the way breaks the motion off."""
+        fault = self._find_fault("base")
         if fault is not None:
-            self._done = MotionReport(0.0, 0.0, 0.0, fault.when_s)
-            return replace(fault, turn_rad=0.0, move_m=0.0)
+            self._done = MotionReport(0.0, 0.0, 0.0, self._body.truth.time_s)
+            return self._answer(fault, self._done)
         self._done = self._body.execute(command)
-        found = self.claim()
-        if isinstance(found, BodyFault) and found.what == "stalled":  # the line is there, so it is heard how far
-            return replace(found, turn_rad=self._done.turn_rad, move_m=self._done.move_m)
-        return found
+        fault = self._find_fault("base")
+        if fault is not None:
+            return self._answer(fault, self._done if fault.odometry_arrives else None)
+        return replace(self._done, sim_time_s=self._body.truth.time_s)
 
     def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
-        """As the body does; where the line or the camera fails on the way, it comes to a stand."""
-        fault = self._fault_of("base") or self._fault_of("camera")
+        """As the body does; with a fault of the base or the camera it comes to a stand."""
+        fault = self._find_fault("base") or self._find_fault("camera")
         if fault is None:
-            found = self._body.steer(course)
-            if isinstance(found, BodyFault):
-                self._done = MotionReport(found.turn_rad or 0.0, found.move_m or 0.0, 0.0, found.when_s)
-            return found
-        self._done = self._body.halt(WATCHDOG_S if fault.part == "base" and fault.what != "stalled" else 0.0)
-        heard = fault.part == "camera" or fault.what == "stalled"
-        return replace(fault, turn_rad=self._done.turn_rad, move_m=self._done.move_m) if heard else fault
+            answer = self._body.steer(course)
+            if isinstance(answer, BodyFault):
+                self._done = MotionReport(answer.turn_rad or 0.0, answer.move_m or 0.0, 0.0, answer.when_s)
+            return answer
+        began_s = self._body.truth.time_s
+        self._done = self._body.halt(fault.stops_motion_after_s or 0.0)
+        return replace(self._answer(fault, self._done if fault.odometry_arrives else None), when_s=began_s)
 
     def claim(self) -> MotionReport | BodyFault:
-        """What the wheels claim of the last command, once the line is there again."""
-        fault = self._fault_of("base")
+        """What the encoders report of the last command, once the base can be read again."""
+        fault = self._find_fault("base")
         if self._done is None:
             raise ValueError("expected a command before a claim of what was done of it, got none")
-        return replace(self._done, sim_time_s=self._body.truth.time_s) if fault is None else fault
+        return replace(self._done, sim_time_s=self._body.truth.time_s) if fault is None else self._answer(fault)
 
     def look(self, purpose: str) -> Frame | BodyFault:
-        """A picture; where the camera fails, none is taken."""
-        return self._fault_of("camera") or self._body.look(purpose)
+        """A picture; with a fault of the camera none is taken."""
+        fault = self._find_fault("camera")
+        return self._body.look(purpose) if fault is None else self._answer(fault)
 
     def ride(self, ride: Ride) -> RideReport | BodyFault:
-        """Whoever presses the button needs no line."""
+        """As the body does: pressing the button needs no device of the robot."""
         return self._body.ride(ride)
 
     def wait(self, duration_s: float) -> float:
-        """Simulated time passes."""
+        """Let simulated time pass."""
         return self._body.wait(duration_s)
 
     def stop(self) -> None:
-        """The simulated robot stands whenever nobody commands it."""
+        """Nothing to do: the simulated robot stands whenever nothing is commanded."""
 
-    def _fault_of(self, part: str) -> BodyFault | None:
-        for kind in self._body.ailing:
-            of, what, detail = AILMENTS[kind]
-            if of == part:
-                return BodyFault(part, what, detail, "", self._body.truth.time_s)
-        return None
+    def _find_fault(self, part: str) -> DeviceFault | None:
+        return next((fault for fault in self._body.device_faults.values() if fault.part == part), None)
+
+    def _answer(self, fault: DeviceFault, done: MotionReport | None = None) -> BodyFault:
+        """What is answered while a device fails, with what the encoders reported, if they can be read."""
+        turn, move = (None, None) if done is None else (done.turn_rad, done.move_m)
+        return BodyFault(fault.part, fault.what, fault.detail, "", self._body.truth.time_s, turn, move)

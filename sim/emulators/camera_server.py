@@ -10,23 +10,24 @@ from types import TracebackType
 from typing import Any
 
 from sim.body.simulated_body import SimulatedBody
+from sim.faults.camera_faults import CameraUnplugged, DroppedFrames, LateFrames
 from world_models.frames import Pose2
 
 PATH = "/stream.mjpg"
 BOUNDARY = "frame"
-GONE = "camera_unplugged"
-NONE_NEW = ("late_frames", "dropped_frames")
+UNPLUGGED = CameraUnplugged.kind
+NO_NEW_FRAME = frozenset((LateFrames.kind, DroppedFrames.kind))
 
 
 class CameraServer:
-    """Serves what a simulated body's camera sees, to anybody on this machine who asks, from threads of its own.
+    """Serves the pictures of a simulated body's camera to every client on this machine, from threads of its own.
 
-    The camera's ailments are the body's: unplugged, it hangs up and takes no call; late or dropped, nothing comes. As
-    long as nothing moves the same picture is sent again, noise and all: that saves the time that it takes to make one.
+    The camera has the body's faults: unplugged, it closes every connection and refuses new ones; late or dropped, it
+    sends nothing. While nothing moves the same picture is sent again, with the same noise, which saves rendering.
     """
 
     def __init__(self, body: SimulatedBody, port: int = 0, rate_hz: float = 10.0) -> None:
-        """``port`` 0 takes a free one. Raises OSError where the port is taken."""
+        """``port`` 0 takes a free one. Raises OSError where the port is in use."""
         self._server = ThreadingHTTPServer(("127.0.0.1", port), partial(_Handler, body, 1.0 / rate_hz))
         self._server.daemon_threads = True
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.1,), name="camera", daemon=True)
@@ -48,18 +49,18 @@ class CameraServer:
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """One viewer."""
+    """One client."""
 
     def __init__(self, body: SimulatedBody, every_s: float, *args: Any) -> None:
         self._body, self._every_s = body, every_s
         super().__init__(*args)
 
     def do_GET(self) -> None:
-        """The stream, until the viewer hangs up or the camera is unplugged."""
+        """Send the stream until the client closes it or the camera is unplugged."""
         if self.path != PATH:
             self.send_error(404, f"expected {PATH}")
             return
-        if GONE in self._body.ailing:
+        if UNPLUGGED in self._body.device_faults:
             self.send_error(503, "the camera is unplugged")
             return
         self.send_response(200)
@@ -73,8 +74,8 @@ class _Handler(BaseHTTPRequestHandler):
     def _stream(self) -> None:
         due_s, jpeg = time.monotonic(), b""
         seen: tuple[Pose2, bool] | None = None
-        while GONE not in self._body.ailing:
-            if not any(kind in self._body.ailing for kind in NONE_NEW):
+        while UNPLUGGED not in self._body.device_faults:
+            if NO_NEW_FRAME.isdisjoint(self._body.device_faults):
                 truth = self._body.truth
                 if (truth.world_from_robot, truth.lights_on) != seen:
                     seen, jpeg = (truth.world_from_robot, truth.lights_on), self._body.picture()
@@ -84,4 +85,4 @@ class _Handler(BaseHTTPRequestHandler):
             time.sleep(max(0.0, due_s - time.monotonic()))
 
     def log_message(self, *_args: Any) -> None:
-        """Nothing is said of calls."""
+        """Requests are not logged."""

@@ -1,4 +1,4 @@
-"""A line that fails when the simulated body says so: nothing comes through, or nothing but noise."""
+"""A serial line with the faults of a simulated body: nothing comes through, or only noise."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ import zlib
 
 from sim.body.simulated_body import SimulatedBody
 from sim.emulators.emulator import Emulator
+from sim.faults.base_faults import LinkLost, Nonsense
 
 
 class FaultyLine:
-    """An emulated base behind a line with the ailments ``link_lost`` and ``nonsense`` of a simulated body."""
+    """An emulated base behind a line that has the faults ``link_lost`` and ``nonsense`` of a simulated body."""
 
     def __init__(self, emulator: Emulator, body: SimulatedBody) -> None:
         self._emulator, self._body = emulator, body
         self._noise = 0
 
     def receive(self, data: bytes) -> None:
-        """What the host says, if the line is there."""
-        if "link_lost" not in self._body.ailing:
+        """Bytes from the host, if the line is there."""
+        if LinkLost.kind not in self._body.device_faults:
             self._emulator.receive(data)
 
     def advance(self, duration_s: float) -> None:
@@ -25,14 +26,14 @@ class FaultyLine:
         self._emulator.advance(duration_s)
 
     def take(self) -> bytes:
-        """What the base says, if the line is there; noise of the same length, always the same, if it is noisy."""
-        said, ailing = self._emulator.take(), self._body.ailing
-        if "link_lost" in ailing:
+        """Bytes from the base, if the line is there; with ``nonsense``, reproducible noise of the same length."""
+        data, faults = self._emulator.take(), self._body.device_faults
+        if LinkLost.kind in faults:
             return b""
-        if "nonsense" in ailing:
-            self._noise = zlib.crc32(said, self._noise)
-            return bytes((b ^ (self._noise >> (i % 24))) & 0xFF for i, b in enumerate(said))
-        return said
+        if Nonsense.kind in faults:
+            self._noise = zlib.crc32(data, self._noise)
+            return bytes((b ^ (self._noise >> (i % 24))) & 0xFF for i, b in enumerate(data))
+        return data
 
     @property
     def moving(self) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from sim.made_up.box_room import Patch, PatchFace
 from sim.render.optics import Optics
 from sim.render.renderer import Renderer
-from sim.render.sensor import SensorParameters, compressed, exposed
+from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -61,4 +61,4 @@ def chessboard_picture(
     renderer: Renderer, optics: Optics, camera_from_board: Pose, sensor: SensorParameters, rng: np.random.Generator
 ) -> bytes:
     """The JPEG bytes that a camera delivers of it."""
-    return compressed(exposed(optics.radiance(renderer, camera_from_board), sensor, rng), sensor.jpeg_quality)
+    return compress_jpeg(expose(optics.radiance(renderer, camera_from_board), sensor, rng), sensor.jpeg_quality)

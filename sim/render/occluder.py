@@ -29,7 +29,7 @@ class Occluder:
     until_s: float
 
     @staticmethod
-    def drawn(part: float, until_s: float, rng: np.random.Generator) -> Occluder:
+    def draw(part: float, until_s: float, rng: np.random.Generator) -> Occluder:
         """One that hides ``part`` of the picture, anywhere in it; always four draws from ``rng``."""
         shape, left, top, shade = rng.random(4)
         width = part ** (0.25 + 0.5 * float(shape))
@@ -40,7 +40,7 @@ class Occluder:
             until_s,
         )
 
-    def before(self, radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+    def cover(self, radiance: NDArray[np.float32]) -> NDArray[np.float32]:
         """A picture (h, w, 3) of light in 0..1 with the occluder in it."""
         rows, columns = radiance.shape[:2]
         top, bottom = round(self.top * rows), round((self.top + self.height) * rows)

@@ -43,7 +43,7 @@ class SensorParameters:
         shot_noise: variance [grey levels^2] that each grey level of brightness adds.
         jpeg_quality: 1..100.
         frames_per_s: how often a picture is taken on the move.
-        exposure_s: how long a picture on the move is exposed; 0: no motion blur.
+        exposure_s: exposure time of a picture on the move; 0: no motion blur.
         lights_off_gain: what is left of the brightness when the lights are off.
     """
 
@@ -61,7 +61,7 @@ class SensorParameters:
         check_bounds(self, BOUNDS)
 
 
-def exposed(
+def expose(
     radiance: NDArray[np.float32], parameters: SensorParameters, rng: np.random.Generator, *, lights_on: bool = True
 ) -> NDArray[np.uint8]:
     """The image (h, w, 3) uint8 that the sensor reads of a radiance (h, w, 3) in 0..1; draws twice from ``rng``."""
@@ -78,13 +78,13 @@ def exposed(
     return image
 
 
-def pass_over(rng: np.random.Generator) -> None:
-    """Draw from ``rng`` what :func:`exposed` draws, for a picture that is known already."""
+def skip_noise_draws(rng: np.random.Generator) -> None:
+    """Draw from ``rng`` what :func:`expose` draws, for a picture that need not be made."""
     rng.standard_normal()
     rng.integers(0, 2**62)
 
 
-def compressed(image_rgb: NDArray[np.uint8], quality: int) -> bytes:
+def compress_jpeg(image_rgb: NDArray[np.uint8], quality: int) -> bytes:
     """JPEG bytes of an RGB image (h, w, 3)."""
     done, data = cv2.imencode(".jpg", cv2.cvtColor(image_rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not done:

@@ -24,7 +24,9 @@ from sim.emulators.denning_motion import Rolling
 from sim.emulators.faulty_line import FaultyLine
 from sim.emulators.ground import BodyGround
 from sim.emulators.terminal import Terminal
-from sim.faults.faults import Ailment, Fault, Moment
+from sim.faults.base_faults import LinkLost
+from sim.faults.camera_faults import CameraUnplugged
+from sim.faults.fault import Fault
 from sim.scenario import Scenario, load_scenario
 from sim.stage import set_stage
 from world_models.files.toml.camera_file import camera_text
@@ -87,7 +89,7 @@ def result_of(folder: Path) -> dict[str, object]:
 def test_dry_run_then_a_mission_in_which_line_and_camera_fail_and_come_back(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    faults = Ailment("link_lost", Moment(after_m=0.7), 4.0), Ailment("camera_unplugged", Moment(after_m=1.0), 4.0)
+    faults = LinkLost(after_m=0.7, duration_s=4.0), CameraUnplugged(after_m=1.0, duration_s=4.0)
     with emulated(tmp_path, *faults) as robot:
         assert main(["drive", *robot.options, "--dry-run"]) == 0
         told = capsys.readouterr().out

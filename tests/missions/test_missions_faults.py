@@ -10,8 +10,10 @@ import pytest
 from blackboard.journal import Decision
 from harvey.simulation.referee import MissionResult
 from harvey.simulation.run import run_mission
-from sim.body.faulty_body import AILMENTS
-from sim.faults.faults import Ailment, Moment
+from sim.faults.base_faults import LinkLost, Stall
+from sim.faults.camera_faults import CameraUnplugged
+from sim.faults.fault import DeviceFault
+from sim.faults.registry import BUILT_IN
 from sim.stage import Stage
 from world_models.entries.body import BodyFault, MotionReport, MotorCommand, Recovery
 from world_models.entries.task import Milestone
@@ -41,20 +43,23 @@ class Watched:
         return [value for value in self.told if isinstance(value, kind)]
 
 
-def driven(stage: Stage, kind: str, duration_s: float) -> tuple[MissionResult, Watched]:
-    fault = Ailment(kind, Moment(after_m=MID_MOVE_M), duration_s)
+DEVICE_FAULTS = [kind for kind in BUILT_IN if issubclass(kind, DeviceFault)]
+
+
+def driven(stage: Stage, kind: type[DeviceFault], duration_s: float) -> tuple[MissionResult, Watched]:
+    fault = kind(after_m=MID_MOVE_M, duration_s=duration_s)
     watched = Watched()
-    ailing = replace(stage, scenario=replace(stage.scenario, faults=(fault,)))
-    return run_mission(ailing, 3, sinks=[watched]), watched
+    faulty = replace(stage, scenario=replace(stage.scenario, faults=(fault,)))
+    return run_mission(faulty, 3, sinks=[watched]), watched
 
 
-@pytest.mark.parametrize("kind", AILMENTS)
-def test_what_passes_is_told_waited_for_and_the_goal_is_reached(short_stage: Stage, kind: str) -> None:
+@pytest.mark.parametrize("kind", DEVICE_FAULTS)
+def test_what_passes_is_told_waited_for_and_the_goal_is_reached(short_stage: Stage, kind: type[DeviceFault]) -> None:
     result, watched = driven(short_stage, kind, 4.0)
-    part, what, _ = AILMENTS[kind]
     assert result.outcome == "reached", result.reason
     assert result.final_error_m < 0.0254 and result.collisions == 0
-    assert [(f.part, f.what, f.status) for f in watched.of(BodyFault)] == [(part, what, "open"), (part, what, "over")]
+    assert [(f.part, f.what, f.status) for f in watched.of(BodyFault)] == [
+        (kind.part, kind.what, "open"), (kind.part, kind.what, "over")]
     assert [r.status for r in watched.of(Recovery)].count("in vain") >= 1
     assert watched.of(Recovery)[-1].status == "over"
     assert watched.moved_at_fault == []
@@ -63,7 +68,7 @@ def test_what_passes_is_told_waited_for_and_the_goal_is_reached(short_stage: Sta
 def test_a_motion_that_was_broken_off_is_claimed_and_a_milestone_has_to_hold_before_the_next(
     short_stage: Stage,
 ) -> None:
-    _, watched = driven(short_stage, "link_lost", 4.0)
+    _, watched = driven(short_stage, LinkLost, 4.0)
     over = watched.told.index(next(r for r in watched.told if isinstance(r, Recovery) and r.status == "over"))
     after = watched.told[over:]
     report = next(v for v in after if isinstance(v, MotionReport))
@@ -72,18 +77,20 @@ def test_a_motion_that_was_broken_off_is_claimed_and_a_milestone_has_to_hold_bef
     assert any(isinstance(v, Milestone) and v.status == "verified" for v in after[:next_move])
 
 
-@pytest.mark.parametrize("kind", ["link_lost", "camera_unplugged"])
-def test_what_does_not_pass_ends_the_mission_with_the_robot_standing(short_stage: Stage, kind: str) -> None:
+@pytest.mark.parametrize("kind", [LinkLost, CameraUnplugged])
+def test_what_does_not_pass_ends_the_mission_with_the_robot_standing(
+    short_stage: Stage, kind: type[DeviceFault]
+) -> None:
     result, watched = driven(short_stage, kind, 500.0)
-    assert result.outcome == "failed" and AILMENTS[kind][1] in result.reason
+    assert result.outcome == "failed" and kind.what in result.reason
     assert 30.0 <= watched.of(Recovery)[-1].waited_s < 40.0
     assert watched.moved_at_fault == [] and result.path_length_m < 2.0
 
 
 def test_a_wheel_that_always_stalls_is_given_up(short_stage: Stage) -> None:
     """The base answers each time, but no motion is ever whole: that ends, too."""
-    faults = tuple(Ailment("stall", Moment(after_s=1.0 + 0.4 * k), 0.3) for k in range(400))
+    faults = tuple(Stall(after_s=1.0 + 0.4 * k, duration_s=0.3) for k in range(400))
     watched = Watched()
-    ailing = replace(short_stage, scenario=replace(short_stage.scenario, faults=faults))
-    result = run_mission(ailing, 3, sinks=[watched])
+    faulty = replace(short_stage, scenario=replace(short_stage.scenario, faults=faults))
+    result = run_mission(faulty, 3, sinks=[watched])
     assert result.outcome in {"failed", "blocked", "lost"} and watched.moved_at_fault == []

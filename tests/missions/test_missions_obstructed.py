@@ -6,7 +6,7 @@ import numpy as np
 
 from blackboard.journal import Decision
 from harvey.simulation.run import run_mission
-from sim.faults.faults import Occlusion
+from sim.faults.occlusion import Occlusion
 from sim.made_up.short_missions import HALLWAY, fault
 from sim.scenario import parse_scenario
 from sim.stage import Stage, set_stage

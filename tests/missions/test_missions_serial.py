@@ -14,7 +14,7 @@ from harvey.simulation.referee import MissionResult
 from harvey.simulation.run import run_mission
 from harvey.simulation.serial_body import KINDS
 from sim.body.simulated_body import SimulatedBody
-from sim.faults.faults import Ailment, Moment
+from sim.faults.registry import find_fault_class
 from sim.stage import Stage
 from world_models.entries.body import BodyFault, MotorCommand, Recovery
 
@@ -50,15 +50,15 @@ def test_bases_that_count_in_whole_steps_reach_within_an_inch(short_stage: Stage
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("ailment", ["link_lost", "nonsense"])
+@pytest.mark.parametrize("fault_kind", ["link_lost", "nonsense"])
 def test_a_line_that_fails_in_mid_move_is_told_and_waited_for_and_the_goal_is_reached(
-    short_stage: Stage, kind: str, ailment: str, monkeypatch: pytest.MonkeyPatch
+    short_stage: Stage, kind: str, fault_kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bodies: list[SimulatedBody] = []
     made = Stage.body
     monkeypatch.setattr(Stage, "body", lambda self, seed: bodies.append(made(self, seed)) or bodies[-1])
     lasts_s = 1.5 if kind == "create2" else 5.0  # nothing but the line can stop a Create 2
-    fault = Ailment(ailment, Moment(after_m=0.7), lasts_s)
+    fault = find_fault_class(fault_kind)(after_m=0.7, duration_s=lasts_s)
     result, _, told = driven(replace(short_stage, scenario=replace(short_stage.scenario, faults=(fault,))), kind)
     assert result.outcome == "reached" and result.final_error_m < INCH_M, result.reason
     faults = [v for v in told if isinstance(v, BodyFault)]

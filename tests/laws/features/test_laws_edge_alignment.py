@@ -17,7 +17,7 @@ from knowledge_sources.methods.features.images import decode
 from knowledge_sources.methods.motion.routes import compute_free_space
 from knowledge_sources.methods.tracking.edge_alignment import EdgeAlignment, align_to_edges
 from sim.render.optics import Optics
-from sim.render.sensor import compressed, exposed
+from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
 from sim.stage import Stage, set_stage
 from world_models.frames import Pose2, wrap_angle
@@ -53,7 +53,7 @@ def somewhere(rng: np.random.Generator) -> Pose2:
 def picture(pose: Pose2, rng: np.random.Generator) -> NDArray[np.uint8]:
     s = stage().scenario
     radiance = Optics.of(s.camera.camera).radiance(stage().building.renderer, robot().camera_from_world(pose))
-    return decode(compressed(exposed(radiance, s.sensor, rng, lights_on=True), s.sensor.jpeg_quality))
+    return decode(compress_jpeg(expose(radiance, s.sensor, rng, lights_on=True), s.sensor.jpeg_quality))
 
 
 def drawn(pose: Pose2, sigmas: tuple[float, float, float], rng: np.random.Generator) -> tuple[Pose2, Floats]:

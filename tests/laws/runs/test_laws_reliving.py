@@ -50,7 +50,7 @@ def test_known_pictures_change_nothing_but_who_makes_them(
     first, second = body(seed), body(seed)
     answers = [first.look() if act is None else first.execute(act) for act in acts]
     pictures = {a.number: a.jpeg for a in answers if isinstance(a, Frame) and a.number < known}
-    second.recall({number: jpeg[:-2] + b"!!" for number, jpeg in pictures.items()})
+    second.use_recorded({number: jpeg[:-2] + b"!!" for number, jpeg in pictures.items()})
     again = [second.look() if act is None else second.execute(act) for act in acts]
     for one, other in zip(answers, again, strict=True):
         if isinstance(one, Frame) and isinstance(other, Frame) and one.number < known:

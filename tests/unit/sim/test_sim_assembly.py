@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sim.body.simulated_body import SimulatedBody
-from sim.faults.faults import Displacement, Moment
+from sim.faults.displacement import Bump, Kidnap
 from sim.render.projection import Lens, view_of
 from sim.render.rasterizer import visible_patches
 from sim.scenario import ScenarioError, list_scenarios, load_scenario, parse_scenario, with_settings
@@ -70,7 +70,7 @@ def test_a_run_is_scored_against_the_goal_in_the_world(main_stage: Stage) -> Non
 def test_the_hallway_kidnap_happens_in_the_hallway_once() -> None:
     stage = set_stage(load_scenario("hallway-kidnap"))
     kidnap = stage.scenario.faults[0]
-    assert isinstance(kidnap, Displacement) and kidnap.moment == Moment("hallway", after_m=6 * 0.3048)
+    assert kidnap == Kidnap("hallway", after_m=6 * 0.3048, distance_m=1.0, turn_rad=math.radians(20.0))
     start = Pose2(12.0, 1.2, 0.0)
     jumps = jumps_of(SimulatedBody(stage.building, start, stage.scenario.camera.camera, stage.scenario.camera.mount,
                                    seed=2, faults=stage.scenario.faults))
@@ -93,7 +93,7 @@ def test_a_scenario_that_does_not_fit_the_world_is_refused(main_stage: Stage) ->
         (with_settings(scenario, {"goal": lost}), "nowhere"),
         (with_settings(scenario, {"goal": lost.replace("(16,2,0)", "(16,8,0)").replace("nowhere", "hallway")}), "room"),
         (with_settings(scenario, {"world": "atlantis"}), "atlantis"),
-        (replace(scenario, faults=(Displacement("bump", Moment("halway")),)), "hallway"),
+        (replace(scenario, faults=(Bump("halway"),)), "hallway"),
     ):
         with pytest.raises(ScenarioError, match=message):
             set_stage(bad)

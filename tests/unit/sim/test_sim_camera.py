@@ -15,7 +15,7 @@ from sim.made_up.box_room import Patch, PatchFace, box_room
 from sim.render.mesh import build_mesh
 from sim.render.rasterizer import sample_offsets
 from sim.render.renderer import Renderer, illumination
-from sim.render.sensor import SensorParameters, compressed, exposed
+from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from sim.render.textures import TEXTURES, texture_code
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
@@ -95,7 +95,7 @@ def test_noise_grows_with_light_as_stated_and_is_gaussian_enough() -> None:
     parameters = SensorParameters(gain=1.0, gain_sigma=0.0, blur_px=0.0, read_noise=2.0, shot_noise=0.05)
     for level in (50.0, 200.0):
         flat = np.full((256, 256, 3), level / 255.0, np.float32)
-        image = exposed(flat, parameters, np.random.default_rng(7)).astype(float)
+        image = expose(flat, parameters, np.random.default_rng(7)).astype(float)
         assert image.mean() == pytest.approx(level, abs=0.1)
         assert image.var() == pytest.approx(4.0 + 0.05 * level + 1.0 / 12.0, rel=0.03)
         centred = (image - image.mean()).ravel()
@@ -106,7 +106,7 @@ def test_noise_grows_with_light_as_stated_and_is_gaussian_enough() -> None:
 def test_a_frame_is_the_same_for_the_same_generator_and_another_for_another() -> None:
     radiance = Renderer.of_faces(box_room()).radiance(CAMERA, CameraMount(1.0).camera_from_robot @
                                                       Pose2(1.0, 2.0, 0.0).lifted().inverse())
-    frames = [compressed(exposed(radiance, SensorParameters(), np.random.default_rng(s)), 92) for s in (1, 1, 2)]
+    frames = [compress_jpeg(expose(radiance, SensorParameters(), np.random.default_rng(s)), 92) for s in (1, 1, 2)]
     assert frames[0] == frames[1] != frames[2]
     decoded = cv2.imdecode(np.frombuffer(frames[0], np.uint8), cv2.IMREAD_COLOR)
     assert decoded is not None
@@ -115,7 +115,7 @@ def test_a_frame_is_the_same_for_the_same_generator_and_another_for_another() ->
 
 def test_it_is_dark_with_the_lights_off() -> None:
     flat = np.full((32, 32, 3), 0.8, np.float32)
-    assert exposed(flat, SensorParameters(), np.random.default_rng(0), lights_on=False).mean() < 10.0
+    assert expose(flat, SensorParameters(), np.random.default_rng(0), lights_on=False).mean() < 10.0
 
 
 @pytest.mark.parametrize("bad", [{"gain": -1.0}, {"jpeg_quality": 0}, {"read_noise": math.nan}])

@@ -9,7 +9,11 @@ import pytest
 
 from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.faults.faults import Ailment, Displacement, Fault, FaultWatch, LightsOff, Moment, free_displacement
+from sim.faults.base_faults import Stall
+from sim.faults.displacement import Bump, Kidnap
+from sim.faults.fault import Fault
+from sim.faults.lights_off import LightsOff
+from sim.faults.schedule import FaultSchedule
 from sim.made_up.box_room import box_room
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotorCommand
@@ -30,17 +34,17 @@ def body(*faults: Fault) -> SimulatedBody:
 
 
 def test_a_fault_in_a_locale_counts_from_the_first_entry_and_strikes_once() -> None:
-    bump = Displacement("bump", Moment("hall", after_m=1.0))
-    watch = FaultWatch.of((bump,)).advanced(9.0, 5.0, "lab").advanced(1.0, 0.6, "hall")
-    assert watch.struck("hall")[0] == ()
-    watch = watch.advanced(1.0, 0.6, "hall")
-    assert watch.struck("lab")[0] == ()
-    due, rest = watch.struck("hall")
-    assert due == (bump,) and rest.struck("hall")[0] == ()
+    bump = Bump("hall", after_m=1.0)
+    schedule = FaultSchedule.of((bump,)).advance(9.0, 5.0, "lab").advance(1.0, 0.6, "hall")
+    assert schedule.take_due("hall")[0] == ()
+    schedule = schedule.advance(1.0, 0.6, "hall")
+    assert schedule.take_due("lab")[0] == ()
+    due, rest = schedule.take_due("hall")
+    assert due == (bump,) and rest.take_due("hall")[0] == ()
 
 
 def test_a_bump_moves_the_robot_but_not_its_encoders() -> None:
-    plain, bumped = body(), body(Displacement("bump", Moment("east", after_m=0.2), left_m=0.3, turn_rad=0.2))
+    plain, bumped = body(), body(Bump("east", after_m=0.2, left_m=0.3, turn_rad=0.2))
     reports = [[robot.execute(MotorCommand(0.0, 0.5)) for _ in range(4)] for robot in (plain, bumped)]
     assert reports[0] == reports[1]
     a, b = plain.truth.world_from_robot, bumped.truth.world_from_robot
@@ -50,9 +54,9 @@ def test_a_bump_moves_the_robot_but_not_its_encoders() -> None:
 
 
 def test_a_kidnap_ends_in_a_free_place_of_the_same_locale() -> None:
-    kidnap = Displacement("kidnap", distance_m=1.0, turn_rad=0.35)
-    free = [free_displacement(Pose2(1.0, 1.0, 0.0), kidnap, np.random.default_rng(seed),
-                              lambda p: p.x_m > 0.5 and p.y_m > 0.5) for seed in range(40)]
+    kidnap = Kidnap(distance_m=1.0, turn_rad=0.35)
+    free = [kidnap.find_free_pose(Pose2(1.0, 1.0, 0.0), np.random.default_rng(seed),
+                                  lambda p: p.x_m > 0.5 and p.y_m > 0.5) for seed in range(40)]
     assert all(p.x_m > 0.5 and p.y_m > 0.5 for p in free)
     assert {round(math.hypot(p.x_m - 1.0, p.y_m - 1.0), 6) for p in free} == {1.0}
     assert {round(p.heading_rad, 6) for p in free} == {0.35, -0.35}
@@ -60,29 +64,29 @@ def test_a_kidnap_ends_in_a_free_place_of_the_same_locale() -> None:
 
 def test_what_did_not_happen_as_it_was_asked_for_is_told() -> None:
     robot = body(
-        Displacement("bump", forward_m=3.0), Displacement("bump", left_m=0.1), Displacement("kidnap", turn_rad=1.0),
-        LightsOff(Moment(after_s=1e6)), Ailment("stall", Moment("attic")),
+        Bump(forward_m=3.0), Bump(left_m=0.1), Kidnap(turn_rad=1.0),
+        LightsOff(after_s=1e6), Stall("attic"),
     )
     robot.move(0.3)
-    blocked, *late = robot.amiss
+    blocked, *late = robot.missed_faults
     assert blocked.startswith("bump: 0.") and blocked.endswith(" m of 3.00 m, for want of room")
     assert late == ["lights_off: its moment did not come", "stall: its moment did not come"]
 
 
 def test_a_blocked_bump_goes_as_far_as_there_is_room() -> None:
-    bump = Displacement("bump", left_m=1.0)
-    there = free_displacement(Pose2(0.0, 0.0, 0.0), bump, np.random.default_rng(0), lambda p: p.y_m < 0.52)
+    bump = Bump(left_m=1.0)
+    there = bump.find_free_pose(Pose2(0.0, 0.0, 0.0), np.random.default_rng(0), lambda p: p.y_m < 0.52)
     assert there.y_m == pytest.approx(0.5)
 
 
 def test_lights_go_off_for_their_time() -> None:
-    robot = body(LightsOff(Moment(after_s=0.5), duration_s=1.0))
+    robot = body(LightsOff(after_s=0.5, duration_s=1.0))
     lit = [(robot.look(), robot.truth.lights_on)[1] for _ in range(20)]
     assert lit.count(False) == 10 and lit[0] and lit[-1]
 
 
 def test_faults_do_not_change_the_noise() -> None:
-    sighted, blind = body(), body(LightsOff(Moment(after_s=0.05), duration_s=0.1))
+    sighted, blind = body(), body(LightsOff(after_s=0.05, duration_s=0.1))
     for robot in (sighted, blind):
         robot.look(), robot.look()
     assert sighted.look().jpeg == blind.look().jpeg

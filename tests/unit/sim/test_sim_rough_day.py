@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.faults.faults import Fault, Moment, Occlusion
+from sim.faults.fault import Fault
+from sim.faults.occlusion import Occlusion
 from sim.made_up.box_room import box_room
 from sim.moved_things import Moved, with_moved
 from sim.render.occluder import Occluder
@@ -32,15 +33,15 @@ def body(*faults: Fault) -> SimulatedBody:
 
 @given(part=st.floats(0.01, 0.9), seed=st.integers(0, 1000))
 def test_an_occluder_hides_the_part_that_it_is_said_to_hide(part: float, seed: int) -> None:
-    occluder = Occluder.drawn(part, 1.0, np.random.default_rng(seed))
-    hidden = occluder.before(np.full((200, 200, 3), 2.0, np.float32)) < 1.0
+    occluder = Occluder.draw(part, 1.0, np.random.default_rng(seed))
+    hidden = occluder.cover(np.full((200, 200, 3), 2.0, np.float32)) < 1.0
     assert hidden[..., 0].mean() == pytest.approx(part, abs=0.01)
     rows, columns = np.nonzero(hidden[..., 0])
     assert hidden[..., 0].sum() == (np.ptp(rows) + 1) * (np.ptp(columns) + 1)
 
 
 def test_an_occlusion_comes_and_goes_at_its_time_and_changes_no_other_noise() -> None:
-    plain, hidden = body(), body(Occlusion(Moment(after_s=0.05), duration_s=0.25, part=0.2))
+    plain, hidden = body(), body(Occlusion(after_s=0.05, duration_s=0.25, part=0.2))
     same = [plain.look().jpeg == hidden.look().jpeg for _ in range(5)]
     assert same == [False, False, False, True, True]
 

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from sim.faults.faults import Displacement, LightsOff, Moment
-from sim.render.sensor import SensorParameters, exposed
+from sim.faults.displacement import Kidnap
+from sim.faults.lights_off import LightsOff
+from sim.render.sensor import SensorParameters, expose
 from sim.scenario import ScenarioError, list_scenarios, load_scenario, parse_scenario, with_settings
 from world_models.entries.location import Place
 from world_models.ptrans import parse_ptrans
@@ -57,8 +58,9 @@ to_x_ft = 10.0
 to_heading_deg = 180.0
 """)
     lights, kidnap = scenario.faults
-    assert lights == LightsOff(Moment(after_s=3.0), 2.0)
-    assert isinstance(kidnap, Displacement) and kidnap.place == Place("a", 3.048, 0.0, pytest.approx(math.pi))
+    assert lights == LightsOff(after_s=3.0, duration_s=2.0)
+    assert isinstance(kidnap, Kidnap) and kidnap.in_locale == "b"
+    assert kidnap.destination == Place("a", 3.048, 0.0, pytest.approx(math.pi))
 
 
 @pytest.mark.parametrize(("text", "message"), [
@@ -68,7 +70,19 @@ to_heading_deg = 180.0
     (MINIMAL + "[limits]\nmax_cycles = 2.5\n", r"s\.toml:4: limits\.max_cycles: expected a whole number, got 2\.5"),
     (MINIMAL + "[start]\nheading_deg = 1\nheading_rad = 1\n",
      r"s\.toml:5: start\.heading_rad: expected only one of heading_deg and heading_rad, got both"),
-    (MINIMAL + '[[faults]]\nkind = "quake"\n', r"s\.toml:3: faults\.0: expected kind = bump, .*, occluded or"),
+    (MINIMAL + '[[faults]]\nkind = "quake"\n',
+     r"s\.toml:4: faults\.0\.kind: expected one of bump, .*, occluded, .*, got 'quake'"),
+    (MINIMAL + '[[faults]]\nkind = "bumb"\n', r"s\.toml:4: faults\.0\.kind: expected one of bump, got 'bumb'"),
+    (MINIMAL + '[[faults]]\nafter_s = 1\n',
+     r"s\.toml:3: faults\.0: expected a table with the key 'kind', got \{after_s"),
+    (MINIMAL + '[[faults]]\nkind = "lights_off"\nturn_deg = 40\n',
+     r"s\.toml:5: faults\.0\.turn_deg: expected one of .*duration_s.*, got the key 'turn_deg'"),
+    (MINIMAL + '[[faults]]\nkind = "stall"\npart = 0.5\n', r"s\.toml:5: faults\.0\.part: expected one of"),
+    (MINIMAL + '[[faults]]\nkind = "bump"\nto_locale = "a"\n', r"s\.toml:5: faults\.0\.to_locale: expected one of"),
+    (MINIMAL + '[[faults]]\nkind = "kidnap"\nto_x_ft = 2\n',
+     r"s\.toml:3: faults\.0: expected to_locale beside .* to_x_m"),
+    (MINIMAL + '[[faults]]\nkind = "kidnap"\nto_locale = "a"\nleft_m = 1\n',
+     r"s\.toml:3: faults\.0: expected no displacement beside to_locale, got left_m"),
     (MINIMAL + "[actuator]\nspeed_m_per_s = 0\n", r"s\.toml:4: actuator\.speed_m_per_s: expected a number from 0.001"),
     (MINIMAL + "[render]\nsamples = 5\n", r"s\.toml:3: render: expected 1, 4, 8, 16 samples"),
     ('world = "w"\ngoal = "(go home)"\n', r"s\.toml:2: goal: expected a goal like"),
@@ -105,7 +119,8 @@ def test_a_malformed_scenario_is_pointed_at(text: str, message: str) -> None:
 ])
 def test_settings_out_of_all_bounds_are_refused_where_they_stand(line: str, bounds: str) -> None:
     key, _, came = line.splitlines()[1].partition(" = ")
-    rest = "thing = 'a/b'\n" if "moved" in line else ""
+    kinds = {"duration_s": "lights_off", "part": "occluded"}
+    rest = "thing = 'a/b'\n" if "moved" in line else f"kind = '{kinds.get(key, 'bump')}'\n" if "faults" in line else ""
     with pytest.raises(ScenarioError) as caught:
         parse_scenario(f"{MINIMAL}{line}\n{rest}", "s.toml")
     assert str(caught.value).startswith("s.toml:4: ")
@@ -116,7 +131,7 @@ def test_settings_out_of_all_bounds_are_refused_where_they_stand(line: str, boun
 def test_a_blur_within_bounds_can_be_seen_through() -> None:
     for blur_px in (1e-300, 0.1, 50.0):
         parameters = SensorParameters(blur_px=blur_px)
-        assert exposed(np.ones((16, 16, 3), np.float32), parameters, np.random.default_rng(1)).shape == (16, 16, 3)
+        assert expose(np.ones((16, 16, 3), np.float32), parameters, np.random.default_rng(1)).shape == (16, 16, 3)
 
 
 def test_an_unknown_scenario_names_near_ones() -> None:

@@ -1,0 +1,78 @@
+"""The robot's camera: renderer, lens, what hides the view, motion blur, sensor and JPEG, one picture at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.body.building import Building
+from sim.body.continuous_motion import ContinuousMotion
+from sim.render.occluder import Occluder
+from sim.render.optics import Optics
+from sim.render.sensor import SensorParameters, compress_jpeg, expose, skip_noise_draws
+from sim.truth import Truth
+from world_models.camera import Camera, CameraMount
+from world_models.entries.body import Frame
+from world_models.frames import Pose
+
+MOTION_BLUR_SAMPLES = 3
+"""Sharp pictures of which one that is exposed on the move is the mean."""
+
+
+class BodyCamera:
+    """The camera of a simulated robot.
+
+    Attributes:
+        sensor: its parameters.
+        frames: how many pictures were taken.
+    """
+
+    def __init__(self, camera: Camera, mount: CameraMount, sensor: SensorParameters, rng: np.random.Generator) -> None:
+        """``rng`` draws the noise of pictures, and nothing else."""
+        self.sensor, self.frames = sensor, 0
+        self._optics, self._mount, self._rng = Optics.of(camera), mount, rng
+        self._occluders: tuple[Occluder, ...] = ()
+        self._recorded: Mapping[int, bytes] = {}
+
+    def add_occluder(self, occluder: Occluder) -> None:
+        """Put something before the camera, until its time is over."""
+        self._occluders += (occluder,)
+
+    def use_recorded(self, pictures: Mapping[int, bytes]) -> None:
+        """Deliver these pictures (JPEG, by frame number) instead of rendering them; later noise is the same."""
+        self._recorded = pictures
+
+    def take_frame(self, building: Building, truth: Truth, motion: ContinuousMotion, purpose: str) -> Frame:
+        """The next frame, numbered from 0, for the purpose of the request."""
+        number, self.frames = self.frames, self.frames + 1
+        jpeg = self._recorded.get(number)
+        if jpeg is None:
+            jpeg = self.take_jpeg(building, truth, motion)
+        else:
+            skip_noise_draws(self._rng)
+        return Frame(jpeg=jpeg, number=number, sim_time_s=truth.time_s, purpose=purpose)
+
+    def take_jpeg(self, building: Building, truth: Truth, motion: ContinuousMotion) -> bytes:
+        """The JPEG bytes of a picture that is not counted as a frame."""
+        radiance = self._radiance(building, truth, motion)
+        for occluder in self._occluders:
+            if truth.time_s < occluder.until_s:
+                radiance = occluder.cover(radiance)
+        image = expose(radiance, self.sensor, self._rng, lights_on=truth.lights_on)
+        return compress_jpeg(image, self.sensor.jpeg_quality)
+
+    def _radiance(self, building: Building, truth: Truth, motion: ContinuousMotion) -> NDArray[np.float32]:
+        """(h, w, 3) light behind the lens; on the move, its mean over the exposure time."""
+        here = truth.world_from_robot
+        if not (motion.speed_m_per_s > 0.0 and self.sensor.exposure_s > 0.0):
+            return self._radiance_from(building, here.lifted(building.floor_m))
+        total = self._radiance_from(building, here.lifted(building.floor_m))
+        for sample in range(1, MOTION_BLUR_SAMPLES):
+            earlier = motion.displacement_after(-self.sensor.exposure_s * sample / (MOTION_BLUR_SAMPLES - 1))
+            total = total + self._radiance_from(building, (here @ earlier).lifted(building.floor_m))
+        return np.asarray(total / MOTION_BLUR_SAMPLES, np.float32)
+
+    def _radiance_from(self, building: Building, world_from_robot: Pose) -> NDArray[np.float32]:
+        return self._optics.radiance(building.renderer, self._mount.camera_from_robot @ world_from_robot.inverse())

@@ -1,0 +1,136 @@
+"""The robot is moved by somebody or something else: bumped aside, or carried off (kidnapped)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from sim.faults.fault import Fault, FaultTarget
+from world_models.bounds import Bounds
+from world_models.entries.location import Place
+from world_models.frames import Pose2
+
+MAX_DISPLACEMENT_M = 5.0
+"""Largest displacement along each axis; further only to a place that is named."""
+MAX_SHORTFALL_M = 0.005
+"""A displacement that falls short by more than this, for want of room, is reported."""
+MAX_DRAWS = 50
+"""Random directions that are tried for a free place."""
+DISPLACEMENT_BOUNDS: Mapping[str, Bounds] = {
+    "forward_m": Bounds(-MAX_DISPLACEMENT_M, MAX_DISPLACEMENT_M),
+    "left_m": Bounds(-MAX_DISPLACEMENT_M, MAX_DISPLACEMENT_M),
+    "turn_rad": Bounds(-2.0 * math.pi, 2.0 * math.pi),
+    "distance_m": Bounds(0.0, MAX_DISPLACEMENT_M),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Displacement(Fault):
+    """The robot is moved without its wheels turning, to a free place in the same locale.
+
+    Attributes:
+        forward_m, left_m, turn_rad: displacement in the robot's frame.
+        distance_m: besides that, this far in a random direction; if it is above 0, the turn's sign is random too.
+    """
+
+    bounds: ClassVar[Mapping[str, Bounds]] = DISPLACEMENT_BOUNDS
+
+    forward_m: float = 0.0
+    left_m: float = 0.0
+    turn_rad: float = 0.0
+    distance_m: float = 0.0
+
+    @property
+    def min_distance_m(self) -> float:
+        """The least distance that it asks for [m]; less is for want of room."""
+        return abs(self.distance_m - math.hypot(self.forward_m, self.left_m))
+
+    def draw(self, rng: np.random.Generator) -> Pose2:
+        """A displacement in the robot's frame. Always takes two numbers from ``rng``."""
+        direction, coin = float(rng.uniform(-math.pi, math.pi)), float(rng.random())
+        sign = -1.0 if self.distance_m > 0 and coin < 0.5 else 1.0
+        return Pose2(
+            self.forward_m + self.distance_m * math.cos(direction),
+            self.left_m + self.distance_m * math.sin(direction),
+            sign * self.turn_rad,
+        )
+
+    def find_free_pose(
+        self, world_from_robot: Pose2, rng: np.random.Generator, is_free: Callable[[Pose2], bool]
+    ) -> Pose2:
+        """A free pose (world frame) to which the robot at ``world_from_robot`` is moved.
+
+        A random displacement is drawn again until its end is free, up to 50 times. After that, and for one that is not
+        random, the first free pose on the way back to the start is taken, in steps of 5 %. Where none is free the
+        robot only turns.
+        """
+        move = self.draw(rng)
+        for _ in range(MAX_DRAWS if self.distance_m > 0 else 0):
+            if is_free(world_from_robot @ move):
+                return world_from_robot @ move
+            move = self.draw(rng)
+        for part in np.linspace(1.0, 0.0, 21):
+            there = world_from_robot @ Pose2(float(part) * move.x_m, float(part) * move.y_m, move.heading_rad)
+            if is_free(there):
+                return there
+        return world_from_robot @ Pose2(0.0, 0.0, move.heading_rad)
+
+    def apply(self, body: FaultTarget) -> None:
+        before = body.truth.world_from_robot
+        there = self.find_free_pose(before, body.fault_rng, body.is_free)
+        moved_m = there.distance_to(before)
+        if self.min_distance_m - moved_m > MAX_SHORTFALL_M:
+            body.report_missed(f"{self.kind}: {moved_m:.2f} m of {self.min_distance_m:.2f} m, for want of room")
+        body.put_robot(there)
+
+
+@dataclass(frozen=True, slots=True)
+class Bump(Displacement):
+    """Somebody bumps into the robot."""
+
+    kind: ClassVar[str] = "bump"
+
+
+@dataclass(frozen=True, slots=True)
+class Kidnap(Displacement):
+    """Somebody carries the robot off: by a displacement, or to a place in any locale.
+
+    Attributes:
+        to_locale: the place's locale; "" for a displacement instead.
+        to_x_m, to_y_m, to_heading_rad: the pose there, in the locale's frame.
+    """
+
+    kind: ClassVar[str] = "kidnap"
+    bounds: ClassVar[Mapping[str, Bounds]] = {
+        **DISPLACEMENT_BOUNDS,
+        "to_x_m": Bounds(-1e5, 1e5),
+        "to_y_m": Bounds(-1e5, 1e5),
+        "to_heading_rad": Bounds(-2.0 * math.pi, 2.0 * math.pi),
+    }
+
+    to_locale: str = ""
+    to_x_m: float = 0.0
+    to_y_m: float = 0.0
+    to_heading_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        Displacement.__post_init__(self)
+        unused = DISPLACEMENT_BOUNDS if self.to_locale else ("to_x_m", "to_y_m", "to_heading_rad")
+        given = [key for key in unused if getattr(self, key) != 0.0]
+        if given:
+            expected = "no displacement beside to_locale" if self.to_locale else "to_locale beside the place in it"
+            raise ValueError(f"expected {expected}, got {', '.join(given)}")
+
+    @property
+    def destination(self) -> Place | None:
+        return Place(self.to_locale, self.to_x_m, self.to_y_m, self.to_heading_rad) if self.to_locale else None
+
+    def apply(self, body: FaultTarget) -> None:
+        if self.destination is None:
+            Displacement.apply(self, body)
+        else:
+            body.put_robot(body.world_from_place(self.destination))

@@ -1,0 +1,124 @@
+"""What every fault is: a trigger, its keys in a scenario file, and what it does to the body or to a device."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from sim.render.occluder import Occluder
+from sim.truth import Truth
+from world_models.bounds import Bounds, check_bounds
+from world_models.entries.location import Place
+from world_models.frames import Pose2
+
+TRIGGER_BOUNDS: Mapping[str, Bounds] = {"after_m": Bounds(0.0, 1e6), "after_s": Bounds(0.0, 1e6)}
+DURATION = Bounds(0.0, 1e6, above=True)
+"""Of a fault that lasts for a while [s]."""
+
+
+class FaultTarget(Protocol):
+    """What a fault can read of the simulated body and do to it. Poses are in the world frame."""
+
+    @property
+    def truth(self) -> Truth:
+        """The robot's true state: pose, time, locale."""
+        ...
+
+    @property
+    def fault_rng(self) -> np.random.Generator:
+        """Random numbers for faults only, so that a fault does not change the noise of wheels and camera."""
+        ...
+
+    def is_free(self, world_from_robot: Pose2) -> bool:
+        """Whether the robot could stand there: clear of obstacles, and in the locale where it is now."""
+        ...
+
+    def world_from_place(self, place: Place) -> Pose2:
+        """The pose of a robot at a place in a locale."""
+        ...
+
+    def put_robot(self, world_from_robot: Pose2) -> None:
+        """Move the robot without its wheels: the encoders count nothing."""
+        ...
+
+    def turn_lights_off(self, duration_s: float) -> None:
+        """Turn the building's lights off from now on, for a while."""
+        ...
+
+    def add_occluder(self, occluder: Occluder) -> None:
+        """Put something before the camera, until its time is over."""
+        ...
+
+    def start_device_fault(self, fault: DeviceFault) -> None:
+        """Let a device fail from now on, for the fault's duration."""
+        ...
+
+    def report_missed(self, reason: str) -> None:
+        """Record that a fault did not happen as it was asked for; the result lists it under ``amiss``."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Fault(ABC):
+    """Something that goes wrong once, as soon as its trigger holds.
+
+    A subclass is a frozen dataclass. Its fields are its keys in ``[[faults]]``, in SI units with the unit as suffix;
+    lengths (``_m``) may also be written there with ``_ft`` or ``_in``, angles (``_rad``) with ``_deg``. Every field has
+    a default.
+
+    Attributes:
+        kind: what a scenario calls it.
+        bounds: of its fields, by name; values outside are refused.
+        in_locale: happens only there; path and time then count from the first entry. "" for anywhere, counted from
+            the start.
+        after_m: path length before it happens [m].
+        after_s: time before it happens [s].
+    """
+
+    kind: ClassVar[str]
+    bounds: ClassVar[Mapping[str, Bounds]] = {}
+
+    in_locale: str = ""
+    after_m: float = 0.0
+    after_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_bounds(self, {**TRIGGER_BOUNDS, **self.bounds})
+
+    @property
+    def destination(self) -> Place | None:
+        """The place where it puts the robot, from the key ``to_locale``; checked against the building beforehand."""
+        return None
+
+    @abstractmethod
+    def apply(self, body: FaultTarget) -> None:
+        """Make it happen."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceFault(Fault):
+    """A device does not work for a while; whoever asks it gets a ``BodyFault`` with these words.
+
+    Attributes:
+        part: the device, "base" or "camera".
+        what: the fault in the words of the hardware drivers; detail: the same in a sentence's words.
+        stops_motion_after_s: a motion is broken off this long after the fault began [s]; None: it is completed.
+        odometry_arrives: whether the encoders' counts are still read while it lasts.
+        duration_s: for how long it lasts [s].
+    """
+
+    part: ClassVar[str]
+    what: ClassVar[str]
+    detail: ClassVar[str]
+    stops_motion_after_s: ClassVar[float | None] = None
+    odometry_arrives: ClassVar[bool] = True
+    bounds: ClassVar[Mapping[str, Bounds]] = {"duration_s": DURATION}
+
+    duration_s: float = 10.0
+
+    def apply(self, body: FaultTarget) -> None:
+        body.start_device_fault(self)

@@ -1,0 +1,68 @@
+"""From the ``kind`` of a scenario's ``[[faults]]`` to the fault class: built in, or of another installed package."""
+
+from __future__ import annotations
+
+from importlib.metadata import entry_points
+
+from sim.faults.base_faults import LinkLost, Nonsense, Stall
+from sim.faults.camera_faults import CameraUnplugged, DroppedFrames, LateFrames
+from sim.faults.displacement import Bump, Kidnap
+from sim.faults.fault import Fault
+from sim.faults.lights_off import LightsOff
+from sim.faults.occlusion import Occlusion
+from world_models.files.toml.settings import read_settings, suggest_keys
+from world_models.files.toml.source import Node, WorldError
+
+GROUP = "harvey.faults"
+"""Entry points of this group name fault classes; an entry point's name is the ``kind`` of its class."""
+BUILT_IN: tuple[type[Fault], ...] = (
+    Bump, Kidnap, LightsOff, Occlusion, LinkLost, Nonsense, Stall, CameraUnplugged, LateFrames, DroppedFrames,
+)
+
+
+def list_fault_kinds() -> tuple[str, ...]:
+    """Every ``kind`` that a scenario can name: the built-in ones first."""
+    built_in = [fault_class.kind for fault_class in BUILT_IN]
+    return tuple(dict.fromkeys([*built_in, *sorted(point.name for point in entry_points(group=GROUP))]))
+
+
+def find_fault_class(kind: str) -> type[Fault]:
+    """The fault class of this kind. A built-in class goes before one of another package.
+
+    Raises:
+        KeyError: there is none.
+        ImportError: an installed package names one that cannot be imported, or that is no class of this kind.
+    """
+    for fault_class in BUILT_IN:
+        if fault_class.kind == kind:
+            return fault_class
+    point = next(iter(entry_points(group=GROUP, name=kind)), None)
+    if point is None:
+        raise KeyError(kind)
+    try:
+        found = point.load()
+    except (ImportError, AttributeError) as error:
+        raise ImportError(f"expected a fault class at {point.value}, got {error}") from error
+    if not (isinstance(found, type) and issubclass(found, Fault) and getattr(found, "kind", None) == kind):
+        raise ImportError(f"expected a subclass of sim.faults.fault.Fault with kind = {kind!r} at {point.value}, "
+                          f"got {found!r}")
+    return found
+
+
+def read_fault(node: Node) -> Fault:
+    """One of a scenario's ``[[faults]]``.
+
+    Raises:
+        WorldError: its kind is unknown, a key does not belong to its class, or a value is out of bounds.
+    """
+    if not isinstance(node.value, dict) or "kind" not in node.value:
+        raise node.fail("a table with the key 'kind'")
+    kind = node["kind"].text()
+    try:
+        fault_class = find_fault_class(kind)
+    except KeyError:
+        raise node["kind"].fail(suggest_keys(kind, list_fault_kinds())) from None
+    except ImportError as error:
+        raise WorldError(f"{node['kind'].where}: {'.'.join(map(str, node['kind'].key))}: {error}") from error
+    keys = {key: value for key, value in node.value.items() if key != "kind"}
+    return read_settings(Node(keys, node.key, node.source), fault_class)
