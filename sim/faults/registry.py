@@ -63,6 +63,6 @@ def read_fault(node: Node) -> Fault:
     except KeyError:
         raise node["kind"].fail(suggest_keys(kind, list_fault_kinds())) from None
     except ImportError as error:
-        raise WorldError(f"{node['kind'].where}: {'.'.join(map(str, node['kind'].key))}: {error}") from error
+        raise WorldError(f"{node['kind'].place}: {error}") from error
     keys = {key: value for key, value in node.value.items() if key != "kind"}
     return read_settings(Node(keys, node.key, node.source), fault_class)

@@ -87,7 +87,7 @@ def test_it_is_found_by_its_entry_point_and_happens_once_in_a_mission() -> None:
 
 def test_a_saved_run_reads_it_from_its_tables() -> None:
     scenario = parse_scenario(OFFICE + QUAKE, "s.toml")
-    assert scenario_from_tables(scenario.data, "s", scenario.folder).faults == scenario.faults
+    assert scenario_from_tables(scenario.source.data, "s", scenario.folder).faults == scenario.faults
 
 
 @pytest.mark.parametrize(("text", "message"), [
