@@ -19,12 +19,12 @@ from blackboard.level import Level
 from blackboard.scheduler import RAISED, Scheduler
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
-from knowledge_sources.methods.verification.line_check import LEAST_ACCOUNTED
 from knowledge_sources.methods.verification.milestone_preview import find_alias, predict_p_false
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.methods.verification.view_quality import compute_view_quality
 from knowledge_sources.plan.milestone_selector import GOOD_PART, GOOD_RAD, LEAST_LINES
 from knowledge_sources.questions import held
+from knowledge_sources.settings import DEFAULT
 from world_models.entries.body import MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.task import Command, Milestone, Outcome, PlanSketch
@@ -131,7 +131,7 @@ def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Mile
     quality = compute_view_quality(lines, robot.camera, mount.camera_from_robot, pose, SIGMA_ACROSS_PX)
     sharp = quality.sigma_m <= GOOD_PART * _tolerance_m(view, milestone) and quality.sigma_rad <= GOOD_RAD
     standing = robot.on_floor_of(belief.locale)
-    seen = len(lines) >= LEAST_ACCOUNTED
+    seen = len(lines) >= DEFAULT.verification.min_matched_lines
     p_false = predict_p_false(standing, pose, lines, np.array(diagonal(SEEN_M, SEEN_RAD))) if seen else 1.0
     other = find_alias(standing, belief.locale, pose, lines) if seen else None
     clear = sharp and len(lines) >= LEAST_LINES and p_false <= POSE_CONFIDENCE.accept

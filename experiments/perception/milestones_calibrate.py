@@ -1,8 +1,7 @@
-"""What evidence for a milestone is worth: weights fitted on floors that the experiment ``milestones`` does not use.
+"""Fit the weights of the evidence for a milestone, on floors that the experiment ``milestones`` does not use.
 
-Writes ``confidence.toml``; put in the place of ``knowledge_sources/methods/verification/verification_weights.toml`` it
-is what the judge goes by. The limits for *verified* and *refuted* follow from the fitted probabilities of the same
-cases.
+Writes ``verification_weights.toml``; copied to ``knowledge_sources/methods/verification/`` the milestone judge uses it.
+The limits for *verified* and *refuted* follow from the fitted probabilities of the same cases.
 """
 
 from __future__ import annotations
@@ -17,13 +16,13 @@ from experiments.perception.milestones_trials import Judged
 from experiments.report import Report
 from experiments.trials import campaign_folder
 from knowledge_sources.methods.verification.pose_confidence import (
-    FITTED,
     POSE_CONFIDENCE,
     TERMS,
+    WEIGHTS_FILE,
+    EvidenceWeights,
     PoseConfidence,
-    Weights,
-    fitted,
-    unseen,
+    fit_weights,
+    remove_colors,
 )
 
 Floats = NDArray[np.float64]
@@ -44,30 +43,31 @@ def run(quick: bool, seed: int) -> Report:
     found = fit_confidence(told)
     how = (f"{len(told)} cases of {floors} floors from {first} on: harvey experiment milestones-calibrate"
            f"{' --quick' if quick else ''} --seed {seed}")
-    (folder / "confidence.toml").write_text(as_toml(found, how), encoding="utf-8")
-    weights = POSE_CONFIDENCE.seeing, found.seeing, POSE_CONFIDENCE.blind, found.blind
+    (folder / WEIGHTS_FILE.name).write_text(as_toml(found, how), encoding="utf-8")
+    weights = (POSE_CONFIDENCE.lines_and_colors, found.lines_and_colors, POSE_CONFIDENCE.lines_only, found.lines_only)
     rows = list(zip((*TERMS, "bias"), *((*w.each, w.bias) for w in weights), strict=True))
     rows += [("accept up to", POSE_CONFIDENCE.accept, found.accept, None, None),
              ("refute from", POSE_CONFIDENCE.refute, found.refute, None, None)]
     error = calibration_error(reliability(told))
     return Report(
-        "What evidence for a milestone is worth",
-        ("evidence", "in use", "fitted now", "lines alone: in use", "fitted now"), tuple(rows),
+        "Weights of the evidence for a milestone",
+        ("evidence", "in use", "fitted now", "lines only: in use", "fitted now"), tuple(rows),
         notes=(
             f"From {how}.", f"With what is in use, stated and found differ by {error:.2%} on average over these cases.",
-            f"To go by it: cp {folder / 'confidence.toml'} {FITTED.relative_to(FITTED.parents[2])}",
+            f"To go by it: cp {folder / WEIGHTS_FILE.name} {WEIGHTS_FILE.relative_to(WEIGHTS_FILE.parents[3])}",
         ),
-        claims=(("no evidence speaks against a pose", min(*found.seeing.each, *found.blind.each) >= 0.0),),
+        claims=(("no evidence speaks against a pose",
+                 min(*found.lines_and_colors.each, *found.lines_only.each) >= 0.0),),
     )
 
 
 def fit_confidence(told: Sequence[Judged]) -> PoseConfidence:
-    """The weights for what was judged, and the limits."""
+    """Fit the weights to judged cases, and derive the limits."""
     evidence, right = np.array([j.evidence for j in told]), np.array([not j.is_wrong for j in told])
-    seeing, blind = fitted(evidence, right), fitted(unseen(evidence), right)
-    p = seeing.p_false(evidence)
+    weights, lines_only = fit_weights(evidence, right), fit_weights(remove_colors(evidence), right)
+    p = weights.p_false(evidence)
     weight = np.where(right, 1.0 / max(1, right.sum()), 1.0 / max(1, (~right).sum()))
-    return PoseConfidence(seeing, blind, accept_limit(p, weight), refute_limit(p, weight))
+    return PoseConfidence(weights, lines_only, accept_limit(p, weight), refute_limit(p, weight))
 
 
 def accept_limit(p: Floats, weight: Floats) -> float:
@@ -85,16 +85,16 @@ def refute_limit(p: Floats, weight: Floats) -> float:
 
 
 def as_toml(confidence: PoseConfidence, how: str) -> str:
-    """The file of weights, with how they were made."""
+    """Write the file of weights, with a comment on how they were fitted."""
     return (
-        f"# What evidence for a pose is worth, in log odds; see confidence.py. Fitted on\n# {how}\n"
-        f"# accept: below it lie {FALSE_ACCEPTS:.2%} of the wrong places; refute: above it {FALSE_REJECTS:.1%} of the"
-        f" right ones.\naccept = {confidence.accept:.3g}\nrefute = {confidence.refute:.4g}\n"
-        f"\n[seeing]   # lines and the colours of faces\n{_table(confidence.seeing)}"
-        f"\n[blind]   # lines alone, where no colours can be compared\n{_table(confidence.blind)}"
+        f"# Weights of the evidence for a pose, in log odds; see pose_confidence.py. Fitted on\n# {how}.\n"
+        f"# accept: {FALSE_ACCEPTS:.2%} of the wrong places lie below it; refute: {FALSE_REJECTS:.1%} of the right ones"
+        f" lie above it.\naccept = {confidence.accept:.3g}\nrefute = {confidence.refute:.4g}\n"
+        f"\n[lines_and_colors]\n{_table(confidence.lines_and_colors)}"
+        f"\n[lines_only]   # where no colors can be compared\n{_table(confidence.lines_only)}"
     )
 
 
-def _table(weights: Weights) -> str:
+def _table(weights: EvidenceWeights) -> str:
     return "".join(f"{name} = {value:.5f}\n" for name, value in zip((*TERMS, "bias"), (*weights.each, weights.bias),
                                                                   strict=True))

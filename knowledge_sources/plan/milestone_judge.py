@@ -17,12 +17,13 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.localization.aliasing import find_strongest_alias
 from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors, decode_small_color
-from knowledge_sources.methods.verification.line_check import LEAST_ACCOUNTED, LineCheck, check_lines
+from knowledge_sources.methods.verification.line_check import LineCheck, check_lines
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.methods.verification.pose_evidence import compute_evidence, compute_motion_tolerance_px
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from knowledge_sources.questions import has_followed, held, open_discrepancy, standing_in
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.settings import DEFAULT
 from knowledge_sources.tolerances import FLOOR_PX, PLAN_PX
 from world_models.entries.body import Frame
 from world_models.entries.location import Hypothesis
@@ -158,14 +159,14 @@ def _verdict(
     a = agreed.agreement
     if contrast < DARK:
         return "not testable", f"the frame is dark (contrast {contrast:.1f} of 255)"
-    if expected < LEAST_ACCOUNTED:
+    if expected < DEFAULT.verification.min_matched_lines:
         return "not testable", f"only {expected} lines are expected in this view"
     colours = f" and {round(faces.agreeing * faces.count)} of {faces.count} faces' colours" if faces.is_testable else ""
     found = f"{a.matched} of {a.visible} lines, {agreed.coverage:.0%} of their length,{colours} accounted for"
     if p_false >= POSE_CONFIDENCE.refute:
         return "refuted", f"{found}; at a wrong place {a.chance:.0%} are by chance"
     where = f"{found}, {shift_px:.1f} px from where expected"
-    if not is_enough or a.matched < LEAST_ACCOUNTED:
+    if not is_enough or a.matched < DEFAULT.verification.min_matched_lines:
         return "not testable", f"{where}: not enough to tell the place by"
     if shift_px > tolerance_px:
         return "refuted", f"{where}: more than the {tolerance_px:.0f} px that the plan may be adjusted by"

@@ -18,7 +18,8 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.localization.aliasing import precompute_views
-from knowledge_sources.methods.verification.color_check import predict_face_colors
+from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
+from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from knowledge_sources.methods.verification.view_quality import ViewQuality, compute_view_quality
 from knowledge_sources.questions import (
     deepest_sketch,
@@ -38,13 +39,11 @@ from world_models.entries.obstruction import Obstruction
 from world_models.entries.task import Milestone, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
-from world_models.visibility.lines_and_points import VisibleLines, visible_lines
+from world_models.visibility.lines_and_points import VisibleLines
 
 FACING_RAD = math.radians(3.5)
 LINES = 60
 """The most lines that one milestone expects."""
-LENGTH_PX = 12.0
-CONTRAST = 0.05
 GOOD_PART = 0.3
 """A view is good enough when it tells the place to this part of the tolerance there."""
 GOOD_RAD = math.radians(0.25)
@@ -262,10 +261,7 @@ def _quality(robot: RobotModel, pose: Pose2, car: str) -> ViewQuality:
 
 def _seen_from(robot: RobotModel, pose: Pose2, car: str = "") -> VisibleLines:
     """The clearest of the lines that should be seen, long ones with contrast, but none of those in a car."""
-    lines = visible_lines(
-        robot.world, robot.camera, robot.camera_from_world(pose), min_length_px=LENGTH_PX, min_contrast=CONTRAST,
-        max_distance_m=15.0,
-    )
+    lines = predict_lines(robot, pose)
     if car:
         marks = robot.world.landmarks
         lines = lines[np.array([car not in (marks[i].locale, marks[i].neighbour) for i in lines.landmark], bool)]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.outlines import inside_polygon
-from world_models.frames import Pose, frozen
+from world_models.frames import Pose, Pose2, frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +106,12 @@ class Doorway:
         left, right = self.threshold_of(locale)
         along = (right - left) / np.linalg.norm(right - left)
         return np.array([-along[1], along[0]])
+
+    def pose_from(self, locale: str) -> Pose2:
+        """The pose in the middle of the threshold of ``locale``, facing out of it [m, world]."""
+        x, y = self.threshold_of(locale).mean(axis=0)
+        ahead = self.outward_from(locale)
+        return Pose2(float(x), float(y), float(np.arctan2(ahead[1], ahead[0])))
 
     def _side(self, locale: str) -> int:
         if locale not in self.between:

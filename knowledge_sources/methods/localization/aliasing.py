@@ -23,14 +23,12 @@ from knowledge_sources.methods.localization.refinement import refine_pose
 from knowledge_sources.methods.localization.repetition import find_repetitions
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.verification.agreement import compute_coverage
+from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
-from world_models.visibility.lines_and_points import VisibleLines, visible_lines
 
 Floats = NDArray[np.float64]
 
-LENGTH_PX, CONTRAST, SIGHT_M = 12.0, 0.05, 15.0
-"""Lines that are longer, clearer and nearer than this are looked for."""
 LINE_PX, LONG_PX = 30.0, 100.0
 """So much length counts as one line; what is longer than LONG_PX tells no more."""
 TOLERANCE_PX, TOLERANCE_RAD = 2.5, 0.06
@@ -101,13 +99,7 @@ def _seen_near(robot: RobotModel, pose: Pose2) -> Floats:
     nearest = (round(pose.x_m / GRID_M), round(pose.y_m / GRID_M), turned)
     of_grid = Pose2(nearest[0] * GRID_M, nearest[1] * GRID_M, nearest[2] * GRID_RAD)
     return robot.world.cached("views of a grid", KEPT_VIEWS, (robot.camera, robot.mount.height_m, nearest),
-                                  lambda: view(robot, of_grid).lines_world)
-
-
-def view(robot: RobotModel, pose: Pose2) -> VisibleLines:
-    """The lines that should be seen from a pose."""
-    return visible_lines(robot.world, robot.camera, robot.camera_from_world(pose), min_length_px=LENGTH_PX,
-                         min_contrast=CONTRAST, max_distance_m=SIGHT_M)
+                                  lambda: predict_lines(robot, of_grid).lines_world)
 
 
 class ScoredView(NamedTuple):

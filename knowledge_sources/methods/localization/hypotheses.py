@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization.refinement import predict_lines
 from knowledge_sources.methods.motion.routes import compute_free_space, is_clear
 from knowledge_sources.methods.verification.agreement import compute_coverage
+from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

@@ -192,7 +192,7 @@ def _judged(
     lengths = np.linalg.norm(here[:, 1] - here[:, 0], axis=1)
     here[~(np.nan_to_num(lengths) >= LEAST_LENGTH_PX)] = np.nan
     found = compute_agreement(here, everything, displaced)
-    coverage = found.total(lengths)
+    coverage = found.covered_length(lengths)
     if found.matched < LEAST_ACCOUNTED or found.p_false > MOST_P_FALSE:
         verdict = PoseVerdict.REFUTED
     elif fine.ok and coverage >= LEAST_COVERAGE and _is_sharp(_as_seen(fine), tolerance_m, tolerance_rad):

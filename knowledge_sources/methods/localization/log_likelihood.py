@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization.refinement import predict_lines
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.verification.agreement import compute_agreement, compute_coverage
+from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_lines

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.pose import planar_from_lines
+from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
-from world_models.visibility.lines_and_points import VisibleLines, visible_lines
 
 Floats = NDArray[np.float64]
 
@@ -31,12 +31,6 @@ MOST_KNOWN_RAD = math.radians(0.5)
 """Turns that are known better than this are not asked about again."""
 TURN_RAD, TURNS_SIGMA = math.radians(1.5), 2.5
 """Turns that are known less well are tried in such steps, as far as so many of their standard deviations."""
-
-
-def predict_lines(robot: RobotModel, world_from_robot: Pose2) -> VisibleLines:
-    """The model lines that are worth looking for from there."""
-    return visible_lines(robot.world, robot.camera, robot.camera_from_world(world_from_robot), min_length_px=12.0,
-                         min_contrast=0.05, max_distance_m=15.0)
 
 
 def refine_pose(robot: RobotModel, glances: Sequence[CameraView], pose: Pose2) -> tuple[Pose2, Floats]:

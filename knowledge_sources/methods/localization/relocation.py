@@ -23,9 +23,10 @@ from knowledge_sources.methods.localization.hypotheses import (
 )
 from knowledge_sources.methods.localization.log_likelihood import PoseLikelihood, compute_pose_likelihood
 from knowledge_sources.methods.localization.pose_candidates import are_distinct, find_pose_candidates
-from knowledge_sources.methods.localization.refinement import predict_lines, refine_pose, refine_view_motions
+from knowledge_sources.methods.localization.refinement import refine_pose, refine_view_motions
 from knowledge_sources.methods.localization.repetition import find_repetitions
 from knowledge_sources.methods.localization.views import CameraView, align_headings
+from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

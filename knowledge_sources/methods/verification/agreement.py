@@ -1,8 +1,8 @@
-"""Does the picture agree with a pose, and how easily would it agree with a wrong one?
+"""Agreement of predicted lines with found segments, counted a contrario.
 
-Agreement is counted a contrario: how many of the expected lines are matched for at the pose, against how many are at
-displaced poses, where they are matched for by chance. The binomial tail is the probability that as much agrees at a
-wrong place (Desolneux, Moisan, Morel: From Gestalt Theory to Image Analysis, 2008, ch. 3).
+How many predicted lines are matched at the pose is compared with how many are at displaced poses, where they are
+matched by chance. The binomial tail is the probability that as many are matched at a wrong pose (Desolneux, Moisan,
+Morel: From Gestalt Theory to Image Analysis, 2008, ch. 3).
 """
 
 from __future__ import annotations
@@ -13,56 +13,79 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.stats import binom
 
-Floats = NDArray[np.float64]
-CELLS = 24
-PLACES = 1e3
-"""Resolvable poses within the matcher's reach, each of which might agree by chance."""
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.verification import VerificationSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Agreement:
-    """What of the expected lines is matched for.
+    """How many of the predicted lines are matched.
 
     Attributes:
-        coverage: (m,) part of each line that some segment lies on, NaN where the line is not in view.
-        chance: probability that a line is matched for at a wrong pose.
-        p_false: probability that as many lines are matched for at a wrong pose.
+        coverage: (m,) covered part of each line, 0..1; NaN where the line is not in view.
+        visible: number of lines in view.
+        matched: number of lines of which enough is covered.
+        chance: probability that a line is matched at a wrong pose.
+        p_false: probability that as many lines are matched at a wrong pose.
     """
 
     coverage: Floats
+    visible: int
+    matched: int
     chance: float
     p_false: float
 
-    @property
-    def visible(self) -> int:
-        """How many lines are in view."""
-        return int(np.count_nonzero(~np.isnan(self.coverage)))
-
-    @property
-    def matched(self) -> int:
-        """How many lines are matched for, by half their length or more."""
-        return int(np.count_nonzero(np.nan_to_num(self.coverage) >= 0.5))
-
-    def total(self, lengths_px: Floats) -> float:
-        """Part of the length in view that is matched for, 0..1."""
-        here = ~np.isnan(self.coverage)
-        length = float(np.sum(lengths_px[here]))
-        return float(np.sum(self.coverage[here] * lengths_px[here])) / length if length > 0 else 0.0
+    def covered_length(self, lengths_px: Floats) -> float:
+        """Covered part of the length in view, 0..1, of lines with these lengths (m,)."""
+        visible = ~np.isnan(self.coverage)
+        length = float(np.sum(lengths_px[visible]))
+        return float(np.sum(self.coverage[visible] * lengths_px[visible])) / length if length > 0 else 0.0
 
 
-def compute_coverage(lines_px: Floats, segments_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
-    """(m,) part of each line (m, 2, 2) that lies under segments (k, 2, 2) within the tolerances."""
+def compute_agreement(
+    lines_px: Floats, segments_px: Floats, displaced_px: Floats, settings: VerificationSettings = DEFAULT.verification
+) -> Agreement:
+    """Compute how well projected lines agree with segments, and how well they would by chance.
+
+    Args:
+        lines_px: (m, 2, 2) projected at the pose, NaN where not in view.
+        segments_px: (k, 2, 2) found in the picture.
+        displaced_px: (p, m, 2, 2) the same lines projected at p wrong poses nearby.
+    """
+    tolerances = settings.line_tolerance_px, settings.line_tolerance_rad, settings
+    coverage = compute_coverage(lines_px, segments_px, *tolerances)
+    displaced = compute_coverage(displaced_px.reshape(-1, 2, 2), segments_px, *tolerances)
+    displaced = displaced.reshape(displaced_px.shape[:2])
+    visible, matched = _count(coverage, settings.min_covered_fraction)
+    visible_there, matched_there = _count(displaced, settings.min_covered_fraction)
+    seen = visible_there > 0
+    rate = float(np.mean(matched_there[seen] / visible_there[seen])) if np.any(seen) else 1.0
+    chance = min(settings.max_chance, max(settings.min_chance, rate))
+    p = settings.test_count * float(binom.sf(matched - 1, visible, chance)) if visible else 1.0
+    return Agreement(coverage, int(visible), int(matched), chance, min(1.0, p))
+
+
+def compute_coverage(
+    lines_px: Floats, segments_px: Floats, tolerance_px: float, tolerance_rad: float,
+    settings: VerificationSettings = DEFAULT.verification,
+) -> Floats:
+    """Compute the part (m,) of each line (m, 2, 2) that lies under segments (k, 2, 2) within the tolerances."""
     lines, segments = np.array(lines_px, float, order="C"), np.array(segments_px, float, order="C")
-    covered: Floats = _covered(lines, segments, tolerance_px, math.sin(tolerance_rad))
+    covered: Floats = _cover(lines, segments, tolerance_px, math.sin(tolerance_rad), settings.cells_per_line)
     return covered
 
 
+def _count(coverage: Floats, min_covered: float) -> Any:
+    """Numbers of visible and of matched lines along the last axis."""
+    return np.count_nonzero(~np.isnan(coverage), axis=-1), np.count_nonzero(coverage >= min_covered, axis=-1)
+
+
 @njit(cache=True, error_model="numpy")
-def _covered(lines: Any, segments: Any, tolerance_px: float, sine: float) -> Any:
-    """(m,) share of CELLS cells of each line over which some near and parallel segment lies; NaN out of view."""
+def _cover(lines: Any, segments: Any, tolerance_px: float, sine: float, cells: int) -> Any:
+    """(m,) part of the cells of each line over which a near and parallel segment lies; NaN where not in view."""
     out = np.empty(len(lines))
     directions = np.empty((len(segments), 2))
     for k in range(len(segments)):
@@ -77,7 +100,7 @@ def _covered(lines: Any, segments: Any, tolerance_px: float, sine: float) -> Any
             out[i] = math.nan
             continue
         u, v = u / length, v / length
-        under = np.zeros(CELLS, np.bool_)
+        under = np.zeros(cells, np.bool_)
         for k in range(len(segments)):
             if abs(u * directions[k, 1] - v * directions[k, 0]) > sine:
                 continue
@@ -87,32 +110,9 @@ def _covered(lines: Any, segments: Any, tolerance_px: float, sine: float) -> Any
                 off = max(off, abs(x * v - y * u))
                 low, high = min(low, x * u + y * v), max(high, x * u + y * v)
             if off <= tolerance_px:
-                for c in range(CELLS):
-                    at = (c + 0.5) / CELLS * length
+                for c in range(cells):
+                    at = (c + 0.5) / cells * length
                     if low <= at <= high:
                         under[c] = True
-        out[i] = np.sum(under) / CELLS
+        out[i] = np.sum(under) / cells
     return out
-
-
-def compute_agreement(
-    lines_px: Floats,
-    segments_px: Floats,
-    displaced_px: Floats,
-    *,
-    tolerance_px: float = 2.5,
-    tolerance_rad: float = 0.06,
-) -> Agreement:
-    """Agreement of lines projected at a pose (m, 2, 2; NaN: not in view) with segments (k, 2, 2).
-
-    ``displaced_px`` (p, m, 2, 2) are the same lines at p wrong poses nearby.
-    """
-    here = compute_coverage(lines_px, segments_px, tolerance_px, tolerance_rad)
-    there = compute_coverage(displaced_px.reshape(-1, 2, 2), segments_px, tolerance_px, tolerance_rad)
-    each = there.reshape(displaced_px.shape[:2])
-    seen = np.count_nonzero(~np.isnan(each), axis=1)
-    by_chance = np.count_nonzero(each >= 0.5, axis=1)[seen > 0] / seen[seen > 0]
-    chance = min(0.95, max(0.02, float(np.mean(by_chance)) if len(by_chance) else 1.0))
-    found = Agreement(here, chance, 1.0)
-    p = PLACES * float(binom.sf(found.matched - 1, found.visible, chance)) if found.visible else 1.0
-    return Agreement(here, chance, min(1.0, p))

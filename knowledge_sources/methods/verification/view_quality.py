@@ -1,4 +1,4 @@
-"""How well a view would tell where the robot is: the information in the lines that should be seen."""
+"""How precise would a pose from this view be? The information matrix of the predicted lines, inverted."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.pose.planar import compute_point_jacobian
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 
-FLOOR = 1e-6
-"""Information that keeps the inverse finite where the lines leave a direction open."""
+EPSILON_INFORMATION = 1e-6
+"""Keeps the information matrix invertible where the lines leave a direction open."""
 
 
 @dataclass(frozen=True, slots=True)
 class ViewQuality:
-    """Standard deviations to be expected of a fix from a view.
+    """Expected standard deviations of a pose from a view.
 
     Attributes:
         sigma_m: of the position, in its worst direction.
         sigma_rad: of the heading.
-        lines: how many model lines it rests on.
+        lines: number of model lines.
     """
 
     sigma_m: float
@@ -32,9 +32,12 @@ class ViewQuality:
 
 
 def compute_view_quality(
-    lines_world: NDArray[np.float64], camera: Camera, camera_from_robot: Pose, world_from_robot: Pose2, sigma_px: float
+    lines_world: Floats, camera: Camera, camera_from_robot: Pose, world_from_robot: Pose2, sigma_px: float
 ) -> ViewQuality:
-    """From the Fisher information of visible model lines (n, 2, 3), their ends seen with ``sigma_px`` across them."""
+    """Compute the Cramer-Rao bound of the pose from visible model lines (n, 2, 3) [m, world].
+
+    Each end of a line is measured across the line with standard deviation ``sigma_px``. Infinite without lines.
+    """
     n = len(lines_world)
     if n == 0:
         return ViewQuality(math.inf, math.inf, 0)
@@ -44,7 +47,7 @@ def compute_view_quality(
     along = np.diff(pixels.reshape(n, 2, 2), axis=1)[:, 0]
     across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
     rows = np.einsum("nj,nejk->nek", across, slopes.reshape(n, 2, 2, 3)).reshape(-1, 3) / sigma_px
-    covariance = np.linalg.inv(rows.T @ rows + FLOOR * np.eye(3))
+    covariance = np.linalg.inv(rows.T @ rows + EPSILON_INFORMATION * np.eye(3))
     return ViewQuality(
         math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1])), math.sqrt(float(covariance[2, 2])), n
     )

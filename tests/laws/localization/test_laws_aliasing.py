@@ -18,9 +18,9 @@ from knowledge_sources.methods.localization.aliasing import (
     precompute_views,
     predict_views_on_grid,
     score_view,
-    view,
 )
 from knowledge_sources.methods.verification.agreement import compute_coverage
+from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
@@ -87,31 +87,35 @@ def test_what_only_one_view_shows_speaks_for_it_where_it_is_seen_and_against_it_
 def test_from_the_middle_of_the_hallway_the_other_way_round_is_told() -> None:
     """What should be seen in one direction is not what should be seen from where the hallway repeats itself."""
     here = Pose2(*WORLD.world_from_locale("hallway").apply([6.0, 1.2, 0.0])[:2], 0.0)
-    seen = view(ROBOT, here).segments_px
+    seen = predict_lines(ROBOT, here).segments_px
     found = find_strongest_alias(ROBOT, seen, "hallway", here)
     assert found is not None and found.margin > 1.0
-    from_there = find_strongest_alias(ROBOT, view(ROBOT, found.world_from_robot).segments_px, "hallway", here)
+    from_there = find_strongest_alias(ROBOT, predict_lines(ROBOT, found.world_from_robot).segments_px, "hallway", here)
     assert from_there is not None and from_there.margin < 0.0
 
 
-@few
-@given(st.integers(0, 2**32 - 1))
-def test_what_can_be_seen_from_near_is_projected_to_where_it_is_seen_from_the_pose(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    x, y = WORLD.world_from_locale("hallway").apply([rng.uniform(3.0, 18.0), 1.2, 0.0])[:2]
-    pose = Pose2(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
-    of_grid = Pose2(*(round(v / by) * by for v, by in zip(
-        (pose.x_m, pose.y_m, pose.heading_rad), (GRID_M, GRID_M, GRID_RAD), strict=True)))
-    assert predict_views_on_grid(ROBOT, [of_grid])[0] == pytest.approx(view(ROBOT, of_grid).segments_px, abs=1e-6)
-    (near,), exact = predict_views_on_grid(ROBOT, [pose]), view(ROBOT, pose).segments_px
-    length = np.linalg.norm(exact[:, 1] - exact[:, 0], axis=1)
-    covered = np.nan_to_num(compute_coverage(exact, near, 0.5, 0.06))
-    assert np.sum(length * covered) >= 0.7 * np.sum(length)
+def test_lines_visible_from_the_grid_are_projected_to_where_they_are_seen_from_the_pose() -> None:
+    """Exactly on the grid; between its poses at least nine tenths of the length, but for one pose in twenty."""
+    rng, shares = np.random.default_rng(0), []
+    for _ in range(200):
+        x, y = WORLD.world_from_locale("hallway").apply([rng.uniform(3.0, 18.0), 1.2, 0.0])[:2]
+        pose = Pose2(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
+        of_grid = Pose2(*(round(v / by) * by for v, by in zip(
+            (pose.x_m, pose.y_m, pose.heading_rad), (GRID_M, GRID_M, GRID_RAD), strict=True)))
+        on_grid, between = predict_views_on_grid(ROBOT, [of_grid, pose])
+        assert on_grid == pytest.approx(predict_lines(ROBOT, of_grid).segments_px, abs=1e-6)
+        exact = predict_lines(ROBOT, pose).segments_px
+        length = np.linalg.norm(exact[:, 1] - exact[:, 0], axis=1)
+        covered = np.nan_to_num(compute_coverage(exact, between, 0.5, 0.06))
+        shares.append(float(np.sum(length * covered) / np.sum(length)))
+    assert np.quantile(shares, 0.05) >= 0.9
+    assert np.quantile(shares, 0.01) >= 0.7
+    assert min(shares) >= 0.5
 
 
 def test_to_have_thought_of_it_beforehand_changes_no_answer() -> None:
     here = Pose2(*WORLD.world_from_locale("hallway").apply([7.31, 1.17, 0.0])[:2], 0.013)
-    seen = view(ROBOT, here).segments_px
+    seen = predict_lines(ROBOT, here).segments_px
     world = load_world(WORLDS / "research_center.toml", details=[])
     asked = RobotModel(world, ROBOT.camera, ROBOT.mount, ROBOT.actuator)
     precompute_views(asked, "hallway", here @ Pose2(0.02, -0.01, 0.004))

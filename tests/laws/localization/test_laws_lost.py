@@ -23,10 +23,11 @@ from knowledge_sources.methods.localization.hypotheses import (
     normalize_log_likelihoods,
 )
 from knowledge_sources.methods.localization.log_likelihood import PoseLikelihood
-from knowledge_sources.methods.localization.refinement import predict_lines, refine_pose, refine_view_motions
+from knowledge_sources.methods.localization.refinement import refine_pose, refine_view_motions
 from knowledge_sources.methods.localization.relocation import Candidate, LocalizationStatus, find_aliases, localize
 from knowledge_sources.methods.localization.views import CameraView, align_headings, propagate_pose
 from knowledge_sources.methods.localization.visibility_map import get_visibility_map
+from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from sim.made_up.generated_floors import generated_floor
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount

@@ -16,9 +16,9 @@ from knowledge_sources.methods.localization.obstructions import (
     is_opaque,
     update_obstruction,
 )
-from knowledge_sources.methods.localization.refinement import predict_lines
 from knowledge_sources.methods.localization.views import CameraView
-from knowledge_sources.methods.verification.color_check import predict_face_colors
+from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
+from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries.obstruction import MOST_HIDDEN, Obstruction

@@ -15,16 +15,22 @@ from knowledge_sources.methods.verification.color_check import (
     ColorCheck,
     check_colors,
     predict_color_check,
-    predict_face_colors,
 )
 from knowledge_sources.methods.verification.line_check import check_lines
-from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, TERMS, fitted, terms, unseen
+from knowledge_sources.methods.verification.pose_confidence import (
+    POSE_CONFIDENCE,
+    TERMS,
+    compute_terms,
+    fit_weights,
+    remove_colors,
+)
 from knowledge_sources.methods.verification.pose_evidence import (
-    NAMES,
+    EVIDENCE_NAMES,
     PoseEvidence,
     compute_evidence,
     compute_motion_tolerance_px,
 )
+from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from knowledge_sources.plan.milestone_selector import expectation
 from sim.made_up.generated_floors import generated_floor
 from sim.render.renderer import Renderer
@@ -63,15 +69,15 @@ def _segments(pose: Pose2) -> np.ndarray:
     return np.nan_to_num(robot.camera.project_segments(_lines(), robot.camera_from_world(pose))[0], nan=-99.0)
 
 
-def _told(lines: np.ndarray, segments: np.ndarray, pose: Pose2, faces: ColorCheck = NOT_TESTED) -> PoseEvidence:
+def _evidence(lines: np.ndarray, segments: np.ndarray, pose: Pose2, faces: ColorCheck = NOT_TESTED) -> PoseEvidence:
     robot = _robot()
     checked = check_lines(robot, lines, segments, pose)
     return compute_evidence(robot, lines, segments, pose, SPREAD, _place(), SPREAD, checked, faces)
 
 
-@given(EVIDENCE, st.sampled_from(NAMES), st.floats(0.0, 0.5))
+@given(EVIDENCE, st.sampled_from(EVIDENCE_NAMES), st.floats(0.0, 0.5))
 def test_more_evidence_never_makes_a_pose_less_sure(found: PoseEvidence, name: str, more: float) -> None:
-    values = dict(zip(NAMES, found.values.tolist(), strict=True))
+    values = dict(zip(EVIDENCE_NAMES, found.values.tolist(), strict=True))
     values[name] += more
     assert POSE_CONFIDENCE.p_false(PoseEvidence(**values)) <= POSE_CONFIDENCE.p_false(found) + 1e-15
 
@@ -87,16 +93,16 @@ def test_the_probability_is_one_and_the_limits_are_in_order(found: PoseEvidence)
 def test_the_order_of_lines_and_segments_does_not_matter(seed: int) -> None:
     lines, segments, rng = _lines(), _segments(_place()), np.random.default_rng(seed)
     there = Pose2(_place().x_m + 0.02, _place().y_m, _place().heading_rad)
-    mixed = _told(lines[rng.permutation(len(lines))], segments[rng.permutation(len(segments))], there)
-    assert mixed.values == pytest.approx(_told(lines, segments, there).values, abs=1e-9)
+    mixed = _evidence(lines[rng.permutation(len(lines))], segments[rng.permutation(len(segments))], there)
+    assert mixed.values == pytest.approx(_evidence(lines, segments, there).values, abs=1e-9)
 
 
 def test_the_right_place_is_surer_than_those_about_it() -> None:
-    faces = ColorCheck(8, 1.0, 0.2)
-    here = POSE_CONFIDENCE.p_false(_told(_lines(), _segments(_place()), _place(), faces))
+    faces = ColorCheck(8, 1.0, 0.2, is_testable=True)
+    here = POSE_CONFIDENCE.p_false(_evidence(_lines(), _segments(_place()), _place(), faces))
     for x, y, turn in ((0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.1), (-0.5, 0.2, 0.05)):
         there = _place() @ Pose2(x, y, turn)
-        assert POSE_CONFIDENCE.p_false(_told(_lines(), _segments(_place()), there, faces)) > 10.0 * here
+        assert POSE_CONFIDENCE.p_false(_evidence(_lines(), _segments(_place()), there, faces)) > 10.0 * here
 
 
 def test_the_tolerance_grows_with_what_the_wheels_may_have_done() -> None:
@@ -109,14 +115,15 @@ def test_the_tolerance_grows_with_what_the_wheels_may_have_done() -> None:
 def test_the_fit_finds_weights_that_part_right_from_wrong_and_none_is_negative() -> None:
     rng = np.random.default_rng(0)
     right = rng.random(400) < 0.5
-    found = rng.random((400, len(NAMES)))
+    found = rng.random((400, len(EVIDENCE_NAMES)))
     found[:, 0] = np.clip(0.3 + 0.4 * right + rng.normal(0.0, 0.1, 400), 0.0, 1.0)
     found[:, 1] = np.clip(0.7 - 0.4 * right + rng.normal(0.0, 0.1, 400), 0.0, 1.0)  # speaks against: must count nothing
-    weights = fitted(found, right)
-    assert len(weights.each) == len(TERMS) == terms(found).shape[1]
+    weights = fit_weights(found, right)
+    assert len(weights.each) == len(TERMS) == compute_terms(found).shape[1]
     assert min(weights.each) >= 0.0 and weights.each[1] == 0.0
     assert np.mean((weights.p_false(found) < 0.5) == right) > 0.9
-    assert not unseen(found)[:, [NAMES.index("faces"), NAMES.index("faces_tested")]].any()
+    colors = [EVIDENCE_NAMES.index(name) for name in ("color_agreement", "color_count")]
+    assert not remove_colors(found)[:, colors].any()
 
 
 @cache

@@ -1,0 +1,175 @@
+"""The faces that should be visible from a pose, with their colors, by ray casting a grid of pixels into the model."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from knowledge_sources.methods.arrays import Floats, Ints
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.verification import VerificationSettings
+from world_models.building.faces import area_vector
+from world_models.building.locale_source import LocaleGeometry
+from world_models.building.regions import Finish, expected_brightness
+from world_models.camera import NEAR_PLANE_M, Camera
+from world_models.frames import Pose, Pose2
+from world_models.robot import RobotModel
+from world_models.visibility.portals import Window, find_visible_locales, image_window
+
+FaceColor = tuple[tuple[float, ...], tuple[tuple[float, ...], ...]]
+"""The color of a face (red, green, blue; 0..1, as bright as the model has it), and points of it in view [m, world]."""
+
+MAX_CORNERS = 8
+"""Corners that the array of polygons has room for; regions of more corners are left out."""
+RAYS = 5
+"""Rays of a sample: the pixel itself and four around it."""
+WHITE = Finish((1.0, 1.0, 1.0))
+
+
+def predict_face_colors(
+    robot: RobotModel, pose: Pose2, settings: VerificationSettings = DEFAULT.verification
+) -> tuple[FaceColor, ...]:
+    """Predict the faces in view from a pose, the largest first. The last answers are kept with the world."""
+    camera, camera_from_world = robot.camera, robot.camera_from_world(pose)
+    key = camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes(), settings
+    return robot.world.cached("face colors", settings.cached_color_views, key,
+                                  lambda: _predict(robot, camera, camera_from_world, settings))
+
+
+def _predict(
+    robot: RobotModel, camera: Camera, camera_from_world: Pose, settings: VerificationSettings
+) -> tuple[FaceColor, ...]:
+    rays, (left, top, right, bottom), window = _build_rays(camera, settings)
+    rooms = sorted(find_visible_locales(robot.world, window, camera_from_world))
+    packets = {(p.locale, p.neighbour or ""): p for room in rooms for p in robot.world.locale_source.geometry(room)}
+    if not packets:
+        return ()
+    parts = [_build_surfaces(robot.world.cache, packets[key]) for key in sorted(packets)]
+    corners, colors, normals = (np.concatenate([part[i] for part in parts]) for i in range(3))
+    center = camera_from_world.inverse().translation
+    facing = np.flatnonzero(np.einsum("ij,ij->i", normals, center - corners[:, 0]) > 1e-6)
+    near = camera_from_world.apply(corners[facing].reshape(-1, 3)).reshape(-1, MAX_CORNERS, 3)
+    boxes = _bound(near)
+    in_view = np.flatnonzero(np.any(near[..., 2] > NEAR_PLANE_M, axis=1) & (boxes[:, 0] <= right)
+                             & (boxes[:, 2] >= left) & (boxes[:, 1] <= bottom) & (boxes[:, 3] >= top))
+    facing = facing[in_view]
+    turned = normals[facing] @ camera_from_world.rotation.T
+    surface, depth = _cast_rays(near[in_view], turned, boxes[in_view], rays, settings.color_grid_size)
+    if camera.obstruction is not None:
+        surface[camera.obstruction.covers(_sample_pixels(camera.width, camera.height, settings)).ravel()] = -1
+    hit = np.unique(surface[surface >= 0])
+    if not len(hit):
+        return ()
+    appearance = np.round(np.column_stack([colors, normals])[facing[hit]], 4)
+    keys, group = np.unique(appearance, axis=0, return_inverse=True)
+    group_of = np.full(len(facing) + 1, -1)  # the last element is that of surface -1
+    group_of[hit] = group.ravel()
+    of = group_of[surface].reshape(-1, RAYS)
+    whole = np.flatnonzero((of[:, 0] >= 0) & np.all(of == of[:, :1], axis=1))
+    at = rays[::RAYS][whole] * depth[::RAYS][whole, None]
+    points = camera_from_world.inverse().apply(at).reshape(-1, 3)
+    return tuple(_to_face_color(keys[g, :3], points[of[whole, 0] == g], settings.max_face_points)
+                 for g in _find_largest(of[whole, 0], settings))
+
+
+@lru_cache(maxsize=8)
+def _build_rays(camera: Camera, settings: VerificationSettings) -> tuple[Floats, Floats, Window]:
+    """Rays (n, 3), z = 1, through the samples of a picture, the rectangle around them (4,), and the picture's own."""
+    rays = camera.rays(_sample_pixels(camera.width, camera.height, settings)).reshape(-1, 3)
+    rays = np.ascontiguousarray(rays / rays[:, 2:])
+    return rays, np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)]), image_window(camera)
+
+
+def _sample_pixels(width: int, height: int, settings: VerificationSettings) -> Floats:
+    """(n, RAYS, 2) a grid of pixels, each with four around it [px]."""
+    margin, size = settings.border_margin_px + settings.edge_margin_px, settings.color_grid_size
+    u, v = np.linspace(margin, width - 1 - margin, size), np.linspace(margin, height - 1 - margin, size)
+    middle = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 1, 2)
+    around = settings.edge_margin_px * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)], float)
+    return np.asarray(middle + around)
+
+
+def _find_largest(groups: Ints, settings: VerificationSettings) -> list[int]:
+    """The most frequent groups, in falling order."""
+    names, counts = np.unique(groups, return_counts=True)
+    order = np.argsort(-counts, kind="stable")[: settings.max_faces]
+    return [int(names[i]) for i in order if counts[i] >= settings.min_face_points]
+
+
+def _to_face_color(color: Floats, points: Floats, max_points: int) -> FaceColor:
+    """A face's color with a few of its points, spread over all of it."""
+    some = sorted({i * (len(points) - 1) // (max_points - 1) for i in range(max_points)})
+    red, green, blue = color.tolist()
+    return (red, green, blue), tuple(map(tuple, points[some].round(3).tolist()))
+
+
+def _build_surfaces(memo: dict[str, Any], packet: LocaleGeometry) -> tuple[Floats, Floats, Floats]:
+    """Corners (m, MAX_CORNERS, 3), shaded colors (m, 3) and normals (m, 3) of a packet's regions; built once."""
+    known: dict[object, tuple[Floats, Floats, Floats]] = memo.setdefault("colored regions", {})
+    key = packet.locale, packet.neighbour
+    if key not in known:
+        regions = [region for _, face in packet.faces for region in (*face.front, *face.back)
+                   if len(region.polygon_world) <= MAX_CORNERS]
+        corners = np.array([[*r.polygon_world, *[r.polygon_world[-1]] * (MAX_CORNERS - len(r.polygon_world))]
+                            for r in regions]).reshape(-1, MAX_CORNERS, 3)
+        normals = np.array([area_vector(region.polygon_world) for region in regions]).reshape(-1, 3)
+        normals = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
+        light = np.array([expected_brightness(WHITE, normal) for normal in normals]).reshape(-1, 1)
+        known[key] = corners, np.array([region.colour for region in regions]).reshape(-1, 3) * light, normals
+    return known[key]
+
+
+def _bound(corners: Floats) -> Floats:
+    """(m, 4) rectangle (x, y low, x, y high), z = 1, around polygons (m, k, 3); infinite where partly behind."""
+    across, down, deep = np.ascontiguousarray(corners.transpose(2, 1, 0))
+    depth = np.maximum(deep, NEAR_PLANE_M)
+    x, y = across / depth, down / depth  # (k, m): numpy takes the minimum of many rows faster than of many short ones
+    box = np.column_stack([x.min(axis=0), y.min(axis=0), x.max(axis=0), y.max(axis=0)])
+    box[deep.min(axis=0) <= NEAR_PLANE_M] = (-np.inf, -np.inf, np.inf, np.inf)
+    return np.asarray(box)
+
+
+@njit(cache=True, error_model="numpy")
+def _cast_rays(corners: Any, normals: Any, boxes: Any, rays: Any, size: int) -> Any:
+    """Index of the polygon (m, k, 3), camera frame, that each ray (x, y, 1) meets first (-1: none), and its depth [m].
+
+    The rays are those of a grid of ``size`` by ``size`` samples. A point of a polygon's plane is inside where it is on
+    the same side of all planes through the eye and one edge.
+    """
+    surface, depth = np.full(len(rays), -1, np.int64), np.full(len(rays), np.inf)
+    columns, rows = rays[: RAYS * size : RAYS, 0], rays[:: RAYS * size, 1]
+    edges = np.empty((corners.shape[1], 3))
+    for m in range(len(corners)):
+        n, c = normals[m], corners[m]
+        sides = 0
+        for k in range(len(c)):  # the last corner is repeated: edges of length zero are left out
+            a, b = c[k], c[(k + 1) % len(c)]
+            if a[0] != b[0] or a[1] != b[1] or a[2] != b[2]:
+                edges[sides, 0] = a[1] * b[2] - a[2] * b[1]
+                edges[sides, 1] = a[2] * b[0] - a[0] * b[2]
+                edges[sides, 2] = a[0] * b[1] - a[1] * b[0]
+                sides += 1
+        left, right = np.searchsorted(columns, boxes[m, 0]) - 1, np.searchsorted(columns, boxes[m, 2]) + 1
+        top, bottom = np.searchsorted(rows, boxes[m, 1]) - 1, np.searchsorted(rows, boxes[m, 3]) + 1
+        ahead = n[0] * c[0, 0] + n[1] * c[0, 1] + n[2] * c[0, 2]
+        for row in range(max(top, 0), min(bottom, size)):
+            for i in range(RAYS * (size * row + max(left, 0)), RAYS * (size * row + min(right, size))):
+                x, y = rays[i, 0], rays[i, 1]
+                if not (boxes[m, 0] <= x <= boxes[m, 2] and boxes[m, 1] <= y <= boxes[m, 3]):
+                    continue
+                slope = n[0] * x + n[1] * y + n[2]
+                if slope >= -1e-12:
+                    continue
+                far = ahead / slope
+                if far <= NEAR_PLANE_M or far >= depth[i]:
+                    continue
+                low, high = 0.0, 0.0
+                for k in range(sides):
+                    side = edges[k, 0] * x + edges[k, 1] * y + edges[k, 2]
+                    low, high = min(low, side), max(high, side)
+                if low > -1e-12 or high < 1e-12:
+                    surface[i], depth[i] = m, far
+    return surface, depth
