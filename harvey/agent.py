@@ -138,7 +138,8 @@ class _Lacking:
         return (self._without(packet) for packet in self._frames.all_geometry())
 
     def _without(self, packet: LocaleGeometry) -> LocaleGeometry:
-        landmarks = ((n, replace(m, edges=Edges.of(())) if m.name in self._names else m) for n, m in packet.landmarks)
+        no_edges = Edges.from_rows(())
+        landmarks = ((n, replace(m, edges=no_edges) if m.name in self._names else m) for n, m in packet.landmarks)
         faces = (pair for pair in packet.faces if pair[1].name not in self._names)
         return replace(packet, faces=tuple(faces), landmarks=tuple(landmarks))
 

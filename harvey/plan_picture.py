@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from world_models.building.plan_view import GROUND, Shape, plan_of
+from world_models.building.plan_view import GROUND, Shape, build_drawing
 from world_models.building.world import World
 
 DOTS_A_METRE, MOST_DOTS = 30.0, 6000.0
@@ -21,7 +21,7 @@ def draw_plan(world: World, out: Path) -> None:
     """Write the plan as a PNG. Raises OSError."""
     from matplotlib.figure import Figure
 
-    plan = plan_of(world)
+    plan = build_drawing(world)
     scale = min(DOTS_A_METRE, MOST_DOTS / float(plan.size.max()))
     figure = Figure(figsize=(plan.size[0] * scale / 100.0, plan.size[1] * scale / 100.0), dpi=100, facecolor=GROUND)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))

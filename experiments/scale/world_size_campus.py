@@ -26,7 +26,7 @@ from world_models.building.locale_source import LocaleGeometry
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.regions import Finish, expected_brightness
 from world_models.building.world import World
-from world_models.files.compiled.packing import pack_array, packed
+from world_models.files.compiled.packing import pack_array, pack_geometry
 from world_models.files.compiled.writer import WorldWriter
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose
@@ -185,7 +185,8 @@ class _Template:
     """One generated building at the origin."""
 
     def __init__(self) -> None:
-        here, east, north = ([packed(p) for p in _packets(x, y)] for x, y in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+        places = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
+        here, east, north = ([pack_geometry(p) for p in _packets(x, y)] for x, y in places)
         self.packets = []
         for packet, (words, numbers), (_, moved_x), (_, moved_y) in zip(
                 _packets(0.0, 0.0), here, east, north, strict=True):
@@ -287,7 +288,7 @@ def _corners(room: _Room, x: float, y: float) -> Edges:
         normals = np.array([(nx, 0.0, 0.0), (0.0, ny, 0.0)])
         levels = [*(expected_brightness(WALL, n) for n in normals), float("nan")]
         rows.append(([(cx, cy, 0.0), (cx, cy, HEIGHT_M)], normals, levels))
-    return Edges.of(rows)
+    return Edges.from_rows(rows)
 
 
 def _door(prefix: str, room: _Room, x: float, y: float) -> list[Face]:

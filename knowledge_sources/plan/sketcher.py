@@ -140,7 +140,7 @@ class Sketcher(RobotKnowledgeSource):
         openings = [np.concatenate(doorway.thresholds_world) for doorway in world.doorways_of(name)]
         near = [(measure_wall_distance_m(world.outline(name), openings, point), "a wall")]
         near += [(measure_thing_distance_m(t.footprint_world, point), t.name)
-                 for t in world.things_of(name) if t.in_the_way]
+                 for t in world.things_of(name) if t.is_obstacle]
         distance_m, what = min(near)
         radius_m, margin_m = self._robot.radius_m, CLEARANCES_M[-1]
         if distance_m >= radius_m + margin_m:

@@ -1,4 +1,8 @@
-"""Where a world's frames come from (§3.4): memory or a file. A world asks for those of one locale at a time."""
+"""Where locale data come from (§3.4): the interface of memory and compiled files, asked for one locale at a time.
+
+The paper keeps a frame of slots for each locale (its place, contents and neighbours). Here "frame" means a coordinate
+frame only; the paper's frame of a locale is its ``Locale`` with doorways, links, geometry and things.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +20,11 @@ from world_models.building.things import Finding, Thing
 
 @dataclass(frozen=True, eq=False)
 class LocaleGeometry:
-    """The faces and landmarks of a locale, or those that it shares with one neighbour (the frame of an open door).
+    """The faces and landmarks of a locale, or those that it shares with one neighbour (around an open door).
 
     Attributes:
-        locale: whose they are.
-        neighbour: the locale from which they are seen too; None for those of one room only.
+        locale: the locale that they belong to.
+        neighbour: the second locale from which they are seen; None for those of one locale only.
         faces, landmarks: each with its number in the world, ascending.
     """
 
@@ -31,20 +35,19 @@ class LocaleGeometry:
 
     @cached_property
     def scene(self) -> Scene:
-        """Its model lines and surfaces in arrays, worked out once."""
+        """Its model lines and surfaces as arrays; cached."""
         return build_scene(self.faces, self.landmarks)
 
 
 @dataclass(frozen=True, slots=True)
-class Arc:
-    """A passage as its container sees it (Figure 8): between two of its parts.
+class PassageEdge:
+    """An edge of a container's passage graph (Figure 8).
 
-    A part is a locale with the number of one of its components: a locale that cannot be crossed from each of its
-    doorways to each other is several parts.
+    A node is (locale, component): a locale that cannot be crossed between all of its doorways has several components.
 
     Attributes:
         passage: name of the doorway or link.
-        between: the two parts, (name of the locale, component).
+        between: the two nodes.
     """
 
     passage: str
@@ -52,11 +55,11 @@ class Arc:
 
 
 class LocaleSource(Protocol):
-    """What a world needs of its memory. Names that it does not know give None or nothing."""
+    """Locale data by name. An unknown name gives None or an empty result."""
 
     @property
     def name(self) -> str:
-        """Of the world and of its root locale."""
+        """Name of the world and of its root locale."""
 
     def names(self) -> Sequence[str]:
         """All locales, root first, then in the order of the file."""
@@ -64,13 +67,13 @@ class LocaleSource(Protocol):
     def locale(self, name: str, /) -> Locale | None: ...
 
     def children(self, name: str, /) -> tuple[str, ...]:
-        """The locales that this one directly contains, in order."""
+        """The locales that this one contains directly, in order."""
 
     def is_room(self, name: str, /) -> bool:
-        """Whether it is a locale that contains no other."""
+        """Whether this is a locale that contains no other."""
 
     def near(self, x_m: float, y_m: float, margin_m: float, /) -> Sequence[str]:
-        """Locales whose rectangle on the plan, grown by a margin, holds a point [m, world]; in the file's order."""
+        """Locales whose bounding rectangle, grown by a margin, holds a point [m, world]; in the order of the file."""
 
     def doorways(self, locale: str, /) -> tuple[Doorway, ...]:
         """Its open doorways, in order."""
@@ -79,20 +82,20 @@ class LocaleSource(Protocol):
         """Elevators and stairs that stop in it."""
 
     def geometry(self, locale: str, /) -> tuple[LocaleGeometry, ...]:
-        """Its own packet and those that it shares."""
+        """Its own geometry and what it shares with each neighbour."""
 
     def things(self, locale: str, /) -> tuple[Thing, ...]: ...
 
-    def arcs(self, container: str, /) -> tuple[Arc, ...]:
-        """The passages between the parts of a locale."""
+    def passage_edges(self, container: str, /) -> tuple[PassageEdge, ...]:
+        """The passages between the locales directly in a container."""
 
     def component(self, locale: str, component: int, /) -> int:
-        """To which component of its container a component of a locale belongs."""
+        """The component of its container that a component of a locale belongs to."""
 
     def passage(self, name: str, /) -> Doorway | Link | None: ...
 
     def named(self, words: str, /) -> Sequence[str]:
-        """Locales with all these words in their name, kind or owner."""
+        """Locales with all these words in their name, kind or properties."""
 
     def all_doorways(self) -> tuple[Doorway, ...]: ...
 
@@ -103,7 +106,7 @@ class LocaleSource(Protocol):
     def all_things(self) -> tuple[Thing, ...]: ...
 
     def counts(self) -> Mapping[str, int]:
-        """How many rooms, doorways, things, faces and landmarks there are."""
+        """Numbers of rooms, open doorways, things, faces and landmarks."""
 
     def faults(self) -> tuple[Finding, ...]:
-        """What could not be built."""
+        """Parts of the description that could not be built."""

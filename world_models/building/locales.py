@@ -1,4 +1,4 @@
-"""Locales (§3.4): parcels of space with their own frames in a contained-by hierarchy, and doorways between them."""
+"""Locales (§3.4): parcels of space with their own coordinate frames in a contained-by hierarchy, and doorways."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from world_models.frames import Pose, Pose2, frozen
 
 @dataclass(frozen=True, eq=False)
 class Locale:
-    """A parcel of space with its own frame (§3.4, Figure 5).
+    """A parcel of space with its own coordinate frame (§3.4, Figure 5).
 
     Attributes:
         name: unique in the world.
         kind: laboratory, hallway, office, floor, building, ...
         parent: the locale that contains it; ``None`` for the root.
         frame: parent_from_locale.
-        outline: (k, 2) its free extent on the floor, counter-clockwise, in its own frame [m].
-        height_m: of its ceiling in its own frame.
-        properties: what else the world file says of it.
-        source: file:line where it is described.
-        floor_m: height of its floor in its own frame; may differ from 0 only where it contains other locales.
-        survey_m, survey_rad: standard deviations of its frame's place and direction in its container.
+        outline: (k, 2) free extent on the floor, counter-clockwise, in its own frame [m].
+        height_m: height of the ceiling in its own frame.
+        properties: other properties of the world file, by name.
+        source: file:line of its description.
+        floor_m: height of the floor in its own frame; not 0 only for a locale that contains others.
+        survey_m, survey_rad: standard deviations of its frame's position and direction in its container.
     """
 
     name: str
@@ -46,10 +46,7 @@ class Locale:
         object.__setattr__(self, "outline", frozen(self.outline, (None, 2)))
 
     def contains(self, point: Any, margin_m: float = 0.0) -> bool:
-        """Whether a point (2,) or (3,) of its own frame lies in it (its border belongs to it).
-
-        ``margin_m`` lets points count that lie at most so far outside.
-        """
+        """Whether a point (2,) or (3,) [m, own frame] lies in it or at most ``margin_m`` outside; borders count."""
         p = np.asarray(point, float)
         if p.size == 3 and not self.floor_m - margin_m - 1e-9 <= p[2] <= self.height_m + margin_m + 1e-9:
             return False
@@ -65,8 +62,8 @@ class Doorway:
         between: the two locales.
         thresholds_world: (2, 2, 2) [m]; ``thresholds_world[i]`` are the feet of the two jambs on the outline of
             ``between[i]``, left jamb first as seen from inside that locale.
-        height_m: of the opening.
-        source: file:line where it is described.
+        height_m: height of the opening.
+        source: file:line of its description.
     """
 
     name: str
@@ -84,13 +81,13 @@ class Doorway:
 
     @property
     def depth_m(self) -> float:
-        """Thickness of the wall that it goes through."""
+        """Thickness of its wall."""
         ends = self.thresholds_world.mean(axis=1)
         return float(np.linalg.norm(ends[1] - ends[0]))
 
     @property
     def centre_world(self) -> NDArray[np.float64]:
-        """(2,) the middle of the opening, half-way through the wall [m]."""
+        """(2,) middle of the opening, half-way through the wall [m]."""
         return np.asarray(self.thresholds_world.mean(axis=(0, 1)))
 
     def other(self, locale: str) -> str:
@@ -98,11 +95,11 @@ class Doorway:
         return self.between[1 - self._side(locale)]
 
     def threshold_of(self, locale: str) -> NDArray[np.float64]:
-        """(2, 2) the feet of its jambs on the outline of ``locale`` [m, world]."""
+        """(2, 2) feet of its left and right jamb on the outline of ``locale`` [m, world]. Raises ValueError."""
         return np.asarray(self.thresholds_world[self._side(locale)])
 
     def outward_from(self, locale: str) -> NDArray[np.float64]:
-        """(2,) unit direction on the floor that leaves ``locale`` through the doorway [world]."""
+        """(2,) unit direction on the floor out of ``locale`` through the doorway [world]."""
         left, right = self.threshold_of(locale)
         along = (right - left) / np.linalg.norm(right - left)
         return np.array([-along[1], along[0]])
@@ -127,8 +124,8 @@ class Link:
         name: unique in the world.
         kind: elevator or stairs.
         between: the two locales.
-        stops_world: (2, 3) where one stands in each of them to begin or to end the ride, and facing where [m, rad].
-        source: file:line where it is described.
+        stops_world: (2, 3) x, y, heading of the robot in each locale at the start or end of the ride [m, rad].
+        source: file:line of its description.
     """
 
     name: str
@@ -145,7 +142,7 @@ class Link:
         return self.between[1 - self.between.index(locale)]
 
     def stop_of(self, locale: str) -> NDArray[np.float64]:
-        """(3,) x, y [m] and heading [rad] of the stop in one of the two, world frame."""
+        """(3,) x, y [m] and heading [rad] of the stop in one of the two locales, world frame."""
         return np.asarray(self.stops_world[self.between.index(locale)])
 
 

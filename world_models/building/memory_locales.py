@@ -1,4 +1,4 @@
-"""Frames held in memory: the world of a TOML file."""
+"""Locale data in memory: the world of a TOML file."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from world_models.building.faces import Face
 from world_models.building.landmarks import Landmark
-from world_models.building.locale_source import Arc, LocaleGeometry
+from world_models.building.locale_source import LocaleGeometry, PassageEdge
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.passages import Network, drivable_passages, network
+from world_models.building.passages import PassageGraphs, build_passage_graphs, drivable_passages
 from world_models.building.things import Finding, Thing
 from world_models.frames import Pose
 
@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class MemoryLocales:
-    """All frames of a world; see :class:`world_models.building.locale_source.LocaleSource` for the questions."""
+    """A :class:`world_models.building.locale_source.LocaleSource` that holds all locales of a world."""
 
     name: str
     locales: Mapping[str, Locale]
@@ -49,7 +49,7 @@ class MemoryLocales:
         return name in self.locales and name not in self._children
 
     def near(self, x_m: float, y_m: float, margin_m: float) -> Sequence[str]:
-        names, low, high = self._boxes
+        names, low, high = self._rectangles
         p = np.array([x_m, y_m])
         return [names[i] for i in np.flatnonzero(np.all((low - margin_m <= p) & (p <= high + margin_m), axis=1))]
 
@@ -65,11 +65,11 @@ class MemoryLocales:
     def things(self, locale: str) -> tuple[Thing, ...]:
         return self._things.get(locale, ())
 
-    def arcs(self, container: str) -> tuple[Arc, ...]:
-        return self._network.arcs.get(container, ())
+    def passage_edges(self, container: str) -> tuple[PassageEdge, ...]:
+        return self._graphs.edges.get(container, ())
 
     def component(self, locale: str, component: int) -> int:
-        return self._network.components[locale, component]
+        return self._graphs.containing[locale, component]
 
     def passage(self, name: str) -> Doorway | Link | None:
         return self._passages.get(name)
@@ -101,16 +101,15 @@ class MemoryLocales:
 
     @cached_property
     def _children(self) -> dict[str, tuple[str, ...]]:
-        pairs = [(locale.parent, name) for name, locale in self.locales.items() if locale.parent is not None]
-        return _grouped(pairs)
+        return _group((locale.parent, name) for name, locale in self.locales.items() if locale.parent is not None)
 
     @cached_property
     def _doorways(self) -> dict[str, tuple[Doorway, ...]]:
-        return _grouped([(name, doorway) for doorway in self.every_doorway for name in doorway.between])
+        return _group((name, doorway) for doorway in self.every_doorway for name in doorway.between)
 
     @cached_property
     def _things(self) -> dict[str, tuple[Thing, ...]]:
-        return _grouped([(thing.locale, thing) for thing in self.every_thing])
+        return _group((thing.locale, thing) for thing in self.every_thing)
 
     @cached_property
     def _passages(self) -> dict[str, Doorway | Link]:
@@ -118,24 +117,25 @@ class MemoryLocales:
         return {passage.name: passage for passage in passages}
 
     @cached_property
-    def _network(self) -> Network:
+    def _graphs(self) -> PassageGraphs:
         parents = {name: locale.parent for name, locale in self.locales.items()}
-        return network(parents, drivable_passages((*self.every_doorway, *self.every_link)))
+        return build_passage_graphs(parents, drivable_passages((*self.every_doorway, *self.every_link)))
 
     @cached_property
     def _all_geometry(self) -> tuple[LocaleGeometry, ...]:
-        faces = _grouped([((face.locale, face.neighbour), (i, face)) for i, face in enumerate(self.every_face)])
-        marks = _grouped([((mark.locale, mark.neighbour), (i, mark)) for i, mark in enumerate(self.every_landmark)])
+        faces = _group(((face.locale, face.neighbour), (i, face)) for i, face in enumerate(self.every_face))
+        marks = _group(((mark.locale, mark.neighbour), (i, mark)) for i, mark in enumerate(self.every_landmark))
         keys = list(dict.fromkeys([*faces, *marks]))
         return tuple(LocaleGeometry(*key, faces.get(key, ()), marks.get(key, ())) for key in keys)
 
     @cached_property
     def _geometry(self) -> dict[str, tuple[LocaleGeometry, ...]]:
-        return _grouped([(name, packet) for packet in self._all_geometry
-                         for name in dict.fromkeys((packet.locale, packet.neighbour)) if name is not None])
+        return _group((name, part) for part in self._all_geometry
+                      for name in dict.fromkeys((part.locale, part.neighbour)) if name is not None)
 
     @cached_property
-    def _boxes(self) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64]]:
+    def _rectangles(self) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64]]:
+        """Names of all locales, and low and high corners (n, 2) of their bounding rectangles [m, world]."""
         poses: dict[str, Pose] = {}
 
         def pose_of(name: str) -> Pose:
@@ -144,29 +144,31 @@ class MemoryLocales:
                 poses[name] = frame if parent is None else pose_of(parent) @ frame
             return poses[name]
 
-        boxes = np.array([extent_of(locale, pose_of(name)) for name, locale in self.locales.items()]).reshape(-1, 4)
-        return tuple(self.locales), boxes[:, :2], boxes[:, 2:]
+        rows = [bounding_rectangle(locale, pose_of(name)) for name, locale in self.locales.items()]
+        rectangles = np.array(rows).reshape(-1, 4)
+        return tuple(self.locales), rectangles[:, :2], rectangles[:, 2:]
 
 
-def extent_of(locale: Locale, world_from_locale: Pose) -> NDArray[np.float64]:
-    """(4,) the bounding rectangle on the plan, x0 y0 x1 y1, a little enlarged [m, world]."""
+def bounding_rectangle(locale: Locale, world_from_locale: Pose) -> NDArray[np.float64]:
+    """(4,) x0, y0, x1, y1 of a locale's outline on the plan, enlarged by a micrometre [m, world]."""
     flat = world_from_locale.apply(np.column_stack([locale.outline, np.zeros(len(locale.outline))]))[:, :2]
     return np.concatenate([flat.min(axis=0) - 1e-6, flat.max(axis=0) + 1e-6])
 
 
 def words_of(text: str) -> frozenset[str]:
-    """The words of a name or a phrase, in small letters; a possessive's s is no word."""
+    """The words of a name or a phrase in lower case, without a possessive's s."""
     return frozenset(word for word in re.split(r"[^a-z0-9]+", text.lower().replace("'s", "")) if word)
 
 
 def words_about(locale: Locale) -> frozenset[str]:
-    """The words by which people may mean a locale: of its name, kind and properties."""
+    """The words by which people may name a locale: those of its name, kind and text properties."""
     texts = [locale.name, locale.kind, *(value for value in locale.properties.values() if isinstance(value, str))]
     return frozenset().union(*map(words_of, texts))
 
 
-def _grouped(pairs: Iterable[tuple[K, T]]) -> dict[K, tuple[T, ...]]:
-    out: dict[K, list[T]] = {}
+def _group(pairs: Iterable[tuple[K, T]]) -> dict[K, tuple[T, ...]]:
+    """The values of each key, in order."""
+    groups: dict[K, list[T]] = {}
     for key, value in pairs:
-        out.setdefault(key, []).append(value)
-    return {key: tuple(values) for key, values in out.items()}
+        groups.setdefault(key, []).append(value)
+    return {key: tuple(values) for key, values in groups.items()}

@@ -1,15 +1,21 @@
-"""Outlines: simple polygons on the floor, counter-clockwise; what lies in them and how they are cut."""
+"""Outlines: simple counter-clockwise polygons on the floor; containment, distance and convex parts.
+
+Point tests are plain Python: outlines have few corners and are asked often, which shapely's overhead would slow down.
+"""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
+MIN_AREA_M2, MIN_SIDE_M, MIN_GAP_M = 1e-4, 0.01, 1e-3
+"""What a room's outline must have: area, length of its sides, distance between sides that share no corner."""
 
 def inside_polygon(point: NDArray[np.float64], polygon: NDArray[np.float64], margin_m: float = 0.0) -> bool:
-    """Whether a point (2,) lies in a simple polygon (k, 2) or at most ``margin_m`` from its border."""
+    """Whether a point (2,) lies in a simple polygon (k, 2) or at most ``margin_m`` from its border; even-odd rule."""
     x, y = point.tolist()
     sides = _sides(polygon)
     if _distance(x, y, sides) <= margin_m + 1e-9:
@@ -19,13 +25,13 @@ def inside_polygon(point: NDArray[np.float64], polygon: NDArray[np.float64], mar
 
 
 def distance_to_border(point: NDArray[np.float64], polygon: NDArray[np.float64]) -> float:
-    """Distance [m] of a point (2,) from the nearest side of a polygon (k, 2)."""
+    """Distance [m] of a point (2,) to the nearest side of a polygon (k, 2)."""
     x, y = point.tolist()
     return _distance(x, y, _sides(polygon))
 
 
 def _sides(polygon: NDArray[np.float64]) -> list[tuple[float, float, float, float]]:
-    """Both ends of each side in plain numbers: there are few, and they are asked often."""
+    """Both ends of each side."""
     corners = polygon.tolist()
     return [(ax, ay, bx, by) for (ax, ay), (bx, by) in zip(corners, (*corners[1:], corners[0]), strict=True)]
 
@@ -42,34 +48,25 @@ def _distance(x: float, y: float, sides: list[tuple[float, float, float, float]]
 
 
 def is_simple(outline: NDArray[np.float64]) -> bool:
-    """Whether a polygon (k, 2) is counter-clockwise, with sides of 1 cm and more that meet only in their corners."""
+    """Whether a polygon (k, 2) is counter-clockwise and simple, with sides of at least 1 cm.
+
+    Sides that share no corner must be 1 mm apart, and no corner may lie within 1 mm of the side before last.
+    """
     ahead = np.roll(outline, -1, axis=0)
     area = 0.5 * float(np.sum(outline[:, 0] * ahead[:, 1] - outline[:, 1] * ahead[:, 0]))
-    if area < 1e-4 or np.linalg.norm(ahead - outline, axis=1).min() < 0.01:
+    if area < MIN_AREA_M2 or np.linalg.norm(ahead - outline, axis=1).min() < MIN_SIDE_M:
         return False
     k = len(outline)
-    for i in range(k):
-        for j in range(i + 1, k):
-            apart = j - i > 1 and (i, j) != (0, k - 1)
-            if apart and _touching(outline[i], ahead[i], outline[j], ahead[j]):
-                return False
-    return all(distance_to_border(outline[i], np.stack([outline[i - 2], outline[i - 1]])) > 1e-3 for i in range(k))
-
-
-def _touching(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]) -> bool:
-    """Whether two segments come nearer than 1 mm."""
-    def side(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> float:
-        u, v = q - p, r - p
-        return float(u[0] * v[1] - u[1] * v[0])
-
-    if side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0:
-        return True
-    pairs = ((a, c, d), (b, c, d), (c, a, b), (d, a, b))
-    return min(distance_to_border(p, np.stack([q, r])) for p, q, r in pairs) < 1e-3
+    sides = shapely.linestrings(np.stack([outline, ahead], axis=1))
+    i, j = np.triu_indices(k, 2)
+    apart = (i != 0) | (j != k - 1)
+    if np.any(shapely.distance(sides[i[apart]], sides[j[apart]]) < MIN_GAP_M):
+        return False
+    return bool(np.all(shapely.distance(shapely.points(outline), np.roll(sides, 2)) > MIN_GAP_M))
 
 
 def convex_pieces(outline: NDArray[np.float64]) -> list[list[int]]:
-    """A simple counter-clockwise polygon (k, 2) cut into convex ones, as vertex numbers (by clipping ears)."""
+    """A simple counter-clockwise polygon (k, 2) cut into convex ones, as vertex indices (ear clipping)."""
     left = list(range(len(outline)))
     if all(_turn(outline, left[i - 2], left[i - 1], left[i]) > 0 for i in left):
         return [left]

@@ -1,9 +1,9 @@
-"""Passages at every level of the hierarchy (§3.4, Figure 8), and routes found there level by level (Figure 9).
+"""Passages at every level of the hierarchy (§3.4, Figure 8), and routes found level by level (Figure 9).
 
-A locale need not be connected within itself: two flats on one storey may meet only outdoors. Each locale therefore
-has components, numbered from 0, within which one can get about without leaving it, and a container joins the
-components of the locales in it by arcs. So a route found at a high level can always be refined at the lower ones, and
-the search for it looks at one container, however large the campus is.
+A locale need not be connected within itself: two flats on one storey may meet only outdoors. Each locale therefore has
+components, numbered from 0, within which one can move without leaving it. A container's passage graph joins the
+components of the locales directly in it. So a route found at a high level can always be refined at the lower ones, and
+a search looks at one container, however large the campus is.
 """
 
 from __future__ import annotations
@@ -13,59 +13,67 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from world_models.building.locale_source import Arc
+import networkx as nx
+
+from world_models.building.locale_source import PassageEdge
 from world_models.building.locales import Doorway, Link
 
 if TYPE_CHECKING:
     from world_models.building.locale_source import LocaleSource
 
-Part = tuple[str, int]
+Component = tuple[str, int]
 """A locale and the number of one of its components."""
 
 
 @dataclass(frozen=True, slots=True)
-class Network:
-    """The arcs of every container, and for each part but the root's the component of its container."""
+class PassageGraphs:
+    """The passage graphs of all containers.
 
-    arcs: Mapping[str, tuple[Arc, ...]]
-    components: Mapping[Part, int]
+    Attributes:
+        edges: of each container's graph.
+        containing: for each component but the root's, the number of the component of its container that it is in.
+    """
+
+    edges: Mapping[str, tuple[PassageEdge, ...]]
+    containing: Mapping[Component, int]
 
 
 def drivable_passages(passages: Iterable[Doorway | Link]) -> list[tuple[str, str, str]]:
-    """(name, one locale, the other) of those that a robot on wheels can use."""
+    """(name, one locale, the other) of the passages that a robot on wheels can use: all but stairs."""
     return [(p.name, *p.between) for p in passages if isinstance(p, Doorway) or p.kind != "stairs"]
 
 
-def network(parents: Mapping[str, str | None], passages: Iterable[tuple[str, str, str]]) -> Network:
-    """From the container of every locale (root first) and the passages between rooms.
+def build_passage_graphs(parents: Mapping[str, str | None], passages: Iterable[tuple[str, str, str]]) -> PassageGraphs:
+    """The graphs of all containers, from the deepest up.
 
     Args:
-        parents: container of each locale; None for the root.
-        passages: (name, one locale, the other).
+        parents: container of each locale, root first; None for the root.
+        passages: (name, one room, the other).
     """
-    paths = _Paths(parents)
+    tree = _Hierarchy(parents)
     crossing: dict[str, list[tuple[str, str, str]]] = {}
     for name, a, b in passages:
-        crossing.setdefault(paths.common(a, b), []).append((name, a, b))
+        crossing.setdefault(tree.common(a, b), []).append((name, a, b))
     children: dict[str, list[str]] = {}
     for name, parent in parents.items():
         if parent is not None:
             children.setdefault(parent, []).append(name)
-    arcs: dict[str, tuple[Arc, ...]] = {}
-    components: dict[Part, int] = {}
+    edges: dict[str, tuple[PassageEdge, ...]] = {}
+    containing: dict[Component, int] = {}
     sizes = {name: 1 for name in parents if name not in children}
-    for container in sorted(children, key=paths.depth, reverse=True):
-        own = [Arc(name, (paths.part_below(a, container, components), paths.part_below(b, container, components)))
+    for container in sorted(children, key=tree.depth, reverse=True):
+        own = [PassageEdge(name, (tree.component_below(a, container, containing),
+                                  tree.component_below(b, container, containing)))
                for name, a, b in crossing.get(container, ())]
-        parts = [(child, number) for child in children[container] for number in range(sizes[child])]
-        components |= _numbered(parts, own)
-        sizes[container] = 1 + max((components[part] for part in parts), default=0)
-        arcs[container] = tuple(own)
-    return Network(arcs, components)
+        nodes = [(child, number) for child in children[container] for number in range(sizes[child])]
+        containing |= _number_components(nodes, own)
+        sizes[container] = 1 + max((containing[node] for node in nodes), default=0)
+        edges[container] = tuple(own)
+    return PassageGraphs(edges, containing)
 
 
-class _Paths:
-    """The way up from each locale."""
+class _Hierarchy:
+    """The contained-by hierarchy, from the container of each locale."""
 
     def __init__(self, parents: Mapping[str, str | None]) -> None:
         self._parents = parents
@@ -85,41 +93,35 @@ class _Paths:
             a, b = (above, b) if deeper is a else (a, above)
         return a
 
-    def part_below(self, room: str, container: str, components: Mapping[Part, int]) -> Part:
-        """The part directly in ``container`` that a room belongs to."""
-        part: Part = (room, 0)
-        while (parent := self._parents[part[0]]) != container:
+    def component_below(self, room: str, container: str, containing: Mapping[Component, int]) -> Component:
+        """The component directly in ``container`` that a room belongs to."""
+        component: Component = (room, 0)
+        while (parent := self._parents[component[0]]) != container:
             assert parent is not None
-            part = (parent, components[part])
-        return part
+            component = (parent, containing[component])
+        return component
 
 
-def _numbered(parts: list[Part], arcs: list[Arc]) -> dict[Part, int]:
-    """The component of each part, numbered in their order."""
-    leader = {part: part for part in parts}
-
-    def found(part: Part) -> Part:
-        while leader[part] != part:
-            leader[part] = part = leader[leader[part]]
-        return part
-
-    for arc in arcs:
-        leader[found(arc.between[0])] = found(arc.between[1])
-    numbers: dict[Part, int] = {}
-    return {part: numbers.setdefault(found(part), len(numbers)) for part in parts}
+def _number_components(nodes: list[Component], edges: list[PassageEdge]) -> dict[Component, int]:
+    """The connected component of each node, numbered in the order of the nodes."""
+    graph: nx.Graph = nx.Graph()
+    graph.add_nodes_from(nodes)
+    graph.add_edges_from(edge.between for edge in edges)
+    numbers = {node: number for number, members in enumerate(nx.connected_components(graph)) for node in members}
+    return {node: numbers[node] for node in nodes}
 
 
-def parts_above(frames: LocaleSource, room: str) -> list[Part]:
-    """The parts that a room belongs to, from itself up to the root."""
-    parts: list[Part] = [(room, 0)]
-    while (locale := frames.locale(parts[-1][0])) is not None and locale.parent is not None:
-        parts.append((locale.parent, frames.component(*parts[-1])))
-    return parts
+def components_above(source: LocaleSource, room: str) -> list[Component]:
+    """The components that a room belongs to, from itself up to the root."""
+    chain: list[Component] = [(room, 0)]
+    while (locale := source.locale(chain[-1][0])) is not None and locale.parent is not None:
+        chain.append((locale.parent, source.component(*chain[-1])))
+    return chain
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A passage, and from which of its two rooms into which it is taken."""
+    """A passage, taken from room ``origin`` into room ``destination``."""
 
     passage: Doorway | Link
     origin: str
@@ -128,43 +130,47 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """A way at one level of the hierarchy.
+    """A route at one level of the hierarchy.
 
     Attributes:
-        container: the smallest locale within which there is a way; the room itself where no passage is needed.
-        steps: the passages in order; what lies between two of them is left to a more detailed route.
+        container: the smallest locale that holds the route; the room itself where no passage is needed.
+        steps: the passages in order; the way between two of them is left to a more detailed route.
     """
 
     container: str
     steps: tuple[Step, ...]
 
 
-def find_route(frames: LocaleSource, origin: str, destination: str) -> Route | None:
+def find_route(source: LocaleSource, origin: str, destination: str) -> Route | None:
     """The route with the fewest passages in the smallest locale that holds one; None where no passage leads there."""
     if origin == destination:
         return Route(origin, ())
-    up, down = parts_above(frames, origin), parts_above(frames, destination)
-    below = {part[0]: part for part in down}
-    for step, (name, component) in enumerate(up):
-        if step and below.get(name) == (name, component):
-            start, goal = up[step - 1], down[down.index((name, component)) - 1]
-            return Route(name, tuple(_step(frames, *step) for step in _fewest(frames.arcs(name), start, goal)))
+    up, down = components_above(source, origin), components_above(source, destination)
+    below = {component[0]: component for component in down}
+    for depth, (name, number) in enumerate(up):
+        if depth and below.get(name) == (name, number):
+            start, goal = up[depth - 1], down[down.index((name, number)) - 1]
+            path = _shortest_path(source.passage_edges(name), start, goal)
+            return Route(name, tuple(_build_step(source, passage, side) for passage, side in path))
     return None
 
 
-def _step(frames: LocaleSource, name: str, side: int) -> Step:
-    passage = frames.passage(name)
+def _build_step(source: LocaleSource, name: str, side: int) -> Step:
+    passage = source.passage(name)
     assert passage is not None
     return Step(passage, passage.between[side], passage.between[1 - side])
 
 
-def _fewest(arcs: Iterable[Arc], start: Part, goal: Part) -> list[tuple[str, int]]:
-    """The shortest chain of arcs from part to part, which are known to be joined: (passage, side that it begins on)."""
-    ahead: dict[Part, list[tuple[Part, str, int]]] = {}
-    for arc in arcs:
+def _shortest_path(edges: Iterable[PassageEdge], start: Component, goal: Component) -> list[tuple[str, int]]:
+    """Breadth-first search between connected nodes: (passage, side on which it begins) of each edge.
+
+    Not networkx: of equally short paths the one over the first edges must be found, whatever library version.
+    """
+    ahead: dict[Component, list[tuple[Component, str, int]]] = {}
+    for edge in edges:
         for side in (0, 1):
-            ahead.setdefault(arc.between[side], []).append((arc.between[1 - side], arc.passage, side))
-    came: dict[Part, tuple[Part, str, int]] = {start: (start, "", 0)}
+            ahead.setdefault(edge.between[side], []).append((edge.between[1 - side], edge.passage, side))
+    came: dict[Component, tuple[Component, str, int]] = {start: (start, "", 0)}
     todo = deque([start])
     while todo and goal not in came:
         here = todo.popleft()
@@ -172,8 +178,8 @@ def _fewest(arcs: Iterable[Arc], start: Part, goal: Part) -> list[tuple[str, int
             if there not in came:
                 came[there] = (here, passage, side)
                 todo.append(there)
-    way: list[tuple[str, int]] = []
+    path: list[tuple[str, int]] = []
     while goal != start:
         goal, passage, side = came[goal]
-        way.append((passage, side))
-    return way[::-1]
+        path.append((passage, side))
+    return path[::-1]

@@ -1,4 +1,4 @@
-"""A plan of the world as a drawing: rooms, doors, furniture and the names of locales, storey beside storey."""
+"""A floor plan of the world as a drawing: rooms, doors, furniture and names, storey beside storey."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from world_models.building.things import STEP_M
 from world_models.building.world import World
 
 SCALE = 40.0
-"""Drawing units in a metre."""
+"""SVG units per metre."""
 
 MARGIN_M = 0.6
 TITLE_M = 0.9
-SAME_STOREY_M = 0.5
-"""Rooms whose floors differ by less are drawn as one storey."""
+MAX_STOREY_STEP_M = 0.5
+"""Rooms whose floors differ by no more are drawn as one storey."""
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Something on the plan.
+    """A shape of the drawing.
 
     Attributes:
         kind: outdoors, room, obstacle, board, paving, doorway, leaf, link, axis or name, title.
         points: (k, 2) on the drawing [m], x to the right and y up.
-        text: what it is called.
+        text: its label.
     """
 
     kind: str
@@ -41,17 +41,17 @@ class Shape:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
-    """A drawing ``size`` (2,) [m] of shapes, the lowest first."""
+class Drawing:
+    """A drawing of ``size`` (2,) width, height [m]; shapes from the bottom up."""
 
     size: Floats
     shapes: tuple[Shape, ...]
 
 
-def plan_of(world: World) -> Plan:
-    """All storeys as on a page, from the lowest; north is up."""
-    rooms_of = _storeys(world)
-    panels = [_panel(world, level_m, rooms, len(rooms_of) > 1) for level_m, rooms in rooms_of]
+def build_drawing(world: World) -> Drawing:
+    """All storeys on one page, from the lowest; north is up."""
+    storeys = _find_storeys(world)
+    panels = [_draw_panel(world, floor_m, rooms, len(storeys) > 1) for floor_m, rooms in storeys]
     columns = math.ceil(math.sqrt(len(panels)))
     rows = [panels[i : i + columns] for i in range(0, len(panels), columns)]
     heights = [max(float(panel.size[1]) for panel in row) for row in rows]
@@ -65,45 +65,45 @@ def plan_of(world: World) -> Plan:
             left += float(panel.size[0])
         top -= height
     width = max(math.fsum(float(panel.size[0]) for panel in row) for row in rows)
-    return Plan(np.array([width, math.fsum(heights)]), tuple(shapes))
+    return Drawing(np.array([width, math.fsum(heights)]), tuple(shapes))
 
 
-def _panel(world: World, level_m: float, rooms: list[str], titled: bool) -> Plan:
+def _draw_panel(world: World, floor_m: float, rooms: list[str], titled: bool) -> Drawing:
     """One storey, its south-west corner at 0, 0."""
     corners = np.concatenate([world.outline(name) for name in rooms])
     low, high = corners.min(axis=0) - MARGIN_M, corners.max(axis=0) + MARGIN_M
     width, height = high - low
-    shapes = [Shape(s.kind, s.points - low, s.text) for s in _storey(world, rooms)]
+    shapes = [Shape(s.kind, s.points - low, s.text) for s in _draw_storey(world, rooms)]
     if titled:
-        text = f"{_title(world, rooms)}, floor at {level_m:.2f} m"
+        text = f"{_title_of(world, rooms)}, floor at {floor_m:.2f} m"
         shapes.append(Shape("title", np.array([[width / 2, height + TITLE_M / 3]]), text))
-    return Plan(np.array([width, height + (TITLE_M if titled else 0.0)]), tuple(shapes))
+    return Drawing(np.array([width, height + (TITLE_M if titled else 0.0)]), tuple(shapes))
 
 
-def _storeys(world: World) -> list[tuple[float, list[str]]]:
+def _find_storeys(world: World) -> list[tuple[float, list[str]]]:
     """Rooms by the height of their floors, in order."""
     out: list[tuple[float, list[str]]] = []
     for floor_m, name in sorted((world.floor_m(name), name) for name in world.rooms):
-        if not out or floor_m - out[-1][0] > SAME_STOREY_M:
+        if not out or floor_m - out[-1][0] > MAX_STOREY_STEP_M:
             out.append((floor_m, []))
         out[-1][1].append(name)
-    return [(level_m, [name for name in world.rooms if name in rooms]) for level_m, rooms in out]
+    return [(floor_m, [name for name in world.rooms if name in rooms]) for floor_m, rooms in out]
 
 
-def _title(world: World, rooms: list[str]) -> str:
-    """The floor that most of the rooms are in."""
+def _title_of(world: World, rooms: list[str]) -> str:
+    """Name of the locale that most of the rooms are in."""
     parents = [world.locale(name).parent or world.root for name in rooms]
     return max(dict.fromkeys(parents), key=parents.count)
 
 
-def _storey(world: World, rooms: list[str]) -> Iterator[Shape]:
+def _draw_storey(world: World, rooms: list[str]) -> Iterator[Shape]:
     for name in rooms:
         kind = "outdoors" if world.locale(name).properties.get("sky") else "room"
         yield Shape(kind, world.outline(name), name)
     for name in rooms:
         for thing in world.things_of(name):
-            flat = "paving" if thing.proud_m is None and thing.high_m <= STEP_M else "board"
-            yield Shape("obstacle" if thing.in_the_way else flat, thing.footprint_world, thing.name)
+            flat = "paving" if thing.protrusion_m is None and thing.high_m <= STEP_M else "board"
+            yield Shape("obstacle" if thing.is_obstacle else flat, thing.footprint_world, thing.name)
     doorways = {doorway.name: doorway for name in rooms for doorway in world.doorways_of(name)}
     for doorway in doorways.values():
         yield Shape("doorway", doorway.thresholds_world.reshape(-1, 2), doorway.name)
@@ -119,19 +119,19 @@ def _storey(world: World, rooms: list[str]) -> Iterator[Shape]:
 
 
 def _footprint(face: Face) -> Floats:
-    """The floor line (2, 2) of an upright polygon."""
+    """(2, 2) the line on the plan of an upright polygon [m]."""
     xy = face.polygon_world[:, :2]
     far = np.linalg.norm(xy - xy[0], axis=1).argmax()
     return np.stack([xy[0], xy[far]])
 
 
 def plan_svg(world: World) -> str:
-    """The plan as an SVG text: one metre is 40 units."""
-    plan = plan_of(world)
-    width, height = plan.size * SCALE
+    """The floor plan as an SVG text, 40 units per metre."""
+    drawing = build_drawing(world)
+    width, height = drawing.size * SCALE
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}">'
     ground = f'<rect width="{width:.0f}" height="{height:.0f}" fill="{GROUND}"/>'
-    return "\n".join([head, _STYLE, ground, *(_element(shape, height) for shape in plan.shapes), "</svg>\n"])
+    return "\n".join([head, _STYLE, ground, *(_svg_element(shape, height) for shape in drawing.shapes), "</svg>\n"])
 
 
 GROUND = "#777"
@@ -146,7 +146,7 @@ text.title { font-size: 20px; font-weight: bold; fill: #fff }
 </style>"""
 
 
-def _element(shape: Shape, height: float) -> str:
+def _svg_element(shape: Shape, height: float) -> str:
     xy = np.column_stack([shape.points[:, 0] * SCALE, height - shape.points[:, 1] * SCALE])
     x, y = xy[0]
     if shape.kind in ("name", "title"):

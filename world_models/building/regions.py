@@ -1,4 +1,4 @@
-"""Regions (§3.4, Figure 7): flat convex areas of one appearance, and what the model believes of light."""
+"""Regions (§3.4, Figure 7): flat convex areas of uniform appearance, and the model of their shading."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ LUMA = np.array([0.299, 0.587, 0.114])
 """Weights of red, green and blue in a grey image."""
 
 AMBIENT = 0.6
+"""Brightness of a white surface parallel to the light."""
 LAMP = np.array([0.12, 0.04, 0.18])
-"""The building's light comes from above and a little from the east: enough to tell which creases show."""
-TOWARDS_LAMP = LAMP / np.linalg.norm(LAMP)
+"""Direction of the building's light: from above and a little from the east. It decides which creases show."""
+LAMP_DIRECTION = LAMP / np.linalg.norm(LAMP)
 
 
 @dataclass(frozen=True, slots=True)
 class Finish:
-    """How a surface looks: colour (red, green, blue) in 0..1, one of :data:`TEXTURES` and the size of its cells."""
+    """Appearance of a surface: colour (red, green, blue) in 0..1, one of :data:`TEXTURES`, size of its cells [m]."""
 
     colour: tuple[float, float, float]
     texture: str = "plain"
@@ -41,11 +42,11 @@ class Region:
 
     Attributes:
         name: unique in the world.
-        polygon_world: (k, 3) convex and flat, counter-clockwise from its visible side [m].
+        polygon_world: (k, 3) convex and flat, counter-clockwise as seen from its visible side [m].
         colour: (red, green, blue) in 0..1.
         texture: one of :data:`TEXTURES`.
-        texture_scale_m: size of the texture's cells.
-        seed: of the texture; follows from the name.
+        texture_scale_m: size of the texture's cells [m].
+        seed: of the texture.
     """
 
     name: str
@@ -56,13 +57,13 @@ class Region:
     seed: int
 
 
-def region(name: str, polygon_world: Any, finish: Finish) -> Region:
-    """A region with this finish; its seed follows from its name."""
+def build_region(name: str, polygon_world: Any, finish: Finish) -> Region:
+    """A region with this finish; its seed is a hash of its name."""
     polygon = frozen(polygon_world, (None, 3))
     seed = zlib.crc32(name.encode()) & 0xFFFF
     return Region(name, polygon, finish.colour, finish.texture, finish.texture_scale_m, seed)
 
 
 def expected_brightness(finish: Finish, normal_world: Any) -> float:
-    """The brightness, 0..1, that the model expects of a surface with this normal (3,)."""
-    return float(finish.luma * (AMBIENT + 0.25 * np.dot(TOWARDS_LAMP, normal_world)))
+    """Brightness, 0..1, of a surface with this finish and unit normal (3,): ambient plus Lambertian light."""
+    return float(finish.luma * (AMBIENT + 0.25 * np.dot(LAMP_DIRECTION, normal_world)))

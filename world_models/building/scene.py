@@ -1,4 +1,4 @@
-"""The world's model lines and surfaces laid out in arrays, as the visibility computation wants them."""
+"""Model lines and surfaces of several locales in arrays, as the visibility computation takes them."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """N model lines, C corners and M convex one-sided surfaces with up to K corners.
+    """N model lines, C landmark corners and M convex one-sided surfaces with up to K corners.
 
     Attributes:
         edges: all model lines.
-        line_landmark, line_index: (N,) which line of which landmark (its number in the world).
+        line_landmark, line_index: (N,) number of the landmark in the world, and of the line in the landmark.
         corners_world: (C, 3) landmark corners [m].
-        corner_landmark, corner_index: (C,) which corner of which landmark.
-        corner_lines: (C, L) the lines (numbers among all N) that meet in it; -1 pads.
-        polygons_world: (M, K, 3) counter-clockwise from the visible side; short ones repeat their last corner.
-        planes_world: (M, 4) unit normal towards the visible side, and offset.
-        surface_face: (M,) the face (its number in the world) that each is a region of.
-        line_locales, corner_locales, surface_locales: (.., 2) numbers in ``locales``, twice the same where only one.
+        corner_landmark, corner_index: (C,) number of the landmark in the world, and of the corner in the landmark.
+        corner_lines: (C, L) indices, 0..N-1, of the lines that meet in the corner; padded with -1.
+        polygons_world: (M, K, 3) counter-clockwise as seen from the visible side [m]; padded with the last corner.
+        planes_world: (M, 4) unit normal towards the visible side, and offset [m].
+        surface_face: (M,) number in the world of the face that the surface is a region of.
+        line_locales, corner_locales, surface_locales: (.., 2) indices in ``locales``; twice the same where only one.
         locales: names, sorted.
     """
 
@@ -51,76 +51,76 @@ class Scene:
 
 
 def build_scene(faces: Sequence[tuple[int, Face]], landmarks: Sequence[tuple[int, Landmark]]) -> Scene:
-    """Arrays of everything, in the order given; each face and landmark comes with its number in the world."""
-    owners = [face for _, face in faces], [mark for _, mark in landmarks]
-    names = sorted({name for group in owners for item in group for name in (item.locale, item.neighbour) if name})
+    """A scene in the order given; each face and landmark comes with its number in the world."""
+    marks = [mark for _, mark in landmarks]
+    items: list[Face | Landmark] = [*(face for _, face in faces), *marks]
+    names = sorted({name for item in items for name in (item.locale, item.neighbour) if name})
     place = {name: index for index, name in enumerate(names)}
 
-    def rooms(items: Sequence[Face | Landmark]) -> Ints:
+    def locale_pairs(items: Sequence[Face | Landmark]) -> Ints:
         return np.array([(place[i.locale], place[i.neighbour or i.locale]) for i in items], np.int64).reshape(-1, 2)
 
     surfaces = [(number, face, region) for number, face in faces for region in (*face.front, *face.back)]
-    polygons = _padded([region for _, _, region in surfaces])
-    marks = owners[1]
+    polygons = _pad_polygons([region for _, _, region in surfaces])
     lines, points = [len(mark.lines_world) for mark in marks], [len(mark.points_world) for mark in marks]
-    numbers, of_marks = np.array([number for number, _ in landmarks], np.int64), rooms(marks)
-    normals = np.array([_unit(area_vector(region.polygon_world)) for _, _, region in surfaces]).reshape(-1, 3)
+    numbers, mark_locales = np.array([number for number, _ in landmarks], np.int64), locale_pairs(marks)
+    normals = np.array([_normalize(area_vector(region.polygon_world)) for _, _, region in surfaces]).reshape(-1, 3)
     return Scene(
-        edges=Edges.joined(mark.edges for mark in marks),
+        edges=Edges.concatenate(mark.edges for mark in marks),
         line_landmark=np.repeat(numbers, lines),
-        line_index=_counts_up(lines),
+        line_index=_count_up(lines),
         corners_world=np.concatenate([np.zeros((0, 3)), *(mark.points_world for mark in marks)]),
         corner_landmark=np.repeat(numbers, points),
-        corner_index=_counts_up(points),
-        corner_lines=_meeting_lines(marks),
+        corner_index=_count_up(points),
+        corner_lines=_corner_lines(marks),
         polygons_world=polygons,
         planes_world=np.column_stack([normals, np.sum(normals * polygons[:, 0], axis=1)]),
         surface_face=np.array([number for number, _, _ in surfaces], np.int64),
-        line_locales=np.repeat(of_marks, lines, axis=0),
-        corner_locales=np.repeat(of_marks, points, axis=0),
-        surface_locales=rooms([face for _, face, _ in surfaces]),
+        line_locales=np.repeat(mark_locales, lines, axis=0),
+        corner_locales=np.repeat(mark_locales, points, axis=0),
+        surface_locales=locale_pairs([face for _, face, _ in surfaces]),
         locales=tuple(names),
     )
 
 
-def joined_scene(parts: Sequence[Scene]) -> Scene:
-    """All of them as one scene, in the order of the world whatever the order of the parts."""
+def concatenate_scenes(parts: Sequence[Scene]) -> Scene:
+    """One scene from several, in the order of the world, whatever the order of the parts."""
     if len(parts) == 1:
         return parts[0]
     names = tuple(sorted({name for part in parts for name in part.locales}))
     place = {name: index for index, name in enumerate(names)}
     renumbered = [np.array([place[name] for name in part.locales], np.int64) for part in parts]
 
-    def together(attribute: str) -> Any:
+    def concatenated(attribute: str) -> Any:
         return np.concatenate([getattr(part, attribute) for part in parts])
 
-    def in_rooms(attribute: str) -> Any:
+    def renumbered_locales(attribute: str) -> Any:
         return np.concatenate([new[getattr(part, attribute)] for part, new in zip(parts, renumbered, strict=True)])
 
-    edges = Edges.joined(part.edges for part in parts)
-    lines = np.argsort(together("line_landmark"), kind="stable")
-    corners = np.argsort(together("corner_landmark"), kind="stable")
-    surfaces = np.argsort(together("surface_face"), kind="stable")
+    edges = Edges.concatenate(part.edges for part in parts)
+    lines = np.argsort(concatenated("line_landmark"), kind="stable")
+    corners = np.argsort(concatenated("corner_landmark"), kind="stable")
+    surfaces = np.argsort(concatenated("surface_face"), kind="stable")
     return Scene(
-        edges=Edges(edges.lines_world[lines], edges.normals_world[lines], edges.levels[lines]),
-        line_landmark=together("line_landmark")[lines],
-        line_index=together("line_index")[lines],
-        corners_world=together("corners_world")[corners],
-        corner_landmark=together("corner_landmark")[corners],
-        corner_index=together("corner_index")[corners],
-        corner_lines=_renumbered_lines(parts, lines)[corners],
-        polygons_world=_widened([part.polygons_world for part in parts])[surfaces],
-        planes_world=together("planes_world")[surfaces],
-        surface_face=together("surface_face")[surfaces],
-        line_locales=in_rooms("line_locales")[lines],
-        corner_locales=in_rooms("corner_locales")[corners],
-        surface_locales=in_rooms("surface_locales")[surfaces],
+        edges=Edges(edges.lines_world[lines], edges.normals_world[lines], edges.brightness[lines]),
+        line_landmark=concatenated("line_landmark")[lines],
+        line_index=concatenated("line_index")[lines],
+        corners_world=concatenated("corners_world")[corners],
+        corner_landmark=concatenated("corner_landmark")[corners],
+        corner_index=concatenated("corner_index")[corners],
+        corner_lines=_renumber_corner_lines(parts, lines)[corners],
+        polygons_world=_concatenate_polygons([part.polygons_world for part in parts])[surfaces],
+        planes_world=concatenated("planes_world")[surfaces],
+        surface_face=concatenated("surface_face")[surfaces],
+        line_locales=renumbered_locales("line_locales")[lines],
+        corner_locales=renumbered_locales("corner_locales")[corners],
+        surface_locales=renumbered_locales("surface_locales")[surfaces],
         locales=names,
     )
 
 
-def _renumbered_lines(parts: Sequence[Scene], order: Ints) -> Ints:
-    """(C, L) the lines that meet in each corner, by their numbers after sorting."""
+def _renumber_corner_lines(parts: Sequence[Scene], order: Ints) -> Ints:
+    """(C, L) indices of the lines that meet in each corner, after sorting by ``order``."""
     after = np.empty(len(order) + 1, np.int64)
     after[order], after[-1] = np.arange(len(order)), -1
     widest = max(part.corner_lines.shape[1] for part in parts)
@@ -133,13 +133,15 @@ def _renumbered_lines(parts: Sequence[Scene], order: Ints) -> Ints:
     return np.asarray(after[np.concatenate(rows)])
 
 
-def _widened(polygons: Sequence[Floats]) -> Floats:
+def _concatenate_polygons(polygons: Sequence[Floats]) -> Floats:
+    """(M, K, 3) from arrays of polygons with different numbers of corners."""
     longest = max(p.shape[1] for p in polygons)
     return np.concatenate([np.concatenate([p, np.repeat(p[:, -1:], longest - p.shape[1], axis=1)], axis=1)
                            if p.shape[1] < longest else p for p in polygons])
 
 
-def _meeting_lines(landmarks: Sequence[Landmark]) -> Ints:
+def _corner_lines(landmarks: Sequence[Landmark]) -> Ints:
+    """(C, L) indices of the lines that meet in each corner of all landmarks, padded with -1."""
     rows, before = [], 0
     for mark in landmarks:
         rows += [before + mark.corner_lines(point) for point in range(len(mark.points_world))]
@@ -149,15 +151,17 @@ def _meeting_lines(landmarks: Sequence[Landmark]) -> Ints:
                     np.int64).reshape(-1, widest)
 
 
-def _padded(regions: Sequence[Region]) -> Floats:
+def _pad_polygons(regions: Sequence[Region]) -> Floats:
+    """(M, K, 3) polygons, padded with their last corners."""
     longest = max((len(region.polygon_world) for region in regions), default=4)
     padded = [np.pad(r.polygon_world, ((0, longest - len(r.polygon_world)), (0, 0)), "edge") for r in regions]
     return np.array(padded, float).reshape(-1, longest, 3)
 
 
-def _counts_up(counts: Sequence[int]) -> Ints:
+def _count_up(counts: Sequence[int]) -> Ints:
+    """0 .. count - 1 for each count, one after the other."""
     return np.concatenate([np.zeros(0, np.int64), *(np.arange(count) for count in counts)])
 
 
-def _unit(vector: Floats) -> Floats:
+def _normalize(vector: Floats) -> Floats:
     return vector / np.linalg.norm(vector)

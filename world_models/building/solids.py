@@ -1,4 +1,4 @@
-"""The geometer: solids made of boxes become faces to see and model lines to look for (§3.4)."""
+"""Solids made of boxes, and the faces and model lines that follow from them (§3.4)."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.faces import Face, build_barrier
-from world_models.building.intervals import subtract_intervals
+from world_models.building.intervals import Interval, subtract_intervals
 from world_models.building.landmarks import Edges
 from world_models.building.regions import Finish, expected_brightness
 from world_models.frames import Pose
 
 CONTACT_M = 1.5e-3
-"""Surfaces that lie this near to one another touch."""
+"""Surfaces this near to each other touch."""
 
-SHORTEST_LINE_M = 0.05
-"""Shorter edges are not worth a model line."""
+MIN_LINE_M = 0.05
+"""Shorter edges are no model lines."""
 
-THIN_M = 0.03
-"""What stands out from its wall by no more than this is seen against that wall from everywhere."""
+MAX_THIN_M = 0.03
+"""A box this thin on a wall is seen against that wall from everywhere."""
 
-Range = tuple[float, float]
+Range = Interval
+"""Extent along an axis [m]."""
 Side = tuple[int, int]
-"""A side of a box: axis 0..2 and 0 for its low, 1 for its high end."""
+"""A side of a box: axis 0..2, and 0 for its low or 1 for its high end."""
 
 SIDES: tuple[Side, ...] = tuple((axis, end) for axis in range(3) for end in range(2))
 
@@ -40,7 +41,7 @@ BOX_EDGES: tuple[tuple[int, Side, Side], ...] = tuple(
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A block in the frame of a part: x to the right as one stands with the back to the wall, y off it, z up [m]."""
+    """A block in the frame of a part: x to the right with the back to the wall, y off the wall, z up [m]."""
 
     x: Range
     y: Range
@@ -52,7 +53,7 @@ class Box:
         return self.x, self.y, self.z
 
     def side(self, side: Side) -> NDArray[np.float64]:
-        """(4, 3) the corners of a side, counter-clockwise from outside [m, part frame]."""
+        """(4, 3) corners of a side, counter-clockwise as seen from outside [m, part frame]."""
         axis, end = side
         b, c = (axis + 1) % 3, (axis + 2) % 3
         corners = np.empty((4, 3))
@@ -69,12 +70,12 @@ class Surface:
     Attributes:
         normal_world: (3,) unit, towards the room.
         offset_m: normal . p for its points.
-        level: its brightness, 0..1.
+        brightness: expected, 0..1.
     """
 
     normal_world: NDArray[np.float64]
     offset_m: float
-    level: float
+    brightness: float
 
     def touches(self, corners_world: NDArray[np.float64], normal_world: NDArray[np.float64]) -> bool:
         """Whether a side with these corners and this outward normal lies against it."""
@@ -82,8 +83,8 @@ class Surface:
         return opposed and bool(np.abs(corners_world @ self.normal_world - self.offset_m).max() < CONTACT_M)
 
 
-def surface_of(polygon_world: NDArray[np.float64], finish: Finish) -> Surface:
-    """The plane of a flat polygon (k, 3), seen from its front."""
+def surface_from_polygon(polygon_world: NDArray[np.float64], finish: Finish) -> Surface:
+    """The plane of a flat polygon (k, 3) [m, world] that is counter-clockwise as seen from its front."""
     normal = np.cross(polygon_world[1] - polygon_world[0], polygon_world[2] - polygon_world[1])
     normal = normal / np.linalg.norm(normal)
     return Surface(normal, float(normal @ polygon_world[0]), expected_brightness(finish, normal))
@@ -96,8 +97,8 @@ class Solid:
     Attributes:
         name: unique in the world.
         boxes: in the part's frame.
-        world_from_part: where the part stands; its z axis is up.
-        surfaces: what it may stand on or against.
+        world_from_part: pose of the part; its z axis is up.
+        surfaces: planes that it may stand on or against.
     """
 
     name: str
@@ -106,127 +107,129 @@ class Solid:
     surfaces: tuple[Surface, ...] = ()
 
     def faces(self, locale: str, **more: Any) -> list[Face]:
-        """The sides that can be seen, each a face with one region."""
+        """The visible sides, each a face with one region; ``more`` goes to every Face."""
         return [
             build_barrier(f"{self.name}/{index}{'xyz'[axis]}{'-+'[end]}", locale,
                     self.world_from_part.apply(box.side((axis, end))), box.finish, **more)
             for index, box in enumerate(self.boxes)
             for axis, end in SIDES
-            if (axis, end) not in self._grounds[index]
+            if (axis, end) not in self._covered[index]
         ]
 
     def edges(self) -> Edges:
-        """Its model lines: each edge once, where a person would see it."""
+        """Its model lines: each edge once, along the stretches where it is visible."""
         taken: dict[tuple[float, ...], list[Range]] = {}
         rows = []
         for index, box in enumerate(self.boxes):
             for axis, first, second in BOX_EDGES:
                 place = (float(axis), *(round(box.ranges[a][e], 3) for a, e in (first, second)), float(first[0]))
                 known = taken.setdefault(place, [])
-                for whole, look in self._looks(index, axis, first, second):
-                    for extent in subtract_intervals(whole, known, SHORTEST_LINE_M):
-                        rows.append((self.world_from_part.apply(_edge(box, axis, extent, first, second)), *look))
+                for whole, sides in self._visible_stretches(index, axis, first, second):
+                    for extent in subtract_intervals(whole, known, MIN_LINE_M):
+                        rows.append((self.world_from_part.apply(_edge(box, axis, extent, first, second)), *sides))
                 known.append(box.ranges[axis])
-        return Edges.of(rows)
+        return Edges.from_rows(rows)
 
     @cached_property
-    def _grounds(self) -> list[dict[Side, float]]:
-        """For each box, the sides that lie wholly against something, with the brightness of that."""
-        return [
-            {side: ground for side in SIDES if (ground := self._ground(index, side)) is not None}
-            for index in range(len(self.boxes))
-        ]
+    def _covered(self) -> list[dict[Side, float]]:
+        """For each box, its sides that lie wholly against something, with the brightness of the covering surface."""
+        covered = []
+        for index in range(len(self.boxes)):
+            brightness = {side: self._find_cover(index, side) for side in SIDES}
+            covered.append({side: value for side, value in brightness.items() if value is not None})
+        return covered
 
-    def _ground(self, index: int, side: Side) -> float | None:
+    def _find_cover(self, index: int, side: Side) -> float | None:
+        """Brightness of the surface or box that covers all of a side; None for an open side."""
         corners = self.world_from_part.apply(self.boxes[index].side(side))
-        normal = self._normal(side)
+        normal = self._normals[side]
         for surface in self.surfaces:
             if surface.touches(corners, normal):
-                return surface.level
+                return surface.brightness
         for other, box in enumerate(self.boxes):
             if other != index and _covers(box, self.boxes[index], side):
-                return self._level(box.finish, _opposite(side))
+                return self._brightness(box.finish, _opposite(side))
         return None
 
-    def _looks(self, index: int, axis: int, first: Side, second: Side) -> Iterator[tuple[Range, tuple[Any, Any]]]:
-        """The stretches of an edge that can be seen, each with (normals, levels) as :class:`Edges` wants them."""
+    def _visible_stretches(
+        self, index: int, axis: int, first: Side, second: Side
+    ) -> Iterator[tuple[Range, tuple[Any, Any]]]:
+        """The visible stretches of an edge, each with (normals, brightness) as :class:`Edges` takes them."""
         stretches: list[tuple[Range, tuple[float | None, float | None]]] = []
-        for low, high in self._cuts(index, axis):
+        for low, high in self._cut_at_neighbours(index, axis):
             middle = (low + high) / 2
-            grounds = (self._ground_at(index, axis, middle, first, second),
-                       self._ground_at(index, axis, middle, second, first))
-            if stretches and stretches[-1][1] == grounds:
+            covers = (self._cover_at(index, axis, middle, first, second),
+                      self._cover_at(index, axis, middle, second, first))
+            if stretches and stretches[-1][1] == covers:
                 low = stretches.pop()[0][0]
-            stretches.append(((low, high), grounds))
-        for extent, grounds in stretches:
-            if look := self._look(index, (first, second), grounds):
-                yield extent, look
+            stretches.append(((low, high), covers))
+        for extent, covers in stretches:
+            sides = self._visible_sides(index, (first, second), covers)
+            if sides is not None:
+                yield extent, sides
 
-    def _cuts(self, index: int, axis: int) -> list[Range]:
+    def _cut_at_neighbours(self, index: int, axis: int) -> list[Range]:
         """The extent of a box along an axis, cut where other boxes begin and end."""
         low, high = self.boxes[index].ranges[axis]
         ends = {end for box in self.boxes for end in box.ranges[axis] if low + CONTACT_M < end < high - CONTACT_M}
         marks = [low, *sorted(ends), high]
         return list(pairwise(marks))
 
-    def _ground_at(self, index: int, axis: int, middle: float, side: Side, other: Side) -> float | None:
-        """Brightness of what a side lies against, just at its edge with ``other``; ``None`` where it is open."""
+    def _cover_at(self, index: int, axis: int, middle: float, side: Side, other: Side) -> float | None:
+        """Brightness of what covers a side right beside its edge with ``other``; None where the side is open."""
         edge = self.boxes[index].ranges[other[0]][other[1]]
         inwards = edge - 2 * CONTACT_M if other[1] else edge + 2 * CONTACT_M
         for near in self._touching[index][side]:
             low, high = near.ranges[other[0]]
             if low < inwards < high and near.ranges[axis][0] < middle < near.ranges[axis][1]:
                 flush = abs((high if other[1] else low) - edge) < CONTACT_M
-                return self._level(near.finish, other if flush else _opposite(side))
-        return self._grounds[index].get(side)
+                return self._brightness(near.finish, other if flush else _opposite(side))
+        return self._covered[index].get(side)
 
     @cached_property
     def _touching(self) -> list[dict[Side, list[Box]]]:
-        """For each box and side, the other boxes that have a side in the same plane, facing it."""
+        """For each box and side, the other boxes with a side in the same plane that faces it."""
         return [
             {side: [b for b in self.boxes if b is not box and _back_to_back(b, box, side)] for side in SIDES}
             for box in self.boxes
         ]
 
-    def _look(
-        self, index: int, sides: tuple[Side, Side], grounds: tuple[float | None, float | None]
+    def _visible_sides(
+        self, index: int, sides: tuple[Side, Side], covers: tuple[float | None, float | None]
     ) -> tuple[Any, Any] | None:
-        """(normals, levels) of an edge between two sides; ``None`` where there is nothing to see."""
-        finish, behind = self.boxes[index].finish, self._behind(index)
-        normals = [self._normal(side) for side in sides]
-        own = [self._level(finish, side) for side in sides]
-        if grounds == (None, None):
-            return normals, [*own, behind]
-        seen = 0 if grounds[0] is None else 1
-        ground = grounds[1 - seen]
-        if grounds[seen] is not None or ground is None or abs(ground - own[seen]) < 1e-9:
+        """(normals, brightness) of an edge between two sides; None where it is not visible."""
+        finish, background = self.boxes[index].finish, self._background(index)
+        normals = [self._normals[side] for side in sides]
+        own = [self._brightness(finish, side) for side in sides]
+        if covers == (None, None):
+            return normals, [*own, background]
+        seen = 0 if covers[0] is None else 1
+        ground = covers[1 - seen]
+        if covers[seen] is not None or ground is None or abs(ground - own[seen]) < 1e-9:
             return None
-        return [normals[seen]] * 2, [own[seen], ground, behind]
-
-    def _normal(self, side: Side) -> NDArray[np.float64]:
-        return self._normals[side]
+        return [normals[seen]] * 2, [own[seen], ground, background]
 
     @cached_property
     def _normals(self) -> dict[Side, NDArray[np.float64]]:
-        """Of its sides, outward."""
+        """(3,) outward unit normal of each side [world]."""
         return {(axis, end): np.asarray(self.world_from_part.rotation[:, axis] * (1.0 if end else -1.0))
                 for axis, end in SIDES}
 
     @cached_property
-    def _levels(self) -> dict[tuple[Finish, Side], float]:
+    def _known_brightness(self) -> dict[tuple[Finish, Side], float]:
         return {}
 
-    def _level(self, finish: Finish, side: Side) -> float:
-        """The brightness of a finish on a side, worked out once."""
-        if (finish, side) not in self._levels:
-            self._levels[finish, side] = expected_brightness(finish, self._normal(side))
-        return self._levels[finish, side]
+    def _brightness(self, finish: Finish, side: Side) -> float:
+        """Expected brightness of a finish on a side; cached."""
+        if (finish, side) not in self._known_brightness:
+            self._known_brightness[finish, side] = expected_brightness(finish, self._normals[side])
+        return self._known_brightness[finish, side]
 
-    def _behind(self, index: int) -> float:
+    def _background(self, index: int) -> float:
         """Brightness behind a thin box on a wall; NaN for others."""
-        for (axis, _), ground in self._grounds[index].items():
+        for (axis, _), ground in self._covered[index].items():
             low, high = self.boxes[index].ranges[axis]
-            if high - low <= THIN_M:
+            if high - low <= MAX_THIN_M:
                 return ground
         return float("nan")
 

@@ -1,4 +1,4 @@
-"""What stands in the rooms, and what is wrong with a world."""
+"""Things that stand in rooms, and findings about a world."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 ROBOT_TOP_M = 1.4
-"""What hangs higher than this is no obstacle."""
+"""A thing that begins higher than this above the floor is no obstacle."""
 
 STEP_M = 0.03
-"""What is no higher than this is driven over."""
+"""A thing no higher than this is driven over."""
 
-FLUSH_M = 0.06
-"""What stands out from its wall by no more than this is no obstacle: the robot keeps clear of the wall itself."""
+MAX_FLUSH_M = 0.06
+"""A thing that protrudes from its wall by no more than this is no obstacle: the robot keeps clear of the wall."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something wrong with a world that could be read: where (file:line) and what."""
+    """A fault of a world that could be read: where (file:line) and what."""
 
     source: str
     what: str
@@ -36,9 +36,9 @@ class Thing:
         name: unique in the world.
         locale: where it stands.
         kind: the part that it is made from.
-        footprint_world: (4, 2) rectangle on the floor [m] that holds it, or what of it the robot could hit.
-        low_m, high_m: its extent above the floor.
-        proud_m: how far it stands out from its wall; ``None`` for one that stands free.
+        footprint_world: (4, 2) rectangle on the floor round all of it, or round what the robot could hit [m].
+        low_m, high_m: its vertical extent above the floor.
+        protrusion_m: how far it protrudes from its wall; ``None`` for a free-standing thing.
         source: file:line where it is placed.
     """
 
@@ -48,10 +48,11 @@ class Thing:
     footprint_world: NDArray[np.float64]
     low_m: float
     high_m: float
-    proud_m: float | None
+    protrusion_m: float | None
     source: str
 
     @property
-    def in_the_way(self) -> bool:
+    def is_obstacle(self) -> bool:
         """Whether the robot could hit it."""
-        return self.low_m < ROBOT_TOP_M and self.high_m > STEP_M and (self.proud_m is None or self.proud_m > FLUSH_M)
+        is_flush = self.protrusion_m is not None and self.protrusion_m <= MAX_FLUSH_M
+        return self.low_m < ROBOT_TOP_M and self.high_m > STEP_M and not is_flush

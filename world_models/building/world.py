@@ -1,7 +1,7 @@
-"""The world (§3.4): locales in a contained-by hierarchy, their doorways, faces and landmarks, and questions on them.
+"""The world (§3.4): locales in a contained-by hierarchy, their doorways, faces and landmarks, and queries on them.
 
-A world takes its frames from a :class:`~world_models.building.locale_source.LocaleSource`, one locale at a time and
-only when asked, so that a robot in a room touches the room. The attributes that name everything (``faces``,
+A world takes locale data from a :class:`~world_models.building.locale_source.LocaleSource`, one locale at a time and
+only when asked, so that a robot in a room loads that room. The attributes that name everything (``faces``,
 ``things``, ``scene``, ...) are for drawing and checking.
 """
 
@@ -20,26 +20,26 @@ from world_models.building.landmarks import Landmark
 from world_models.building.locale_source import LocaleGeometry, LocaleSource
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.passages import Route, find_route
-from world_models.building.scene import Scene, build_scene, joined_scene
+from world_models.building.scene import Scene, build_scene, concatenate_scenes
 from world_models.building.things import Finding, Thing
 from world_models.frames import Pose, frozen
 
 T = TypeVar("T")
 
-NEAR_FLOOR_M = 0.5
-"""A camera so far above a room's ceiling, or below its floor, may still be in its doorway."""
+FLOOR_MARGIN_M = 0.5
+"""A camera this far above a room's ceiling or below its floor may still be in its doorway."""
 
-SCENES = 32
-"""How many joined scenes are kept."""
+MAX_SCENES = 32
+"""Size of the cache of scenes."""
 
 
 class World:
-    """Everything that is known of the building; the root locale's frame is the world frame.
+    """The model of a building; the root locale's coordinate frame is the world frame.
 
     Attributes:
-        frames: where it comes from.
+        locale_source: where locale data come from.
         name: of the world and of its root locale.
-        memo: what others work out of it once, and keep with it.
+        cache: results that others compute from the world once and keep with it, by name.
     """
 
     def __init__(self, locale_source: LocaleSource) -> None:
@@ -50,13 +50,13 @@ class World:
         self._scenes: dict[tuple[str, ...], Scene] = {}
         self.cache: dict[str, Any] = {}
 
-    def cached(self, what: str, most: int, key: Hashable, make: Callable[[], T]) -> T:
-        """What was made for a key, made now unless it is among the last ``most`` of its kind."""
-        known: dict[Hashable, T] = self.cache.setdefault(what, {})
+    def cached(self, name: str, max_items: int, key: Hashable, compute: Callable[[], T]) -> T:
+        """The result for a key from the cache ``name``, which keeps the last ``max_items``; computed if not there."""
+        known: dict[Hashable, T] = self.cache.setdefault(name, {})
         if key not in known:
-            if len(known) >= most:
+            if len(known) >= max_items:
                 del known[next(iter(known))]
-            known[key] = make()
+            known[key] = compute()
         return known[key]
 
     @property
@@ -67,7 +67,7 @@ class World:
     # -- one locale ------------------------------------------------------------------------------------------------
 
     def locale(self, name: str) -> Locale:
-        """Raises ValueError where no locale has this name."""
+        """A locale by name. Raises ValueError where there is none."""
         found = self.locale_source.locale(name)
         if found is None:
             names = self.locale_source.names()
@@ -80,12 +80,12 @@ class World:
         return self.locale_source.is_room(name)
 
     def children_of(self, name: str) -> tuple[str, ...]:
-        """The locales that this one directly contains."""
+        """The locales that this one contains directly."""
         self.locale(name)
         return self.locale_source.children(name)
 
     def rooms_in(self, name: str) -> Iterator[str]:
-        """The locales within this one that contain no other; itself where it is such a one."""
+        """The rooms within a locale, or the locale itself where it is a room."""
         if self.is_room(name):
             yield name
         for child in self.children_of(name):
@@ -108,7 +108,7 @@ class World:
         return shared
 
     def world_from_locale(self, name: str) -> Pose:
-        """The frame of a locale."""
+        """Pose of a locale's coordinate frame."""
         return self._pose(name)[0]
 
     def floor_m(self, name: str) -> float:
@@ -116,7 +116,7 @@ class World:
         return float(self.world_from_locale(name).translation[2])
 
     def _pose(self, name: str) -> tuple[Pose, Pose]:
-        """The frame of a locale, and its inverse."""
+        """world_from_locale and locale_from_world; cached."""
         if name not in self._poses:
             locale = self.locale(name)
             above = self.world_from_locale(locale.parent) if locale.parent is not None else Pose.identity()
@@ -135,20 +135,20 @@ class World:
         return self.locale_source.links(locale)
 
     def things_of(self, locale: str) -> tuple[Thing, ...]:
-        """What stands in a locale."""
+        """The things that stand in a locale."""
         self.locale(locale)
         return self.locale_source.things(locale)
 
     def outline(self, locale: str) -> NDArray[np.float64]:
-        """(k, 2) the free extent of a locale on the floor, counter-clockwise [m, world]."""
+        """(k, 2) free extent of a locale on the floor, counter-clockwise [m, world]."""
         own = self.locale(locale).outline
         return frozen(self._pose(locale)[0].apply(np.column_stack([own, np.zeros(len(own))]))[:, :2])
 
     def obstacles(self, locale: str) -> tuple[NDArray[np.float64], ...]:
-        """Footprints (4, 2) of what the robot could hit in a locale [m, world]."""
-        return tuple(t.footprint_world for t in self.things_of(locale) if t.in_the_way)
+        """Footprints (4, 2) of the things in a locale that the robot could hit [m, world]."""
+        return tuple(t.footprint_world for t in self.things_of(locale) if t.is_obstacle)
 
-    # -- places and ways -------------------------------------------------------------------------------------------
+    # -- places and routes -----------------------------------------------------------------------------------------
 
     def locale_at(self, point_world: Any) -> str | None:
         """The deepest locale that contains a point (2,) on the floor or (3,) [m, world]."""
@@ -165,26 +165,26 @@ class World:
         return best[1] if best else None
 
     def rooms_near(self, point_world: Any, margin_m: float) -> tuple[str, ...]:
-        """The rooms whose rectangle on the plan is at most so far from a point (2,) or (3,) [m, world]."""
+        """The rooms whose bounding rectangle is at most ``margin_m`` from a point (2,) or (3,) [m, world]."""
         x, y, *z = (float(value) for value in np.asarray(point_world, float))
         rooms = (name for name in self.locale_source.near(x, y, margin_m) if self.is_room(name))
         return tuple(name for name in rooms if not z or self._reaches(name, z[0]))
 
     def _reaches(self, name: str, z_m: float) -> bool:
-        """Whether a height is between floor and ceiling of a locale, or not far from there."""
+        """Whether a height is between floor and ceiling of a locale, within FLOOR_MARGIN_M."""
         base = self.floor_m(name)
-        return base - NEAR_FLOOR_M <= z_m <= base + self.locale(name).height_m + NEAR_FLOOR_M
+        return base - FLOOR_MARGIN_M <= z_m <= base + self.locale(name).height_m + FLOOR_MARGIN_M
 
     def route(self, origin: str, destination: str) -> Route | None:
-        """The way from room to room, at the highest level at which they differ; None where there is none."""
+        """The route from room to room at the highest level at which they differ; None where there is none."""
         for name in (origin, destination):
             self.locale(name)
         return find_route(self.locale_source, origin, destination)
 
     def walk(self, origin: str, destination: str) -> list[str] | None:
-        """The rooms of the way with the fewest passages for people, who can use stairs too; None where there is none.
+        """The rooms of the route with the fewest passages, stairs included; None where there is none.
 
-        It looks at the passages of the whole world.
+        It searches the passages of the whole world.
         """
         passages: tuple[Doorway | Link, ...] = (*self.doorways, *self.links)
         ways: nx.Graph = nx.Graph(passage.between for passage in passages)
@@ -195,7 +195,7 @@ class World:
         return way
 
     def passage(self, name: str) -> Doorway | Link:
-        """Raises ValueError where no doorway or link has this name."""
+        """A doorway or link by name. Raises ValueError where there is none."""
         found = self.locale_source.passage(name)
         if found is None:
             raise ValueError(f"expected a passage of {self.name}, got {name!r}")
@@ -204,10 +204,10 @@ class World:
     # -- what is seen ----------------------------------------------------------------------------------------------
 
     def scene_of(self, locales: Iterable[str]) -> Scene:
-        """Model lines and surfaces of these locales, with what they share with neighbours, in arrays."""
+        """Model lines and surfaces of these locales, with those shared with neighbours, as arrays; cached."""
         names = tuple(sorted(locales))
         if names not in self._scenes:
-            if len(self._scenes) >= SCENES:
+            if len(self._scenes) >= MAX_SCENES:
                 del self._scenes[next(iter(self._scenes))]
             self._scenes[names] = self._joined(names)
         return self._scenes[names]
@@ -215,7 +215,7 @@ class World:
     def _joined(self, locales: Sequence[str]) -> Scene:
         parts = self._geometry_of(locales)
         scenes = [self._scene_part(parts[key]) for key in sorted(parts, key=str)]
-        return joined_scene(scenes) if scenes else build_scene((), ())
+        return concatenate_scenes(scenes) if scenes else build_scene((), ())
 
     def _geometry_of(self, locales: Iterable[str]) -> dict[tuple[str, str | None], LocaleGeometry]:
         """The geometry of several locales, each part once, by (locale, neighbour)."""
@@ -227,11 +227,11 @@ class World:
 
     @cached_property
     def landmarks(self) -> Sequence[Landmark]:
-        """What can be recognised, by number; those of locales that were looked at are at hand."""
+        """All landmarks by number; those of locales that were loaded are at hand."""
         return _Landmarks(self)
 
     def landmark(self, name: str) -> Landmark:
-        """Raises ValueError where no landmark has this name."""
+        """A landmark by name. Raises ValueError where there is none."""
         found = [mark for mark in self.landmarks if mark.name == name]
         if not found:
             raise ValueError(f"expected the name of a landmark of {self.name}, got {name!r}")
@@ -241,17 +241,17 @@ class World:
 
     @cached_property
     def locales(self) -> Mapping[str, Locale]:
-        """All by name, root first, then in the order of the file; a locale is loaded when it is asked for."""
+        """All locales by name, root first, then in the order of the file; each is loaded when asked for."""
         return _Locales(self.locale_source)
 
     @cached_property
     def rooms(self) -> tuple[str, ...]:
-        """The locales that contain no other, in order."""
+        """The locales that contain no other, in the order of the file."""
         return tuple(name for name in self.locale_source.names() if self.is_room(name))
 
     @property
     def doorways(self) -> tuple[Doorway, ...]:
-        """The open ones, through which one can pass."""
+        """All open doorways."""
         return self.locale_source.all_doorways()
 
     @property
@@ -261,16 +261,16 @@ class World:
 
     @property
     def things(self) -> tuple[Thing, ...]:
-        """What stands in the rooms."""
+        """All things."""
         return self.locale_source.all_things()
 
     @cached_property
     def faces(self) -> tuple[Face, ...]:
-        """Barriers and doorways; what is drawn are their regions."""
+        """All barriers and doorways, by number; their regions are what is drawn."""
         return _in_order(pair for part in self.locale_source.all_geometry() for pair in part.faces)
 
     def faces_within(self, name: str) -> tuple[Face, ...]:
-        """The faces of all rooms in a locale and of the next rooms beyond its doorways, in order."""
+        """The faces of all rooms in a locale and of the rooms beyond its doorways, by number."""
         inside = tuple(self.rooms_in(name))
         beyond = [doorway.other(room) for room in inside for doorway in self.locale_source.doorways(room)]
         parts = self._geometry_of(dict.fromkeys((*inside, *beyond)))
@@ -284,7 +284,7 @@ class World:
     def scene(self) -> Scene:
         """Model lines and surfaces of the whole world."""
         scenes = [self._scene_part(part) for part in self.locale_source.all_geometry()]
-        return joined_scene(scenes or [build_scene((), ())])
+        return concatenate_scenes(scenes or [build_scene((), ())])
 
     @cached_property
     def passages(self) -> nx.Graph:
@@ -298,12 +298,12 @@ class World:
         return graph
 
     def counts(self) -> Mapping[str, int]:
-        """How many rooms, open doorways, things, faces and landmarks there are."""
+        """Numbers of rooms, open doorways, things, faces and landmarks."""
         return self.locale_source.counts()
 
     @property
     def building_faults(self) -> tuple[Finding, ...]:
-        """What could not be built."""
+        """Parts of the description that could not be built."""
         return self.locale_source.faults()
 
 
@@ -313,7 +313,7 @@ def _in_order(numbered: Iterable[tuple[int, T]]) -> tuple[T, ...]:
 
 
 class _Locales(Mapping[str, Locale]):
-    """Locales by name, each loaded when it is asked for."""
+    """Locales by name, each loaded when asked for."""
 
     def __init__(self, locale_source: LocaleSource) -> None:
         self._locale_source = locale_source
@@ -335,7 +335,7 @@ class _Locales(Mapping[str, Locale]):
 
 
 class _Landmarks(Sequence[Landmark]):
-    """Landmarks by number; those of locales that were not looked at yet make it read all."""
+    """Landmarks by number; one of a locale that was not loaded yet loads all."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -345,8 +345,8 @@ class _Landmarks(Sequence[Landmark]):
             return [self[i] for i in range(*number.indices(len(self)))]
         known = self._world._landmarks
         if number not in known:
-            for packet in self._world.locale_source.all_geometry():
-                known.update(packet.landmarks)
+            for part in self._world.locale_source.all_geometry():
+                known.update(part.landmarks)
         if number not in known:
             raise IndexError(f"expected the number of one of {len(self)} landmarks, got {number}")
         return known[number]

@@ -44,7 +44,7 @@ def same(one: World, other: World) -> None:
         assert one.locale(name).properties == other.locale(name).properties
         assert [d.name for d in one.doorways_of(name)] == [d.name for d in other.doorways_of(name)]
         assert [t.name for t in one.things_of(name)] == [t.name for t in other.things_of(name)]
-        assert one.locale_source.arcs(name) == other.locale_source.arcs(name)
+        assert one.locale_source.passage_edges(name) == other.locale_source.passage_edges(name)
 
 
 @pytest.mark.parametrize("details", [[], [DETAILS]])

@@ -9,7 +9,7 @@ import pytest
 
 from harvey.plan_picture import draw_plan
 from world_models.building.checks import check_world
-from world_models.building.plan_view import plan_of, plan_svg
+from world_models.building.plan_view import build_drawing, plan_svg
 from world_models.building.world import World
 from world_models.commands import find_room, parse_command
 from world_models.entries.location import Place
@@ -37,7 +37,7 @@ def described(world: World, names: dict[str, str], up_m: float = 0.0) -> Iterato
     for mark in world.landmarks:
         if mark.locale in names:
             yield (mark.name, mark.kind, mark.neighbour, (np.round(mark.lines_world - up, 9) + 0.0).tolist(),
-                   np.nan_to_num(np.round(mark.edges.levels, 9), nan=-1.0).tolist())
+                   np.nan_to_num(np.round(mark.edges.brightness, 9), nan=-1.0).tolist())
 
 
 def test_the_research_centers_floor_is_what_it_was_before_it_was_written_shorter() -> None:
@@ -133,7 +133,7 @@ def test_bring_this_to_somebody_across_the_campus(campus: World) -> None:
 
 
 def test_the_plan_has_a_panel_for_every_storey(campus: World, tmp_path: Path) -> None:
-    plan = plan_of(campus)
+    plan = build_drawing(campus)
     titles = [shape.text for shape in plan.shapes if shape.kind == "title"]
     assert [text.partition(",")[0] for text in titles] == list(FLOORS_M)
     names = [shape.text for shape in plan.shapes if shape.kind == "name"]

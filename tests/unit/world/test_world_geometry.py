@@ -43,7 +43,7 @@ def test_a_box_on_the_floor_hides_its_underside_and_keeps_its_foot_line() -> Non
     edges = box.edges()
     feet = np.all(edges.lines_world[..., 2] == 0, axis=1)
     assert np.count_nonzero(feet) == 4 and len(edges) == 12
-    assert np.allclose(edges.levels[feet, 1], 0.2)
+    assert np.allclose(edges.brightness[feet, 1], 0.2)
 
 
 def test_two_flush_boxes_of_one_finish_show_no_seam() -> None:

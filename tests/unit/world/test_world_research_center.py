@@ -132,10 +132,10 @@ def test_the_hallway_does_not_repeat_itself(world: World) -> None:
 
 
 def test_flat_boards_are_no_obstacles_but_furniture_is(world: World) -> None:
-    assert not next(t for t in world.things if t.kind == "notice-board").in_the_way
-    assert not next(t for t in world.things if t.kind == "exit-sign").in_the_way
-    assert next(t for t in world.things if t.kind == "pillar").in_the_way
-    assert next(t for t in world.things if t.name == "allens-office/desk").in_the_way
+    assert not next(t for t in world.things if t.kind == "notice-board").is_obstacle
+    assert not next(t for t in world.things if t.kind == "exit-sign").is_obstacle
+    assert next(t for t in world.things if t.kind == "pillar").is_obstacle
+    assert next(t for t in world.things if t.name == "allens-office/desk").is_obstacle
 
 
 def test_a_plan_shows_every_room_and_thing(world: World) -> None:

@@ -28,7 +28,7 @@ def unpack_array(data: bytes, shape: tuple[int, ...]) -> Floats:
     return frozen(np.frombuffer(data, "<f8").reshape(shape))
 
 
-def packed(packet: LocaleGeometry) -> tuple[str, bytes]:
+def pack_geometry(packet: LocaleGeometry) -> tuple[str, bytes]:
     """The words of a packet as JSON, and its numbers."""
     faces = [[number, f.name, f.kind, f.parent, dict(f.properties), len(f.polygon_world),
               [_words(r) for r in f.front], [_words(r) for r in f.back]] for number, f in packet.faces]
@@ -37,7 +37,7 @@ def packed(packet: LocaleGeometry) -> tuple[str, bytes]:
     for _, face in packet.faces:
         arrays += [face.polygon_world, *(r.polygon_world for r in (*face.front, *face.back))]
     for _, mark in packet.landmarks:
-        arrays += [mark.edges.lines_world, mark.edges.normals_world, mark.edges.levels]
+        arrays += [mark.edges.lines_world, mark.edges.normals_world, mark.edges.brightness]
     flat = np.concatenate([np.zeros(0), *(array.ravel() for array in arrays)])
     return json.dumps([faces, marks], separators=(",", ":")), pack_array(flat)
 
@@ -46,7 +46,7 @@ def _words(r: Region) -> list[Any]:
     return [r.name, len(r.polygon_world), list(r.colour), r.texture, r.texture_scale_m, r.seed]
 
 
-def unpacked(locale: str, neighbour: str | None, rows: Iterable[tuple[str, bytes]]) -> LocaleGeometry:
+def unpack_geometry(locale: str, neighbour: str | None, rows: Iterable[tuple[str, bytes]]) -> LocaleGeometry:
     """One packet of one or several rows: the model's, and those of details that were compiled with it.
 
     Raises ValueError, TypeError or LookupError where the bytes are not what was packed.

@@ -10,11 +10,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from world_models.building.locale_source import Arc, LocaleGeometry
+from world_models.building.locale_source import LocaleGeometry, PassageEdge
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.memory_locales import words_of
 from world_models.building.things import Finding, Thing
-from world_models.files.compiled.packing import unpack_array, unpacked
+from world_models.files.compiled.packing import unpack_array, unpack_geometry
 from world_models.files.compiled.schema import FORMAT
 from world_models.files.toml.source import WorldError
 from world_models.frames import Pose
@@ -148,16 +148,16 @@ class SqliteLocales:
         rows: dict[tuple[str, str | None], list[tuple[str, bytes]]] = {}
         for locale, neighbour, words, numbers in self._rows(query, *values):
             rows.setdefault((locale, neighbour), []).append((words, numbers))
-        return tuple(unpacked(*key, several) for key, several in rows.items())
+        return tuple(unpack_geometry(*key, several) for key, several in rows.items())
 
     def things(self, locale: str) -> tuple[Thing, ...]:
         return self._once("things", locale, lambda: tuple(_thing(row) for row in self._rows(
             f"{THING} where t.locale = (select id from locale where name = ?) and layer <= ? order by t.id",
             locale, self._layer)))
 
-    def arcs(self, container: str) -> tuple[Arc, ...]:
+    def passage_edges(self, container: str) -> tuple[PassageEdge, ...]:
         return self._once("passages", container, lambda: tuple(
-            Arc(passage, ((a, a_part), (b, b_part))) for passage, a, a_part, b, b_part in self._rows(
+            PassageEdge(passage, ((a, a_part), (b, b_part))) for passage, a, a_part, b, b_part in self._rows(
                 "select passage, la.name, a_part, lb.name, b_part from arc join locale la on la.id = a"
                 " join locale lb on lb.id = b where container = (select id from locale where name = ?) order by arc.id",
                 container)))

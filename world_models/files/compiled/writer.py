@@ -15,11 +15,11 @@ import numpy as np
 
 from world_models.building.locale_source import LocaleGeometry
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.memory_locales import extent_of, words_about
-from world_models.building.passages import drivable_passages, network
+from world_models.building.memory_locales import bounding_rectangle, words_about
+from world_models.building.passages import build_passage_graphs, drivable_passages
 from world_models.building.things import Finding, Thing
 from world_models.building.world import World
-from world_models.files.compiled.packing import pack_array, packed
+from world_models.files.compiled.packing import pack_array, pack_geometry
 from world_models.files.compiled.schema import FORMAT, INDICES, SCHEMA
 from world_models.files.toml.source import WorldError
 from world_models.frames import Pose
@@ -104,7 +104,7 @@ class WorldWriter:
         parent = locale.parent
         pose = locale.frame if parent is None else self._poses[parent] @ locale.frame
         self._poses[locale.name], self._parents[locale.name] = pose, parent
-        x0, y0, x1, y1 = (float(v) for v in extent_of(locale, pose))
+        x0, y0, x1, y1 = (float(v) for v in bounding_rectangle(locale, pose))
         frame = pack_array(np.column_stack([locale.frame.rotation, locale.frame.translation]))
         self._insert("insert into locale values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 1)", (
             number, locale.name, locale.kind, None if parent is None else self._ids[parent], frame,
@@ -130,7 +130,7 @@ class WorldWriter:
     def add_packet(self, packet: LocaleGeometry, layer: int = 0) -> None:
         """Faces and landmarks; empty ones are left out."""
         if packet.faces or packet.landmarks:
-            self.add_packed(packet.locale, packet.neighbour, *packed(packet), layer)
+            self.add_packed(packet.locale, packet.neighbour, *pack_geometry(packet), layer)
 
     def add_packed(self, locale: str, neighbour: str | None, words: str, numbers: bytes, layer: int = 0) -> None:
         """A packet that is packed already."""
@@ -142,7 +142,7 @@ class WorldWriter:
             "insert into thing (locale, layer, name, kind, footprint, low_m, high_m, proud_m, source)"
             " values (?, ?, ?, ?, ?, ?, ?, ?, ?)",
             (self._ids[thing.locale], layer, thing.name, thing.kind, pack_array(thing.footprint_world), thing.low_m,
-             thing.high_m, thing.proud_m, thing.source))
+             thing.high_m, thing.protrusion_m, thing.source))
 
     def count(self, layer: int, counts: object) -> None:
         """How many of everything there are with so many layers."""
@@ -151,13 +151,14 @@ class WorldWriter:
     def finish(self, faults: Iterable[Finding] = ()) -> None:
         """Find the passages of every container, index everything and write it out."""
         ids = self._ids
-        found = network(self._parents, self._passages)
-        arcs = ((ids[container], arc.passage, *(v for name, part in arc.between for v in (ids[name], part)))
-                for container, several in found.arcs.items() for arc in several)
+        graphs = build_passage_graphs(self._parents, self._passages)
+        edges = [(ids[container], edge.passage, ids[a], a_part, ids[b], b_part)
+                 for container, several in graphs.edges.items() for edge in several
+                 for (a, a_part), (b, b_part) in [edge.between]]
         self._file.executemany("insert into arc (container, passage, a, a_part, b, b_part) values (?, ?, ?, ?, ?, ?)",
-                               arcs)
+                               edges)
         self._file.executemany("insert into component values (?, ?, ?)",
-                               ((ids[name], part, above) for (name, part), above in found.components.items() if above))
+                               ((ids[name], part, above) for (name, part), above in graphs.containing.items() if above))
         self._file.executemany("insert into word values (?, ?)", self._words)
         self._meta("sha256", self._digest.hexdigest())
         self._file.executemany("insert into fault values (?, ?)", ((fault.source, fault.what) for fault in faults))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from world_models.building.faces import Face, build_barrier
 from world_models.building.landmarks import Edges, Landmark
 from world_models.building.regions import Finish, expected_brightness
-from world_models.building.solids import Box, Range, Solid, Surface, surface_of
+from world_models.building.solids import Box, Range, Solid, Surface, surface_from_polygon
 from world_models.files.construction.blueprint import DoorSpec
 from world_models.files.construction.shells import CASING_M, CASING_PROUD_M, Opening, Wall
 from world_models.frames import Pose
@@ -86,7 +86,7 @@ class DoorSide:
         polygon = self.wall.rectangle(self.x, (0.0, self.opening.top_m), -self.depth_m)
         face = build_barrier(f"{self.name}/leaf", self.wall.locale, polygon, self.spec.leaf, parent=self.wall.face_name)
         middle = self.wall.world_from_wall @ _moved((self.x[0] + self.x[1]) / 2, -self.depth_m)
-        surface = surface_of(polygon, self.spec.leaf)
+        surface = surface_from_polygon(polygon, self.spec.leaf)
         panel = Solid(f"{self.name}/panel", self.spec.panel, middle, (*self._ground, surface))
         (a, b), h, y, frame = self.x, self.opening.top_m, -self.depth_m, self.spec.frame
         edges = [
@@ -95,7 +95,8 @@ class DoorSide:
             self._line((a, y, h), (b, y, h), "-z", "+y", frame, self.spec.leaf),
             self._line((a, y, 0), (b, y, 0), "+z", "+y", self.floor, self.spec.leaf),
         ]
-        return [face, *panel.faces(self.wall.locale, parent=face.name)], Edges.joined([Edges.of(edges), panel.edges()])
+        faces = [face, *panel.faces(self.wall.locale, parent=face.name)]
+        return faces, Edges.concatenate([Edges.from_rows(edges), panel.edges()])
 
     def casing_edges(self) -> Edges:
         """Outer edges of the boards, and their inner edges along the jambs."""
@@ -110,7 +111,7 @@ class DoorSide:
         rows.append(self._line((a - w, p, h + w), (b + w, p, h + w), "+y", "+z", frame, frame, wall))
         rows.append(self._line((a - w, 0, h + w), (b + w, 0, h + w), "+z", "+y", frame, wall, ground=True))
         rows.append(self._line((a, p, h), (b, p, h), "+y", "-z", frame, frame))
-        return Edges.of(rows)
+        return Edges.from_rows(rows)
 
     def lining_edges(self, back_m: float, floor: Finish) -> Edges:
         """Where the jambs meet soffit and floor."""
@@ -119,19 +120,19 @@ class DoorSide:
         for x, into in ((a, "+x"), (b, "-x")):
             rows.append(self._line((x, back, h), (x, front, h), into, "-z", frame, frame))
             rows.append(self._line((x, back, 0), (x, front, 0), into, "+z", frame, floor))
-        return Edges.of(rows)
+        return Edges.from_rows(rows)
 
     def threshold_edge(self) -> Edges:
         """Where the threshold meets the floor of this room."""
         (a, b) = self.x
-        return Edges.of([self._line((a, 0, 0), (b, 0, 0), "+z", "+z", self.spec.threshold, self.floor)])
+        return Edges.from_rows([self._line((a, 0, 0), (b, 0, 0), "+z", "+z", self.spec.threshold, self.floor)])
 
     @property
     def _ground(self) -> tuple[Surface, ...]:
         up = np.array([0.0, 0.0, 1.0])
         base = float(self.wall.world_from_wall.translation[2])
         floor = Surface(up, base, expected_brightness(self.floor, up))
-        return floor, surface_of(self.wall.polygon_world, self.wall.finish)
+        return floor, surface_from_polygon(self.wall.polygon_world, self.wall.finish)
 
     def _painted(self, name: str, corners: Sequence[Sequence[float]], finish: Finish) -> Face:
         polygon = self.wall.world_from_wall.apply(corners)
@@ -162,14 +163,14 @@ def open_door(near: DoorSide, far: DoorSide) -> tuple[list[Face], Landmark]:
     edges = [near.lining_edges(back, near.spec.threshold)]
     edges += [part for side in (near, far) for part in (side.casing_edges(), side.threshold_edge())]
     name, (first, second) = near.spec.name, near.spec.between
-    return faces, Landmark(name, first, "doorway", Edges.joined(edges), neighbour=second, source=near.spec.source)
+    return faces, Landmark(name, first, "doorway", Edges.concatenate(edges), neighbour=second, source=near.spec.source)
 
 
 def closed_door(side: DoorSide) -> tuple[list[Face], Landmark]:
     """Faces and the landmark of a closed door, as seen from one room."""
     leaf_faces, leaf_edges = side.leaf()
     faces = [*side.casing_faces(), *side.lining(side.depth_m), side.threshold(side.floor), *leaf_faces]
-    edges = Edges.joined([side.casing_edges(), side.lining_edges(side.depth_m, side.floor), leaf_edges])
+    edges = Edges.concatenate([side.casing_edges(), side.lining_edges(side.depth_m, side.floor), leaf_edges])
     return faces, Landmark(side.name, side.wall.locale, "door", edges, source=side.spec.source)
 
 

@@ -13,8 +13,8 @@ from world_models.building.faces import Face
 from world_models.building.intervals import subtract_intervals
 from world_models.building.landmarks import Edges, Landmark
 from world_models.building.outlines import convex_pieces
-from world_models.building.regions import Finish, expected_brightness, region
-from world_models.building.solids import SHORTEST_LINE_M, Box, Range, Solid, Surface, surface_of
+from world_models.building.regions import Finish, build_region, expected_brightness
+from world_models.building.solids import MIN_LINE_M, Box, Range, Solid, Surface, surface_from_polygon
 from world_models.files.construction.blueprint import LocaleSpec, RoomLook
 from world_models.frames import Pose
 
@@ -125,7 +125,7 @@ class Shell:
         above = [Surface(-UP, -float(up[1]), expected_brightness(look.ceiling, -UP))] if look.ceiling else []
         return (
             Surface(UP, float(up[0]), expected_brightness(look.floor, UP)), *above,
-            *(surface_of(wall.polygon_world, wall.finish) for wall in self.walls),
+            *(surface_from_polygon(wall.polygon_world, wall.finish) for wall in self.walls),
         )
 
     def faces(self) -> list[Face]:
@@ -151,7 +151,7 @@ class Shell:
         flat = np.column_stack([self.spec.outline, np.full(len(self.spec.outline), z)])
         pieces = [[*corners] if up else [*corners][::-1] for corners in convex_pieces(self.spec.outline)]
         polygons = [self.world_from_locale.apply(flat[piece]) for piece in pieces]
-        regions = tuple(region(f"{name}/{index}", polygon, finish) for index, polygon in enumerate(polygons))
+        regions = tuple(build_region(f"{name}/{index}", polygon, finish) for index, polygon in enumerate(polygons))
         outline = self.world_from_locale.apply(flat if up else flat[::-1])
         return Face(name, self.spec.name, outline, front=regions)
 
@@ -169,17 +169,18 @@ class Shell:
         return solids
 
     def _strip(
-        self, index: int, name: str, finish: Finish, stretches: Sequence[Range], z: Range, proud_m: float
+        self, index: int, name: str, finish: Finish, stretches: Sequence[Range], z: Range, protrusion_m: float
     ) -> Solid:
         """Boards along a wall; in an inner corner they end at the front of the next wall's board."""
         wall, ahead = self.walls[index], self.walls[(index + 1) % len(self.walls)]
         along, surfaces = wall.world_from_wall.rotation[:, 0], self.surfaces
         end = wall.length_m
         if float(along @ ahead.inward_world) < -1e-6:
-            end -= proud_m
-            front = ahead.rectangle((0.0, 1.0), (0.0, 1.0), proud_m)
-            surfaces = (*surfaces, surface_of(front, finish))
-        boxes = [Box((low, min(high, end)), (0.0, proud_m), z, finish) for low, high in stretches if low < end - 1e-3]
+            end -= protrusion_m
+            front = ahead.rectangle((0.0, 1.0), (0.0, 1.0), protrusion_m)
+            surfaces = (*surfaces, surface_from_polygon(front, finish))
+        boxes = [Box((low, min(high, end)), (0.0, protrusion_m), z, finish)
+                 for low, high in stretches if low < end - 1e-3]
         return Solid(f"{wall.face_name}/{name}", tuple(boxes), wall.world_from_wall, surfaces)
 
     def _wall_edges(self, index: int) -> Edges:
@@ -196,11 +197,11 @@ class Shell:
             flats.append((wall.height_m, look.ceiling, -UP, look.moulding))
         for z, finish, normal, board in flats:
             for x in wall.free_of_openings(CASING_M) if board is None and z == 0.0 else [(0.0, wall.length_m)]:
-                if board is None and x[1] - x[0] >= SHORTEST_LINE_M:
+                if board is None and x[1] - x[0] >= MIN_LINE_M:
                     line = wall.world_from_wall.apply([(x[0], 0, z), (x[1], 0, z)])
                     brightness = (wall.brightness, expected_brightness(finish, normal), nan)
                     rows.append((line, (wall.inward_world, normal), brightness))
-        return Edges.joined([Edges.of(rows), *(solid.edges() for solid in self._trim(index))])
+        return Edges.concatenate([Edges.from_rows(rows), *(solid.edges() for solid in self._trim(index))])
 
 
     def _skyline(self, wall: Wall, before: Wall) -> list[_Row]:
@@ -229,5 +230,6 @@ def _wall_face(wall: Wall) -> Face:
     rectangles = [(x, full) for x in wall.free_of_openings()]
     rectangles += [((o.left_m, o.right_m), (o.top_m, wall.height_m)) for o in wall.openings]
     name = wall.face_name
-    regions = tuple(region(f"{name}/{i}", wall.rectangle(x, z), wall.finish) for i, (x, z) in enumerate(rectangles))
+    regions = tuple(build_region(f"{name}/{i}", wall.rectangle(x, z), wall.finish)
+                    for i, (x, z) in enumerate(rectangles))
     return Face(name, wall.locale, wall.polygon_world, front=regions)
