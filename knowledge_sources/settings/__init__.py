@@ -13,7 +13,6 @@ from knowledge_sources.settings.features import FeaturesSettings
 from knowledge_sources.settings.goal import GoalSettings
 from knowledge_sources.settings.localization import LocalizationSettings
 from knowledge_sources.settings.matching import MatchingSettings
-from knowledge_sources.settings.motion import MotionSettings
 from knowledge_sources.settings.plan import PlanSettings
 from knowledge_sources.settings.pose import PoseSettings
 from knowledge_sources.settings.tracking import TrackingSettings
@@ -30,7 +29,6 @@ class Settings:
     verification: VerificationSettings = field(default_factory=VerificationSettings)
     localization: LocalizationSettings = field(default_factory=LocalizationSettings)
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
-    motion: MotionSettings = field(default_factory=MotionSettings)
     calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
     action: ActionSettings = field(default_factory=ActionSettings)
     plan: PlanSettings = field(default_factory=PlanSettings)

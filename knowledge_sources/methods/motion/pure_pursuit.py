@@ -1,11 +1,11 @@
-"""How a robot is steered along a straight leg (§5), and the law behind it.
+"""Pure pursuit along a straight leg (§5), with a bound on the position error.
 
 The law: *correcting the heading alone keeps the position error bounded along a segment.* Let y be the distance from the
 line, e the heading against it (both small), and let each increment of length d begin with a TURN towards the point of
 the line that lies L ahead, L >= d, and be an arc of the wheels' curvature c (§3.2). Before the increment the believed
-pose is wrong by at most b beside the line and by at most h in heading; the TURN itself errs by at most t, and what is
-known of the drift by at most k in curvature. After the turn the robot faces along ``-(y + b') / L + h' + t'``, with
-|b'| <= b, |h'| <= h, |t'| <= t, whatever its heading was before; the chord of the arc that is known is taken off the
+pose is wrong by at most b beside the line and by at most h in heading; the TURN itself errs by at most t, and the
+estimated drift by at most k in curvature. After the turn the robot faces along ``-(y + b') / L + h' + t'``, with
+|b'| <= b, |h'| <= h, |t'| <= t, whatever its heading was before; the chord of the estimated arc is subtracted from the
 turn, so that the increment ends at::
 
     y_next = (1 - d / L) y + d (-b' / L + h' + t') + k' d^2 / 2 ,   |k'| <= k
@@ -15,9 +15,11 @@ The heading before the increment has dropped out, and y is multiplied by 0 <= 1 
     |y_n| <= (1 - d / L)^n |y_0| + Y,      Y = b + L (h + t) + k d L / 2
 
 since the sum of the geometric series is L/d times what one increment adds. Y does not grow with the length of the
-segment; without the turns y grows with its square. Where drift is not known, k is the drift itself. Within an increment
-the arc strays from its chord by at most c d^2 / 8 more. On the move the same holds with d the way between two pictures
-and L the look-ahead then; the arc to steer takes the place of the turn.
+segment; without the turns y grows with its square. Where drift is not estimated, k is the drift itself. Within an
+increment the arc strays from its chord by at most c d^2 / 8 more. On the move the same holds with d the way between two
+pictures and L the look-ahead then; the curvature steered takes the place of the turn.
+
+Source: R. C. Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01, 1992.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ from world_models.frames import Pose2, wrap_angle
 
 
 def measure_progress(leg: Leg, here: Pose2) -> tuple[float, float]:
-    """What is left along the leg, and how far to the left of it the robot is [m]."""
+    """Distance left along the leg, and distance of the robot to the left of it [m]."""
     dx, dy = leg.x1_m - leg.x0_m, leg.y1_m - leg.y0_m
     length = math.hypot(dx, dy) or 1.0
     rx, ry = leg.x1_m - here.x_m, leg.y1_m - here.y_m
@@ -38,31 +40,30 @@ def measure_progress(leg: Leg, here: Pose2) -> tuple[float, float]:
 
 
 def compute_bearing(point: tuple[float, float], here: Pose2) -> float:
-    """How far to the left of the robot's heading a point lies [rad]."""
+    """Direction of a point (x, y), world, against the robot's heading, positive to the left [rad]."""
     return wrap_angle(math.atan2(point[1] - here.y_m, point[0] - here.x_m) - here.heading_rad)
 
 
 def find_aim_point(leg: Leg, along_m: float, lookahead_m: float) -> tuple[float, float]:
-    """The point of the line to steer at [m, world], where ``along_m`` are left of the leg."""
+    """The point of the leg to steer at [m, world], ``lookahead_m`` ahead of where ``along_m`` are left of it."""
     length = math.hypot(leg.x1_m - leg.x0_m, leg.y1_m - leg.y0_m)
     part = min(1.0, max(0.0, (length - along_m + lookahead_m) / max(length, 1e-9)))
     return leg.x0_m + part * (leg.x1_m - leg.x0_m), leg.y0_m + part * (leg.y1_m - leg.y0_m)
 
 
 def update_leg(leg: Leg, here: Pose2, point: tuple[float, float]) -> Leg:
-    """The leg with where the robot is beside it and where the point lies that it steers at: what a motion follows from.
-    """
+    """The leg with the robot's distances to its end and to its line, and the direction of the point steered at."""
     along, left = measure_progress(leg, here)
     return replace(leg, to_go_m=along, left_m=left, aim_rad=compute_bearing(point, here))
 
 
 def compute_chord_turn(turn_rad: float, curvature_per_m: float, length_m: float) -> float:
-    """What to turn so that the chord of the arc that follows, and not its tangent, lies in a direction [rad]."""
+    """Turn that puts the chord of the arc that follows, and not its tangent, in a direction [rad]."""
     return turn_rad - 0.5 * curvature_per_m * length_m
 
 
 def compute_curvature_to(point: tuple[float, float], here: Pose2) -> float:
-    """Of the arc, tangent to the robot's heading, that leads through a point ahead [1/m]."""
+    """Curvature of the arc tangent to the robot's heading that leads through a point ahead [1/m]."""
     away = math.hypot(point[0] - here.x_m, point[1] - here.y_m)
     return 2.0 * math.sin(compute_bearing(point, here)) / max(away, 1e-6)
 
@@ -70,11 +71,11 @@ def compute_curvature_to(point: tuple[float, float], here: Pose2) -> float:
 def compute_error_bound_m(
     *, increment_m: float, lookahead_m: float, place_m: float, heading_rad: float, curvature_per_m: float
 ) -> float:
-    """Y of the law above: beyond which no error of position grows, at the ends of increments [m].
+    """Y of the law above: bound of the position error at the ends of increments [m].
 
     Args:
-        place_m, heading_rad: by how much the belief, and the turn, may be wrong: b, and h + t.
-        curvature_per_m: by how much the drift that is reckoned with may be: k.
+        place_m, heading_rad: largest error of the believed place, b, and of believed heading and turn together, h + t.
+        curvature_per_m: largest error of the estimated drift, k.
 
     Raises:
         ValueError: the look-ahead is shorter than an increment.

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.features.correlation import (
     compute_second_peak,
     correlate,
@@ -25,7 +25,7 @@ fractions = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
 shifts = st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0))
 
 
-def pattern(seed: int, shift: Any = (0.0, 0.0), scale: float = 1.0) -> NDArray[np.float64]:
+def pattern(seed: int, shift: Any = (0.0, 0.0), scale: float = 1.0) -> Floats:
     """Sum of waves of 6 px and more, moved by a shift and enlarged about the image's middle; exact at every place."""
     rng = np.random.default_rng(seed)
     v, u = (np.mgrid[0:SIZE, 0:SIZE] - SIZE / 2.0)
@@ -38,7 +38,7 @@ def pattern(seed: int, shift: Any = (0.0, 0.0), scale: float = 1.0) -> NDArray[n
     return image
 
 
-def middle(offset: Any = (0.0, 0.0)) -> NDArray[np.float64]:
+def middle(offset: Any = (0.0, 0.0)) -> Floats:
     return np.asarray(np.array([SIZE / 2.0, SIZE / 2.0]) + offset)
 
 
@@ -91,7 +91,7 @@ def test_brightness_and_contrast_do_not_matter(seed: int, gain: float, level: fl
     assert a.second_peak == pytest.approx(b.second_peak, abs=1e-3)
 
 
-def brute_force(patch: NDArray[np.float64], image: NDArray[np.float64], half: int, u: int, v: int) -> float:
+def brute_force(patch: Floats, image: Floats, half: int, u: int, v: int) -> float:
     seen = image[v - half : v + half + 1, u - half : u + half + 1]
     return float(np.corrcoef(patch.ravel(), seen.ravel())[0, 1])
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from knowledge_sources.methods.arrays import Floats, Image
 from knowledge_sources.methods.features.lines import LineSegments, find_lines
 from knowledge_sources.settings import DEFAULT
 
@@ -22,13 +22,13 @@ phases = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
 few = settings(deadline=None, max_examples=25)
 
 
-def coverage(point: Any, normal: Any, size: int = SIZE) -> NDArray[np.float64]:
+def coverage(point: Any, normal: Any, size: int = SIZE) -> Floats:
     """Share of each pixel's square on the normal's side of a line, in closed form."""
     v, u = np.mgrid[0:size, 0:size].astype(float)
     distance = (u - point[0]) * normal[0] + (v - point[1]) * normal[1]
     p, q = np.maximum(np.abs(normal), 1e-4)
 
-    def ramp(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ramp(x: Floats) -> Floats:
         return np.maximum(x, 0.0) ** 2 / 2.0
 
     a, b = (p + q) / 2.0, (p - q) / 2.0
@@ -43,11 +43,11 @@ def step(angle: float, phase: Any, dark: float = 60.0, bright: float = 180.0) ->
     return dark + (bright - dark) * coverage(point, normal), point, normal
 
 
-def grey(image: NDArray[np.float64]) -> NDArray[np.uint8]:
+def grey(image: Floats) -> Image:
     return np.clip(np.rint(image), 0, 255).astype(np.uint8)
 
 
-def prediction(point: Any, normal: Any, offset: float = 0.0, turn: float = 0.0) -> NDArray[np.float64]:
+def prediction(point: Any, normal: Any, offset: float = 0.0, turn: float = 0.0) -> Floats:
     along = np.array([-normal[1], normal[0]]) + turn * normal
     centre = point + offset * normal
     return np.array([[centre - 28.0 * along, centre + 28.0 * along]])
@@ -57,7 +57,7 @@ def longest(found: LineSegments) -> int:
     return int(np.argmax(found.lengths_px))
 
 
-def off_line(found: LineSegments, point: Any, normal: Any) -> NDArray[np.float64]:
+def off_line(found: LineSegments, point: Any, normal: Any) -> Floats:
     return np.asarray((found.segments_px[longest(found)] - point) @ normal)
 
 
@@ -140,7 +140,7 @@ def test_predictions_are_independent_of_their_order(order: list[int]) -> None:
         )
 
 
-def rectangle(angle: float, half: tuple[float, float]) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+def rectangle(angle: float, half: tuple[float, float]) -> tuple[Image, Floats]:
     """A bright rectangle, and its four sides."""
     axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     middle = np.array([SIZE / 2.0, SIZE / 2.0])
@@ -166,7 +166,7 @@ def test_bands_find_what_the_whole_image_finds(angle: float, half: tuple[float, 
     assert len(sides) == len(whole)
 
 
-def line_distance(segment: NDArray[np.float64], point: NDArray[np.float64]) -> float:
+def line_distance(segment: Floats, point: Floats) -> float:
     along = (segment[1] - segment[0]) / np.linalg.norm(segment[1] - segment[0])
     return float((point - segment[0]) @ (-along[1], along[0]))
 

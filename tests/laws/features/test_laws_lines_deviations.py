@@ -13,26 +13,25 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from knowledge_sources.methods.arrays import Floats, Image
 from knowledge_sources.methods.features.lines import LineSegments, find_lines
 from knowledge_sources.settings import DEFAULT
 
 SIZE = 81
 SIGMA_END_PX = DEFAULT.features.sigma_along_px
 NO_SYSTEMATIC = replace(DEFAULT.features, line_systematic_px=0.005)
-Array = NDArray[np.float64]
 LOOKS = [(4.0, 60.0, None), (2.0, 30.0, 90), (6.0, 40.0, None)]
 
 
-def share_beyond(point: Any, normal: Any) -> Array:
+def share_beyond(point: Any, normal: Any) -> Floats:
     """Share of each pixel's square on the normal's side of a line, to an eighth of a pixel."""
     fine = (np.arange(8 * SIZE) + 0.5) / 8.0 - 0.5
     side = (fine[None, :] - point[0]) * normal[0] + (fine[:, None] - point[1]) * normal[1]
     return np.asarray(np.clip(8.0 * side + 0.5, 0.0, 1.0).reshape(SIZE, 8, SIZE, 8).mean(axis=(1, 3)))
 
 
-def seen(image: Array, noise: float, quality: int | None, rng: np.random.Generator) -> NDArray[np.uint8]:
+def seen(image: Floats, noise: float, quality: int | None, rng: np.random.Generator) -> Image:
     blurred = cv2.GaussianBlur(image, (0, 0), 0.5)
     grey = np.clip(np.rint(blurred + noise * rng.standard_normal(image.shape)), 0, 255).astype(np.uint8)
     if quality is None:
@@ -41,7 +40,7 @@ def seen(image: Array, noise: float, quality: int | None, rng: np.random.Generat
     return np.asarray(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE), np.uint8)
 
 
-def predictions(ends: Array, rng: np.random.Generator) -> Array:
+def predictions(ends: Floats, rng: np.random.Generator) -> Floats:
     """The lines (n, 2, 2) as a prior that is a few pixels and degrees off would have them."""
     turn = rng.uniform(-0.06, 0.06)
     middle = ends.mean(axis=(0, 1))
@@ -49,7 +48,7 @@ def predictions(ends: Array, rng: np.random.Generator) -> Array:
     return np.asarray((ends - middle) @ rotation + middle + rng.uniform(-3.0, 3.0, 2))
 
 
-def off_and_turn(found: LineSegments, point: Array, normal: Array) -> tuple[float, float]:
+def off_and_turn(found: LineSegments, point: Floats, normal: Floats) -> tuple[float, float]:
     """Errors of the longest segment's middle and direction, in its own deviations."""
     k = int(np.argmax(found.lengths_px))
     off = (found.segments_px[k] - point) @ normal
@@ -77,7 +76,7 @@ def test_two_thirds_lie_within_one_deviation_and_nearly_all_within_two(
     assert np.all(np.mean(sizes < 2.0, axis=0) > 0.88)
 
 
-def rectangle(rng: np.random.Generator) -> tuple[Array, Array]:
+def rectangle(rng: np.random.Generator) -> tuple[Floats, Floats]:
     """A bright rectangle on grey, and its sides (4, 2, 2)."""
     angle, half = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(12.0, 25.0, 2)
     axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
@@ -89,7 +88,7 @@ def rectangle(rng: np.random.Generator) -> tuple[Array, Array]:
     return 50.0 + 120.0 * share, np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
-def end_errors(found: LineSegments, side: Array) -> list[float]:
+def end_errors(found: LineSegments, side: Floats) -> list[float]:
     """How far the ends of the longest segment on a side lie inside it [px]; negative: beyond."""
     length = float(np.linalg.norm(side[1] - side[0]))
     along = (side[1] - side[0]) / length

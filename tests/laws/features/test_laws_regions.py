@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.features.regions import find_histogram_valleys, segment_regions
 
 few = settings(deadline=None, max_examples=20)
@@ -16,7 +16,7 @@ seeds = st.integers(0, 10_000)
 sides = st.integers(20, 45)
 
 
-def boxes(seed: int, noise: float = 2.0) -> NDArray[np.uint8]:
+def boxes(seed: int, noise: float = 2.0) -> Image:
     """Rectangles of clearly different brightness on a plain ground."""
     rng = np.random.default_rng(seed)
     image = np.full((128, 160), 40.0)
