@@ -27,7 +27,7 @@ STEP_M = ACTUATOR.reach * ACTUATOR.increment_m
 errors = st.lists(st.tuples(*[st.floats(-1.0, 1.0)] * 4), min_size=20, max_size=60)
 """For each increment: of the believed place, heading, the turn and the curvature, as parts of their bounds."""
 SLACK = 1.05
-"""The law is told for small angles."""
+"""The law is stated for small angles."""
 
 
 def line(length_m: float) -> Leg:
@@ -43,7 +43,7 @@ def test_correcting_the_heading_alone_keeps_the_position_error_bounded_along_a_s
     errors: list[tuple[float, float, float, float]], start_m: float, start_rad: float, drift: float, place_m: float,
     heading_rad: float, curvature: float,
 ) -> None:
-    """|y_n| <= (1 - d/L)^n |y_0| + Y, however long the segment is; ``steering`` derives it."""
+    """|y_n| <= (1 - d/L)^n |y_0| + Y, however long the segment is; ``pure_pursuit`` derives it."""
     leg, here = line(2.0 * STEP_M * len(errors)), Pose2(0.0, start_m, start_rad)
     bound = compute_error_bound_m(increment_m=STEP_M, lookahead_m=LOOKAHEAD_M, place_m=place_m,
                                   heading_rad=2.0 * heading_rad, curvature_per_m=curvature)

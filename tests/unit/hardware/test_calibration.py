@@ -1,4 +1,4 @@
-"""Calibration: rendered boards give their camera back, within what is told of it; useless pictures say why."""
+"""Calibration: rendered boards give their camera back, within its standard deviations; unusable pictures say why."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_a_board_nowhere_near_the_floor_is_refused(calibration: Calibration) -> 
         estimate_mounting(calibration, corners, PATTERN, standing_at_m=-1.0)
 
 
-def test_a_camera_file_tells_the_same_numbers(tmp_path: Path) -> None:
+def test_a_camera_file_holds_the_same_numbers(tmp_path: Path) -> None:
     mount = CameraMount(0.2, 0.08, math.radians(5.0))
     (tmp_path / "camera.toml").write_text(camera_text(CAMERA, mount, ("a note",)))
     camera, read = load_camera(tmp_path / "camera.toml")
@@ -128,7 +128,7 @@ def test_a_camera_file_tells_the_same_numbers(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         (("fx_px = 402.0", "fx_px = -1"), r"camera.toml:4: camera.fx_px: expected a number from 1 to 1e\+06, got -1"),
         (("width_px = 512", "width_px = 51.5"), "expected a whole number of pixels"),
@@ -138,12 +138,12 @@ def test_a_camera_file_tells_the_same_numbers(tmp_path: Path) -> None:
         (("height_m = 0.2", "height_m = 'tall'"), "height_m: expected a number"),
     ],
 )
-def test_a_camera_file_that_is_wrong_is_pointed_at(tmp_path: Path, change: tuple[str, str], told: str) -> None:
+def test_a_camera_file_that_is_wrong_is_pointed_at(tmp_path: Path, change: tuple[str, str], message: str) -> None:
     text = camera_text(CAMERA, CameraMount(0.2))
     assert change[0] in text
     path = tmp_path / "camera.toml"
     path.write_text(text.replace(*change, 1))
-    with pytest.raises(CameraFileError, match=told):
+    with pytest.raises(CameraFileError, match=message):
         load_camera(path)
 
 
@@ -164,7 +164,7 @@ def test_the_command_writes_file_report_and_picture(
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         ([], "expected pictures or --camera SOURCE, got neither"),
         (["nowhere/*.jpg"], "got 'nowhere/*.jpg'"),
@@ -175,9 +175,9 @@ def test_the_command_writes_file_report_and_picture(
         (["x.jpg", "--mount-board", "floor"], "--mount-image: expected a picture"),
     ],
 )
-def test_wrong_options_are_told(
-    words: list[str], told: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+def test_wrong_options_are_named(
+    words: list[str], message: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["calibrate", *words]) == 2
-    assert told in capsys.readouterr().err
+    assert message in capsys.readouterr().err

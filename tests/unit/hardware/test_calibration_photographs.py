@@ -46,8 +46,8 @@ def test_two_halves_of_the_photographs_agree_as_they_say(side: str) -> None:
     """Nobody knows the true camera: but two calibrations that share no photograph must agree within what they tell."""
     views = views_of(side)
     first, second = calibrated(views[::2]), calibrated(views[1::2])
-    told = np.hypot(first.deviations, second.deviations)
-    apart = np.abs(first.values - second.values) / told
+    sigma = np.hypot(first.deviations, second.deviations)
+    apart = np.abs(first.values - second.values) / sigma
     assert np.all(apart < 3.0)
 
 
