@@ -14,7 +14,7 @@ from world_models.building.regions import Region
 
 
 @dataclass(frozen=True, slots=True)
-class Moved:
+class MovedThing:
     """One of a scenario's ``[[moved]]``.
 
     Attributes:
@@ -30,24 +30,24 @@ class Moved:
         check_bounds(self, {"x_m": Bounds(-1000.0, 1000.0), "y_m": Bounds(-1000.0, 1000.0)})
 
 
-def with_moved(faces: Sequence[Face], moved: Sequence[Moved]) -> tuple[Face, ...]:
+def move_things(faces: Sequence[Face], moved: Sequence[MovedThing]) -> tuple[Face, ...]:
     """The faces of a building in which things stand elsewhere.
 
     Raises:
         ValueError: there is no such thing.
     """
     for thing in moved:
-        if not any(is_of(face, thing) for face in faces):
+        if not any(belongs_to(face, thing) for face in faces):
             raise ValueError(f"expected a thing of the building, as locale/name, got {thing.thing!r}")
-    return tuple(_put(face, [thing for thing in moved if is_of(face, thing)]) for face in faces)
+    return tuple(_put(face, [thing for thing in moved if belongs_to(face, thing)]) for face in faces)
 
 
-def is_of(face: Face, moved: Moved) -> bool:
+def belongs_to(face: Face, moved: MovedThing) -> bool:
     """Whether a face is one of the thing's."""
     return face.name == moved.thing or face.name.startswith(f"{moved.thing}/")
 
 
-def _put(face: Face, moved: Sequence[Moved]) -> Face:
+def _put(face: Face, moved: Sequence[MovedThing]) -> Face:
     if not moved:
         return face
     by_m = np.sum([(thing.x_m, thing.y_m, 0.0) for thing in moved], axis=0)

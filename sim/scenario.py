@@ -12,7 +12,7 @@ from sim.body.actuator import ActuatorParameters
 from sim.body.elevator import Helper
 from sim.faults.fault import Fault
 from sim.faults.registry import read_fault
-from sim.moved_things import Moved
+from sim.moved_things import MovedThing
 from sim.render.optics import check_lens
 from sim.render.rasterizer import sample_offsets
 from sim.render.sensor import SensorParameters
@@ -112,7 +112,7 @@ class Scenario(Mission):
     actuator: ActuatorParameters
     sensor: SensorParameters
     faults: tuple[Fault, ...] = ()
-    moved: tuple[Moved, ...] = ()
+    moved: tuple[MovedThing, ...] = ()
     rides: tuple[Helper, ...] = ()
 
     def refused(self, key: Key, why: str) -> ScenarioError:
@@ -177,7 +177,7 @@ def _scenario(source: Source, name: str, folder: Path) -> Scenario:
     return Scenario(
         details=tuple(named_file(text, ROOT / "sim" / "buildings", folder) for text in details),
         faults=tuple(read_fault(item) for item in node["faults"].items()) if "faults" in node else (),
-        moved=tuple(read_settings(item, Moved) for item in node["moved"].items()) if "moved" in node else (),
+        moved=tuple(read_settings(item, MovedThing) for item in node["moved"].items()) if "moved" in node else (),
         rides=tuple(read_settings(item, Helper) for item in node["rides"].items()) if "rides" in node else (),
         **shared,
     )

@@ -9,7 +9,7 @@ import numpy as np
 from sim.body.building import Building
 from sim.body.collision import ROBOT_RADIUS_M
 from sim.faults.fault import Fault
-from sim.moved_things import is_of, with_moved
+from sim.moved_things import belongs_to, move_things
 from sim.scenario import Scenario
 from world_models.building.faces import Face
 from world_models.building.outlines import inside_polygon
@@ -60,11 +60,11 @@ def faces_of(scenario: Scenario, world: World, faces: Sequence[Face]) -> Sequenc
     """
     for i, moved in enumerate(scenario.moved):
         try:
-            faces = with_moved(faces, [moved])
+            faces = move_things(faces, [moved])
         except ValueError as error:
             raise scenario.refused(("moved", i, "thing"), str(error)) from None
-        locale = next(face.locale for face in faces if is_of(face, moved))
-        corners = np.concatenate([face.polygon_world[:, :2] for face in faces if is_of(face, moved)])
+        locale = next(face.locale for face in faces if belongs_to(face, moved))
+        corners = np.concatenate([face.polygon_world[:, :2] for face in faces if belongs_to(face, moved)])
         if not all(inside_polygon(corner, world.outline(locale), STICKS_OUT_M) for corner in corners):
             raise scenario.refused(("moved", i), f"expected {moved.thing} to stay within {locale}, got it moved out of"
                                    f" it, by x {moved.x_m:g} m and y {moved.y_m:g} m")

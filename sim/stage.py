@@ -66,7 +66,7 @@ class Stage:
         return replace(found, position_error_m=math.hypot(found.position_error_m, up_m)) if up_m else found
 
 
-def set_stage(scenario: Scenario) -> Stage:
+def build_stage(scenario: Scenario) -> Stage:
     """Load the scenario's world and building.
 
     Raises:

@@ -12,9 +12,9 @@ import sys
 from pathlib import Path
 from sim.made_up.short_missions import OFFICE
 from harvey.simulation.run import run_mission
-from sim.stage import set_stage
+from sim.stage import build_stage
 from sim.scenario import parse_scenario
-run_mission(set_stage(parse_scenario(OFFICE, "across-allens-office")), {SEED}, out=Path(sys.argv[1]))
+run_mission(build_stage(parse_scenario(OFFICE, "across-allens-office")), {SEED}, out=Path(sys.argv[1]))
 """
 
 

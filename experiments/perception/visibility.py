@@ -16,8 +16,8 @@ from tqdm import tqdm
 
 from experiments.report import Report
 from sim.render.mesh import build_mesh
-from sim.render.projection import Lens, view_of
-from sim.render.rasterizer import sample_offsets, visible_patches
+from sim.render.projection import Pinhole, project_mesh
+from sim.render.rasterizer import find_visible_patches, sample_offsets
 from world_models.building.outlines import inside_polygon
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
@@ -57,10 +57,10 @@ def run(quick: bool, seed: int) -> Report:
 def agreement(rng: np.random.Generator, views: int = VIEWS, rays: int = RAYS) -> tuple[int, int]:
     """(points on which model and renderer agree, points) in one made-up house."""
     world = read_world(Source.parse(house(rng), "house.toml"))
-    mesh, lens, same, asked = build_mesh(world.faces), Lens.of(CAMERA), 0, 0
+    mesh, lens, same, asked = build_mesh(world.faces), Pinhole.of(CAMERA), 0, 0
     for _ in range(views):
         pose = MOUNT.camera_from_robot @ _somewhere(world, rng).lifted().inverse()
-        seen = visible_patches(mesh, view_of(mesh, lens, pose.rotation, pose.translation), lens, SAMPLES)
+        seen = find_visible_patches(mesh, project_mesh(mesh, lens, pose.rotation, pose.translation), lens, SAMPLES)
         points, drawn = _points(world, pose, seen, rng, rays)
         same += int(np.sum(hidden(world, CAMERA, pose, points) == ~drawn))
         asked += len(points)

@@ -19,7 +19,7 @@ from harvey.hardware.drivers.cameras.video_file import write_video
 from harvey.runner.ports import Body
 from harvey.simulation.run import run_mission
 from sim.scenario import load_scenario, with_settings
-from sim.stage import Stage, set_stage
+from sim.stage import Stage, build_stage
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate, Outcome
@@ -169,7 +169,7 @@ def run(quick: bool, seed: int) -> Report:
 
 def _stage(quick: bool) -> Stage:
     scenario = load_scenario(QUICK_SCENARIO if quick else SCENARIO)
-    return set_stage(with_settings(scenario, {"goal": QUICK_GOAL}) if quick else scenario)
+    return build_stage(with_settings(scenario, {"goal": QUICK_GOAL}) if quick else scenario)
 
 
 def _driven(stage: Stage, seed: int) -> tuple[Told, Recording]:

@@ -16,7 +16,7 @@ from blackboard.scheduler import Scheduler
 from harvey.simulation.run import robot_model, run_mission
 from harvey.wiring import knowledge_sources, servoing
 from sim.scenario import Scenario, load_scenario
-from sim.stage import set_stage
+from sim.stage import build_stage
 from world_models.entries import KINDS
 
 
@@ -80,7 +80,7 @@ def mission_cost(cycles: int | None, seed: int) -> Cost:
     if cycles is not None:
         scenario = replace(scenario, limits=replace(scenario.limits, max_cycles=cycles))
     recorded: list[Decision] = []
-    run_mission(set_stage(scenario), seed, sinks=[recorded.append])
+    run_mission(build_stage(scenario), seed, sinks=[recorded.append])
     return _replay_timed(scenario, recorded)
 
 

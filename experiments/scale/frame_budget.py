@@ -15,7 +15,7 @@ from experiments.report import Cell, Report
 from harvey.simulation.run import run_mission
 from harvey.wiring import knowledge_sources
 from sim.scenario import load_scenario
-from sim.stage import set_stage
+from sim.stage import build_stage
 from world_models.entries.body import Frame
 from world_models.robot import RobotModel
 
@@ -102,7 +102,7 @@ def _driven(scenario: str, seed: int) -> Times:
     def sources(robot: RobotModel) -> Sequence[KnowledgeSource]:
         return [_Timed(ks, times) if ks.name in timed else ks for ks in knowledge_sources(robot)]
 
-    run_mission(set_stage(load_scenario(scenario)), seed, sources=sources)
+    run_mission(build_stage(load_scenario(scenario)), seed, sources=sources)
     return times
 
 

@@ -19,7 +19,7 @@ from logs.recording.stream import FLUSH_CYCLES
 from logs.recording.writer import RecordingWriter, all_loggers
 from sim.body.simulated_body import SimulatedBody
 from sim.scenario import load_scenario
-from sim.stage import Stage, set_stage
+from sim.stage import Stage, build_stage
 from world_models.frames import Pose2
 
 SCENARIOS, QUICK_SCENARIOS = ("lab-to-allens-office", "bump", "hallway-kidnap"), ("forty-foot-hallway",)
@@ -40,7 +40,7 @@ def run(quick: bool, seed: int) -> Report:
     rows: list[tuple[Cell, ...]] = []
     claims: list[tuple[str, bool]] = []
     for name in QUICK_SCENARIOS if quick else SCENARIOS:
-        measured = _measured(set_stage(load_scenario(name)), seed)
+        measured = _measured(build_stage(load_scenario(name)), seed)
         rows += [(name, *row) for row in measured.rows()]
         claims += [(f"{name}: {claim}", held) for claim, held in measured.claims()]
     return Report("What the recorder costs", ("mission", "what", "required", "ours"), tuple(rows), NOTES, tuple(claims))

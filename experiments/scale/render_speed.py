@@ -13,7 +13,7 @@ from sim.made_up.box_room import Patch, PatchFace
 from sim.render.renderer import Renderer
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
-from sim.stage import Stage, set_stage
+from sim.stage import Stage, build_stage
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 
@@ -28,7 +28,7 @@ FLAT_M = 1e6
 
 def run(quick: bool, seed: int) -> Report:
     """Frames from all over the building of Figure 17's mission, and the edges of cards turned in all ways."""
-    stage, rng = set_stage(load_scenario("lab-to-allens-office")), np.random.default_rng(seed)
+    stage, rng = build_stage(load_scenario("lab-to-allens-office")), np.random.default_rng(seed)
     ideal_s, whole_s = _frame_times_s(stage, rng, QUICK_FRAMES if quick else FRAMES)
     errors_px = _edge_errors_px(stage.scenario.camera.camera, rng, QUICK_CARDS if quick else CARDS)
     speed, rms_px = 1.0 / float(np.mean(whole_s)), math.sqrt(float(np.mean(errors_px**2)))

@@ -22,7 +22,7 @@ from harvey.simulation.run import robot_model
 from harvey.wiring import knowledge_sources, servoing
 from sim.body.faulty_body import FaultyBody
 from sim.scenario import parse_scenario
-from sim.stage import Stage, set_stage
+from sim.stage import Stage, build_stage
 from world_models.building.world import World
 from world_models.files.compiled.sqlite_locales import SqliteLocales
 
@@ -70,7 +70,7 @@ def main(path: str, goal: str, seed: str) -> None:
 
 def staged(path: str, goal: str) -> Stage:
     """The mission in the world of a file, with its building."""
-    return set_stage(parse_scenario(SCENARIO.format(world=Path(path).as_posix(), goal=goal), "world-size"))
+    return build_stage(parse_scenario(SCENARIO.format(world=Path(path).as_posix(), goal=goal), "world-size"))
 
 
 def most_mb() -> float:

@@ -80,9 +80,9 @@ class _Staged:
 @lru_cache(maxsize=2)
 def _stage(staged: _Staged) -> Stage:
     """Set once for all the seeds that a process drives."""
-    from sim.stage import set_stage
+    from sim.stage import build_stage
 
-    return set_stage(staged.scenario)
+    return build_stage(staged.scenario)
 
 
 def seeds_of(text: str) -> tuple[int, ...]:

@@ -48,13 +48,13 @@ def _factor(text: str) -> float:
 
 
 def _run(args: Namespace) -> int:
-    from sim.emulators.terminal import Terminal
+    from sim.emulators.pseudo_terminal import PseudoTerminal
 
     if args.scenario is None and not (args.camera_port is None and args.calibration is None):
         raise BadInput("--camera-port and --calibration: expected a --scenario to look at, got none")
     emulator, where, body = _base(args)
     trace = _Trace(args.kind, where) if args.trace else None
-    terminal = Terminal(emulator, trace)
+    terminal = PseudoTerminal(emulator, trace)
     print(f"an emulated {args.kind} base is at {terminal.name}; Ctrl-C ends it", flush=True)
     try:
         with _camera(args.camera_port, body):
@@ -87,38 +87,38 @@ def _base(args: Namespace) -> tuple[Emulator, Callable[[], tuple[float, str]], S
     """
     from sim.emulators.create2 import Create2Emulator
     from sim.emulators.denning import DenningEmulator
-    from sim.emulators.denning_motion import Rolling
+    from sim.emulators.denning_motion import ConstantSpeedMotion
     from sim.emulators.faulty_line import FaultyLine
     from sim.emulators.p2os import P2osEmulator
 
     ground, where, body = _ground(args)
     emulator: Emulator
     if args.kind == "denning":
-        emulator = DenningEmulator(Rolling(ground))
+        emulator = DenningEmulator(ConstantSpeedMotion(ground))
     else:
         emulator = P2osEmulator(ground) if args.kind == "p2os" else Create2Emulator(ground)
     return emulator if body is None else FaultyLine(emulator, body), where, body
 
 
 def _ground(args: Namespace) -> tuple[Ground, Callable[[], tuple[float, str]], SimulatedBody | None]:
-    from sim.emulators.ground import BodyGround, Floor
+    from sim.emulators.ground import IdealGround, SimulatedGround
 
     if args.scenario is None:
-        floor = Floor()
+        floor = IdealGround()
         return floor, lambda: (floor.time_s, f"{floor.pose.x_m:.3f} {floor.pose.y_m:.3f} m"), None
     body = _body(args.scenario, args.seed, args.calibration)
-    return BodyGround(body), lambda: (body.truth.time_s, _place(body)), body
+    return SimulatedGround(body), lambda: (body.truth.time_s, _place(body)), body
 
 
 def _body(name: str, seed: int, calibration: str | None) -> SimulatedBody:
     from sim.scenario import ScenarioError, load_scenario
-    from sim.stage import set_stage
+    from sim.stage import build_stage
     from world_models.files.toml.camera_file import camera_text
 
     print(f"{name}: setting the stage", file=sys.stderr, flush=True)
     try:
         scenario = load_scenario(name)
-        body = set_stage(scenario).body(seed)
+        body = build_stage(scenario).body(seed)
     except ScenarioError as error:
         raise BadInput(str(error)) from None
     if calibration is not None:

@@ -27,7 +27,7 @@ from harvey.simulation.referee import MissionResult
 from harvey.simulation.run import Around, Mission
 from logs.camera_file import Pictures
 from sim.scenario import ScenarioError, scenario_from_tables
-from sim.stage import Stage, set_stage
+from sim.stage import Stage, build_stage
 from world_models.entries.body import Course, MotorCommand
 from world_models.entries.task import Outcome, Resumed
 from world_models.files.toml.mission import ROOT
@@ -108,7 +108,7 @@ def stage_of(head: RunHead) -> Stage:
     if head.kind == HARDWARE:
         raise BadInput(f"expected a run of the simulator, got one on hardware: harvey drive {head.name} begins it anew")
     try:
-        return set_stage(scenario_from_tables(head.scenario, head.name, ROOT / head.folder))
+        return build_stage(scenario_from_tables(head.scenario, head.name, ROOT / head.folder))
     except ScenarioError as error:
         raise BadInput(f"run.json: {error}") from None
 

@@ -21,12 +21,12 @@ from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
 from sim.emulators.create2 import Create2Emulator
 from sim.emulators.denning import DenningEmulator
-from sim.emulators.denning_motion import AtOnce
+from sim.emulators.denning_motion import InstantMotion
 from sim.emulators.emulator import Emulator
 from sim.emulators.faulty_line import FaultyLine
-from sim.emulators.ground import BodyGround
+from sim.emulators.ground import SimulatedGround
 from sim.emulators.p2os import P2osEmulator
-from sim.emulators.wired import Wired
+from sim.emulators.pseudo_terminal_link import PseudoTerminalLink
 
 KINDS = ("denning", "p2os", "create2")
 IN_PROCESS = "simulated"
@@ -50,7 +50,7 @@ def reached(body: SimulatedBody, kind: str) -> Iterator[Body]:
         yield FaultyBody(body)
         return
     clock = None if kind == "denning" else lambda: body.truth.time_s
-    base = _base(kind, Wired(FaultyLine(_emulator(kind, body), body), clock))
+    base = _base(kind, PseudoTerminalLink(FaultyLine(_emulator(kind, body), body), clock))
     try:
         yield HardwareBody(base, FaultyBody(body), clock=lambda: body.truth.time_s, pause=body.wait,
                            carried=body.ride)
@@ -60,8 +60,8 @@ def reached(body: SimulatedBody, kind: str) -> Iterator[Body]:
 
 def _emulator(kind: str, body: SimulatedBody) -> Emulator:
     if kind == "denning":
-        return DenningEmulator(AtOnce(body))
-    return P2osEmulator(BodyGround(body)) if kind == "p2os" else Create2Emulator(BodyGround(body))
+        return DenningEmulator(InstantMotion(body))
+    return P2osEmulator(SimulatedGround(body)) if kind == "p2os" else Create2Emulator(SimulatedGround(body))
 
 
 def _base(kind: str, link: Link) -> Base:

@@ -33,14 +33,14 @@ class Create2Emulator:
     """The robot's side of the Open Interface.
 
     Attributes:
-        heard: told of every command that was carried out, as its bytes, if it is there.
+        on_command: told of every command that was carried out, as its bytes, if it is there.
         mode: 0 off, 1 passive, 2 safe, 3 full.
         deaf: whether it was told another baud rate, so that it cannot be understood, nor understand.
     """
 
-    def __init__(self, ground: Ground, *, count: int = 0, heard: Callable[[bytes], None] | None = None) -> None:
+    def __init__(self, ground: Ground, *, count: int = 0, on_command: Callable[[bytes], None] | None = None) -> None:
         """``count``: where its encoders begin."""
-        self._ground, self._count, self.heard = ground, count, heard
+        self._ground, self._count, self.on_command = ground, count, on_command
         self.stops = 0
         self.power_cycle()
 
@@ -104,8 +104,8 @@ class Create2Emulator:
         return LENGTHS.get(opcode, 0)
 
     def _obey(self, opcode: int, values: bytes, raw: bytes) -> None:
-        if self.heard is not None and opcode in (7, *range(128, 174)):
-            self.heard(raw)
+        if self.on_command is not None and opcode in (7, *range(128, 174)):
+            self.on_command(raw)
         if opcode == 128:
             self._enter(PASSIVE)
         elif self.mode == OFF:

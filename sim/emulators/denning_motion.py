@@ -59,7 +59,7 @@ class Body(Protocol):
     def execute(self, command: MotorCommand, /) -> MotionReport: ...
 
 
-class AtOnce:
+class InstantMotion:
     """Commands are carried out when they come, in the time of the body: nothing of them is seen on the way."""
 
     turn_rate, speed = math.radians(45.0), 0.4
@@ -87,7 +87,7 @@ class AtOnce:
         return self._claim
 
 
-class Rolling:
+class ConstantSpeedMotion:
     """Wheels that turn at one speed and move at one speed, and come to what was commanded exactly.
 
     Wheels that do not get on for half a second are stalled.

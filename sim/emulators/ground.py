@@ -22,7 +22,7 @@ class Ground(Protocol):
         ...
 
 
-class Floor:
+class IdealGround:
     """An endless, even floor on which wheels do exactly as they are told.
 
     Attributes:
@@ -54,7 +54,7 @@ class Floor:
         return turn_rad, move_m
 
 
-class BodyGround:
+class SimulatedGround:
     """The floor of a simulated building, with wheels that err as a robot's do."""
 
     def __init__(self, body: SimulatedBody) -> None:

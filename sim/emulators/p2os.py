@@ -68,12 +68,12 @@ class P2osEmulator:
     """The base's side of P2OS.
 
     Attributes:
-        heard: told of every command that was accepted, as (number, argument, raw bytes), if it is there.
+        on_command: told of every command that was accepted, as (number, argument, raw bytes), if it is there.
         rejected: headers that no packet followed are counted by the reader; stops: how often the watchdog struck.
     """
 
-    def __init__(self, ground: Ground, *, heard: Callable[[Request], None] | None = None) -> None:
-        self._ground, self.heard = ground, heard
+    def __init__(self, ground: Ground, *, on_command: Callable[[Request], None] | None = None) -> None:
+        self._ground, self.on_command = ground, on_command
         self.stops = 0
         self._reset()
 
@@ -107,8 +107,8 @@ class P2osEmulator:
     def receive(self, data: bytes) -> None:
         """Bytes from the line."""
         for request in self._reader.feed(data):
-            if self.heard is not None:
-                self.heard(request)
+            if self.on_command is not None:
+                self.on_command(request)
             self._quiet_s, self._muted = 0.0, False
             if self._open:
                 self._obey(request.number, request.argument)

@@ -42,7 +42,7 @@ class Optics:
         """The lens of a camera. Raises ValueError where it bends rays so much that two fall on one pixel."""
         if camera.distortion is None:
             return Optics(camera)
-        rays = straightened(_points(camera), np.asarray(camera.distortion))
+        rays = undistort(_points(camera), np.asarray(camera.distortion))
         fx, fy = FINER * camera.fx, FINER * camera.fy
         focal = np.array([fx, fy])
         low, high = (rays * focal).min(axis=(0, 1)) - 4.0, (rays * focal).max(axis=(0, 1)) + 4.0
@@ -65,10 +65,10 @@ def check_lens(camera: Camera) -> None:
     """Raises ValueError where a camera's lens cannot be rendered, by the rim of its picture."""
     if camera.distortion is not None:
         rays = (camera.border() - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
-        straightened(rays, np.asarray(camera.distortion))
+        undistort(rays, np.asarray(camera.distortion))
 
 
-def bent(rays: Floats, distortion: Floats) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
+def distort(rays: Floats, distortion: Floats) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
     """Rays (..., 2), x / z and y / z, behind the lens, and their derivatives by those before it: dx/dx, dx/dy = dy/dx,
     dy/dy, (...) each.
     """
@@ -85,7 +85,7 @@ def bent(rays: Floats, distortion: Floats) -> tuple[Floats, tuple[Floats, Floats
     return out, (dxx, cross, dyy)
 
 
-def straightened(rays: Floats, distortion: Floats) -> Floats:
+def undistort(rays: Floats, distortion: Floats) -> Floats:
     """The rays (..., 2) before the lens that are ``rays`` behind it.
 
     Raises:
@@ -93,7 +93,7 @@ def straightened(rays: Floats, distortion: Floats) -> Floats:
     """
     before = rays.copy()
     for _ in range(STEPS):
-        out, (dxx, cross, dyy) = bent(before, distortion)
+        out, (dxx, cross, dyy) = distort(before, distortion)
         unfolded = dxx * dyy - cross * cross
         error = rays - out
         if float(np.max(np.abs(error))) < NEAR:

@@ -41,7 +41,7 @@ class Pieces(NamedTuple):
     bare: Floats
 
 
-def pieces_of(seen: NDArray[np.int16], offsets: NDArray[np.float64], patches: int) -> Pieces:
+def split_pieces(seen: NDArray[np.int16], offsets: NDArray[np.float64], patches: int) -> Pieces:
     """The pieces of what is seen, (height, N, width), of P patches, at samples with these (N,) offsets [px]."""
     ints, floats, bare = _take_apart(seen, offsets)
     order, first = _sorted(ints[3], patches)

@@ -15,7 +15,7 @@ from world_models.camera import Camera
 
 
 @dataclass(frozen=True, eq=False)
-class Lens:
+class Pinhole:
     """A pinhole: focal lengths and principal point [px], image size [px]; pixel (0, 0) is the first pixel's centre."""
 
     fx: float
@@ -26,11 +26,11 @@ class Lens:
     height: int
 
     @staticmethod
-    def of(camera: Camera) -> Lens:
+    def of(camera: Camera) -> Pinhole:
         """Raises ValueError for a camera with lens distortion."""
         if camera.distortion is not None:
             raise ValueError(f"expected a camera without lens distortion, got {camera.distortion}")
-        return Lens(camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
+        return Pinhole(camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class View:
     vertices_camera: NDArray[np.float64]
 
 
-def view_of(mesh: Mesh, lens: Lens, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> View:
+def project_mesh(mesh: Mesh, lens: Pinhole, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> View:
     """The mesh seen by a camera at ``camera_from_world`` = (rotation (3, 3), translation (3,) [m])."""
     centre = -rotation.T @ translation
     normals, offsets = mesh.planes_world[:, :3], mesh.planes_world[:, 3]
@@ -68,7 +68,7 @@ def view_of(mesh: Mesh, lens: Lens, rotation: NDArray[np.float64], translation: 
     )
 
 
-def _pixel_forms(directions_camera: NDArray[np.float64], lens: Lens) -> NDArray[np.float64]:
+def _pixel_forms(directions_camera: NDArray[np.float64], lens: Pinhole) -> NDArray[np.float64]:
     """Directions d (..., 3) as forms (..., 3): d . ray(u, v) = form @ (u, v, 1)."""
     x, y, z = directions_camera[..., 0], directions_camera[..., 1], directions_camera[..., 2]
     return np.stack([x / lens.fx, y / lens.fy, z - x * lens.cx / lens.fx - y * lens.cy / lens.fy], axis=-1)

@@ -18,7 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sim.render.mesh import Mesh
-from sim.render.projection import Lens, View
+from sim.render.projection import Pinhole, View
 
 NEAR_M = 0.02
 """Patches are cut at this depth in front of the optical centre [m]."""
@@ -42,7 +42,7 @@ NOTHING = -1
 """The identity of the background."""
 
 
-def visible_patches(mesh: Mesh, view: View, lens: Lens, samples: int) -> NDArray[np.int16]:
+def find_visible_patches(mesh: Mesh, view: View, lens: Pinhole, samples: int) -> NDArray[np.int16]:
     """The patch seen at every sample, (height, N, width), ``NOTHING`` where none is."""
     longest = int(np.diff(mesh.first).max(initial=0)) + 2
     boxes, edges, ends = _outlines(

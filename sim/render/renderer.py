@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from sim.render.mesh import FaceLike, Mesh, build_mesh
 from sim.render.noise_table import noise_table
-from sim.render.pieces import pieces_of
-from sim.render.projection import Lens, View, view_of
-from sim.render.rasterizer import sample_offsets, visible_patches
+from sim.render.pieces import split_pieces
+from sim.render.projection import Pinhole, View, project_mesh
+from sim.render.rasterizer import find_visible_patches, sample_offsets
 from sim.render.textures import shade
 from world_models.camera import Camera
 from world_models.frames import Pose
@@ -55,10 +55,10 @@ class Renderer:
 
     def radiance(self, camera: Camera, camera_from_world: Pose) -> NDArray[np.float32]:
         """The noiseless image (height, width, 3), RGB in 0..1."""
-        lens = Lens.of(camera)
-        view = view_of(self.mesh, lens, camera_from_world.rotation, camera_from_world.translation)
-        pieces = pieces_of(
-            visible_patches(self.mesh, view, lens, self.samples), sample_offsets(self.samples), len(self.mesh)
+        lens = Pinhole.of(camera)
+        view = project_mesh(self.mesh, lens, camera_from_world.rotation, camera_from_world.translation)
+        pieces = split_pieces(
+            find_visible_patches(self.mesh, view, lens, self.samples), sample_offsets(self.samples), len(self.mesh)
         )
         image: NDArray[np.float32] = shade(pieces, self._looks(view), self.noise, HAZE_PER_M)
         return image

@@ -6,9 +6,9 @@ import pytest
 
 from sim.made_up.short_missions import OFFICE
 from sim.scenario import parse_scenario
-from sim.stage import Stage, set_stage
+from sim.stage import Stage, build_stage
 
 
 @pytest.fixture(scope="session")
 def short_stage() -> Stage:
-    return set_stage(parse_scenario(OFFICE, "across-allens-office"))
+    return build_stage(parse_scenario(OFFICE, "across-allens-office"))

@@ -20,15 +20,15 @@ from harvey.cli import main
 from sim.body.simulated_body import SimulatedBody
 from sim.emulators.camera_server import CameraServer
 from sim.emulators.denning import DenningEmulator
-from sim.emulators.denning_motion import Rolling
+from sim.emulators.denning_motion import ConstantSpeedMotion
 from sim.emulators.faulty_line import FaultyLine
-from sim.emulators.ground import BodyGround
-from sim.emulators.terminal import Terminal
+from sim.emulators.ground import SimulatedGround
+from sim.emulators.pseudo_terminal import PseudoTerminal
 from sim.faults.base_faults import LinkLost
 from sim.faults.camera_faults import CameraUnplugged
 from sim.faults.fault import Fault
 from sim.scenario import Scenario, load_scenario
-from sim.stage import set_stage
+from sim.stage import build_stage
 from world_models.files.toml.camera_file import camera_text
 
 GOAL = "(ptrans (hallway (4,4,0)) (hallway (9,4,0)))"
@@ -62,11 +62,11 @@ def scenario() -> Scenario:
 @contextmanager
 def emulated(folder: Path, *faults: Fault) -> Iterator[Emulated]:
     """A robot in the hallway, as ``harvey emulate`` has it, in threads of this process."""
-    stage = set_stage(replace(scenario(), faults=faults))
+    stage = build_stage(replace(scenario(), faults=faults))
     body, over = stage.body(0), threading.Event()
     body.picture()  # compiled before anybody waits for it
-    base = DenningEmulator(Rolling(BodyGround(body)), watchdog_s=2.0)
-    terminal = Terminal(FaultyLine(base, body))
+    base = DenningEmulator(ConstantSpeedMotion(SimulatedGround(body)), watchdog_s=2.0)
+    terminal = PseudoTerminal(FaultyLine(base, body))
     server = threading.Thread(target=terminal.serve, kwargs={"until": over.is_set, "speed": 1.5})
     (folder / "camera.toml").write_text(camera_text(stage.scenario.camera.camera, stage.scenario.camera.mount))
     (folder / "mission.toml").write_text(MISSION)

@@ -10,7 +10,7 @@ import pytest
 from harvey.simulation.referee import MissionResult
 from harvey.simulation.run import run_mission
 from sim.scenario import parse_scenario
-from sim.stage import set_stage
+from sim.stage import build_stage
 from towers import tower
 
 RIDE = """
@@ -32,7 +32,7 @@ HELPER = "[[rides]]\ncomes_s = 3.0\ntakes_s = 9.0\n"
 def driven(folder: Path, rides: str, floors: int = 2) -> tuple[MissionResult, list[dict[str, object]]]:
     """The result, and the decisions as they stand in the journal."""
     (folder / "tower.toml").write_text(tower(floors))
-    result = run_mission(set_stage(parse_scenario(RIDE + rides, "ride", folder)), 1, out=folder / "run")
+    result = run_mission(build_stage(parse_scenario(RIDE + rides, "ride", folder)), 1, out=folder / "run")
     return result, [json.loads(line) for line in (folder / "run" / "journal.jsonl").read_text().splitlines()]
 
 

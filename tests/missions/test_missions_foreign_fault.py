@@ -10,7 +10,7 @@ from harvey.simulation.run import run_mission
 from sim.faults.registry import list_fault_kinds
 from sim.made_up.short_missions import OFFICE, fault
 from sim.scenario import Scenario, ScenarioError, parse_scenario, scenario_from_tables
-from sim.stage import set_stage
+from sim.stage import build_stage
 from world_models.frames import Pose2
 
 MODULE = '''
@@ -61,7 +61,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def jumps_of(scenario: Scenario) -> tuple[list[float], tuple[str, ...]]:
     """Turns of more than 2 degrees from one true state to the next in which no time passes for the wheels."""
-    stage = set_stage(scenario)
+    stage = build_stage(scenario)
     turns: list[float] = []
     body = stage.body(3)
     put = body.put_robot
@@ -80,7 +80,7 @@ def test_it_is_found_by_its_entry_point_and_happens_once_in_a_mission() -> None:
     scenario = parse_scenario(OFFICE + QUAKE, "s.toml")
     turns, missed = jumps_of(scenario)
     assert turns == [pytest.approx(0.05236, abs=1e-4)] and missed == ("earthquake: no plaster came down",)
-    result = run_mission(set_stage(scenario), 3)
+    result = run_mission(build_stage(scenario), 3)
     assert result.outcome == "reached", result.reason
     assert list(result.amiss) == ["earthquake: no plaster came down"]
 

@@ -14,7 +14,7 @@ from logs.recording.overview import read_series
 from logs.recording.paths import CHAPTERS, HARVEY, TABLE, WHY
 from sim.made_up.short_missions import HALLWAY, fault
 from sim.scenario import parse_scenario
-from sim.stage import set_stage
+from sim.stage import build_stage
 
 SCENARIO = (
     HALLWAY
@@ -30,7 +30,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
     folder = tmp_path_factory.mktemp("faulty")
     out = folder / "run"
     out.mkdir()
-    run_mission(set_stage(parse_scenario(SCENARIO, "faulty")), 0, out=out)
+    run_mission(build_stage(parse_scenario(SCENARIO, "faulty")), 0, out=out)
     return RunDirectory(out)
 
 

@@ -15,7 +15,7 @@ from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
 from harvey.simulation.run import run_mission
 from sim.scenario import parse_scenario, with_settings
-from sim.stage import Stage, set_stage
+from sim.stage import Stage, build_stage
 
 SCENARIO = """
 world = "research_center"
@@ -37,7 +37,7 @@ SEED = 0
 
 @pytest.fixture(scope="module")
 def stage() -> Stage:
-    return set_stage(parse_scenario(SCENARIO, "on-the-move"))
+    return build_stage(parse_scenario(SCENARIO, "on-the-move"))
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +85,7 @@ def test_a_run_that_is_cut_off_on_the_move_goes_on(run: RunDirectory, stage: Sta
 
 
 def test_who_is_carried_off_on_the_move_stops_at_once(tmp_path: Path) -> None:
-    stage = set_stage(parse_scenario(SCENARIO + KIDNAP, "carried-off"))
+    stage = build_stage(parse_scenario(SCENARIO + KIDNAP, "carried-off"))
     run = RunDirectory(tmp_path / "run")
     result = run_mission(stage, SEED, out=run.path)
     assert result.outcome == "reached" and result.collisions == 0 and result.milestones["false_accepts"] == 0

@@ -9,7 +9,7 @@ from harvey.simulation.run import run_mission
 from sim.faults.occlusion import Occlusion
 from sim.made_up.short_missions import HALLWAY, fault
 from sim.scenario import parse_scenario
-from sim.stage import Stage, set_stage
+from sim.stage import Stage, build_stage
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.task import Milestone
 
@@ -30,7 +30,7 @@ def test_it_finds_what_is_before_its_camera_and_looks_past_it() -> None:
             if isinstance(value, Milestone) and value.expected_px and known:
                 behind.append(known[-1].hidden_part(value.expected_px))
 
-    stage = set_stage(parse_scenario(HALLWAY + HIDDEN, "behind-something"))
+    stage = build_stage(parse_scenario(HALLWAY + HIDDEN, "behind-something"))
     result = run_mission(stage, 1, sinks=[watch])
     assert result.outcome == "reached" and result.final_error_m < 0.0254
     assert result.collisions == 0 and result.milestones["false_accepts"] == 0

@@ -17,8 +17,8 @@ from harvey.hardware.drivers.bases.denning import DenningBase
 from harvey.hardware.drivers.bases.p2os import P2osBase
 from sim.emulators.create2 import Create2Emulator
 from sim.emulators.denning import DenningEmulator
-from sim.emulators.denning_motion import Rolling
-from sim.emulators.ground import Floor
+from sim.emulators.denning_motion import ConstantSpeedMotion
+from sim.emulators.ground import IdealGround
 from sim.emulators.p2os import P2osEmulator
 from world_models.entries.body import MotionReport, MotorCommand
 
@@ -29,7 +29,7 @@ class Trial:
     def __init__(self, protocol: str, rng: np.random.Generator, findings: Findings, noise: float) -> None:
         """``noise``: the probability that something is done to what is said, either way."""
         self._protocol, self._rng, self._found, self._bounds = protocol, rng, findings, BOUNDS[protocol]
-        self._floor = Floor()
+        self._floor = IdealGround()
         self._accepted: list[bytes] = []
         self._base_end: Any = self._emulator()
         self._noises = (Noise(rng, noise), Noise(rng, noise))
@@ -208,10 +208,10 @@ class Trial:
 
     def _emulator(self) -> Any:
         if self._protocol == "denning":
-            return DenningEmulator(Rolling(self._floor))
+            return DenningEmulator(ConstantSpeedMotion(self._floor))
         if self._protocol == "p2os":
-            return P2osEmulator(self._floor, heard=lambda request: self._accepted.append(request.raw))
-        return Create2Emulator(self._floor, count=int(self._rng.integers(0, 65536)), heard=self._accepted.append)
+            return P2osEmulator(self._floor, on_command=lambda request: self._accepted.append(request.raw))
+        return Create2Emulator(self._floor, count=int(self._rng.integers(0, 65536)), on_command=self._accepted.append)
 
     def _driver(self) -> Base:
         if self._protocol == "denning":

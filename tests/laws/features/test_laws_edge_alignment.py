@@ -19,7 +19,7 @@ from knowledge_sources.methods.tracking.edge_alignment import EdgeAlignment, ali
 from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
-from sim.stage import Stage, set_stage
+from sim.stage import Stage, build_stage
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_lines
@@ -31,7 +31,7 @@ ROOMS = ("hallway", "robot-laboratory", "library", "allens-office", "conference-
 
 @cache
 def stage() -> Stage:
-    return set_stage(load_scenario("lab-to-allens-office"))
+    return build_stage(load_scenario("lab-to-allens-office"))
 
 
 @cache

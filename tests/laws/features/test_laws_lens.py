@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from knowledge_sources.methods.features.rectification import Rectifier
 from sim.made_up.box_room import box_room
-from sim.render.optics import Optics, bent, straightened
+from sim.render.optics import Optics, distort, undistort
 from sim.render.renderer import Renderer
 from sim.scenario import ScenarioError, load_scenario, with_settings
 from world_models.camera import Camera, CameraMount
@@ -32,7 +32,7 @@ def lenses(draw: st.DrawFn) -> Camera:
 
 def straightened_or_none(behind: np.ndarray, k: np.ndarray) -> np.ndarray:
     try:
-        return straightened(behind, k)
+        return undistort(behind, k)
     except ValueError:
         reject()
 
@@ -61,7 +61,7 @@ def test_the_simulator_s_lens_is_the_robot_s(lens: Camera, px: np.ndarray) -> No
     k = np.asarray(lens.distortion)
     behind = (px - (lens.cx, lens.cy)) / (lens.fx, lens.fy)
     before = straightened_or_none(behind, k)
-    np.testing.assert_allclose(bent(before, k)[0], behind, atol=1e-9)
+    np.testing.assert_allclose(distort(before, k)[0], behind, atol=1e-9)
     np.testing.assert_allclose(lens.project(np.column_stack([before, np.ones(len(before))])), px, atol=1e-6)
 
 

@@ -14,8 +14,8 @@ from harvey.hardware.drivers.bases.counters import signed, step
 from sim.emulators import p2os_packets
 from sim.emulators.create2 import Create2Emulator
 from sim.emulators.denning import DenningEmulator
-from sim.emulators.denning_motion import Rolling
-from sim.emulators.ground import Floor
+from sim.emulators.denning_motion import ConstantSpeedMotion
+from sim.emulators.ground import IdealGround
 from sim.emulators.p2os import P2osEmulator
 
 NOISE = st.binary(max_size=300)
@@ -124,7 +124,7 @@ def test_the_pioneer_decoder_goes_on_after_noise(noise: bytes, told: dict[str, i
 
 @given(SPEEDS, SPEEDS, st.binary(max_size=4).filter(lambda b: not create2_wire.OPCODES & set(b)))
 def test_a_create_obeys_a_speed_whatever_was_left_open_before_it(right: int, left: int, cut: bytes) -> None:
-    robot = Create2Emulator(Floor())
+    robot = Create2Emulator(IdealGround())
     robot.receive(create2_wire.wake() + create2_wire.safe())
     robot.receive(bytes([create2_wire.DRIVE_DIRECT]) + cut)
     robot.receive(create2_wire.drive(right, left))
@@ -140,7 +140,7 @@ def test_no_byte_of_a_speed_is_an_opcode(right: int, left: int) -> None:
 
 @given(NOISE, st.integers(0, 0xFFFF))
 def test_the_stream_decoder_goes_on_after_noise(noise: bytes, count: int) -> None:
-    robot = Create2Emulator(Floor(), count=count)
+    robot = Create2Emulator(IdealGround(), count=count)
     robot.receive(create2_wire.wake())
     robot.advance(0.1)
     decoder = create2_wire.Decoder()
@@ -155,7 +155,8 @@ def test_bytes_of_any_kind_raise_nothing_at_either_end(noise: bytes, size: int) 
     for decoder in (denning_wire.Decoder(), p2os_wire.Decoder(), create2_wire.Decoder()):
         for piece in pieces:
             list(decoder.feed(piece))
-    for base in (DenningEmulator(Rolling(Floor())), P2osEmulator(Floor()), Create2Emulator(Floor())):
+    ground = IdealGround
+    for base in (DenningEmulator(ConstantSpeedMotion(ground())), P2osEmulator(ground()), Create2Emulator(ground())):
         for piece in pieces:
             base.receive(piece)
             base.advance(0.01)

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from sim.made_up.box_room import Patch, PatchFace, box_faces, box_room
 from sim.render.mesh import Mesh, build_mesh
-from sim.render.pieces import pieces_of
-from sim.render.projection import Lens, view_of
-from sim.render.rasterizer import sample_offsets, visible_patches
+from sim.render.pieces import split_pieces
+from sim.render.projection import Pinhole, project_mesh
+from sim.render.rasterizer import find_visible_patches, sample_offsets
 from sim.render.renderer import Renderer
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
@@ -124,9 +124,9 @@ def test_the_nearest_face_wins(seed: int, x: float, y: float, heading: float, ti
     clutter = [f for i, low in enumerate(lows) for f in box_faces(low, low + rng.uniform(0.1, 0.9, 3), f"box{i}")]
     mesh = build_mesh([*(f for f in box_room() if len(f.front) == 1), *clutter])
     camera_from_world = CameraMount(1.0, 0.1, tilt).camera_from_robot @ Pose2(x, y, heading).lifted().inverse()
-    lens = Lens.of(CAMERA)
-    view = view_of(mesh, lens, camera_from_world.rotation, camera_from_world.translation)
-    seen = visible_patches(mesh, view, lens, 4)
+    lens = Pinhole.of(CAMERA)
+    view = project_mesh(mesh, lens, camera_from_world.rotation, camera_from_world.translation)
+    seen = find_visible_patches(mesh, view, lens, 4)
     rows, subs, columns = rng.integers(0, 256, 400), rng.integers(0, 4, 400), rng.integers(0, 256, 400)
     pixels = np.stack([columns + sample_offsets(4)[subs], rows - 0.5 + (subs + 0.5) / 4], axis=1)
     expected, certain = rays_hit(mesh, camera_from_world, pixels)
@@ -139,8 +139,8 @@ def test_the_nearest_face_wins(seed: int, x: float, y: float, heading: float, ti
 def test_a_closed_room_has_no_holes_and_the_same_pose_gives_the_same_bytes(x: float, y: float, heading: float) -> None:
     pose = MOUNT.camera_from_robot @ Pose2(x, y, heading).lifted().inverse()
     mesh = build_mesh(box_room())
-    lens = Lens.of(CAMERA)
-    seen = visible_patches(mesh, view_of(mesh, lens, pose.rotation, pose.translation), lens, 8)
+    lens = Pinhole.of(CAMERA)
+    seen = find_visible_patches(mesh, project_mesh(mesh, lens, pose.rotation, pose.translation), lens, 8)
     assert seen.min() >= 0
     first, second = (Renderer.of_faces(box_room()).image(CAMERA, pose).tobytes() for _ in range(2))
     assert first == second
@@ -154,7 +154,7 @@ def test_the_pieces_make_up_what_is_seen(seed: int, patches: int) -> None:
     seen = np.repeat(np.repeat(coarse, 4, axis=1), 7, axis=2)
     scattered = rng.random(seen.shape) < 0.03
     seen[scattered] = rng.integers(-1, patches, int(scattered.sum()))
-    pieces = pieces_of(seen, sample_offsets(4), patches)
+    pieces = split_pieces(seen, sample_offsets(4), patches)
     parts = np.zeros((patches, 6, 35))
     for patch in range(patches):
         for i in pieces.order[pieces.first[patch] : pieces.first[patch + 1]]:

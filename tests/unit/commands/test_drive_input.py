@@ -21,9 +21,9 @@ from harvey.hardware.preflight import Preflight
 from harvey.hardware.stop_key import stop_key
 from harvey.simulation.serial_body import body_kind
 from sim.emulators.denning import DenningEmulator
-from sim.emulators.denning_motion import Rolling
-from sim.emulators.ground import Floor
-from sim.emulators.terminal import Terminal
+from sim.emulators.denning_motion import ConstantSpeedMotion
+from sim.emulators.ground import IdealGround
+from sim.emulators.pseudo_terminal import PseudoTerminal
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.camera_file import camera_text
 
@@ -134,8 +134,8 @@ def test_a_file_is_no_serial_port(tmp_path: Path) -> None:
 
 
 def test_a_base_of_another_kind_and_a_wall_for_a_goal_are_found_out_before_anything_moves(tmp_path: Path) -> None:
-    emulator = DenningEmulator(Rolling(Floor()))
-    terminal, over = Terminal(emulator), threading.Event()
+    emulator = DenningEmulator(ConstantSpeedMotion(IdealGround()))
+    terminal, over = PseudoTerminal(emulator), threading.Event()
     server = threading.Thread(target=terminal.serve, kwargs={"until": over.is_set})
     server.start()
     (tmp_path / "camera.toml").write_text(camera_text(Camera.from_field_of_view(1.1), CameraMount(1.0)))

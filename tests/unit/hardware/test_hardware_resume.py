@@ -37,9 +37,9 @@ def test_what_is_no_time_and_no_number_is_said(short_run: RunDirectory, tmp_path
 def short_run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
     from sim.made_up.short_missions import OFFICE
     from sim.scenario import parse_scenario
-    from sim.stage import set_stage
+    from sim.stage import build_stage
 
     out = tmp_path_factory.mktemp("run")
-    stage: Stage = set_stage(parse_scenario(OFFICE, "across-allens-office"))
+    stage: Stage = build_stage(parse_scenario(OFFICE, "across-allens-office"))
     run_mission(stage, 0, out=out)
     return RunDirectory(out)

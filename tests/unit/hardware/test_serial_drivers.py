@@ -25,11 +25,11 @@ from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
 from sim.emulators.create2 import PASSIVE, Create2Emulator
 from sim.emulators.denning import DenningEmulator
-from sim.emulators.denning_motion import AtOnce, Rolling
-from sim.emulators.ground import BodyGround, Floor
+from sim.emulators.denning_motion import ConstantSpeedMotion, InstantMotion
+from sim.emulators.ground import IdealGround, SimulatedGround
 from sim.emulators.p2os import P2osEmulator
-from sim.emulators.terminal import Terminal
-from sim.emulators.wired import Wired
+from sim.emulators.pseudo_terminal import PseudoTerminal
+from sim.emulators.pseudo_terminal_link import PseudoTerminalLink
 from sim.made_up.box_room import box_room
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotionReport, MotorCommand
@@ -39,9 +39,9 @@ KINDS = ("denning", "p2os", "create2")
 NEAR_M, NEAR_RAD = 0.011, math.radians(1.0)
 
 
-def emulator(kind: str, floor: Floor) -> Any:
+def emulator(kind: str, floor: IdealGround) -> Any:
     if kind == "denning":
-        return DenningEmulator(Rolling(floor))
+        return DenningEmulator(ConstantSpeedMotion(floor))
     return P2osEmulator(floor) if kind == "p2os" else Create2Emulator(floor, count=65_500)
 
 
@@ -56,7 +56,7 @@ class Bench:
     """A driver, the base that it drives, and the line between them."""
 
     kind: str
-    floor: Floor
+    floor: IdealGround
     end: Any
     line: Any
     base: Base
@@ -65,9 +65,9 @@ class Bench:
 @pytest.fixture(params=KINDS)
 def wired(request: pytest.FixtureRequest) -> Iterator[Bench]:
     """Over a pseudo-terminal."""
-    floor = Floor()
+    floor = IdealGround()
     end = emulator(request.param, floor)
-    line = Wired(end)
+    line = PseudoTerminalLink(end)
     bench = Bench(request.param, floor, end, line, driver(request.param, line))
     yield bench
     bench.base.close()
@@ -76,7 +76,7 @@ def wired(request: pytest.FixtureRequest) -> Iterator[Bench]:
 @pytest.fixture(params=KINDS)
 def quiet(request: pytest.FixtureRequest) -> Bench:
     """Over a line in memory that does nothing to the bytes, but may be broken."""
-    floor, rng = Floor(), np.random.default_rng(0)
+    floor, rng = IdealGround(), np.random.default_rng(0)
     end = emulator(request.param, floor)
     line = NoisyLine(end, Noise(rng, 0.0), Noise(rng, 0.0), tick_s=0.01)
     return Bench(request.param, floor, end, line, driver(request.param, line))
@@ -198,7 +198,7 @@ def test_a_base_that_lost_power_is_taken_up_again(quiet: Bench) -> None:
 
 @pytest.mark.parametrize("kind", ["denning", "p2os"])
 def test_the_bases_own_watchdog_stops_it_when_the_host_dies(kind: str) -> None:
-    floor = Floor()
+    floor = IdealGround()
     end = emulator(kind, floor)
     line = NoisyLine(end, Noise(np.random.default_rng(0), 0.0), Noise(np.random.default_rng(0), 0.0), tick_s=0.01)
     base = driver(kind, line)
@@ -213,7 +213,7 @@ def test_the_bases_own_watchdog_stops_it_when_the_host_dies(kind: str) -> None:
 
 def test_a_pioneer_takes_its_motion_up_after_the_watchdog_unless_it_is_told_to_stop_first() -> None:
     """Source: the P2OS manual: it "will resume again on receipt of a client packet"."""
-    floor = Floor()
+    floor = IdealGround()
     base = P2osEmulator(floor)
     for command in (0, 1, 2, 1):
         base.receive(encode(command))
@@ -234,9 +234,9 @@ def test_a_pioneer_takes_its_motion_up_after_the_watchdog_unless_it_is_told_to_s
 
 
 def test_a_repeated_denning_command_moves_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    floor = Floor()
-    end = DenningEmulator(Rolling(floor))
-    link = Wired(end)
+    floor = IdealGround()
+    end = DenningEmulator(ConstantSpeedMotion(floor))
+    link = PseudoTerminalLink(end)
     said: list[bytes] = []
     real = link.write
 
@@ -260,16 +260,16 @@ def test_over_a_body_that_acts_at_once_the_denning_reports_are_the_bodys_own() -
         def execute(self, command: MotorCommand) -> MotionReport:
             return MotionReport(command.turn_rad * (1 + 2**-50), command.move_m / 3.0, 0.1 + 0.2, 1e-17)
 
-    base = DenningBase(Wired(DenningEmulator(AtOnce(Body()))))
+    base = DenningBase(PseudoTerminalLink(DenningEmulator(InstantMotion(Body()))))
     command = MotorCommand(-0.1, math.pi)
     assert base.execute(command) == Body().execute(command)
     base.close()
 
 
 def test_a_create_that_is_lifted_is_a_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
-    floor = Floor()
+    floor = IdealGround()
     end = Create2Emulator(floor)
-    line = Wired(end)
+    line = PseudoTerminalLink(end)
     base = Create2Base(line)
     base.heartbeat()
     real = floor.roll
@@ -288,7 +288,7 @@ def test_a_create_that_is_lifted_is_a_refusal(monkeypatch: pytest.MonkeyPatch) -
 
 def test_a_pioneer_of_an_unknown_kind_is_refused_until_its_units_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sim.emulators.p2os, "NAMES", b"Somebody\0Pioneer\0p9zz\0")
-    line = Wired(P2osEmulator(Floor()))
+    line = PseudoTerminalLink(P2osEmulator(IdealGround()))
     fault = faulted(lambda: P2osBase(line).move(0.1))
     assert fault.kind == "refused" and "p9zz" in fault.detail and "mm_per_unit" in fault.detail
     assert P2osBase(line, mm_per_unit=1.0).move(0.1).move_m == pytest.approx(0.1, abs=NEAR_M)
@@ -313,7 +313,7 @@ def test_the_guard_stops_a_base_whose_driver_hangs_and_only_then() -> None:
 
 
 def test_a_serial_link_opens_reads_writes_and_says_what_is_wrong() -> None:
-    terminal = Terminal(DenningEmulator(Rolling(Floor())))
+    terminal = PseudoTerminal(DenningEmulator(ConstantSpeedMotion(IdealGround())))
     link = SerialLink(terminal.name, 38400)
     link.write(b"#garbage\n")
     assert link.read(0.0) == b""
@@ -328,9 +328,9 @@ def test_a_serial_link_opens_reads_writes_and_says_what_is_wrong() -> None:
 
 
 def test_a_terminal_that_nobody_reads_does_not_hold_the_base_up() -> None:
-    end = Create2Emulator(Floor())
+    end = Create2Emulator(IdealGround())
     end.receive(bytes([128, 148, 2, 43, 44]))
-    terminal = Terminal(end)
+    terminal = PseudoTerminal(end)
     for _ in range(40):
         end.advance(1.0)
         terminal.exchange()
@@ -364,8 +364,8 @@ def test_the_simulators_body_is_a_base_too() -> None:
 @pytest.mark.parametrize("kind", ["p2os", "create2"])
 def test_over_a_simulated_body_wheels_err_walls_stop_and_the_clock_is_the_bodys(kind: str) -> None:
     body = simulated()
-    end = P2osEmulator(BodyGround(body)) if kind == "p2os" else Create2Emulator(BodyGround(body))
-    base = driver(kind, Wired(end, lambda: body.truth.time_s))
+    end = P2osEmulator(SimulatedGround(body)) if kind == "p2os" else Create2Emulator(SimulatedGround(body))
+    base = driver(kind, PseudoTerminalLink(end, lambda: body.truth.time_s))
     report = base.execute(MotorCommand(0.3, 2.0))
     gone_m = body.truth.path_m
     assert report.move_m == pytest.approx(2.0, abs=NEAR_M)

@@ -22,7 +22,7 @@ from blackboard.level import Level
 from harvey.simulation.run import robot_model, run_mission
 from harvey.wiring import knowledge_sources
 from sim.scenario import load_scenario
-from sim.stage import set_stage
+from sim.stage import build_stage
 from world_models.entries.body import Frame, MotionReport, RideReport
 from world_models.entries.task import Command
 from world_models.robot import RobotModel
@@ -145,7 +145,7 @@ def asked_twice(source: KnowledgeSource, impure: list[str]) -> KnowledgeSource:
 def test_ratings_and_acts_are_pure() -> None:
     """At the beginning of a real mission: asked again, everyone gives the same answer and changes nothing."""
     scenario = load_scenario("lab-to-allens-office")
-    stage = set_stage(replace(scenario, limits=replace(scenario.limits, max_cycles=90)))
+    stage = build_stage(replace(scenario, limits=replace(scenario.limits, max_cycles=90)))
     impure: list[str] = []
     result = run_mission(stage, 1, sources=lambda robot: [asked_twice(s, impure) for s in knowledge_sources(robot)])
     assert "90 cycles" in result.reason and result.frames > 2

@@ -12,28 +12,28 @@ import pytest
 
 from sim.body.simulated_body import SimulatedBody
 from sim.faults.displacement import Bump, Kidnap
-from sim.render.projection import Lens, view_of
-from sim.render.rasterizer import visible_patches
+from sim.render.projection import Pinhole, project_mesh
+from sim.render.rasterizer import find_visible_patches
 from sim.scenario import ScenarioError, list_scenarios, load_scenario, parse_scenario, with_settings
-from sim.stage import Stage, set_stage
+from sim.stage import Stage, build_stage
 from world_models.entries.body import MotorCommand
 from world_models.frames import Pose2
 
 
 @pytest.fixture(scope="module")
 def main_stage() -> Stage:
-    return set_stage(load_scenario("lab-to-allens-office"))
+    return build_stage(load_scenario("lab-to-allens-office"))
 
 
 @pytest.mark.parametrize("name", list_scenarios())
 def test_every_scenario_can_be_set_up_and_its_goal_is_free(name: str) -> None:
-    stage = set_stage(load_scenario(name))
+    stage = build_stage(load_scenario(name))
     assert stage.building.obstacles.clearance_m(stage.goal_world) > 0.05
     assert stage.body(0).truth.locale == stage.building.locale_at(stage.start_world) != ""
 
 
 def test_the_forty_feet_are_free_of_obstacles_a_foot_to_either_side() -> None:
-    stage = set_stage(load_scenario("forty-foot-hallway"))
+    stage = build_stage(load_scenario("forty-foot-hallway"))
     assert stage.start_world.distance_to(stage.goal_world) == pytest.approx(40 * 0.3048)
     for part in np.linspace(0.0, 40 * 0.3048, 80):
         assert stage.building.obstacles.clearance_m(stage.start_world @ Pose2(float(part), 0.0, 0.0)) > 0.3048
@@ -43,11 +43,11 @@ def test_the_forty_feet_are_free_of_obstacles_a_foot_to_either_side() -> None:
 def test_the_building_has_no_holes_where_the_mission_goes(main_stage: Stage, locale: str) -> None:
     world, mesh, settings = main_stage.world, main_stage.building.renderer.mesh, main_stage.scenario.camera
     middle = world.outline(locale).mean(axis=0)
-    lens = Lens.of(settings.camera)
+    lens = Pinhole.of(settings.camera)
     for heading in np.linspace(-3.0, 3.0, 6):
         robot = Pose2(middle[0], middle[1], float(heading))
         pose = settings.mount.camera_from_robot @ robot.lifted().inverse()
-        seen = visible_patches(mesh, view_of(mesh, lens, pose.rotation, pose.translation), lens, 4)
+        seen = find_visible_patches(mesh, project_mesh(mesh, lens, pose.rotation, pose.translation), lens, 4)
         assert np.mean(seen < 0) < 1e-5
 
 
@@ -68,7 +68,7 @@ def test_a_run_is_scored_against_the_goal_in_the_world(main_stage: Stage) -> Non
 
 
 def test_the_hallway_kidnap_happens_in_the_hallway_once() -> None:
-    stage = set_stage(load_scenario("hallway-kidnap"))
+    stage = build_stage(load_scenario("hallway-kidnap"))
     kidnap = stage.scenario.faults[0]
     assert kidnap == Kidnap("hallway", after_m=6 * 0.3048, distance_m=1.0, turn_rad=math.radians(20.0))
     start = Pose2(12.0, 1.2, 0.0)
@@ -96,7 +96,7 @@ def test_a_scenario_that_does_not_fit_the_world_is_refused(main_stage: Stage) ->
         (replace(scenario, faults=(Bump("halway"),)), "hallway"),
     ):
         with pytest.raises(ScenarioError, match=message):
-            set_stage(bad)
+            build_stage(bad)
 
 
 SMALL = """world = "research_center"
@@ -124,7 +124,7 @@ def test_what_does_not_go_with_the_building_is_pointed_at(
     Path("b").mkdir()
     Path("b/m.toml").write_text(SMALL.replace(old, new, 1) if old else SMALL + new)
     with pytest.raises(ScenarioError) as caught:
-        set_stage(load_scenario("b/m.toml"))
+        build_stage(load_scenario("b/m.toml"))
     assert str(caught.value).startswith(f"b/{told}")
 
 
@@ -132,7 +132,7 @@ def test_what_was_set_otherwise_is_named_by_its_key() -> None:
     goal = "(ptrans (hallway (4,400,0)) (hallway (24,4,0)))"
     scenario = with_settings(parse_scenario(SMALL, "m.toml"), {"goal": goal})
     with pytest.raises(ScenarioError, match=r"^--set goal: expected a start within hallway"):
-        set_stage(scenario)
+        build_stage(scenario)
 
 
 @pytest.mark.parametrize("place", ["(4,4,3)", "(4,4,-0.5)", "(4e,4,0)", "(9999999,4,0)", f"({'9' * 400},4,0)"])

@@ -10,7 +10,7 @@ from sim.body.elevator import Helper
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
 from sim.scenario import ScenarioError, parse_scenario, scenario_from_tables
-from sim.stage import Stage, set_stage
+from sim.stage import Stage, build_stage
 from towers import tower
 from world_models.entries.body import BodyFault, Ride, RideReport
 
@@ -31,7 +31,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def stage(folder: Path, rides: str) -> Stage:
-    return set_stage(parse_scenario(SCENARIO + rides, "tower", folder))
+    return build_stage(parse_scenario(SCENARIO + rides, "tower", folder))
 
 
 @pytest.fixture(scope="module")

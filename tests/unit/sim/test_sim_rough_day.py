@@ -14,10 +14,10 @@ from sim.body.simulated_body import SimulatedBody
 from sim.faults.fault import Fault
 from sim.faults.occlusion import Occlusion
 from sim.made_up.box_room import box_room
-from sim.moved_things import Moved, with_moved
+from sim.moved_things import MovedThing, move_things
 from sim.render.occluder import Occluder
 from sim.scenario import SCENARIOS, ScenarioError, load_scenario, parse_scenario
-from sim.stage import set_stage
+from sim.stage import build_stage
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import load_world
 from world_models.frames import Pose2
@@ -54,7 +54,7 @@ def test_a_part_of_the_view_is_a_part() -> None:
 def test_what_was_moved_stands_elsewhere_with_all_that_is_on_it_and_nothing_else_does() -> None:
     world = load_world(load_scenario("rough-day").world)
     faces = world.faces_within("hallway")
-    moved = with_moved(faces, (Moved("hallway/fire-hose", 0.5, -0.25), Moved("hallway/fire-hose", 0.5)))
+    moved = move_things(faces, (MovedThing("hallway/fire-hose", 0.5, -0.25), MovedThing("hallway/fire-hose", 0.5)))
     for before, after in zip(faces, moved, strict=True):
         by_m = (1.0, -0.25, 0.0) if before.name.startswith("hallway/fire-hose/") else (0.0, 0.0, 0.0)
         pairs = zip((before, *before.front, *before.back), (after, *after.front, *after.back), strict=True)
@@ -65,4 +65,4 @@ def test_what_was_moved_stands_elsewhere_with_all_that_is_on_it_and_nothing_else
 def test_a_thing_that_is_not_there_cannot_be_moved() -> None:
     scenario = parse_scenario(ROUGH.replace("notices-by-students", "chandelier"), "rough.toml")
     with pytest.raises(ScenarioError, match=r"moved\.\d\.thing: expected a thing .* got 'hallway/chandelier'"):
-        set_stage(scenario)
+        build_stage(scenario)

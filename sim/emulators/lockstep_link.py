@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from sim.emulators.emulator import Emulator
-from sim.emulators.terminal import Terminal
+from sim.emulators.pseudo_terminal import PseudoTerminal
 
 LEAST_S = 1e-6
 """Every read takes at least so long, so that time goes on whatever the host does."""
@@ -32,7 +32,7 @@ class LockstepLink:
     """A link (as the drivers want one) on which time passes only while its host waits."""
 
     def __init__(
-        self, port: Port, terminal: Terminal, emulator: Emulator, *, clock: Callable[[], float] | None = None,
+        self, port: Port, terminal: PseudoTerminal, emulator: Emulator, *, clock: Callable[[], float] | None = None,
         tick_s: float = 0.015,
     ) -> None:
         """A link to the base behind a terminal.

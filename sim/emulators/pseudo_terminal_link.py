@@ -7,11 +7,11 @@ from collections.abc import Callable
 import serial
 
 from sim.emulators.emulator import Emulator
-from sim.emulators.lockstep import LockstepLink
-from sim.emulators.terminal import Terminal
+from sim.emulators.lockstep_link import LockstepLink
+from sim.emulators.pseudo_terminal import PseudoTerminal
 
 
-class Wired(LockstepLink):
+class PseudoTerminalLink(LockstepLink):
     """A lock-step link, both ends of its pseudo-terminal with it.
 
     Attributes:
@@ -20,10 +20,10 @@ class Wired(LockstepLink):
 
     def __init__(self, emulator: Emulator, clock: Callable[[], float] | None = None) -> None:
         """``clock``: see :class:`LockstepLink`."""
-        terminal = Terminal(emulator)
+        terminal = PseudoTerminal(emulator)
         super().__init__(serial.serial_for_url(terminal.name), terminal, emulator, clock=clock)
         self.name = terminal.name
-        self._open: Terminal | None = terminal
+        self._open: PseudoTerminal | None = terminal
 
     def close(self) -> None:
         """Let go of both ends."""

@@ -17,7 +17,7 @@ MOST_S = 0.25
 """A server that was held up for longer lets the base's time stand still instead of catching up."""
 
 
-class Terminal:
+class PseudoTerminal:
     """An emulated base on a pseudo-terminal.
 
     Attributes:
