@@ -17,7 +17,7 @@ from harvey.campaign.progress import counted
 from harvey.units import INCH_M
 
 if TYPE_CHECKING:
-    from harvey.simulation.referee import MissionResult
+    from harvey.runner.result import MissionResult
 
 MAIN, KIDNAP = SCENARIOS = ("lab-to-allens-office", "hallway-kidnap")
 LEVELS_OFF: Mapping[str, tuple[str, ...]] = {
@@ -64,14 +64,14 @@ def run(quick: bool, seed: int) -> Report:
 
 
 def _row(scenario: str, name: str, results: Sequence[MissionResult]) -> tuple[Cell, ...]:
-    errors_m = [r.final_error_m for r in results]
+    errors_m = [r.error_m for r in results]
     others = sorted({r.outcome for r in results} - {"reached"})
     return (
         scenario, name, sum(1 for r in results if r.outcome == "reached"), _within_inch(results),
         ", ".join(f"{sum(1 for r in results if r.outcome == kind)} {kind}" for kind in others) or None,
         1000.0 * math.fsum(errors_m) / len(errors_m), 1000.0 * max(errors_m),
-        1000.0 * max(r.max_cross_track_m for r in results),
-        sum(r.collisions for r in results), sum(r.milestones["false_accepts"] for r in results),
+        1000.0 * max(r.max_cross_track_m or 0.0 for r in results),
+        sum(r.collisions or 0 for r in results), sum(r.false_accepts for r in results),
         sum(r.replans for r in results), sum(r.relocalizations for r in results),
     )
 
@@ -86,11 +86,11 @@ def _claims(results: Results) -> Iterator[tuple[str, bool]]:
             yield f"{scenario}: without the goal level fewer do", _within_inch(results[scenario, "goal off"]) < arrived
     on, action_off, plan_off = (results[MAIN, name] for name in ("all on", "action off", "plan off"))
     yield (f"{MAIN}: without the action level it strays more than twice as far from its path",
-           max(r.max_cross_track_m for r in action_off) > 2.0 * max(r.max_cross_track_m for r in on))
+           max(r.max_cross_track_m or 0.0 for r in action_off) > 2.0 * max(r.max_cross_track_m or 0.0 for r in on))
     yield (f"{MAIN}: without the plan level it ends more than twice as far off, or not at all",
-           max(r.final_error_m for r in plan_off) > 2.0 * max(r.final_error_m for r in on))
+           max(r.error_m for r in plan_off) > 2.0 * max(r.error_m for r in on))
 
 
 def _within_inch(results: Sequence[MissionResult]) -> int:
     """Missions that reached their goal within an inch."""
-    return sum(1 for r in results if r.outcome == "reached" and r.final_error_m <= INCH_M)
+    return sum(1 for r in results if r.outcome == "reached" and r.error_m <= INCH_M)

@@ -17,7 +17,7 @@ from harvey.agent import agent_of
 from harvey.campaign.campaign import Task
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_recorder import RunRecorder
-from harvey.simulation.run import Mission, head_of
+from harvey.simulation.run import SimulatedRun, head_of
 from harvey.units import INCH_M
 from sim.stage import Stage
 from sim.truth import Truth
@@ -78,12 +78,12 @@ def driven_and_kept(drive: Drive, out: Path | None) -> Driven:
     head = replace(head_of(stage, drive.seed), constants=ONE_LEG)
     ends: list[Truth] = []
     with agent_of(head) as agent:
-        run = None if out is None else RunDirectory(out)
-        recorder = RunRecorder(run, head, agent.robot)
-        mission = Mission(stage, head, agent, recorder, (_ends_of_moves(ends, lambda: mission),))
-        result = mission.driven(run, mission.begin)
-        track = mission.body.track
-    way = np.array([_beside(stage, truth) for truth in track])
+        files = None if out is None else RunDirectory(out)
+        recorder = RunRecorder(files, head, agent.robot)
+        with SimulatedRun(stage, head, agent, recorder, (_ends_of_moves(ends, lambda: run),)) as run:
+            result = run.drive(files)
+        body = run.simulated_body
+    way = np.array([_beside(stage, truth) for truth in body.track])
     if drive.continuous:
         z_in, x_in = _passing(way, _reach(stage))
     else:
@@ -91,7 +91,7 @@ def driven_and_kept(drive: Drive, out: Path | None) -> Driven:
     open_z, open_x = unservoed(drive.seed, drive.feet)
     some = way[:: max(1, len(way) // 80)]
     return Driven(
-        drive.seed, result.outcome, result.collisions, result.frames, mission.body.curvature_per_m, z_in, x_in,
+        drive.seed, result.outcome, result.collisions or 0, result.frames, body.curvature_per_m, z_in, x_in,
         float(np.max(np.abs(way[:, 1]))), open_z, open_x, some[:, 0].tolist(), some[:, 1].tolist(),
         time.process_time() - began_s,
     )
@@ -116,13 +116,13 @@ def _stage(feet: int, continuous: bool) -> Stage:
     return Task(SCENARIO, (("goal", goal), ("motion.continuous", "on" if continuous else "off")), 0).stage()
 
 
-def _ends_of_moves(ends: list[Truth], mission: Callable[[], Mission]) -> Callable[[Decision], None]:
+def _ends_of_moves(ends: list[Truth], run: Callable[[], SimulatedRun]) -> Callable[[Decision], None]:
     """A sink that notes where the robot truly is after each MOVE."""
 
     def heard(decision: Decision) -> None:
         for change in decision.observed:
             if isinstance(change.entry.value, MotionReport) and change.entry.value.move_m > 0.0:
-                ends.append(mission().body.truth)
+                ends.append(run().simulated_body.truth)
 
     return heard
 

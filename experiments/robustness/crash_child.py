@@ -13,12 +13,12 @@ from pathlib import Path
 
 from harvey.agent import agent_of
 from harvey.campaign.campaign import Task
-from harvey.replay.replay import pictures_of, replayed
-from harvey.replay.resume import remains_of, resume
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
 from harvey.runner.ports import Body
-from harvey.simulation.run import Around, run_mission
+from harvey.runner.replay import pictures_of, replay
+from harvey.runner.resume import remains_of
+from harvey.simulation.run import Around, resume_mission, run_mission
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
 
 MOTION_S = 0.05
@@ -28,12 +28,12 @@ MOTION_S = 0.05
 class Remembered:
     """A body whose world remembers every command that reached it, whatever becomes of the agent."""
 
-    def __init__(self, body: Body, retelling: Callable[[], bool], memory: Path) -> None:
-        self._body, self._retelling = body, retelling
+    def __init__(self, body: Body, replaying: Callable[[], bool], memory: Path) -> None:
+        self._body, self._replaying = body, replaying
         self._memory = memory.open("ab", buffering=0)
 
     def execute(self, command: MotorCommand) -> MotionReport | BodyFault:
-        if self._retelling():
+        if self._replaying():
             return self._body.execute(command)
         self._memory.write(json.dumps({"begun": [command.turn_rad, command.move_m]}).encode() + b"\n")
         time.sleep(MOTION_S)
@@ -62,7 +62,7 @@ class Remembered:
 
 def remembering(memory: Path) -> Around:
     """Puts a memory round a body."""
-    return lambda body, retelling: Remembered(body, retelling, memory)
+    return lambda body, replaying: Remembered(body, replaying, memory)
 
 
 def main(argv: list[str]) -> int:
@@ -72,9 +72,9 @@ def main(argv: list[str]) -> int:
         run_mission(Task(scenario, (), int(seed)).stage(), int(seed), out=Path(out), around=remembering(Path(memory)))
         return 0
     run = RunDirectory(Path(argv[1]))
-    result = resume(run, remains_of(run), around=remembering(Path(argv[2])))
+    result = resume_mission(run, remains_of(run), around=remembering(Path(argv[2])))
     with agent_of(RunHead.read(run.path)) as agent:
-        same = all(told.same for told in replayed(run, pictures_of(run), agent.scheduler()))
+        same = all(told.same for told in replay(run, pictures_of(run), agent.scheduler()))
     print(json.dumps({"outcome": result.outcome, "reason": result.reason, "same": same,
                       "error_m": result.final_error_m, "decisions": result.decisions}))
     return 0

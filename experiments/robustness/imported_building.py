@@ -28,7 +28,7 @@ from world_models.files.importers import import_building
 from world_models.files.world_files import load_world
 
 if TYPE_CHECKING:
-    from harvey.simulation.referee import MissionResult
+    from harvey.runner.result import MissionResult
 
 MISSIONS, QUICK_MISSIONS = 50, 2
 LEAST = 0.96
@@ -64,7 +64,7 @@ class Errand:
 
 def run(quick: bool, seed: int) -> Report:
     """Import, check, drive."""
-    from harvey.simulation.referee import MissionResult
+    from harvey.runner.result import MissionResult
 
     path, title = building_file(DUPLEX), "Missions between the rooms of an imported house"
     if find_spec("ifcopenshell") is None or not path.is_file():
@@ -137,7 +137,7 @@ def _task(errand: Errand, folder: Path, seed: int) -> Task:
 
 
 def _arrived(result: MissionResult) -> bool:
-    return result.outcome == "reached" and result.final_error_m <= NEAR_M
+    return result.outcome == "reached" and result.error_m <= NEAR_M
 
 
 def _declared(result: MissionResult) -> bool:
@@ -150,14 +150,14 @@ def _least(count: int) -> int:
 
 
 def _row(name: str, results: Sequence[MissionResult]) -> tuple[Cell, ...]:
-    errors_mm = [1000.0 * r.final_error_m for r in results if _arrived(r)]
+    errors_mm = [1000.0 * r.error_m for r in results if _arrived(r)]
     others = sorted({r.outcome for r in results if not _arrived(r)})
     return (
         name, len(results), len(errors_mm),
         ", ".join(f"{sum(1 for r in results if not _arrived(r) and r.outcome == kind)} {kind}" for kind in others)
         or None,
         float(np.mean(errors_mm)) if errors_mm else None, max(errors_mm, default=None),
-        sum(r.collisions for r in results), sum(r.milestones["false_accepts"] for r in results),
+        sum(r.collisions or 0 for r in results), sum(r.false_accepts for r in results),
         sum(r.replans for r in results), sum(r.relocalizations for r in results),
         float(np.sum([r.path_length_m for r in results])), float(np.mean([r.wall_time_s for r in results])),
     )
@@ -165,7 +165,7 @@ def _row(name: str, results: Sequence[MissionResult]) -> tuple[Cell, ...]:
 
 def _told(errand: Errand, result: MissionResult, seed: int) -> str:
     return (f"mission-{errand.number} (seed {seed + errand.number}), {errand.origin} to {errand.destination}:"
-            f" {result.outcome} ({result.reason}), {1000.0 * result.final_error_m:.0f} mm from its goal,"
+            f" {result.outcome} ({result.reason}), {1000.0 * result.error_m:.0f} mm from its goal,"
             f" {result.collisions} collisions.")
 
 

@@ -15,7 +15,7 @@ from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy, Servoing
 from harvey.runner.ports import BodyPort
-from harvey.runner.run import until_outcome
+from harvey.runner.run import run_to_outcome
 from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.goal.relocalizer import Relocalizer
@@ -123,7 +123,7 @@ def found_in(trial: Kidnap) -> Found:
     watch = _Watch(body)
     scheduler = _lost(scene.robot, watch, belief)
     began = time.process_time()
-    until_outcome(scheduler, over=lambda s: "found" if _is_found(s) else None)
+    run_to_outcome(scheduler, over=lambda s: "found" if _is_found(s) else None)
     cpu_s = time.process_time() - began - watch.cpu_s
     view = scheduler.view
     held = view.latest(Hypothesis, lambda h: h.is_held)

@@ -85,8 +85,8 @@ def driven(task: Task) -> Ended:
     """One mission, of which nothing is kept but how it ended."""
     r = run_task(task)
     return Ended(
-        task.scenario, task.seed, r.outcome, r.reason, r.final_error_m, r.collisions, r.milestones["false_accepts"],
-        r.milestones["refuted"], r.replans, r.relocalizations, r.wall_time_s,
+        task.scenario, task.seed, r.outcome, r.reason, r.error_m, r.collisions or 0, r.false_accepts,
+        r.milestones["refuted"] or 0, r.replans, r.relocalizations, r.wall_time_s,
     )
 
 

@@ -95,11 +95,11 @@ def explained(task: Task) -> Explained:
 def _same(run: RunDirectory) -> int:
     """How many decisions are the same when the run is decided again."""
     from harvey.agent import agent_of
-    from harvey.replay.replay import pictures_of, replayed
     from harvey.run_files.run_head import RunHead
+    from harvey.runner.replay import pictures_of, replay
 
     with agent_of(RunHead.read(run.path)) as agent:
-        return sum(1 for told in replayed(run, pictures_of(run), agent.scheduler()) if told.same)
+        return sum(1 for told in replay(run, pictures_of(run), agent.scheduler()) if told.same)
 
 
 def _asked(run: Path, *more: str) -> tuple[float, float]:

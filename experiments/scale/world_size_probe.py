@@ -17,7 +17,7 @@ from blackboard.effect import Post
 from blackboard.journal import Decision, decision_line
 from blackboard.scheduler import Scheduler
 from harvey.runner.ports import BodyPort
-from harvey.runner.run import until_outcome
+from harvey.runner.run import run_to_outcome
 from harvey.simulation.run import robot_model
 from harvey.wiring import knowledge_sources, servoing
 from sim.body.faulty_body import FaultyBody
@@ -104,7 +104,7 @@ def _drive(stage: Stage, seed: int) -> dict[str, Any]:
     scheduler = Scheduler(knowledge_sources(robot), ports=(BodyPort(FaultyBody(stage.body(seed))),),
                           servoing=servoing(stage.scenario.servo), sinks=(watcher,))
     scheduler.tell([Post(stage.scenario.command)], "user")
-    outcome = until_outcome(scheduler)
+    outcome = run_to_outcome(scheduler)
     frames = robot.world.locale_source
     assert isinstance(frames, SqliteLocales)
     return {"outcome": outcome.kind, "journal": watcher.journal, "decisions": watcher.decisions,

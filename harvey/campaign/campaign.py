@@ -17,7 +17,7 @@ from harvey.run_files.run_directory import RunDirectory, new_run
 
 if TYPE_CHECKING:
     from harvey.campaign.tally import Tally
-    from harvey.simulation.referee import MissionResult
+    from harvey.runner.result import MissionResult
     from sim.scenario import Scenario
     from sim.stage import Stage
 
@@ -134,16 +134,16 @@ def room_for(out: Path, name: str, seed: int) -> Path:
 
 def _kept_or_resumed(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence[Sink], live: bool) -> MissionResult:
     """What an earlier campaign did of this mission. Raises BadInput where another mission is there."""
-    from harvey.replay.resume import remains_of, resume
     from harvey.run_files.run_head import RunHead
-    from harvey.simulation.referee import MissionResult
-    from harvey.simulation.run import head_of
+    from harvey.runner.result import MissionResult
+    from harvey.runner.resume import remains_of
+    from harvey.simulation.run import head_of, resume_mission
 
     if not RunHead.read(run.path).is_like(head_of(stage, task.seed, task.body)):
         raise BadInput(f"{run.path}: expected a run of {task.named}, got one that began otherwise")
     remains, record = remains_of(run), run.read_result()
     if remains.outcome is None or record.get("outcome") != remains.outcome.kind:
-        return resume(run, remains, sinks=sinks, live=live, stage=stage)
+        return resume_mission(run, remains, sinks=sinks, live=live, stage=stage)
     try:
         return MissionResult(**record)
     except TypeError as error:

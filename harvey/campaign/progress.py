@@ -15,7 +15,7 @@ from harvey.campaign.tally import Tally
 from harvey.units import count
 
 if TYPE_CHECKING:
-    from harvey.simulation.referee import MissionResult
+    from harvey.runner.result import MissionResult
 
 
 class Bar:
@@ -95,7 +95,7 @@ def counted(
     with tqdm(total=total, file=out, disable=not out.isatty(), unit="mission", leave=False) as bar:
         for number, (task, result) in enumerate(done, 1):
             if not out.isatty():
-                how = f"{result.outcome}, {millimetres(result.final_error_m)}"
+                how = f"{result.outcome}, {millimetres(result.error_m)}"
                 print(f"{number} of {total}: {task.named}: {how}", file=out, flush=True)
             bar.update()
             yield task, result

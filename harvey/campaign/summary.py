@@ -12,7 +12,7 @@ from harvey.units import INCH_M, count, degrees
 
 if TYPE_CHECKING:
     from harvey.dry_run import MilestonePreview
-    from harvey.simulation.referee import MissionResult
+    from harvey.runner.result import MissionResult
     from world_models.entries.task import Outcome
 
 COLUMNS = ("seed", "outcome", "error mm", "inches", "milestones", "refuted", "wrong", "sketches", "replans",
@@ -29,7 +29,7 @@ def one(r: MissionResult, out: Path | None) -> str:
     m = r.milestones
     lines = [
         f"{r.outcome}: {r.reason}",
-        f"  final error   {millimetres(r.final_error_m)} from the goal, {degrees(r.final_heading_error_rad)} off",
+        f"  final error   {millimetres(r.error_m)} from the goal, {degrees(r.final_heading_error_rad)} off",
         f"  milestones    {m['verified']} verified, {m['refuted']} refuted, {m['not_testable']} not testable,"
         f" {m['false_accepts']} accepted wrongly",
         f"  plans         {count(r.sketches, 'sketch', 'sketches')}, {count(r.replans, 'replan')},"
@@ -81,13 +81,14 @@ def _prospect(p: MilestonePreview) -> tuple[str, ...]:
 
 def _cells(r: MissionResult) -> tuple[str, ...]:
     counts, ways = _counts(r), _ways(r)
-    return (str(r.seed), r.outcome, f"{r.final_error_m * 1000:.1f}", f"{r.final_error_m / INCH_M:.2f}",
+    return (str(r.seed), r.outcome, f"{r.error_m * 1000:.1f}", f"{r.error_m / INCH_M:.2f}",
             *(str(n) for n in counts), f"{ways[0]:.1f}", f"{ways[1]:.0f}", f"{ways[2]:.0f}", f"{ways[3]:.1f}")
 
 
 def _counts(r: MissionResult) -> tuple[int, ...]:
     m = r.milestones
-    return (m["verified"], m["refuted"], m["false_accepts"], r.sketches, r.replans, r.relocalizations, r.collisions)
+    return (m["verified"] or 0, m["refuted"] or 0, r.false_accepts, r.sketches, r.replans, r.relocalizations,
+            r.collisions or 0)
 
 
 def _ways(r: MissionResult) -> tuple[float, ...]:
@@ -97,7 +98,7 @@ def _ways(r: MissionResult) -> tuple[float, ...]:
 def _total(results: Sequence[MissionResult]) -> tuple[str, ...]:
     """Counts are summed, ways averaged, of errors the worst is told."""
     reached = sum(1 for r in results if r.outcome == "reached")
-    worst_m = max(r.final_error_m for r in results)
+    worst_m = max(r.error_m for r in results)
     sums = [sum(values) for values in zip(*(_counts(r) for r in results), strict=True)]
     means = [math.fsum(values) / len(results) for values in zip(*(_ways(r) for r in results), strict=True)]
     return ("all", f"{reached} of {len(results)} reached", f"max {worst_m * 1000:.1f}", f"{worst_m / INCH_M:.2f}",

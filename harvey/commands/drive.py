@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from blackboard.journal import Decision
     from harvey.hardware.mission import HardwareMission
     from harvey.hardware.preflight import Check, Preflight
+    from harvey.runner.result import MissionResult
 
 OPTIONS: Mapping[str, tuple[str, str, str]] = {
     "world": ("world", "FILE", "the building: a world file, or the name of one that comes with Harvey"),
@@ -101,7 +102,7 @@ def _drive(mission: HardwareMission, dry: Preflight, clock: Callable[[], float],
     tell_how_to_stop()
     result = drive(mission, dry.robot, dry.base, dry.camera, clock, out=out, sinks=[follow], live=live)
     print(summary(result, out))
-    return 0 if result["outcome"] == "reached" else 1
+    return 0 if result.outcome == "reached" else 1
 
 
 def tell_how_to_stop() -> None:
@@ -109,12 +110,12 @@ def tell_how_to_stop() -> None:
     print("\nspace, enter, q, escape or Ctrl-C stops the robot at once", file=sys.stderr, flush=True)
 
 
-def summary(result: Mapping[str, Any], out: Path) -> str:
+def summary(result: MissionResult, out: Path) -> str:
     """How a mission on hardware went, and what to do with its run."""
-    m = result["milestones"]
-    return (f"{result['outcome']}: {result['reason']}\n"
+    m = result.milestones
+    return (f"{result.outcome}: {result.reason}\n"
             f"  milestones    {m['verified']} verified, {m['refuted']} refuted, {m['not_testable']} not testable\n"
-            f"  way           {result['path_length_m']:.1f} m, as the wheels claim, in {result['sim_time_s']:.0f} s\n"
+            f"  way           {result.path_length_m:.1f} m, as the wheels claim, in {result.sim_time_s:.0f} s\n"
             f"  recording     {out / 'recording.rrd'}\n\n"
             f"open it with    harvey view {out}\nask it with     harvey why {out}")
 

@@ -17,11 +17,11 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     from tqdm import tqdm
 
-    from harvey.replay.repair import redrawn
+    from harvey.replay.repair import redraw
 
     run = open_run(args.run)
     with tqdm(unit=" decisions", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
-        decisions = redrawn(run, (lambda _decision: bar.update(),))
+        decisions = redraw(run, (lambda _decision: bar.update(),))
     print(f"{run.recording} was drawn anew from {count(decisions, 'decision')} of the journal")
     return 0
 

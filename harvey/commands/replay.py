@@ -15,8 +15,8 @@ from harvey.run_files.run_directory import RunDirectory, open_run, vacant
 from harvey.units import count
 
 if TYPE_CHECKING:
-    from harvey.replay.replay import Told
     from harvey.run_files.run_head import RunHead
+    from harvey.runner.replay import ReplayedDecision
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -64,13 +64,13 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
 def _again(run: RunDirectory) -> int:
     """Decide it again as it was."""
     from harvey.agent import agent_of
-    from harvey.replay.replay import pictures_of, replayed
     from harvey.run_files.run_head import RunHead
+    from harvey.runner.replay import pictures_of, replay
 
     pictures, agreed, head = pictures_of(run), 0, RunHead.read(run.path)
     elsewhere = head.decided_elsewhere()
     with agent_of(head) as agent:
-        for told in shown(replayed(run, pictures, agent.scheduler())):
+        for told in shown(replay(run, pictures, agent.scheduler())):
             if not told.same:
                 print(f"{_difference(agreed, told)}\n\n{_perhaps(head, elsewhere)}")
                 return 1
@@ -95,7 +95,7 @@ def _perhaps(head: RunHead, elsewhere: str) -> str:
     return "The run was decided by the same code as this, so its files were changed since, or the libraries are others."
 
 
-def _difference(agreed: int, told: Told) -> str:
+def _difference(agreed: int, told: ReplayedDecision) -> str:
     from blackboard.journal import decision_record
     from harvey.diff.first_difference import describe
     from harvey.run_files.records import decision_of
@@ -104,7 +104,7 @@ def _difference(agreed: int, told: Told) -> str:
     return "\n".join(["first: as recorded; second: as decided now", *describe(agreed, told.recorded, now)])
 
 
-def shown(decisions: Iterable[Told]) -> Iterator[Told]:
+def shown(decisions: Iterable[ReplayedDecision]) -> Iterator[ReplayedDecision]:
     """The decisions, with a bar on a terminal."""
     from tqdm import tqdm
 

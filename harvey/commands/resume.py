@@ -15,8 +15,8 @@ from harvey.run_files.run_directory import RunDirectory, open_run
 from harvey.units import count
 
 if TYPE_CHECKING:
-    from harvey.replay.resume import Remains
     from harvey.run_files.run_head import RunHead
+    from harvey.runner.resume import Remains
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -30,8 +30,8 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     run = open_run(args.run, "run.json")
     from harvey.campaign.summary import one
-    from harvey.replay.resume import remains_of, resume
     from harvey.run_files.run_head import HARDWARE, RunHead
+    from harvey.runner.resume import remains_of
 
     remains = remains_of(run)
     if remains.outcome is not None and run.read_result().get("outcome") == remains.outcome.kind:
@@ -44,7 +44,9 @@ def _run(args: Namespace) -> int:
     if moved:
         raise BadInput(f"--base and --camera: expected a run on hardware, and {run.path} is one of the simulator")
     _tell(run, remains, head)
-    result = resume(run, remains, live=args.live)
+    from harvey.simulation.run import resume_mission
+
+    result = resume_mission(run, remains, live=args.live)
     print(one(result, run.path))
     return 0 if result.outcome == "reached" else 1
 
@@ -57,9 +59,10 @@ def _on_hardware(
     from harvey.commands.drive import checked, follow, summary, tell_how_to_stop
     from harvey.hardware.mission import mission_of
     from harvey.hardware.preflight import Preflight
-    from harvey.hardware.resume import resume, stood_at
+    from harvey.hardware.resume import time_of_last_observation
+    from harvey.hardware.run import resume
 
-    mission, began_s = mission_of(head, moved), time.monotonic() - stood_at(run)[0]
+    mission, began_s = mission_of(head, moved), time.monotonic() - time_of_last_observation(run)
 
     def clock() -> float:
         return time.monotonic() - began_s
@@ -71,7 +74,7 @@ def _on_hardware(
         tell_how_to_stop()
         result = resume(mission, run, remains, dry.base, dry.camera, clock, sinks=[follow], live=live)
     print(summary(result, run.path))
-    return 0 if result["outcome"] == "reached" else 1
+    return 0 if result.outcome == "reached" else 1
 
 
 def _tell(run: RunDirectory, remains: Remains, head: RunHead) -> None:
@@ -80,7 +83,7 @@ def _tell(run: RunDirectory, remains: Remains, head: RunHead) -> None:
     for what in remains.dropped:
         print(f"dropped: {what}", file=sys.stderr)
     told = count(remains.decisions, "decision")
-    print(f"{run.path}: {told} told again, then it goes on", file=sys.stderr, flush=True)
+    print(f"{run.path}: {told} replayed, then it goes on", file=sys.stderr, flush=True)
 
 
 COMMAND = Command(

@@ -20,18 +20,17 @@ from blackboard.scheduler import Scheduler
 from harvey.agent import agent_of
 from harvey.campaign.campaign import room_for
 from harvey.replay.hidden_segments import check_segments
-from harvey.replay.replay import Live, pictures_of
-from harvey.replay.resume import stage_of
 from harvey.run_files.observations import effect_of
 from harvey.run_files.records import DecisionRecord, EntryRecord, as_line, decision_of, read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import SIMULATOR, RunHead
 from harvey.run_files.run_recorder import RunRecorder
 from harvey.runner.ports import BodyPort
-from harvey.runner.run import Over, endless, until_outcome
-from harvey.simulation.body_replay import RESUME, BodyReplay
-from harvey.simulation.referee import MissionResult
-from harvey.simulation.run import UNFINISHED, Mission
+from harvey.runner.replay import Live, ignore, pictures_of
+from harvey.runner.result import UNFINISHED, MissionResult
+from harvey.runner.resume import RESUME
+from harvey.runner.run import Over, run_to_outcome
+from harvey.simulation.run import SimulatedRun, stage_of
 from world_models.entries.task import Outcome
 
 
@@ -102,26 +101,23 @@ def what_if(
                 return player.answer(player.played(scheduler, head, recorder), None)
             finally:
                 recorder.close()
-        stage = stage_of(head)
-        mission = Mission(stage, head, agent, recorder, (player.heard,))
-        reliving = BodyReplay(mission.port, head.seed, stage.scenario.actuator)
-        result = mission.driven(out, lambda: _simulated(mission, player, head, reliving, go_on))
+        with SimulatedRun(stage_of(head), head, agent, recorder, (player.heard,)) as simulated:
+            result = simulated.drive(out, lambda: _drive_changed(simulated, player, go_on))
         return player.answer(Outcome(result.outcome, result.reason), result)
 
 
-def _simulated(mission: Mission, player: _Player, head: RunHead, reliving: Live, go_on: bool) -> Outcome:
+def _drive_changed(run: SimulatedRun, player: _Player, go_on: bool) -> Outcome:
     """By the record as far as it answers; then by the simulated robot, if it is to go on."""
-    mission.kept.closed = True
-    mission.body.use_recorded(player.pictures)
-    outcome = player.played(
-        mission.scheduler, head, mission.recorder, live=reliving, before=mission.tell_truth, over=mission.over)
+    run.recorded_port.closed = True
+    with run.body_replay.replay(player.pictures) as live:
+        outcome = player.played(
+            run.scheduler, run.head, run.recorder, live=live, before=run.before_cycle, over=run.over)
     if player.parting is None or not go_on:
         return outcome
-    mission.body.use_recorded({})
-    mission.kept.closed = False
+    run.recorded_port.closed = False
     for change in player.open:
-        mission.scheduler.tell(mission.kept.answer(change), mission.kept.name)
-    return mission.go_on(player.last)
+        run.scheduler.tell(run.recorded_port.answer(change), run.port.name)
+    return run.go_on(player.last)
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,8 +155,8 @@ class _Player:
                 self._first = recorded, decision_of(decision_record(decision))
 
     def played(
-        self, scheduler: Scheduler, head: RunHead, recorder: RunRecorder, *, live: Live = lambda made, observed: None,
-        before: Callable[[], None] = lambda: None, over: Over = endless,
+        self, scheduler: Scheduler, head: RunHead, recorder: RunRecorder, *, live: Live = ignore,
+        before: Callable[[], None] = lambda: None, over: Over = lambda _scheduler: None,
     ) -> Outcome:
         """Decide until the end, or until the record no longer answers."""
         scheduler.tell([Post(head.task())], "user")
@@ -170,7 +166,7 @@ class _Player:
             before()
 
         try:
-            return until_outcome(scheduler, over=over, before=told)
+            return run_to_outcome(scheduler, over=over, before=told)
         except _PartedError:
             return Outcome(UNFINISHED, "from here the recorded observations no longer hold")
 
@@ -196,7 +192,7 @@ class _Player:
         live(made, step.answers)
         for record in step.answers:
             effect = effect_of(record, self.pictures, scheduler.view, scheduler.kinds)
-            recorder.keep(effect)
+            recorder.record_picture(effect)
             scheduler.tell([effect], record.author)
 
 

@@ -9,7 +9,7 @@ from harvey.diff.first_difference import describe, differing_leaves
 from harvey.replay.counterfactual import Answer, Parting
 from harvey.run_files.records import DecisionRecord
 from harvey.run_files.run_directory import RunDirectory
-from harvey.simulation.run import UNFINISHED
+from harvey.runner.result import UNFINISHED
 from harvey.units import count
 from harvey.why.sentences import sentence
 
@@ -67,7 +67,7 @@ def _end(answer: Answer, run: RunDirectory) -> Iterator[str]:
     error_m = before.get("final_error_m")
     truly = f", {millimetres(error_m)} from the goal" if isinstance(error_m, int | float) else ""
     yield f"  as recorded:              {before.get('outcome', UNFINISHED)}{truly}"
-    now = f", {millimetres(answer.result.final_error_m)} from the goal" if answer.result is not None else ""
+    now = f", {millimetres(answer.result.error_m)} from the goal" if answer.result is not None else ""
     yield f"  as it would have been:    {answer.outcome.kind}{now}: {answer.outcome.reason}"
 
 

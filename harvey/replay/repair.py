@@ -7,19 +7,19 @@ from collections.abc import Sequence
 
 from blackboard.journal import Sink
 from harvey.agent import agent_of
-from harvey.replay.replay import checked, pictures_of, replayed
-from harvey.replay.resume import relived, remains_of, stage_of
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import SIMULATOR, RunHead
 from harvey.run_files.run_recorder import RunRecorder
-from harvey.simulation.run import Mission
+from harvey.runner.replay import check_same, pictures_of, replay
+from harvey.runner.resume import remains_of, replay_run
+from harvey.simulation.run import SimulatedRun, stage_of
 
 
-def redrawn(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
+def redraw(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
     """Draw a run's recording anew; the old one stays until the new one is whole. Returns how many decisions it shows.
 
     Raises:
-        BadInput: the run cannot be told again as it was.
+        BadInput: the run cannot be replayed as it was.
         RecordingError: the recording cannot be written.
     """
     decisions = remains_of(run).decisions
@@ -28,12 +28,12 @@ def redrawn(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
         recorder = RunRecorder(None, head, agent.robot, drawing=part)
         try:
             if head.kind == SIMULATOR:
-                stage = stage_of(head)
-                relived(run, Mission(stage, head, agent, recorder, sinks), stage)
+                with SimulatedRun(stage_of(head), head, agent, recorder, sinks) as simulated:
+                    replay_run(run, simulated, simulated.body_replay)
             else:
                 scheduler = agent.scheduler(sinks=(*recorder.sinks, *sinks))
-                for told in replayed(run, pictures_of(run), scheduler):
-                    checked(run, told)
+                for decision in replay(run, pictures_of(run), scheduler):
+                    check_same(run, decision)
             recorder.close()
             os.replace(part, run.recording)
         finally:

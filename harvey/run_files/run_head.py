@@ -47,7 +47,7 @@ class RunHead:
         without, constants: what was taken from the experts' agents, for a run that tells what would have been.
         scenario: simulator: the scenario's tables as read, with ``--set`` applied; hardware: what the driver needs.
         folder: simulator: where the scenario's file was.
-        body: simulator: how the body is reached, as :func:`harvey.simulation.serial_body.reached` knows it.
+        body: simulator: how the body is reached, as :func:`harvey.simulation.serial_body.open_body` knows it.
         harvey: version; code: what :func:`~harvey.run_files.deciding_code.deciding_code` says of the deciding program,
             "" in a run that is older than that.
         arithmetic: how the libraries calculated, as :func:`harvey.arithmetic.arithmetic` tells; "" in an older run.

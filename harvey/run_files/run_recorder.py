@@ -31,10 +31,11 @@ class Extent:
 
 
 class RunRecorder:
-    """Keeps a run. With neither a directory nor a viewer it keeps nothing.
+    """Records a run. With neither a directory nor a viewer it records nothing.
 
-    While a run is told again (``retelling``) it is drawn, but nothing is written to journal and camera file, and the
-    ports are not asked.
+    Attributes:
+        replaying: while it is set, the run is drawn, but nothing is written to journal and camera file, and the ports
+            are not asked.
     """
 
     def __init__(
@@ -47,13 +48,13 @@ class RunRecorder:
             run: where; None keeps neither journal nor pictures.
             live: let a viewer watch.
             whole: go on with the files of a run, of which so much is whole.
-            drawing: of a run that is only told again: where its recording is drawn.
+            drawing: of a run that is only replayed: where its recording is drawn.
 
         Raises:
             OSError: a file cannot be written, or another process is writing it.
             RecordingError: the recording cannot be written.
         """
-        self.retelling = whole is not None or drawing is not None
+        self.replaying = whole is not None or drawing is not None
         self._journal: JournalFile | None = None
         self._camera: CameraFile | None = None
         self._recording_writer: RecordingWriter | None = None
@@ -82,17 +83,17 @@ class RunRecorder:
         """For the scheduler; the journal comes first."""
         return (self._write, *([self._recording_writer] if self._recording_writer else []))
 
-    def kept(self, port: Port) -> RecordedPort:
+    def record_port(self, port: Port) -> RecordedPort:
         """The port, whose pictures are on the disk before the board sees them."""
         return RecordedPort(self, port)
 
-    def keep(self, effect: Effect) -> None:
+    def record_picture(self, effect: Effect) -> None:
         """Put a picture on the disk, if that is what was observed. Raises CannotWriteError."""
         value = None if isinstance(effect, Retract) else effect.value
         if self._camera is not None and isinstance(value, Frame):
             self._camera.add(value.jpeg)
 
-    def truth(self, pose: Pose2, sim_time_s: float) -> None:
+    def draw_truth(self, pose: Pose2, sim_time_s: float) -> None:
         """Where the robot truly is, for the drawing."""
         if self._recording_writer is not None:
             self._recording_writer.truth(pose, sim_time_s)
@@ -102,12 +103,12 @@ class RunRecorder:
         self._opened.close()
 
     def _write(self, decision: Decision) -> None:
-        if self._journal is not None and not self.retelling:
+        if self._journal is not None and not self.replaying:
             self._journal(decision)
 
 
 class RecordedPort:
-    """A port whose pictures are kept.
+    """A port whose pictures are recorded.
 
     Attributes:
         closed: whether it leaves everything unanswered.
@@ -122,11 +123,11 @@ class RecordedPort:
         return self._port.name
 
     def answer(self, change: Change) -> Iterable[Effect]:
-        return () if self.closed or self._recorder.retelling else self._answers(change)
+        return () if self.closed or self._recorder.replaying else self._answers(change)
 
     def _answers(self, change: Change) -> Iterator[Effect]:
         for effect in self._port.answer(change):
-            self._recorder.keep(effect)
+            self._recorder.record_picture(effect)
             yield effect
 
 

@@ -1,54 +1,178 @@
-"""The loop of a run: cycle until there is an outcome. It knows neither simulator nor robot."""
+"""Run: an agent at work through a body, from the command to the outcome, and the files that it leaves."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Protocol
 
 from blackboard.change import Quiescence
 from blackboard.effect import Post
-from blackboard.journal import Decision
+from blackboard.journal import Decision, Sink
 from blackboard.scheduler import RAISED, Scheduler
+from harvey.agent import Agent
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import RunHead
+from harvey.run_files.run_recorder import RunRecorder
+from harvey.runner.ports import Body, BodyPort
+from harvey.runner.result import UNFINISHED, MissionResult, RunCounts
+from logs.disk import CannotWriteError
+from logs.errors import RecordingError
+from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, Outcome
+from world_models.files.toml.mission import Limits
+
+MIN_FREE_BYTES = 1 << 18
+"""A disk with less room than this is full."""
 
 Over = Callable[[Scheduler], str | None]
 """Why a run has to end after this cycle, in words; None as long as it may go on."""
 
 
-def endless(_scheduler: Scheduler) -> str | None:
-    """No limit."""
-    return None
+class Referee(Protocol):
+    """Knows the truth about a run; the board never hears of it."""
+
+    def __call__(self, decision: Decision, /) -> None:
+        """Sink: follow the run."""
+        ...
+
+    def over(self) -> str | None:
+        """Why the truth ends the run now, in words."""
+        ...
+
+    def complete(self, result: MissionResult, belief: Hypothesis | None, /) -> MissionResult:
+        """The result with what only the truth can tell; ``belief`` is the last one held."""
+        ...
 
 
-def until_outcome(
+class Run:
+    """One run: an agent, a body, and the recorder of its files.
+
+    Attributes:
+        head: how it begins.
+        port: the body's, without the recorder; recorded_port: the same, as the agent has it.
+        scheduler: the agent at work.
+        before_cycle: called before each cycle.
+    """
+
+    def __init__(
+        self, head: RunHead, agent: Agent, body: Body, recorder: RunRecorder, *, limits: Limits,
+        clock: Callable[[], float], referee: Referee | None = None, sinks: Sequence[Sink] = (),
+        before_cycle: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Put a run together.
+
+        Args:
+            limits: when to give up; clock: the body's time, by which that is judged [s].
+            referee: who knows the truth; None on hardware.
+            sinks: called with every decision.
+        """
+        self._began_s = time.perf_counter()
+        self.head, self.body, self.recorder = head, body, recorder
+        self._limits, self._clock, self._referee = limits, clock, referee
+        self.before_cycle = before_cycle
+        self.port = BodyPort(body)
+        self.recorded_port = recorder.record_port(self.port)
+        self._counts = RunCounts()
+        truth = () if referee is None else (referee,)
+        self.scheduler: Scheduler = agent.scheduler(
+            ports=(self.recorded_port,), sinks=(*recorder.sinks, self._counts, *truth, *sinks))
+
+    def begin(self) -> Outcome:
+        """From the command to the outcome."""
+        self.scheduler.tell([Post(self.head.task())], "user")
+        return self.go_on()
+
+    def go_on(self, last: Decision | None = None) -> Outcome:
+        """To the outcome, from wherever the board is; ``last`` is the last decision of a run that was cut off."""
+        return run_to_outcome(self.scheduler, over=self.over, before=self.before_cycle, last=last)
+
+    def over(self, scheduler: Scheduler) -> str | None:
+        """Why it has to end now, if it has."""
+        if self._referee is not None and (why := self._referee.over()) is not None:
+            return why
+        if (now_s := self._clock()) > self._limits.max_time_s:
+            return f"not there after {now_s:.0f} s"
+        return f"not there after {scheduler.cycle} cycles" if scheduler.cycle >= self._limits.max_cycles else None
+
+    def drive(self, files: RunDirectory | None, start: Callable[[], Outcome] | None = None) -> MissionResult:
+        """Drive to the outcome, stop the body, close the recorder and write the result.
+
+        A disk that takes no more stops the run. What was written before is whole, so the run may go on when there is
+        room. Any other exception passes, with a note on how to go on.
+
+        Args:
+            files: where the run is recorded; None records nothing.
+            start: from where to where: :meth:`begin`, or what brings a run that was cut off to its end.
+        """
+        start = start or self.begin
+        try:
+            if files is not None:
+                files.write_result({"scenario": self.head.name, "seed": self.head.seed, "outcome": UNFINISHED})
+            outcome = start()
+        except (CannotWriteError, RecordingError) as error:
+            outcome = _stopped(files, error)
+        except BaseException as error:
+            self._close()
+            if files is not None:
+                error.add_note(f"what was recorded is kept; harvey resume {files.path} goes on with it")
+            raise
+        not_drawn = self._close()
+        result = self._result(replace(outcome, reason=outcome.reason + not_drawn))
+        if files is not None:
+            with suppress(OSError):  # where the disk is full, the outcome that is there, unfinished, is true as well
+                files.write_result(result.record())
+        return result
+
+    def _close(self) -> str:
+        """Stop the body and close the files; what to say where the recording's last part could not be written."""
+        self.body.stop()
+        try:
+            self.recorder.close()
+        except RecordingError:
+            return "; the last part of its recording is not written (harvey repair draws it anew)"
+        return ""
+
+    def _result(self, outcome: Outcome) -> MissionResult:
+        took_s = time.perf_counter() - self._began_s
+        head, belief = self.head, self.scheduler.view.latest(Hypothesis, lambda h: h.is_held)
+        result = self._counts.result(head.name, head.seed, head.task().text, outcome, took_s)
+        return result if self._referee is None else self._referee.complete(result, belief and belief.value)
+
+
+def run_to_outcome(
     scheduler: Scheduler,
     *,
-    over: Over = endless,
+    over: Over = lambda _scheduler: None,
     before: Callable[[], None] = lambda: None,
     last: Decision | None = None,
 ) -> Outcome:
-    """Cycle until an outcome is on the board, a limit is reached, an expert raises, or the board falls still for good.
+    """Cycle until an outcome is on the board, a limit is reached, a knowledge source raises, or nothing is left to do.
 
-    Stillness is told to the board once (``Quiescence``), so that somebody may answer it.
+    The board is told once that nothing is pending (``Quiescence``), so that a knowledge source may answer it.
 
     Args:
         over: asked after each cycle whether a limit is reached.
         before: called before each cycle.
         last: the decision that was made last, where a run goes on that was cut off.
     """
-    told_still = -1
+    quiet_since = -1
     why = _why_over(last, scheduler, over) if last is not None else None
     while (declared := scheduler.view.latest(Outcome)) is None:
         if why is not None:
-            return _declared(scheduler, why)
+            return _declare(scheduler, why)
         before()
         decision = scheduler.step()
         if decision is not None:
             why = _why_over(decision, scheduler, over)
-        elif told_still == scheduler.cycle:
+        elif quiet_since == scheduler.cycle:
             why = "the board fell still and nobody declared an outcome"
         else:
             scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
-            told_still = scheduler.cycle + 1
+            quiet_since = scheduler.cycle + 1
     scheduler.step()  # the outcome itself is seen, so that it stands in the journal
     return declared.value
 
@@ -60,9 +184,17 @@ def _why_over(decision: Decision, scheduler: Scheduler, over: Over) -> str | Non
     return over(scheduler)
 
 
-def _declared(scheduler: Scheduler, reason: str) -> Outcome:
-    """An outcome that nobody on the board declared; it is put there, and so into the journal."""
+def _declare(scheduler: Scheduler, reason: str) -> Outcome:
+    """Declare failure where no knowledge source declared an outcome; it is posted, and so journalled."""
     outcome = Outcome("failed", reason)
     scheduler.tell([Post(outcome, scheduler.view.all(Goal)[-1:])], "mission")
     scheduler.step()
     return outcome
+
+
+def _stopped(files: RunDirectory | None, error: Exception) -> Outcome:
+    """The outcome of a run whose files cannot be written any more."""
+    full = files is not None and shutil.disk_usage(files.path).free < MIN_FREE_BYTES
+    why = f"{error} (the disk is full)" if full else str(error)
+    go_on = "" if files is None else f"; harvey resume {files.path} goes on with it"
+    return Outcome("failed", f"stopped, because nothing more can be written down: {why}{go_on}")

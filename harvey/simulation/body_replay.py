@@ -6,8 +6,10 @@ pictures that are known are not made once more. Where the body answers otherwise
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -18,19 +20,32 @@ from blackboard.entry import Entry
 from blackboard.scheduler import Port
 from harvey.errors import BadInput
 from harvey.run_files.records import EntryRecord, as_line
+from harvey.runner.replay import Live
 from sim.body.actuator import ActuatorParameters
+from sim.body.simulated_body import SimulatedBody
 from world_models.entries.body import Course, MotorCommand
 from world_models.entries.task import Resumed
 
-RESUME = "resume"
-"""The author of what a run is told that goes on after a crash."""
-
 
 class BodyReplay:
-    """Asks a port of a simulated body again, and compares its answers with what was observed."""
+    """Asks a port of a simulated body again, and compares its answers with what was observed.
 
-    def __init__(self, port: Port, seed: int, actuator: ActuatorParameters) -> None:
-        self._port, self._seed, self._actuator = port, seed, actuator
+    It is a :class:`harvey.runner.resume.ResumedBody`.
+    """
+
+    def __init__(self, port: Port, body: SimulatedBody, seed: int, actuator: ActuatorParameters) -> None:
+        self._port, self._body, self._seed, self._actuator = port, body, seed, actuator
+
+    @contextmanager
+    def replay(self, pictures: Mapping[int, bytes]) -> Iterator[Live]:
+        """A while in which the body takes none of the pictures that are known."""
+        self._body.use_recorded(pictures)
+        yield self
+        self._body.use_recorded({})
+
+    def report(self, request: Entry[Any]) -> Iterable[Effect]:
+        """What the wheels claim of a command that was cut off."""
+        return self.answer(Posted(request), True)
 
     def __call__(self, made: Sequence[Change], observed: Sequence[EntryRecord]) -> None:
         """Let the body do what the changes asked for. Raises BadInput where it answers otherwise than ``observed``."""

@@ -44,7 +44,7 @@ def body_kind(text: str) -> str:
 
 
 @contextmanager
-def reached(body: SimulatedBody, kind: str) -> Iterator[Body]:
+def open_body(body: SimulatedBody, kind: str) -> Iterator[Body]:
     """The body as the mission reaches it: at once, or over the protocol of a kind of base."""
     if kind == IN_PROCESS:
         yield FaultyBody(body)

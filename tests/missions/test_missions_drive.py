@@ -137,7 +137,7 @@ def test_a_mission_whose_process_was_killed_in_mid_move_goes_on(
         there = robot.body.truth
     assert gone_m < 1.5 and abs(there.world_from_robot.x_m - GOAL_M) < INCH_M and there.collisions == 0
     told = capsys.readouterr().err
-    assert "told again, then it goes on" in told and "base: link lost: over" in told
+    assert "replayed, then it goes on" in told and "base: link lost: over" in told
     assert result_of(tmp_path)["outcome"] == "reached"
     assert main(["replay", run]) == 0
     assert main(["why", run, "resumed-1"]) == 0

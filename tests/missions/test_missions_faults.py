@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from blackboard.journal import Decision
-from harvey.simulation.referee import MissionResult
+from harvey.runner.result import MissionResult
 from harvey.simulation.run import run_mission
 from sim.faults.base_faults import LinkLost, Stall
 from sim.faults.camera_faults import CameraUnplugged

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from harvey.agent import agent_of
-from harvey.replay.replay import pictures_of, replayed
-from harvey.replay.resume import remains_of, resume
 from harvey.run_files.records import read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
-from harvey.simulation.run import run_mission
+from harvey.runner.replay import pictures_of, replay
+from harvey.runner.resume import remains_of
+from harvey.simulation.run import resume_mission, run_mission
 from sim.scenario import parse_scenario, with_settings
 from sim.stage import Stage, build_stage
 
@@ -51,7 +51,7 @@ def run(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
 
 def decided_again(run: RunDirectory) -> bool:
     with agent_of(RunHead.read(run.path)) as agent:
-        return all(told.same for told in replayed(run, pictures_of(run), agent.scheduler()))
+        return all(told.same for told in replay(run, pictures_of(run), agent.scheduler()))
 
 
 def test_each_picture_on_the_move_corrects_the_course_and_all_of_it_is_decided_again_to_the_byte(
@@ -77,7 +77,7 @@ def test_a_run_that_is_cut_off_on_the_move_goes_on(run: RunDirectory, stage: Sta
     for name in ("run.json", "camera.mjpeg"):
         (cut.path / name).write_bytes((run.path / name).read_bytes())
     cut.journal.write_bytes(b"".join(lines[: rolling[30]]))
-    assert resume(cut, remains_of(cut), stage=stage).outcome == "reached"
+    assert resume_mission(cut, remains_of(cut), stage=stage).outcome == "reached"
     told = next(e for r in read_records(cut.journal) for e in r.observed if e.type == "Resumed")
     assert told.value["interrupted"] == [next(
         e.ref for r in read_records(cut.journal) if r.cycle == rolling[30] for e in r.made if e.type == "Course")]

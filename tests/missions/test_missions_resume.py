@@ -15,14 +15,14 @@ import pytest
 from experiments.robustness import crash
 from harvey.agent import agent_of
 from harvey.cli import main
-from harvey.replay.repair import redrawn
-from harvey.replay.replay import pictures_of, replayed
-from harvey.replay.resume import remains_of, resume
+from harvey.replay.repair import redraw
 from harvey.run_files.records import DecisionRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
-from harvey.simulation.referee import MissionResult
-from harvey.simulation.run import run_mission
+from harvey.runner.replay import pictures_of, replay
+from harvey.runner.result import MissionResult
+from harvey.runner.resume import remains_of
+from harvey.simulation.run import resume_mission, run_mission
 from logs import disk
 from logs.reader import damage_of, read_decisions, read_frames
 from sim.stage import Stage
@@ -51,13 +51,13 @@ def cut(whole: RunDirectory, to: Path, decisions: int, *, tail: int = 40) -> Run
 
 
 def gone_on(run: RunDirectory, stage: Stage) -> MissionResult:
-    return resume(run, remains_of(run), stage=stage)
+    return resume_mission(run, remains_of(run), stage=stage)
 
 
 def decided_again(run: RunDirectory) -> bool:
     """Whether the whole journal, the crash included, comes out again byte for byte."""
     with agent_of(RunHead.read(run.path)) as agent:
-        return all(told.same for told in replayed(run, pictures_of(run), agent.scheduler()))
+        return all(told.same for told in replay(run, pictures_of(run), agent.scheduler()))
 
 
 def made_by(records: list[DecisionRecord], kind: str, which: int) -> int:
@@ -173,7 +173,7 @@ def test_a_damaged_recording_is_drawn_anew(
 ) -> None:
     run = cut(whole, tmp_path / "run", 30)
     assert damage_of(run.recording) is not None
-    assert redrawn(run) == 30
+    assert redraw(run) == 30
     assert damage_of(run.recording) is None
     assert [d["cycle"] for d in read_decisions(run.recording)] == list(range(1, 31))
     drawn, known = read_frames(run.recording), pictures_of(run)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from blackboard.journal import Decision, decision_line
-from harvey.simulation.referee import MissionResult
+from harvey.runner.result import MissionResult
 from harvey.simulation.run import run_mission
 from harvey.simulation.serial_body import KINDS
 from sim.body.simulated_body import SimulatedBody

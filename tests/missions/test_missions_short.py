@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from harvey.simulation.referee import MissionResult
+from harvey.runner.result import MissionResult
 from harvey.simulation.run import run_mission
 from sim.stage import Stage
 

@@ -20,7 +20,7 @@ from harvey.campaign.summary import foreseen, one, several
 from harvey.dry_run import MilestonePreview
 from harvey.errors import BadInput
 from harvey.run_files.records import EntryRecord
-from harvey.simulation.referee import MissionResult
+from harvey.runner.result import MissionResult
 from harvey.tables import table
 from harvey.units import degrees, metres, turn
 from harvey.why.sentences import sentence

@@ -2,35 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from harvey.errors import BadInput
-from harvey.hardware.resume import stood_at
+from harvey.hardware.resume import count_pictures, time_of_last_observation
 from harvey.run_files.run_directory import RunDirectory
 from harvey.simulation.run import run_mission
 from sim.stage import Stage
 
 
 def test_time_and_pictures_go_on_from_the_last_ones(short_run: RunDirectory) -> None:
-    last_s, pictures = stood_at(short_run)
-    assert last_s > 1.0 and pictures == short_run.read_result()["frames"]
+    assert time_of_last_observation(short_run) > 1.0
+    assert count_pictures(short_run) == short_run.read_result()["frames"]
 
 
 def test_a_run_without_a_decision_begins_at_nought(tmp_path: Path) -> None:
-    assert stood_at(RunDirectory(tmp_path)) == (0.0, 0)
+    assert (time_of_last_observation(RunDirectory(tmp_path)), count_pictures(RunDirectory(tmp_path))) == (0.0, 0)
 
 
-@pytest.mark.parametrize(("old", "new"), [
-    ('"number":1,"sim', '"number":"x","sim'), ('"sim_time_s":', '"sim_time_s":"x","was":')])
-def test_what_is_no_time_and_no_number_is_said(short_run: RunDirectory, tmp_path: Path, old: str, new: str) -> None:
+@pytest.mark.parametrize(("read", "old", "new", "expected"), [
+    (count_pictures, '"number":1,"sim', '"number":"x","sim', "expected a picture's number"),
+    (time_of_last_observation, '"sim_time_s":', '"sim_time_s":"x","was":', "expected when it was observed")])
+def test_what_is_no_time_and_no_number_is_said(
+    short_run: RunDirectory, tmp_path: Path, read: Callable[[RunDirectory], object], old: str, new: str, expected: str
+) -> None:
     told = short_run.journal.read_text(encoding="utf-8")
     assert old in told
     spoilt = RunDirectory(tmp_path)
     spoilt.journal.write_text(told.replace(old, new), encoding="utf-8")
-    with pytest.raises(BadInput, match="expected when it was observed"):
-        stood_at(spoilt)
+    with pytest.raises(BadInput, match=expected):
+        read(spoilt)
 
 
 @pytest.fixture(scope="module")

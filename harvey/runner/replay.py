@@ -1,8 +1,8 @@
-"""Replay: a recorded run told again from its observations.
+"""Replay: a recorded run decided again from its observations.
 
 A run is what it observed and nothing else: whatever came from outside is put on the board where the journal says it
 came, and every decision must come out as it stands in the journal, to the byte. So a replay needs neither simulator nor
-robot; and a run that was cut off gets its board, its agenda and all that is pending back by being told again.
+robot; and a run that was cut off gets its board, its agenda and all that is pending back by being replayed.
 """
 
 from __future__ import annotations
@@ -21,11 +21,15 @@ from logs.camera_file import Pictures
 from logs.reader import read_frames
 
 Live = Callable[[Sequence[Change], Sequence[EntryRecord]], None]
-"""Told of the changes that a decision made and of what was observed next."""
+"""Hears of the changes that a decision made and of what was observed next."""
+
+
+def ignore(_made: Sequence[Change], _observed: Sequence[EntryRecord]) -> None:
+    """No body lives through the replay."""
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class ReplayedDecision:
     """A decision as recorded, and as it is decided now; None where nothing is left to decide.
 
     Attributes:
@@ -42,14 +46,14 @@ class Told:
         return self.now is not None and decision_line(self.now).encode() == self.line
 
 
-def replayed(
+def replay(
     run: RunDirectory, pictures: Mapping[int, bytes], scheduler: Scheduler, *,
-    live: Live = lambda made, observed: None, before: Callable[[], None] = lambda: None,
-) -> Iterator[Told]:
+    live: Live = ignore, before: Callable[[], None] = lambda: None,
+) -> Iterator[ReplayedDecision]:
     """Each decision beside its record.
 
     Args:
-        live: lets a simulated body live through it again.
+        live: lets a simulated body do the same again.
         before: called before each decision.
 
     Raises:
@@ -61,12 +65,12 @@ def replayed(
         for observation in recorded.observed:
             scheduler.tell([effect_of(observation, pictures, scheduler.view, scheduler.kinds)], observation.author)
         before()
-        told = Told(recorded, line, scheduler.step())
-        made = () if told.now is None else told.now.made
-        yield told
+        decision = scheduler.step()
+        made = () if decision is None else decision.made
+        yield ReplayedDecision(recorded, line, decision)
 
 
-def checked(run: RunDirectory, told: Told) -> Told:
+def check_same(run: RunDirectory, told: ReplayedDecision) -> ReplayedDecision:
     """The same; raises BadInput where it was not decided as it was."""
     if not told.same:
         raise BadInput(f"{run.journal}: cycle {told.recorded.cycle} is not decided again as it was (harvey replay "

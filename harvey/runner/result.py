@@ -1,0 +1,105 @@
+"""Result: how a mission went, as ``result.json`` holds it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from blackboard.journal import Decision
+from world_models.entries.body import Frame, MotionReport
+from world_models.entries.location import Hypothesis
+from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch
+
+UNFINISHED = "unfinished"
+"""The outcome in ``result.json`` of a run that has none yet."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionResult:
+    """How a mission went. What only the truth could tell is None on hardware.
+
+    Attributes:
+        outcome: reached, lost, blocked or failed; reason: why.
+        final_heading_error_rad: from the wanted heading; where none is wanted, from what the robot believed.
+        path_length_m, sim_time_s: true in the simulator; on hardware as the wheels claim.
+        milestones: how many were verified, refuted, not testable and (by the truth) accepted falsely.
+        replans: sketches adjusted or drawn anew; relocalizations: how often it found itself again.
+        sketches: how many plan sketches were drawn.
+        max_cross_track_m: how far the robot truly strayed from the line of the leg it was driving.
+        amiss: which of the scenario's faults did not happen, or not as they were asked for, in words.
+    """
+
+    scenario: str
+    seed: int
+    outcome: str
+    reason: str
+    goal: str
+    final_error_m: float | None
+    final_heading_error_rad: float | None
+    path_length_m: float
+    sim_time_s: float
+    wall_time_s: float
+    frames: int
+    decisions: int
+    milestones: Mapping[str, int | None]
+    replans: int
+    relocalizations: int
+    sketches: int
+    collisions: int | None
+    max_cross_track_m: float | None
+    amiss: Sequence[str] = ()
+
+    @property
+    def error_m(self) -> float:
+        """The final error; NaN where nobody knows the truth."""
+        return math.nan if self.final_error_m is None else self.final_error_m
+
+    @property
+    def false_accepts(self) -> int:
+        """How many milestones were accepted falsely, as far as that is known."""
+        return self.milestones["false_accepts"] or 0
+
+    def record(self) -> dict[str, Any]:
+        """As JSON types."""
+        return {name: getattr(self, name) for name in self.__slots__}
+
+
+class RunCounts:
+    """A sink that counts what was decided, and adds up what the wheels claim."""
+
+    def __init__(self) -> None:
+        self.decisions = self.replans = self.relocalizations = self.sketches = self.frames = 0
+        self.milestones = {"verified": 0, "refuted": 0, "not_testable": 0}
+        self.path_m = self.time_s = 0.0
+
+    def __call__(self, decision: Decision) -> None:
+        self.decisions += 1
+        for change in decision.observed:
+            value = change.entry.value
+            if isinstance(value, MotionReport):
+                self.path_m += value.move_m
+                self.time_s = value.sim_time_s
+            self.frames += isinstance(value, Frame)
+        for change in decision.made:
+            value, revision = change.entry.value, change.entry.revision
+            if isinstance(value, Milestone) and value.status.replace(" ", "_") in self.milestones:
+                self.milestones[value.status.replace(" ", "_")] += 1
+            elif isinstance(value, PlanSketch):
+                self.sketches += revision == 0
+                self.replans += value.adjustments > 0 and value.verified and change.entry.author == "sketcher"
+            elif isinstance(value, Goal):
+                self.replans += value.status == "abandoned"
+            elif isinstance(value, Hypothesis) and value.is_held:
+                self.relocalizations += value.basis == "relocalization"
+
+    def result(self, name: str, seed: int, goal: str, outcome: Outcome, wall_time_s: float) -> MissionResult:
+        """How it went, without the truth."""
+        return MissionResult(
+            scenario=name, seed=seed, outcome=outcome.kind, reason=outcome.reason, goal=goal,
+            final_error_m=None, final_heading_error_rad=None, path_length_m=self.path_m, sim_time_s=self.time_s,
+            wall_time_s=wall_time_s, frames=self.frames, decisions=self.decisions,
+            milestones={**self.milestones, "false_accepts": None}, replans=self.replans,
+            relocalizations=self.relocalizations, sketches=self.sketches, collisions=None, max_cross_track_m=None,
+        )

@@ -1,0 +1,156 @@
+"""Resume: a run that was cut off goes on from its last decision; the robot was stopped in between.
+
+What was cut off in the middle of writing is dropped. Board, agenda and all that was pending come back by replaying the
+journal's observations, each decision compared to the byte. A motor command that was written down but not reported on is
+the delicate case: it is not carried out again. The robot has stopped somewhere in it, and its body says what it can.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from blackboard.change import Change, Posted, Retracted
+from blackboard.effect import Effect, Post
+from blackboard.entry import Entry
+from blackboard.journal import Decision
+from harvey.errors import BadInput
+from harvey.run_files.records import read_records
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_recorder import Extent
+from harvey.runner.replay import Live, camera_bytes, check_same, pictures_of, replay
+from harvey.runner.run import Run
+from logs.camera_file import Pictures
+from world_models.entries.body import Course, MotorCommand
+from world_models.entries.task import Outcome, Resumed
+
+RESUME = "resume"
+"""The author of what a run is told that goes on after a crash."""
+
+
+@dataclass(frozen=True, slots=True)
+class Remains:
+    """What is whole of a run that was cut off.
+
+    Attributes:
+        extent: of the files.
+        decisions: how many.
+        outcome: how the run ended by its journal; None where it did not.
+        dropped: what is not whole, in words.
+    """
+
+    extent: Extent
+    decisions: int
+    outcome: Outcome | None
+    dropped: tuple[str, ...]
+
+
+def remains_of(run: RunDirectory) -> Remains:
+    """Look at a run without touching it. Raises BadInput where it cannot be used at all."""
+    there = camera_bytes(run)
+    decisions, outcome = _decided(run) if run.journal.is_file() else (0, None)
+    if decisions == 0:
+        _check_not_lost(run, there)
+    if not run.journal.is_file():
+        return Remains(Extent(), 0, None, ())
+    whole, pictures = _whole_lines(run.journal), pictures_of(run)
+    end = pictures.end if isinstance(pictures, Pictures) else 0
+    dropped = []
+    if run.journal.stat().st_size > whole:
+        dropped.append(f"decision {decisions + 1}, which was cut off while it was written")
+    if there > end:
+        dropped.append(f"{there - end} bytes of a picture that no decision had seen")
+    return Remains(Extent(whole, end), decisions, outcome, tuple(dropped))
+
+
+def _check_not_lost(run: RunDirectory, pictures: int) -> None:
+    """Raises BadInput where a run of which no decision is there was more than begun: its journal was lost since.
+
+    A picture is asked for by a decision that is on the disk by then; so where nothing was lost, there is none.
+    """
+    lost = [f"{run.camera.name} has {pictures} bytes of pictures"] * (pictures > 0)
+    if told := run.read_result().get("decisions"):
+        lost.append(f"{run.result.name} tells of {told} decisions")
+    if lost:
+        raise BadInput(f"{run.journal}: expected the decisions of the run, got none, although {' and '.join(lost)}; "
+                       "nothing was touched")
+
+
+class ResumedBody(Protocol):
+    """How a body comes to where its run was cut off: the only part that differs between simulator and hardware."""
+
+    def replay(self, pictures: Mapping[int, bytes], /) -> AbstractContextManager[Live]:
+        """A while in which the body hears of each decision that is replayed; ``pictures`` are those of the run."""
+        ...
+
+    def report(self, request: Entry[Any], /) -> Iterable[Effect]:
+        """What is observed of a motor command that was cut off."""
+        ...
+
+
+def replay_run(files: RunDirectory, run: Run, body: ResumedBody) -> Decision | None:
+    """Replay a run to its board, and bring its body to where it was; returns the last decision.
+
+    Raises:
+        BadInput: a decision, or an answer of the body, is not what it was.
+    """
+    pictures, last = pictures_of(files), None
+    with body.replay(pictures) as live:
+        for decision in replay(files, pictures, run.scheduler, live=live, before=run.before_cycle):
+            last = check_same(files, decision).now
+    return last
+
+
+def continue_run(files: RunDirectory, run: Run, body: ResumedBody) -> Outcome:
+    """Go on with a run from its last decision to its outcome. Raises BadInput where it cannot be replayed as it was."""
+    last = replay_run(files, run, body)
+    if last is not None:
+        _report_crash(run, body, last)
+    run.recorder.replaying = False
+    if last is None:
+        return run.begin()
+    for change in last.made:
+        if not is_command(change):
+            run.scheduler.tell(run.recorded_port.answer(change), run.port.name)
+    return run.go_on(last)
+
+
+def _report_crash(run: Run, body: ResumedBody, last: Decision) -> None:
+    """Answer the commands that were cut off by what the body can tell of them."""
+    cut_off = [change.entry for change in last.made if is_command(change)]
+    refs = tuple(str(entry.ref) for entry in cut_off)
+    run.scheduler.tell([Post(Resumed(run.scheduler.cycle, refs), tuple(cut_off))], RESUME)
+    for entry in cut_off:
+        for effect in body.report(entry):
+            run.recorder.record_picture(effect)
+            run.scheduler.tell([effect], run.port.name)
+
+
+def is_command(change: Change) -> bool:
+    """Whether a change asks the wheels to turn."""
+    if isinstance(change.entry.value, Course):
+        return not isinstance(change, Retracted)
+    return isinstance(change, Posted) and isinstance(change.entry.value, MotorCommand)
+
+
+def _decided(run: RunDirectory) -> tuple[int, Outcome | None]:
+    """How many decisions there are, and the outcome, if it was seen."""
+    decisions, seen, outcome = 0, False, None
+    for record in read_records(run.journal):
+        decisions += 1
+        ends = [entry.value for entry in (*record.observed, *record.made) if entry.type == Outcome.__name__]
+        outcome = Outcome(str(ends[0].get("kind")), str(ends[0].get("reason"))) if ends else outcome
+        seen = seen or any(ref.startswith(f"{Outcome.__name__}-") for ref in record.seen)
+    return decisions, outcome if seen else None
+
+
+def _whole_lines(path: Path) -> int:
+    """Length of a file up to the end of its last whole line [bytes]."""
+    whole = 0
+    with path.open("rb") as file:
+        for line in file:
+            whole += len(line) if line.endswith(b"\n") else 0
+    return whole
