@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from experiments.paper.pose_peer import Peer
 from experiments.perception.corridor_data import SHOWN, Corridor, CorridorFrame, load_corridor
 from harvey.errors import BadInput
-from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX, LineSegments, find_lines
+from knowledge_sources.methods.features.lines import LineSegments, find_lines
 from knowledge_sources.methods.localization.locate_camera import LEAST_LENGTH_PX, CameraFix, PoseVerdict, locate_camera
 from knowledge_sources.methods.matching import match_lines
 from knowledge_sources.methods.pose import med_r_and_t
+from knowledge_sources.settings import DEFAULT
 from world_models.frames import Pose
 
 Array = NDArray[np.float64]
@@ -143,8 +144,8 @@ def _papers(
     match = match_lines(px, segments.segments_px, strategy="first", replace=False, peaks=1)
     i, k = match.pairs.T
     return med_r_and_t(
-        model[i], segments.segments_px[k], frame.camera, prior, landmark_ids=i.tolist(), sigma_px=SIGMA_ACROSS_PX,
-        probability=0.999, rng=rng,
+        model[i], segments.segments_px[k], frame.camera, prior, landmark_ids=i.tolist(),
+        sigma_px=DEFAULT.features.sigma_across_px, probability=0.999, rng=rng,
     ).camera_from_world
 
 
