@@ -10,11 +10,11 @@ from dataclasses import field
 from typing import Any
 
 
-def setting(default: float, unit: str, what: str, source: str) -> Any:
+def setting(default: float | tuple[float, ...] | str, unit: str, what: str, source: str) -> Any:
     """A field of a settings dataclass.
 
     Args:
-        default: a whole number where only whole numbers make sense.
+        default: a whole number where only whole numbers make sense; a tuple where there are several; a name.
         unit: ``px``, ``m``, ``rad``, ``s``, ``1`` for a ratio or a probability, ``count``.
         what: one sentence, without the unit.
         source: section or equation of the paper, or the experiment that chose it, or "engineering judgement".

@@ -1,15 +1,47 @@
 """Where is the camera, given model lines and the image segments matched to them (§6.2)?
 
-Every solver takes ``(model_lines_world (n, 2, 3), segments_px (n, 2, 2), camera, prior, *, landmark_ids, sigma_px)``,
-``prior`` being a guess of ``camera_from_world``, and gives a :class:`PoseEstimate`:
+Which solver to use:
 
-* :func:`r_then_t`       rotation first, then translation (Liu et al., §6.2.1): the paper's baseline.
-* :func:`r_and_t`        both at once (E1 or E2, §6.2.2): the wide basin.
-* :func:`r_and_t_ml`     E1 to get there, image distances in pixels to finish: the smallest error.
-* :func:`med_r_and_t`    least median of squares over 3-line or 3-landmark subsets (§6.2.4): to 45 % outliers.
-* :func:`trunc_r_and_t`  a truncated loss over the same subsets: beyond 50 % outliers.
+==========================  =========================================================================
+:func:`r_and_t_ml`          all matches are right: maximum likelihood, the smallest error
+:func:`med_r_and_t`         up to about 45 % of the matches may be wrong (least median of squares)
+:func:`trunc_r_and_t`       more than half may be wrong, and the noise is known (truncated loss)
+:func:`planar_from_lines`   a robot on the floor whose camera mounting is known; matches may be wrong
+:func:`planar_from_points`  the same from tracked points (Huber's loss)
+:func:`r_and_t`             the paper's own objectives E1 and E2: the widest basin, a larger error
+:func:`r_then_t`            the paper's baseline (Liu et al.): rotation first, then translation
+==========================  =========================================================================
 
-On the floor, with a known mount: :func:`planar_from_lines` and :func:`planar_from_points`.
+The solvers of a camera's six unknowns take ``(model_lines_world (n, 2, 3) [m], segments_px (n, 2, 2), camera, prior)``,
+``prior`` being a guess of ``camera_from_world``, and return a :class:`PoseEstimate`. Those on the floor take the
+mounting ``camera_from_robot`` and a prior ``world_from_robot``, and return a :class:`PlanarEstimate`. All of them say
+which lines they rejected and why, and state a covariance. Their numbers are in
+:class:`knowledge_sources.settings.pose.PoseSettings`.
+
+>>> import numpy as np
+>>> from knowledge_sources.methods.pose import med_r_and_t
+>>> from world_models.camera import Camera
+>>> from world_models.frames import Pose
+
+Eight lines of a door and a window, seen by a camera at the world's origin; one of them is matched wrongly:
+
+>>> x, y = [-1.0, 0.0, 1.0, 2.0], [-1.0, 1.0, 0.5]
+>>> upright = [[[x[i], y[0], 4.0 + i], [x[i], y[1], 4.0 + i]] for i in range(4)]
+>>> level = [[[x[0], y[i], 4.0 + i], [x[3], y[i], 5.0 + i]] for i in range(3)] + [[[x[0], 0.2, 6.0], [x[2], 0.2, 4.5]]]
+>>> lines = np.array(upright + level)
+>>> camera = Camera.from_field_of_view(np.radians(65.0))
+>>> segments, visible = camera.project_segments(lines, Pose.identity())
+>>> segments[2] += 30.0
+
+Three lines of code:
+
+>>> prior = Pose.from_rotation_vector([0.02, -0.03, 0.01], [0.2, -0.1, 0.15])
+>>> found = med_r_and_t(lines, segments, camera, prior, sigma_px=0.5)
+>>> bool(np.abs(found.camera_from_world.translation).max() < 0.01)
+True
+
+>>> found.ok, found.rejected[2]
+(True, 'too far from the model line')
 """
 
 from knowledge_sources.methods.pose.estimate import PlanarEstimate, PoseEstimate

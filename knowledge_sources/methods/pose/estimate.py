@@ -1,16 +1,11 @@
-"""What a pose solver hands back."""
+"""The results of the pose solvers."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from knowledge_sources.methods.arrays import Floats, Mask
 from world_models.frames import Pose, Pose2
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 DISTANCE = "too far from the model line"
 BEHIND = "behind the camera"
@@ -25,18 +20,18 @@ class PoseEstimate:
     Attributes:
         camera_from_world: the pose.
         covariance: (6, 6) of the left perturbation (rotation [rad], translation [m]) of :meth:`Pose.perturbed`.
-        inliers: (n,) lines that the pose rests on.
+        inliers: (n,) the lines that decided the pose.
         residuals_px: (n, 2) signed distances of the (undistorted) segment ends to the projected model line [px].
         rejected: n reasons, ``None`` for an inlier.
         cost: the solver's own objective at the pose.
-        iterations: descent steps taken.
-        reason: ``None`` if the lines decided the pose; else why the prior, wholly or in part, had to.
+        iterations: Levenberg-Marquardt steps taken.
+        reason: ``None`` if the lines decided the pose; else why the prior did, wholly or in part.
     """
 
     camera_from_world: Pose
-    covariance: Array
+    covariance: Floats
     inliers: Mask
-    residuals_px: Array
+    residuals_px: Floats
     rejected: tuple[str | None, ...]
     cost: float = 0.0
     iterations: int = 0
@@ -55,18 +50,18 @@ class PlanarEstimate:
     Attributes:
         world_from_robot: the pose.
         covariance: (3, 3) of (x [m], y [m], heading [rad]).
-        inliers: (n,) what the pose rests on.
+        inliers: (n,) the lines or points that decided the pose.
         residuals_px: (n, 2) signed; lines: distances of both segment ends to the projected model line,
             points: u and v [px].
         rejected: n reasons, ``None`` for an inlier.
         cost: squared residuals over their variance, each at most the rejection bound, plus the prior's share.
-        reason: ``None`` if the image decided the pose; else why the prior, wholly or in part, had to.
+        reason: ``None`` if the image decided the pose; else why the prior did, wholly or in part.
     """
 
     world_from_robot: Pose2
-    covariance: Array
+    covariance: Floats
     inliers: Mask
-    residuals_px: Array
+    residuals_px: Floats
     rejected: tuple[str | None, ...]
     cost: float = 0.0
     reason: str | None = None

@@ -1,4 +1,4 @@
-"""Matched lines made ready for the solvers: Plücker coordinates of the model, rays and planes of the image."""
+"""Matched lines, prepared for the solvers: Plücker coordinates of the model, rays and planes of the image."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.pose.estimate import Array
-from knowledge_sources.methods.pose.numerics.line_kernels import NO_LENGTH, NOT_FINITE, prepared
+from knowledge_sources.methods.arrays import Floats, Indices, Mask
+from knowledge_sources.methods.pose.numerics.kernels import NO_LENGTH, NOT_FINITE, LineArrays, prepare_lines
 from world_models.camera import Camera
 
-TINY = 1e-12
 LandmarkIds = Sequence[Any] | NDArray[Any] | None
-"""A hashable name a line, or none at all."""
+"""A hashable name for each line, or none at all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,25 +33,25 @@ class LineSet:
         focal_px: (2,) fx, fy.
     """
 
-    points: Array
-    directions: Array
-    moments: Array
-    rays: Array
-    normals: Array
-    lengths_px: Array
-    sigma_px: Array
-    focal_px: Array
+    points: Floats
+    directions: Floats
+    moments: Floats
+    rays: Floats
+    normals: Floats
+    lengths_px: Floats
+    sigma_px: Floats
+    focal_px: Floats
 
     def __len__(self) -> int:
         return len(self.points)
 
     @property
-    def arrays(self) -> tuple[Array, ...]:
-        """All of them in this order, as the compiled loops take them."""
+    def arrays(self) -> LineArrays:
+        """All of them in this order, as the compiled functions take them."""
         return (self.points, self.directions, self.moments, self.rays, self.normals, self.lengths_px, self.sigma_px,
                 self.focal_px)
 
-    def take(self, chosen: Any) -> LineSet:
+    def take(self, chosen: Mask | Indices) -> LineSet:
         """The lines named by a mask or by indices."""
         return LineSet(
             self.points[chosen],
@@ -69,11 +68,15 @@ class LineSet:
 def build_line_set(model_lines_world: Any, segments_px: Any, camera: Camera, sigma_px: Any) -> LineSet:
     """Check the shapes and prepare the lines.
 
+    Args:
+        model_lines_world: (n, 2, 3) [m]. segments_px: (n, 2, 2) as the lens shows them.
+        sigma_px: of the segment ends across the line, one number or (n,).
+
     Raises:
         ValueError: a wrong shape, a value that is not finite, a model line without length or a sigma that is not > 0.
     """
-    model, segments = matched_arrays(model_lines_world, segments_px)
-    directions, moments, rays, normals, lengths, fault, row = prepared(
+    model, segments = check_matched_arrays(model_lines_world, segments_px)
+    directions, moments, rays, normals, lengths, fault, row = prepare_lines(
         model, camera.undistort(segments), camera.fx, camera.fy, camera.cx, camera.cy
     )
     if fault == NOT_FINITE:
@@ -81,20 +84,20 @@ def build_line_set(model_lines_world: Any, segments_px: Any, camera: Camera, sig
         raise ValueError(f"expected finite {name}, got a value that is not in row {row}")
     if fault == NO_LENGTH:
         raise ValueError(f"expected model lines with a length, got none in row {row}")
-    sigma = checked_sigma(sigma_px, len(model))
+    sigma = check_sigma(sigma_px, len(model))
     return LineSet(model, directions, moments, rays, normals, lengths, sigma, np.array([camera.fx, camera.fy]))
 
 
-def matched_arrays(model_lines_world: Any, segments_px: Any) -> tuple[Array, Array]:
+def check_matched_arrays(model_lines_world: Any, segments_px: Any) -> tuple[Floats, Floats]:
     """Copies (n, 2, 3) and (n, 2, 2). Raises ValueError where the shapes are wrong or do not match."""
-    model = _checked(model_lines_world, "model_lines_world", (2, 3))
-    segments = _checked(segments_px, "segments_px", (2, 2))
+    model = _check_shape(model_lines_world, "model_lines_world", (2, 3))
+    segments = _check_shape(segments_px, "segments_px", (2, 2))
     if len(model) != len(segments):
         raise ValueError(f"expected one segment a model line, got {len(model)} lines and {len(segments)} segments")
     return model, segments
 
 
-def landmark_groups(landmark_ids: LandmarkIds, n: int) -> list[NDArray[np.intp]]:
+def group_by_landmark(landmark_ids: LandmarkIds, n: int) -> list[Indices]:
     """Indices of the lines of each landmark, in order of first appearance; one line a group without ids."""
     check_landmarks(landmark_ids, n)
     if landmark_ids is None:
@@ -111,8 +114,8 @@ def check_landmarks(landmark_ids: LandmarkIds, n: int) -> None:
         raise ValueError(f"expected {n} landmark ids, one a line, got {len(landmark_ids)}")
 
 
-def checked_sigma(sigma_px: Any, n: int) -> Array:
-    """A standard deviation a row, (n,), from one number or n."""
+def check_sigma(sigma_px: Any, n: int) -> Floats:
+    """A standard deviation a row, (n,), from one number or n. Raises ValueError unless all are > 0 and finite."""
     if isinstance(sigma_px, float) and 0.0 < sigma_px < math.inf:
         same = np.empty(n)
         same.fill(sigma_px)
@@ -123,7 +126,7 @@ def checked_sigma(sigma_px: Any, n: int) -> Array:
     return np.full(n, sigma) if sigma.shape == () else np.array(sigma)
 
 
-def _checked(values: Any, name: str, row: tuple[int, ...]) -> Array:
+def _check_shape(values: Any, name: str, row: tuple[int, ...]) -> Floats:
     array = np.asarray(values, float)
     if array.size == 0:
         array = array.reshape(0, *row)

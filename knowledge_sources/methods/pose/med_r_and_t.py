@@ -2,36 +2,41 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose.estimate import Array, Mask, PoseEstimate
-from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, build_line_set, landmark_groups
-from knowledge_sources.methods.pose.numerics.finish import NO_SUBSET, estimate_at, guarded, prior_estimate, reasons
+from knowledge_sources.methods.arrays import Floats, Mask
+from knowledge_sources.methods.pose.estimate import PoseEstimate
+from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, build_line_set, group_by_landmark
+from knowledge_sources.methods.pose.numerics.finish import (
+    MIN_LENGTH_PX,
+    NO_SUBSET,
+    build_estimate,
+    build_prior_estimate,
+    check_in_front,
+    find_rejections,
+)
 from knowledge_sources.methods.pose.numerics.levenberg_marquardt import invert_information
-from knowledge_sources.methods.pose.numerics.subset_poses import compute_squared_distances, concentrated, subset_poses
-from knowledge_sources.methods.pose.numerics.subsets import count_subsets, list_subsets, padded_rows
+from knowledge_sources.methods.pose.numerics.subsets import (
+    compute_squared_distances,
+    concentrate,
+    count_subsets,
+    list_subsets,
+    pad_rows,
+    solve_subsets,
+)
 from knowledge_sources.methods.pose.r_and_t import PoseState
-from knowledge_sources.methods.pose.r_and_t_ml import likeliest, r_and_t_ml
+from knowledge_sources.methods.pose.r_and_t_ml import find_likeliest, r_and_t_ml
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.pose import PoseSettings
 from world_models.camera import Camera
 from world_models.frames import Pose
 
 MEDIAN_CHI2_2 = 1.386
 """Median of the chi-squared law with two degrees of freedom: a line has two residuals."""
-MOST_WRONG = 0.45
-"""Share of wrong lines up to which the median is to hold."""
-TIE = -2.0 * math.log(1.0 - 0.5 / (1.0 - MOST_WRONG))
-"""Medians up to this are no evidence either way: where so many lines are wrong, the median of all is a high quantile of
-the right ones' chi-squared law (1 - exp(-x / 2))."""
-SUBSET = 3
-CONCENTRATED = 16
-"""So many of the best candidates are solved again on the lines that fit them best."""
-ROUNDS = 6
-"""So often, at most, lines are taken out or back and the pose is solved for again."""
-LEAST_SCALE = 0.3
-"""Lines that agree better than this share of ``sigma_px`` do not make others outliers."""
+SUBSET_SIZE = 3
+"""Lines or landmarks in a subset: three lines decide six unknowns."""
 
 
 def med_r_and_t(
@@ -43,89 +48,103 @@ def med_r_and_t(
     landmark_ids: LandmarkIds = None,
     sigma_px: Any = 1.0,
     probability: float | None = None,
-    outliers: float = 0.5,
     rng: np.random.Generator | None = None,
-    cutoff: float = 3.0,
+    settings: PoseSettings = DEFAULT.pose,
 ) -> PoseEstimate:
-    """The pose of the subset with the least median squared error, then the rest without the outliers.
+    """Camera pose by least median of squares: holds up to about 45 % of wrong lines.
 
-    Source: §6.2.4, E_m, steps 1-4. Each subset is solved by R and T; the errors whose median is taken are measured
-    in the image, in units of ``sigma_px``, where they are alike for near and far lines. Medians that this noise cannot
-    tell apart are ties, and step 3's threshold decides between them: the pose under which more lines stay. Holds to
-    about 45 % outliers.
+    Source: §6.2.4, E_m, steps 1 to 4. R and T solves each subset. The errors whose median is taken are measured in the
+    image, over ``sigma_px``, where they are alike for near and far lines. Medians that this noise cannot tell apart are
+    ties, and the threshold of step 3 decides between them: the pose under which more lines stay.
 
     Args:
-        landmark_ids: n hashable names: the landmark version (3-landmark subsets). ``None``: the line version.
+        model_lines_world: (n, 2, 3) [m]. segments_px: (n, 2, 2) observed, as the lens shows them.
+        prior: guess of ``camera_from_world``; every subset starts from it.
+        landmark_ids: n hashable names: 3-landmark subsets. ``None``: 3-line subsets.
+        sigma_px: standard deviation of the segment ends across the line, one number or (n,).
         probability: ``None`` tries every subset; else so many are drawn (with ``rng``) that one is free of outliers
-            with this probability when the share ``outliers`` of the groups is wrong.
-        cutoff: lines beyond this many standard deviations, estimated from the median, are outliers.
+            with this probability.
+
+    Raises:
+        ValueError: as :func:`build_line_set`; ids that are not one a line; subsets must be drawn without ``rng``.
     """
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
-    candidates = subset_candidates(lines, prior, landmark_ids, probability, outliers, rng)
+    outlier_part = settings.med_drawn_outlier_part
+    candidates = compute_candidates(lines, prior, landmark_ids, probability, outlier_part, rng, settings)
     if candidates is None:
-        return r_and_t_ml(model_lines_world, segments_px, camera, prior, sigma_px=sigma_px)
-    turns, shifts = with_concentrated(lines, *candidates)
-    errors = compute_squared_distances(lines, turns, shifts)
+        return r_and_t_ml(model_lines_world, segments_px, camera, prior, sigma_px=sigma_px, settings=settings)
+    rotations, translations = _add_concentrated(lines, *candidates, settings)
+    errors = compute_squared_distances(lines, rotations, translations)
     medians = np.median(errors, axis=1)
     least = float(medians.min())
-    bound = 2.0 * (cutoff * _robust_scale(least, len(lines))) ** 2
-    tied = np.flatnonzero(medians <= max(least, TIE))
+    bound = 2.0 * (settings.outlier_sigmas * _compute_robust_scale(least, len(lines), settings)) ** 2
+    tied = np.flatnonzero(medians <= max(least, settings.tied_median))
     best = int(tied[np.argmin(np.minimum(errors[tied], bound).sum(axis=1))])
-    return refined_on(lines, prior, (turns[best], shifts[best]), errors[best] <= bound, bound)
+    start = rotations[best], translations[best]
+    return refine_on_inliers(lines, prior, start, errors[best] <= bound, bound, settings)
 
 
-def with_concentrated(lines: LineSet, turns: Array, shifts: Array) -> tuple[Array, Array]:
-    """The candidates and, besides, those of least median solved again on the better half of all lines."""
-    medians = np.median(compute_squared_distances(lines, turns, shifts), axis=1)
-    few = np.argsort(medians, kind="stable")[:CONCENTRATED]
-    more = concentrated(lines, turns[few], shifts[few], (len(lines) + SUBSET) // 2)
-    return np.concatenate([turns, more[0]]), np.concatenate([shifts, more[1]])
-
-
-def subset_candidates(
+def compute_candidates(
     lines: LineSet,
     prior: Pose,
     landmark_ids: LandmarkIds,
     probability: float | None,
-    outliers: float,
+    outlier_part: float,
     rng: np.random.Generator | None,
-) -> tuple[Array, Array] | None:
-    """Poses (k, 3, 3), (k, 3) of the 3-group subsets, or ``None`` if there are fewer than 4 lines or 3 groups."""
-    groups = landmark_groups(landmark_ids, len(lines))
-    if len(groups) < SUBSET:
-        groups = landmark_groups(None, len(lines))
-    if len(lines) <= SUBSET:
+    settings: PoseSettings,
+) -> tuple[Floats, Floats] | None:
+    """Poses (k, 3, 3), (k, 3) of the subsets, or ``None`` if there are fewer than 4 lines."""
+    groups = group_by_landmark(landmark_ids, len(lines))
+    if len(groups) < SUBSET_SIZE:
+        groups = group_by_landmark(None, len(lines))
+    if len(lines) <= SUBSET_SIZE:
         return None
-    needed = None if probability is None else count_subsets(SUBSET, outliers, probability)
-    rows, real = padded_rows(groups, list_subsets(len(groups), SUBSET, needed, rng))
-    return subset_poses(lines, rows, real, prior)
+    needed = None if probability is None else count_subsets(SUBSET_SIZE, outlier_part, probability)
+    rows, real = pad_rows(groups, list_subsets(len(groups), SUBSET_SIZE, needed, rng))
+    return solve_subsets(lines, rows, real, prior, settings)
 
 
-def refined_on(lines: LineSet, prior: Pose, start: PoseState, near: Mask, bound: float) -> PoseEstimate:
-    """R and T, with the likelihood's finish, on the lines kept; reasons for the others (§6.2.4, steps 3 and 4).
+def refine_on_inliers(
+    lines: LineSet, prior: Pose, start: PoseState, near: Mask, bound: float, settings: PoseSettings
+) -> PoseEstimate:
+    """The likeliest pose of the lines kept, with reasons for the others (§6.2.4, steps 3 and 4).
 
-    Both steps again while the pose so found keeps other lines: what a subset's noise had put too far may come back.
+    Repeated while the new pose keeps other lines: a line that a subset's noise had put too far may come back.
+
+    Args:
+        near: (n,) the lines kept at ``start``. bound: of a line's squared distance over its variance.
     """
-    near = near & (lines.lengths_px > 1e-9)
-    if int(np.count_nonzero(near)) < SUBSET:
-        return prior_estimate(lines, prior, NO_SUBSET)
-    for _ in range(ROUNDS):
-        end, reason = likeliest(lines.take(near), prior, start=start)
+    near = near & (lines.lengths_px > MIN_LENGTH_PX)
+    if int(np.count_nonzero(near)) < SUBSET_SIZE:
+        return build_prior_estimate(lines, prior, NO_SUBSET, settings)
+    for _ in range(settings.max_refinements):
+        end, reason = find_likeliest(lines.take(near), prior, None, settings, start)
         start = rotation, translation = end.state
         fine = compute_squared_distances(lines, rotation, translation) <= bound
-        rejected = reasons(lines, rotation, translation, fine)
+        rejected = find_rejections(lines, rotation, translation, fine, settings)
         again = np.array([r is None for r in rejected], bool)
-        if np.array_equal(again, near) or int(np.count_nonzero(again)) < SUBSET:
+        if np.array_equal(again, near) or int(np.count_nonzero(again)) < SUBSET_SIZE:
             break
         near = again
     covariance = invert_information(end.normal.hessian)
-    estimate = estimate_at(
+    estimate = build_estimate(
         lines, rotation, translation, covariance, rejected, end.normal.cost, end.iterations, reason
     )
-    return guarded(lines, prior, estimate, near)
+    return check_in_front(lines, prior, estimate, settings, near)
 
 
-def _robust_scale(median_squared: float, n: int) -> float:
-    """Standard deviation of one residual from the median over n lines, with the small-sample factor."""
-    scale = (1.0 + 5.0 / max(n - SUBSET, 1)) * float(np.sqrt(median_squared / MEDIAN_CHI2_2))
-    return max(scale, LEAST_SCALE)
+def _add_concentrated(
+    lines: LineSet, rotations: Floats, translations: Floats, settings: PoseSettings
+) -> tuple[Floats, Floats]:
+    """The candidates, and those of least median solved again on the better half of all lines."""
+    medians = np.median(compute_squared_distances(lines, rotations, translations), axis=1)
+    few = np.argsort(medians, kind="stable")[: settings.med_candidates]
+    half = (len(lines) + SUBSET_SIZE) // 2
+    more = concentrate(lines, rotations[few], translations[few], half, settings)
+    return np.concatenate([rotations, more[0]]), np.concatenate([translations, more[1]])
+
+
+def _compute_robust_scale(median_squared: float, n: int, settings: PoseSettings) -> float:
+    """Standard deviation of one residual from the median over n lines, with Rousseeuw's small-sample factor."""
+    scale = (1.0 + 5.0 / max(n - SUBSET_SIZE, 1)) * float(np.sqrt(median_squared / MEDIAN_CHI2_2))
+    return max(scale, settings.min_noise_part)

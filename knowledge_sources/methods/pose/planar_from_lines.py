@@ -1,43 +1,39 @@
-"""Where is the robot on the floor, from matched lines, some of them wrong?"""
+"""Robot pose on the floor from matched lines, some of them wrong: truncated loss over pairs of lines."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose.estimate import BEHIND, Array, Mask, PlanarEstimate
-from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, build_line_set, landmark_groups
-from knowledge_sources.methods.pose.numerics import line_kernels as kernels
-from knowledge_sources.methods.pose.numerics.cautious_update import least_move, most_unexplained
-from knowledge_sources.methods.pose.numerics.finish import reasons
-from knowledge_sources.methods.pose.numerics.image_error import aspects
-from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Descent, Normal, invert_information
+from knowledge_sources.methods.arrays import Floats, Indices, Mask
+from knowledge_sources.methods.pose.estimate import BEHIND, PlanarEstimate
+from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, build_line_set, group_by_landmark
+from knowledge_sources.methods.pose.numerics import kernels
+from knowledge_sources.methods.pose.numerics.discrepancy_principle import compute_max_chi2, solve_near_prior
+from knowledge_sources.methods.pose.numerics.finish import find_rejections
+from knowledge_sources.methods.pose.numerics.image_error import measure_lines
+from knowledge_sources.methods.pose.numerics.kernels import FloorArrays
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import invert_information
 from knowledge_sources.methods.pose.planar import (
     FEW,
     NOT_BETTER,
     PlanarPrior,
     build_planar_prior,
     compute_camera_poses,
-    mounted,
-    pose2,
+    compute_scatter,
+    to_pose2,
+    to_rigid_motion,
 )
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.pose import PoseSettings
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 
-SUBSET_LINES = 28
-"""Pairs are formed of so many of the longest segments (378 pairs)."""
-LONGEST_STEP = np.array([2.0, 2.0, 0.5])
-"""A pair that asks for more (m, m, rad) at once is nearly degenerate: it goes there by degrees or not at all."""
-LONGEST_STEP.setflags(write=False)
-FINALISTS = 8
-WIDENING = (4.0, 2.0, 1.0, 1.0)
-"""In the polish of the finalists, round by round, by how much the squared bound on inliers is wider."""
-ROUNDS = 8
-FEW_LINES = 3
-"""So many leave their noise hardly any freedom to show itself: without a stated covariance they go warily."""
+NO_BOUND = 1e12
+"""Bound on squared distances where every line is taken as right; finite, as compiled costs are sums."""
 
 
 def planar_from_lines(
@@ -51,181 +47,188 @@ def planar_from_lines(
     landmark_ids: LandmarkIds = None,
     sigma_px: Any = 1.0,
     robust: bool = True,
-    cutoff: float = 3.0,
+    settings: PoseSettings = DEFAULT.pose,
 ) -> PlanarEstimate:
-    """The floor pose under which the observed segment ends are likeliest.
+    """Robot pose on the floor of maximum likelihood, robust beyond 50 % of wrong lines.
 
     Source: §6.2.4 with three unknowns: two lines are enough for a candidate, and a truncated loss with known sigma
-    takes the median's place (it holds beyond 50 % outliers). Candidates from pairs of lines, the prior and all
-    lines; the best are polished on their inliers.
+    replaces the median. Candidates come from pairs of lines, from the prior and from all lines; the best are refined on
+    their inliers.
 
     Args:
         model_lines_world: (n, 2, 3) [m]. segments_px: (n, 2, 2); several segments may share a model line.
         camera_from_robot: the mount. prior: ``world_from_robot``.
         prior_covariance: (3, 3) of (x, y, heading): the prior is one more measurement. ``None``: it only decides
-            directions that the lines leave open; those, and three lines or
-            fewer, move it as little as their noise allows.
+            directions that the lines leave open; those, and three lines or fewer, move it as little as their noise
+            allows.
         landmark_ids: n names; pairs within one landmark are not tried as candidates.
         sigma_px: of the segment ends across the line, one number or (n,).
         robust: False takes every line as right.
-        cutoff: a line beyond this many standard deviations is an outlier.
+
+    Raises:
+        ValueError: as :func:`build_line_set`; ids that are not one a line; a covariance of another shape.
     """
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
-    groups = landmark_groups(landmark_ids, len(lines))
-    belief = build_planar_prior(prior, prior_covariance)
-    bound = 2.0 * cutoff**2
+    groups = group_by_landmark(landmark_ids, len(lines))
+    floor = _Floor(lines, build_planar_prior(prior, prior_covariance, settings), camera_from_robot, settings)
+    mean = floor.prior.mean
+    bound = 2.0 * settings.outlier_sigmas**2
     if not len(lines):
-        return _estimate(lines, belief.mean, belief, camera_from_robot, (), bound, FEW)
+        return _build_estimate(floor, mean, (), bound, FEW)
     if not robust:
-        end = _descend(lines, belief.mean, belief, camera_from_robot)
-        everything = np.ones(len(lines), bool)
-        return _settled(lines, everything, end.state, belief, camera_from_robot, np.inf)
-    candidates = _candidates(lines, groups, belief, camera_from_robot)
-    costs = _costs(lines, candidates, belief, camera_from_robot, bound)
-    order = np.argsort(costs, kind="stable")[:FINALISTS]
-    finalists = _polished(lines, candidates[order], belief, camera_from_robot, bound)
-    best = int(np.argmin(_costs(lines, finalists, belief, camera_from_robot, bound)))
-    state, near = _agreed(lines, finalists[best], belief, camera_from_robot, bound)
-    return _settled(lines, near, state, belief, camera_from_robot, bound)
+        state, _ = floor.minimise(mean, settings.max_floor_iterations)
+        return _finish(floor, np.ones(len(lines), bool), state, NO_BOUND)
+    candidates = _compute_candidates(floor, groups)
+    order = np.argsort(floor.compute_costs(candidates, bound), kind="stable")[: settings.floor_finalists]
+    finalists = _refine(floor, candidates[order], bound)
+    best = int(np.argmin(floor.compute_costs(finalists, bound)))
+    state, near = _alternate(floor, finalists[best], bound)
+    return _finish(floor, near, state, bound)
 
 
-def _candidates(lines: LineSet, groups: list[Any], belief: PlanarPrior, mount: Pose) -> Array:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Floor:
+    """The data of one call: lines, prior and mount ``camera_from_robot``. A state is (x [m], y [m], heading [rad])."""
+
+    lines: LineSet
+    prior: PlanarPrior
+    mount: Pose
+    settings: PoseSettings
+
+    def take(self, near: Mask) -> _Floor:
+        """With some of the lines only."""
+        return replace(self, lines=self.lines.take(near))
+
+    @property
+    def arrays(self) -> FloorArrays:
+        """As the compiled functions take them."""
+        return self.lines.arrays, self.prior.mean, self.prior.information, to_rigid_motion(self.mount)
+
+    def minimise(self, state: Floats, iterations: int) -> tuple[Floats, Floats]:
+        """The state (3,) of least squares on all lines, with the prior, from ``state``; and the Hessian (3, 3)."""
+        end, hessian, _, _ = kernels.minimise_floor_pose(
+            self.arrays, np.ones(len(self.lines)), np.array(state), iterations
+        )
+        return end, hessian
+
+    def compute_costs(self, states: Floats, bound: float) -> Floats:
+        """(k,) truncated squared errors of all lines, plus the prior's share."""
+        costs: Floats = kernels.compute_floor_costs(self.arrays, np.array(states), bound)
+        return costs
+
+    def measure_lines(self, state: Floats) -> tuple[Floats, Mask, Mask]:
+        """See :func:`image_error.measure_lines`."""
+        rotation, translation = compute_camera_poses(state, self.mount)
+        return measure_lines(self.lines, rotation, translation, self.settings.max_beside_px)
+
+    def find_near(self, state: Floats, bound: float) -> Mask:
+        """(n,) the lines within the bound, in front of the camera and beside their model line."""
+        distances, front, overlap = self.measure_lines(state)
+        squares = np.sum((distances / self.lines.sigma_px[:, None]) ** 2, axis=1)
+        return np.asarray(front & overlap & (squares <= bound))
+
+
+def _compute_candidates(floor: _Floor, groups: list[Indices]) -> Floats:
     """States (k, 3): the prior, all lines at once, and each pair of long lines of different landmarks."""
+    lines, settings = floor.lines, floor.settings
     group_of = np.empty(len(lines), dtype=np.intp)
     for g, rows in enumerate(groups):
         group_of[rows] = g
-    longest = np.sort(np.argsort(-lines.lengths_px, kind="stable")[:SUBSET_LINES])
+    longest = np.sort(np.argsort(-lines.lengths_px, kind="stable")[: settings.floor_subset_lines])
     pairs = np.array([p for p in combinations(longest, 2) if group_of[p[0]] != group_of[p[1]]], dtype=np.intp)
-    whole = _descend(lines, belief.mean, belief, mount, iterations=8).state
-    base = np.stack([belief.mean, whole])
+    whole, _ = floor.minimise(floor.prior.mean, settings.floor_start_iterations)
+    base = np.stack([floor.prior.mean, whole])
     if not len(pairs):
         return base
-    return np.concatenate([base, _pair_states(lines, pairs, belief, mount)])
+    states = kernels.solve_floor_pairs(floor.arrays, pairs, _max_step(settings), settings.floor_pair_iterations)
+    return np.concatenate([base, states])
 
 
-def _pair_states(lines: LineSet, pairs: Any, belief: PlanarPrior, mount: Pose, iterations: int = 4) -> Array:
-    """Gauss-Newton on each pair (k, 2) with the prior, all at once: (k, 3)."""
-    states: Array = kernels.floor_pairs(
-        lines.arrays, pairs, *belief.arrays, mounted(mount), np.array(LONGEST_STEP), iterations
-    )
-    return states
-
-
-def _costs(lines: LineSet, states: Array, belief: PlanarPrior, mount: Pose, bound: float) -> Array:
-    """(k,) truncated squared errors of all lines, plus the prior's share."""
-    costs: Array = kernels.floor_costs(lines.arrays, np.array(states), *belief.arrays, mounted(mount), bound)
-    return costs
-
-
-def _polished(lines: LineSet, states: Array, belief: PlanarPrior, mount: Pose, bound: float) -> Array:
+def _refine(floor: _Floor, states: Floats, bound: float) -> Floats:
     """States (k, 3) moved by Gauss-Newton on each one's own inliers, all at once; the first rounds let more in."""
-    moved: Array = kernels.floor_polished(
-        lines.arrays, states, *belief.arrays, mounted(mount), np.array(LONGEST_STEP), bound, np.array(WIDENING)
+    settings = floor.settings
+    moved: Floats = kernels.refine_floor_states(
+        floor.arrays, states, _max_step(settings), bound, np.array(settings.floor_widenings)
     )
     return moved
 
 
-def _agreed(lines: LineSet, state: Array, belief: PlanarPrior, mount: Pose, bound: float) -> tuple[Array, Mask]:
+def _max_step(settings: PoseSettings) -> Floats:
+    return np.array([settings.max_floor_step_m, settings.max_floor_step_m, settings.max_floor_step_rad])
+
+
+def _alternate(floor: _Floor, state: Floats, bound: float) -> tuple[Floats, Mask]:
     """Alternate inliers and likelihood until they agree."""
-    near = _near(lines, state, mount, bound)
-    for _ in range(ROUNDS):
-        state = _descend(lines.take(near), state, belief, mount).state
-        again = _near(lines, state, mount, bound)
+    near = floor.find_near(state, bound)
+    for _ in range(floor.settings.max_floor_rounds):
+        state, _ = floor.take(near).minimise(state, floor.settings.max_floor_iterations)
+        again = floor.find_near(state, bound)
         if np.array_equal(again, near):
             break
         near = again
     return state, near
 
 
-def _near(lines: LineSet, state: Array, mount: Pose, bound: float) -> Mask:
-    rotation, translation = compute_camera_poses(state, mount)
-    distances, front, over = aspects(lines, rotation, translation)
-    squares = np.sum((distances / lines.sigma_px[:, None]) ** 2, axis=1)
-    return np.asarray(front & over & (squares <= bound))
-
-
-def _descend(
-    lines: LineSet, state: Array, belief: PlanarPrior, mount: Pose, iterations: int = 20
-) -> Descent[Array]:
-    """Least squares on the lines given, with the prior."""
-    at, hessian, cost, steps = kernels.floor_descend(
-        lines.arrays, np.ones(len(lines)), np.array(state), *belief.arrays, mounted(mount), iterations
-    )
-    return Descent(at, Normal(cost, hessian, np.zeros(3)), steps)
-
-
-def _settled(
-    lines: LineSet, near: Mask, state: Array, belief: PlanarPrior, mount: Pose, bound: float
-) -> PlanarEstimate:
-    """Drop a weak prior where the lines know better, and check against the prior itself."""
-    kept = lines.take(near)
+def _finish(floor: _Floor, near: Mask, state: Floats, bound: float) -> PlanarEstimate:
+    """Drop a weak prior where the lines know better, and return the prior where no pose fits better."""
+    kept, settings = floor.take(near), floor.settings
+    mean = floor.prior.mean
     reason = None
-    if not belief.given:
-        alone = PlanarPrior(belief.mean, np.zeros((3, 3)), True)
-        hessian = _descend(kept, state, alone, mount, iterations=0).normal.hessian
-        reason = None if _decided(hessian, belief) else FEW
-        if reason is None and len(kept) > FEW_LINES:
-            state = _descend(kept, state, alone, mount).state
+    if not floor.prior.given:
+        alone = replace(kept, prior=PlanarPrior(mean, np.zeros((3, 3)), True))
+        _, hessian = alone.minimise(state, 0)
+        reason = None if _is_decided(hessian, floor.prior) else FEW
+        if reason is None and len(kept.lines) > settings.max_few_lines:
+            state, _ = alone.minimise(state, settings.max_floor_iterations)
         else:
-            state = _cautious(kept, belief, mount)
-    rotation, translation = compute_camera_poses(state, mount)
-    rejected = reasons(lines, rotation, translation, near)
-    if np.isinf(bound):
+            state = _solve_near_prior(kept)
+    rejected = find_rejections(floor.lines, *compute_camera_poses(state, floor.mount), near, settings)
+    if bound == NO_BOUND:
         rejected = tuple(r if r == BEHIND else None for r in rejected)
-    cost_bound = 1e12 if np.isinf(bound) else bound
-    costs = _costs(lines, np.stack([state, belief.mean]), belief, mount, cost_bound)
+    costs = floor.compute_costs(np.stack([state, mean]), bound)
     if costs[0] > costs[1] + 1.0:
-        state, reason = belief.mean, NOT_BETTER
-    return _estimate(lines, state, belief, mount, rejected, cost_bound, reason)
+        state, reason = mean, NOT_BETTER
+    return _build_estimate(floor, state, rejected, bound, reason)
 
 
-def _cautious(lines: LineSet, belief: PlanarPrior, mount: Pose) -> Array:
-    """The state nearest to the prior that explains the lines, see :func:`least_move`."""
+def _solve_near_prior(floor: _Floor) -> Floats:
+    """The state nearest to the prior that explains the lines, see :func:`solve_near_prior`."""
+    prior, settings = floor.prior, floor.settings
 
-    def pulled(weight: float) -> Array:
-        return _descend(lines, belief.mean, replace(belief, information=weight * belief.information), mount).state
+    def solve(weight: float) -> Floats:
+        pulled = replace(floor, prior=replace(prior, information=weight * prior.information))
+        return pulled.minimise(prior.mean, settings.max_floor_iterations)[0]
 
-    def unexplained(state: Array) -> float:
-        return float(np.sum(kernels.floor_squares(lines.arrays, np.array(state), mounted(mount))))
+    def compute_chi2(state: Floats) -> float:
+        return float(np.sum(kernels.compute_floor_squares(floor.arrays, np.array(state))))
 
-    return least_move(belief.mean, pulled, unexplained, most_unexplained(2.0 * len(lines)))
+    max_chi2 = compute_max_chi2(2.0 * len(floor.lines), settings)
+    return solve_near_prior(prior.mean, solve, compute_chi2, max_chi2, settings)
 
 
-def _decided(hessian: Array, belief: PlanarPrior) -> bool:
+def _is_decided(hessian: Floats, prior: PlanarPrior) -> bool:
     """Whether in every direction the lines know more than the weak prior."""
-    scale = 1.0 / np.sqrt(np.diag(belief.information))
+    scale = 1.0 / np.sqrt(np.diag(prior.information))
     return bool(np.linalg.eigvalsh(hessian * scale[:, None] * scale)[0] >= 1.0)
 
 
-def _estimate(
-    lines: LineSet,
-    state: Array,
-    belief: PlanarPrior,
-    mount: Pose,
-    rejected: tuple[str | None, ...],
-    bound: float,
-    reason: str | None,
+def _build_estimate(
+    floor: _Floor, state: Floats, rejected: tuple[str | None, ...], bound: float, reason: str | None
 ) -> PlanarEstimate:
     inliers = np.array([r is None for r in rejected], dtype=bool)
-    kept = lines.take(inliers)
-    normal = _descend(kept, state, belief, mount, iterations=0).normal
-    weak = not belief.given and reason is None
-    hessian = normal.hessian - belief.information if weak else normal.hessian
-    distances = aspects(lines, *compute_camera_poses(state, mount))[0]
+    kept = floor.take(inliers)
+    _, hessian = kept.minimise(state, 0)
+    if not floor.prior.given and reason is None:
+        hessian = hessian - floor.prior.information
+    distances = floor.measure_lines(state)[0]
+    squares = float(np.sum((distances[inliers] / kept.lines.sigma_px[:, None]) ** 2))
+    scatter = compute_scatter(squares, 2 * len(kept.lines), floor.settings)
     return PlanarEstimate(
-        world_from_robot=pose2(state),
-        covariance=invert_information(hessian) * _excess(kept, distances[inliers]),
+        world_from_robot=to_pose2(state),
+        covariance=invert_information(hessian) * scatter,
         inliers=inliers,
         residuals_px=distances,
         rejected=rejected,
-        cost=float(_costs(lines, state[None], belief, mount, bound)[0]),
+        cost=float(floor.compute_costs(state[None], bound)[0]),
         reason=reason,
     )
-
-
-def _excess(lines: LineSet, distances: Array) -> float:
-    """By how much the inliers scatter more than sigma says (a variance ratio, never below 1)."""
-    freedom = distances.size - 3
-    if freedom < 6:
-        return 1.0
-    return max(1.0, float(np.sum((distances / lines.sigma_px[:, None]) ** 2)) / freedom)

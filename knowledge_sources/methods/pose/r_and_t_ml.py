@@ -1,4 +1,4 @@
-"""R and T with the maximum-likelihood finish: E1 to get there, image distances to end."""
+"""R and T with a maximum-likelihood finish: E1 to get near, distances in the image to end."""
 
 from __future__ import annotations
 
@@ -6,39 +6,38 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.pose.estimate import BEHIND, Array, PoseEstimate
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.pose.estimate import BEHIND, PoseEstimate
 from knowledge_sources.methods.pose.line_set import (
     LandmarkIds,
     LineSet,
     build_line_set,
     check_landmarks,
-    checked_sigma,
-    matched_arrays,
+    check_matched_arrays,
+    check_sigma,
 )
-from knowledge_sources.methods.pose.numerics import line_kernels as kernels
-from knowledge_sources.methods.pose.numerics.cautious_update import least_move, most_unexplained
+from knowledge_sources.methods.pose.numerics import kernels
+from knowledge_sources.methods.pose.numerics.discrepancy_principle import compute_max_chi2, solve_near_prior
 from knowledge_sources.methods.pose.numerics.finish import (
     FEW_LINES,
     NOT_BETTER,
     UNDECIDED,
-    WEAK_INFORMATION,
-    all_kept,
-    estimate_at,
-    guarded,
-    mostly_in_front,
-    open_direction,
-    prior_estimate,
+    build_estimate,
+    build_prior_estimate,
+    check_in_front,
+    compute_weak_information,
+    has_open_direction,
+    is_mostly_in_front,
+    reject_behind,
 )
-from knowledge_sources.methods.pose.numerics.image_error import OVERLAP_SLACK_PX
-from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Descent, invert_information
-from knowledge_sources.methods.pose.numerics.line_kernels import IMAGE
-from knowledge_sources.methods.pose.numerics.subset_poses import compute_squared_distances
-from knowledge_sources.methods.pose.r_and_t import PoseState, compiled_descent, solve_e1
+from knowledge_sources.methods.pose.numerics.kernels import IMAGE
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Minimum, invert_information
+from knowledge_sources.methods.pose.numerics.subsets import compute_squared_distances
+from knowledge_sources.methods.pose.r_and_t import MIN_LINES, PoseState, minimise_compiled, minimise_e1
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.pose import PoseSettings
 from world_models.camera import Camera
 from world_models.frames import Pose
-
-LEAST = np.diag(WEAK_INFORMATION).copy()
-"""Knowing less than this in some direction, the lines do not decide the pose."""
 
 
 def r_and_t_ml(
@@ -50,79 +49,95 @@ def r_and_t_ml(
     landmark_ids: LandmarkIds = None,
     sigma_px: Any = 1.0,
     prior_covariance: Any = None,
+    settings: PoseSettings = DEFAULT.pose,
 ) -> PoseEstimate:
-    """The pose under which the observed segment ends are likeliest.
+    """Camera pose of maximum likelihood: the smallest error, where every line is matched rightly.
 
-    Minimises the squared distances [px] of the ends to the projected infinite model lines over their variance.
-    Started from E1 (§6.2.2), whose basin is wide but whose optimum is not efficient where depths vary.
+    Minimises the squared distances [px] of the observed ends to the projected infinite model lines over their variance.
+    Started from E1 (§6.2.2), whose basin is wide but whose minimum is not efficient where depths vary.
 
-    With ``prior_covariance`` (6, 6) of the prior's left perturbation the prior is one more measurement. Without it
-    the prior only decides what the lines leave open: parallel ones, or three and fewer, move it no further than their
-    noise demands.
+    Args:
+        model_lines_world: (n, 2, 3) [m]. segments_px: (n, 2, 2) observed, as the lens shows them.
+        prior: guess of ``camera_from_world``.
+        landmark_ids: checked, not used, as every line counts.
+        sigma_px: standard deviation of the segment ends across the line, one number or (n,).
+        prior_covariance: (6, 6) of the prior's left perturbation: the prior is one more measurement. ``None``: the
+            prior only decides what the lines leave open; parallel lines, or three and fewer, move it no further than
+            their noise demands.
+
+    Raises:
+        ValueError: as :func:`build_line_set`; ids that are not one a line; a covariance of another shape.
     """
     if prior_covariance is None:
-        found = _explained(model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px)
-        if found is not None:
-            return found
+        estimate = _solve_in_prior_basin(
+            model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px, settings
+        )
+        if estimate is not None:
+            return estimate
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     check_landmarks(landmark_ids, len(lines))
-    information = prior_information(prior_covariance)
+    information = _invert_covariance(prior_covariance)
     if not len(lines):
-        return prior_estimate(lines, prior, FEW_LINES)
-    end, reason = likeliest(lines, prior, information)
+        return build_prior_estimate(lines, prior, FEW_LINES, settings)
+    end, reason = find_likeliest(lines, prior, information, settings)
     rotation, translation = end.state
-    if _chi2(lines, rotation, translation) > _chi2(lines, prior.rotation, prior.translation):
-        return prior_estimate(lines, prior, NOT_BETTER)
+    if _compute_chi2(lines, rotation, translation) > _compute_chi2(lines, prior.rotation, prior.translation):
+        return build_prior_estimate(lines, prior, NOT_BETTER, settings)
     covariance = invert_information(end.normal.hessian)
-    kept = all_kept(lines, rotation, translation)
-    return guarded(
-        lines,
-        prior,
-        estimate_at(lines, rotation, translation, covariance, kept, end.normal.cost, end.iterations, reason),
+    kept = reject_behind(lines, rotation, translation)
+    estimate = build_estimate(
+        lines, rotation, translation, covariance, kept, end.normal.cost, end.iterations, reason
     )
+    return check_in_front(lines, prior, estimate, settings)
 
 
-def likeliest(
-    lines: LineSet, prior: Pose, information: Array | None = None, start: PoseState | None = None
-) -> tuple[Descent[PoseState], str | None]:
-    """Descend to the likeliest pose from ``start`` (E1's optimum if None), and why the prior had to help."""
+def find_likeliest(
+    lines: LineSet, prior: Pose, information: Floats | None, settings: PoseSettings, start: PoseState | None = None
+) -> tuple[Minimum[PoseState], str | None]:
+    """The likeliest pose from ``start`` (``None``: E1's minimum), and why the prior had to help.
+
+    ``information`` (6, 6) is the prior's, ``None`` if it does not count.
+    """
     if information is not None:
-        return ml_descent(lines, start or _best_start(lines, prior), prior, information), None
-    if len(lines) < 3:
-        return _cautious(lines, prior), FEW_LINES
-    end = ml_descent(lines, start or _best_start(lines, prior))
-    undecided = open_direction(end.normal.hessian)
-    if len(lines) > 3 and not undecided:
+        return _minimise_image(lines, start or _find_start(lines, prior, settings), settings, prior, information), None
+    if len(lines) < MIN_LINES:
+        return _solve_near_prior(lines, prior, settings), FEW_LINES
+    end = _minimise_image(lines, start or _find_start(lines, prior, settings), settings)
+    undecided = has_open_direction(end.normal.hessian, settings)
+    if len(lines) > MIN_LINES and not undecided:
         return end, None
-    return _cautious(lines, prior), UNDECIDED if undecided else None
+    return _solve_near_prior(lines, prior, settings), UNDECIDED if undecided else None
 
 
-def _cautious(lines: LineSet, prior: Pose) -> Descent[PoseState]:
-    """See :func:`least_move`. The covariance is that of a weak prior: the pull says nothing of how right it is."""
+def _solve_near_prior(lines: LineSet, prior: Pose, settings: PoseSettings) -> Minimum[PoseState]:
+    """See :func:`solve_near_prior`. The covariance is that of a weak prior, as nobody stated how good the prior is."""
     here = (prior.rotation, prior.translation)
-    state = least_move(
+    weak = compute_weak_information(settings)
+    state = solve_near_prior(
         here,
-        lambda weight: ml_descent(lines, here, prior, weight * WEAK_INFORMATION).state,
-        lambda state: _chi2(lines, *state),
-        most_unexplained(2.0 * len(lines)),
+        lambda weight: _minimise_image(lines, here, settings, prior, weight * weak).state,
+        lambda state: _compute_chi2(lines, *state),
+        compute_max_chi2(2.0 * len(lines), settings),
+        settings,
     )
-    return compiled_descent(IMAGE, lines, np.ones(len(lines)), state, prior, WEAK_INFORMATION, 0)
+    return minimise_compiled(IMAGE, lines, np.ones(len(lines)), state, 0, prior, weak)
 
 
-def _explained(
-    model: Any, segments: Any, camera: Camera, prior: Pose, landmark_ids: LandmarkIds, sigma_px: Any
+def _solve_in_prior_basin(
+    model_lines: Any, segments: Any, camera: Camera, prior: Pose, landmark_ids: LandmarkIds, sigma_px: Any,
+    settings: PoseSettings,
 ) -> PoseEstimate | None:
-    """The estimate at the foot of the prior's own basin if it explains the lines to their noise: E1 is not asked."""
-    model, ends_px = matched_arrays(model, segments)
+    """The estimate at the minimum of the prior's own basin, without E1, if it explains the lines to their noise."""
+    model, ends_px = check_matched_arrays(model_lines, segments)
     n = len(model)
     check_landmarks(landmark_ids, n)
     freedom = 2.0 * n - 6.0
     if freedom < 0.0:
         return None
-    fine, rotation, translation, covariance, cost, steps, distances, front = kernels.explained_from(
-        model, camera.undistort(ends_px), (camera.fx, camera.fy, camera.cx, camera.cy), checked_sigma(sigma_px, n),
-        (np.array(prior.rotation), np.array(prior.translation)), LEAST,
-        most_unexplained(freedom), OVERLAP_SLACK_PX,
+    fine, rotation, translation, covariance, cost, steps, distances, front = kernels.solve_from_prior(
+        model, camera.undistort(ends_px), (camera.fx, camera.fy, camera.cx, camera.cy), check_sigma(sigma_px, n),
+        (np.array(prior.rotation), np.array(prior.translation)), np.array(compute_weak_information(settings)),
+        compute_max_chi2(freedom, settings), settings.max_beside_px, settings.max_iterations,
     )
     if not fine:
         return None
@@ -131,14 +146,16 @@ def _explained(
     return PoseEstimate(Pose(rotation, translation), covariance, front, distances, rejected, cost, steps)
 
 
-def ml_descent(
-    lines: LineSet, start: PoseState, prior: Pose | None = None, information: Array | None = None
-) -> Descent[PoseState]:
+def _minimise_image(
+    lines: LineSet, start: PoseState, settings: PoseSettings, prior: Pose | None = None,
+    information: Floats | None = None,
+) -> Minimum[PoseState]:
     """Minimise the squared image distances over their variance, plus the prior's if its information is given."""
-    return compiled_descent(IMAGE, lines, np.ones(len(lines)), start, prior, information)
+    weights = np.ones(len(lines))
+    return minimise_compiled(IMAGE, lines, weights, start, settings.max_iterations, prior, information)
 
 
-def prior_information(covariance: Any) -> Array | None:
+def _invert_covariance(covariance: Any) -> Floats | None:
     """The inverse of a (6, 6) covariance, ``None`` for ``None``."""
     if covariance is None:
         return None
@@ -148,16 +165,16 @@ def prior_information(covariance: Any) -> Array | None:
     return np.asarray(np.linalg.inv(matrix))
 
 
-def _best_start(lines: LineSet, prior: Pose) -> PoseState:
-    """E1's optimum, unless it is behind the camera or the image says that the prior is nearer."""
+def _find_start(lines: LineSet, prior: Pose, settings: PoseSettings) -> PoseState:
+    """E1's minimum, unless it is behind the camera or the prior fits the image better."""
     here = (prior.rotation, prior.translation)
-    if len(lines) < 3:
+    if len(lines) < MIN_LINES:
         return here
-    e1 = solve_e1(lines, prior, np.ones(len(lines))).state
-    if not mostly_in_front(lines, *e1):
+    e1 = minimise_e1(lines, prior, np.ones(len(lines)), settings).state
+    if not is_mostly_in_front(lines, *e1):
         return here
-    return e1 if _chi2(lines, *e1) <= _chi2(lines, *here) else here
+    return e1 if _compute_chi2(lines, *e1) <= _compute_chi2(lines, *here) else here
 
 
-def _chi2(lines: LineSet, rotation: Array, translation: Array) -> float:
+def _compute_chi2(lines: LineSet, rotation: Floats, translation: Floats) -> float:
     return float(np.sum(compute_squared_distances(lines, rotation, translation)))

@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose.line_set import build_line_set
-from knowledge_sources.methods.pose.numerics.finish import WEAK_INFORMATION
+from knowledge_sources.methods.pose.numerics.finish import compute_weak_information
 from knowledge_sources.methods.pose.numerics.image_error import compute_image_jacobian, find_in_front
 from knowledge_sources.methods.pose.numerics.plane_error import (
     compute_camera_ends,
     compute_plane_distances,
     compute_plane_jacobian,
 )
+from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -199,7 +200,7 @@ def test_the_paper_s_two_hand_back_the_prior_below_three_lines(
 def weighed(found: Pose, truth: Pose) -> float:
     apart = found @ truth.inverse()
     move = np.concatenate([apart.rotation_vector, apart.translation])
-    return float(np.sqrt(move @ WEAK_INFORMATION @ move))
+    return float(np.sqrt(move @ compute_weak_information(DEFAULT.pose) @ move))
 
 
 @given(scene=scenes, seed=seeds)

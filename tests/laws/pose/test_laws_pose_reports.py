@@ -14,7 +14,8 @@ from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_pri
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose.estimate import BEHIND, DISTANCE, NO_LENGTH, NO_OVERLAP
 from knowledge_sources.methods.pose.line_set import build_line_set
-from knowledge_sources.methods.pose.numerics.image_error import compute_image_distances, find_in_front, find_overlapping
+from knowledge_sources.methods.pose.numerics.image_error import compute_image_distances, measure_lines
+from knowledge_sources.settings import DEFAULT
 
 SOLVERS = [r_then_t, r_and_t, r_and_t_ml, med_r_and_t, trunc_r_and_t]
 ROBUST = [med_r_and_t, trunc_r_and_t]
@@ -61,8 +62,7 @@ def test_each_rejected_line_has_a_reason_that_is_true(solver: Solver, scene: Pos
     segments[1] += 3.0 * along
     found = solve(solver, scene, segments, rng)
     lines, pose = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX), found.camera_from_world
-    front = find_in_front(lines, pose.rotation, pose.translation)
-    over = find_overlapping(lines, pose.rotation, pose.translation)
+    _, front, over = measure_lines(lines, pose.rotation, pose.translation, DEFAULT.pose.max_beside_px)
     far = np.sum((found.residuals_px / SIGMA_PX) ** 2, axis=1)
     assert found.rejected[0] == NO_LENGTH and found.rejected[1] is not None
     for i, reason in enumerate(found.rejected):

@@ -1,1 +1,1 @@
-"""The least squares behind the pose solvers: residuals, Jacobians, Levenberg-Marquardt, subsets."""
+"""Inside the pose solvers: residuals, Jacobians, Levenberg-Marquardt, subsets, last checks."""

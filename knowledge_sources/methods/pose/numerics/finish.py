@@ -1,30 +1,19 @@
-"""What every solver does last: depth signs, reasons, and the prior where the lines do not know better."""
+"""The last steps of every solver: sign of the depths, rejections, and the prior where it is better."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
-from knowledge_sources.methods.pose.estimate import (
-    BEHIND,
-    DISTANCE,
-    NO_LENGTH,
-    NO_OVERLAP,
-    Array,
-    Mask,
-    PoseEstimate,
-)
+from knowledge_sources.methods.arrays import Floats, Mask
+from knowledge_sources.methods.pose.estimate import BEHIND, DISTANCE, NO_LENGTH, NO_OVERLAP, PoseEstimate
 from knowledge_sources.methods.pose.line_set import LineSet
-from knowledge_sources.methods.pose.numerics.image_error import aspects, find_in_front
-from knowledge_sources.methods.pose.numerics.levenberg_marquardt import orthonormal
-from world_models.frames import Pose
-
-WEAK_TURN_RAD = 0.3
-WEAK_SHIFT_M = 3.0
-WEAK_INFORMATION = np.diag([WEAK_TURN_RAD**-2] * 3 + [WEAK_SHIFT_M**-2] * 3)
-"""(6, 6) what a prior without a covariance is taken to be worth: too little to move a pose that lines decide."""
-WEAK_INFORMATION.setflags(write=False)
+from knowledge_sources.methods.pose.numerics.image_error import find_in_front, measure_lines
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import orthonormalise
+from knowledge_sources.settings.pose import PoseSettings
+from world_models.frames import Pose, frozen
 
 FEW_LINES = "fewer than 3 lines: the prior decides the rest"
 UNDECIDED = "the lines leave a direction open: the prior decides it"
@@ -32,23 +21,39 @@ NOT_BETTER = "no pose fits better than the prior"
 ALL_BEHIND = "every pose found lies behind the camera: the prior is returned"
 NO_SUBSET = "no subset of lines agrees: the prior is returned"
 
+MIN_LENGTH_PX = 1e-9
+"""A shorter segment has no direction."""
 
-def open_direction(hessian: Array) -> bool:
+
+def compute_weak_information(settings: PoseSettings) -> Floats:
+    """(6, 6) information of a prior without a covariance: too little to move a pose that lines decide. Read-only."""
+    return _compute_weak_information(settings.weak_rotation_rad, settings.weak_translation_m)
+
+
+@lru_cache(maxsize=8)
+def _compute_weak_information(rotation_rad: float, translation_m: float) -> Floats:
+    return frozen(np.diag([rotation_rad**-2] * 3 + [translation_m**-2] * 3))
+
+
+def has_open_direction(hessian: Floats, settings: PoseSettings) -> bool:
     """Whether, in some direction, the lines know less than a weak prior."""
-    scale = 1.0 / np.sqrt(np.diag(WEAK_INFORMATION))
+    scale = 1.0 / np.sqrt(np.diag(compute_weak_information(settings)))
     return bool(np.linalg.eigvalsh(hessian * scale[:, None] * scale)[0] < 1.0)
 
 
-def mostly_in_front(lines: LineSet, rotation: Array, translation: Array) -> bool:
+def is_mostly_in_front(lines: LineSet, rotation: Floats, translation: Floats) -> bool:
     """Whether more than half of the lines pass in front of the camera."""
     return len(lines) == 0 or 2 * int(np.count_nonzero(find_in_front(lines, rotation, translation))) > len(lines)
 
 
-def reasons(lines: LineSet, rotation: Array, translation: Array, near: Mask) -> tuple[str | None, ...]:
+def find_rejections(
+    lines: LineSet, rotation: Floats, translation: Floats, near: Mask, settings: PoseSettings
+) -> tuple[str | None, ...]:
     """Why each line is no inlier (n); ``near`` (n,) says which are near enough to their model line."""
-    _, front, over = aspects(lines, rotation, translation)
-    beside = ~over
-    tests = ((lines.lengths_px <= 1e-9, NO_LENGTH), (~near, DISTANCE), (~front, BEHIND), (beside, NO_OVERLAP))
+    _, front, overlap = measure_lines(lines, rotation, translation, settings.max_beside_px)
+    tests = (
+        (lines.lengths_px <= MIN_LENGTH_PX, NO_LENGTH), (~near, DISTANCE), (~front, BEHIND), (~overlap, NO_OVERLAP)
+    )
     out: list[str | None] = [None] * len(lines)
     for mask, reason in tests:
         for i in np.flatnonzero(mask):
@@ -56,11 +61,16 @@ def reasons(lines: LineSet, rotation: Array, translation: Array, near: Mask) -> 
     return tuple(out)
 
 
-def estimate_at(
+def reject_behind(lines: LineSet, rotation: Floats, translation: Floats) -> tuple[str | None, ...]:
+    """Reasons of a solver that rejects only what lies behind the camera."""
+    return tuple(None if f else BEHIND for f in find_in_front(lines, rotation, translation))
+
+
+def build_estimate(
     lines: LineSet,
-    rotation: Array,
-    translation: Array,
-    covariance: Array,
+    rotation: Floats,
+    translation: Floats,
+    covariance: Floats,
     rejected: tuple[str | None, ...],
     cost: float,
     iterations: int,
@@ -68,10 +78,10 @@ def estimate_at(
 ) -> PoseEstimate:
     """The estimate at a pose, with its residuals."""
     return PoseEstimate(
-        camera_from_world=Pose(orthonormal(rotation), translation),
+        camera_from_world=Pose(orthonormalise(rotation), translation),
         covariance=0.5 * (covariance + covariance.T),
         inliers=np.array([r is None for r in rejected], dtype=bool),
-        residuals_px=aspects(lines, rotation, translation)[0],
+        residuals_px=measure_lines(lines, rotation, translation)[0],
         rejected=rejected,
         cost=cost,
         iterations=iterations,
@@ -79,22 +89,18 @@ def estimate_at(
     )
 
 
-def prior_estimate(lines: LineSet, prior: Pose, reason: str) -> PoseEstimate:
-    """The prior as it came, with the reason why; lines behind it are no inliers."""
-    front = find_in_front(lines, prior.rotation, prior.translation)
-    rejected = tuple(None if f else BEHIND for f in front)
-    covariance = np.linalg.inv(WEAK_INFORMATION)
-    return estimate_at(lines, prior.rotation, prior.translation, covariance, rejected, float("inf"), 0, reason)
+def build_prior_estimate(lines: LineSet, prior: Pose, reason: str, settings: PoseSettings) -> PoseEstimate:
+    """The prior unchanged, with the reason why; lines behind it are no inliers."""
+    rejected = reject_behind(lines, prior.rotation, prior.translation)
+    covariance = np.asarray(np.linalg.inv(compute_weak_information(settings)), float)
+    return build_estimate(lines, prior.rotation, prior.translation, covariance, rejected, float("inf"), 0, reason)
 
 
-def all_kept(lines: LineSet, rotation: Array, translation: Array) -> tuple[str | None, ...]:
-    """Reasons of a solver that rejects nothing but what lies behind the camera."""
-    return tuple(None if f else BEHIND for f in find_in_front(lines, rotation, translation))
-
-
-def guarded(lines: LineSet, prior: Pose, estimate: PoseEstimate, kept: Mask | None = None) -> PoseEstimate:
-    """The estimate if its lines (those ``kept``) lie in front of the camera, else the prior."""
+def check_in_front(
+    lines: LineSet, prior: Pose, estimate: PoseEstimate, settings: PoseSettings, kept: Mask | None = None
+) -> PoseEstimate:
+    """The estimate if most of its lines (those ``kept``) lie in front of the camera, else the prior."""
     pose = estimate.camera_from_world
-    if mostly_in_front(lines if kept is None else lines.take(kept), pose.rotation, pose.translation):
+    if is_mostly_in_front(lines if kept is None else lines.take(kept), pose.rotation, pose.translation):
         return estimate
-    return replace(prior_estimate(lines, prior, ALL_BEHIND), iterations=estimate.iterations)
+    return replace(build_prior_estimate(lines, prior, ALL_BEHIND, settings), iterations=estimate.iterations)

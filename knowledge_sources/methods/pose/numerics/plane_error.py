@@ -6,15 +6,20 @@ from typing import Literal
 
 import numpy as np
 
-from knowledge_sources.methods.pose.estimate import Array
-from knowledge_sources.methods.pose.line_set import TINY, LineSet
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.pose.line_set import LineSet
+from knowledge_sources.methods.pose.numerics.kernels import TINY
 from knowledge_sources.methods.pose.numerics.levenberg_marquardt import cross, invert_information
 
 Weighting = Literal["unit", "length"]
 
 
-def line_weights(lines: LineSet, weighting: Weighting) -> Array:
-    """The paper's weights sigma_i (n,): all one, or the segment's share of the mean length."""
+def compute_line_weights(lines: LineSet, weighting: Weighting) -> Floats:
+    """The paper's weights sigma_i (n,): all one, or the segment's length over the mean length.
+
+    Raises:
+        ValueError: ``weighting`` is neither "unit" nor "length".
+    """
     if weighting == "unit":
         return np.ones(len(lines))
     if weighting == "length":
@@ -22,24 +27,24 @@ def line_weights(lines: LineSet, weighting: Weighting) -> Array:
     raise ValueError(f'expected weighting "unit" or "length", got {weighting!r}')
 
 
-def compute_camera_ends(lines: LineSet, rotation: Array, translation: Array) -> Array:
+def compute_camera_ends(lines: LineSet, rotation: Floats, translation: Floats) -> Floats:
     """q = R p + T, (n, 2, 3) [m, camera]."""
     return np.asarray(lines.points @ rotation.T + translation)
 
 
-def compute_plane_distances(lines: LineSet, ends: Array) -> Array:
+def compute_plane_distances(lines: LineSet, ends: Floats) -> Floats:
     """n . q, (n, 2) [m]: the bracket of E1."""
     return np.asarray(np.matmul(ends, lines.normals[:, :, None])[..., 0])
 
 
-def compute_plane_jacobian(lines: LineSet, ends: Array) -> Array:
+def compute_plane_jacobian(lines: LineSet, ends: Floats) -> Floats:
     """Derivatives (n, 2, 6) of n . q by the left perturbation: (q x n, n)."""
     turn = cross(ends, lines.normals[:, None, :])
     return np.concatenate([turn, np.broadcast_to(lines.normals[:, None, :], ends.shape)], axis=-1)
 
 
-def best_translation(lines: LineSet, rotation: Array, translation: Array, weights: Array) -> Array:
-    """T (3,) that minimises E1 for a given R, exactly; what the lines do not say stays as in ``translation``."""
+def compute_translation(lines: LineSet, rotation: Floats, translation: Floats, weights: Floats) -> Floats:
+    """T (3,) that minimises E1 exactly for a given R; in directions that the lines leave open, ``translation``'s."""
     misses = compute_plane_distances(lines, compute_camera_ends(lines, rotation, translation))
     weighted = lines.normals * weights[:, None]
     moved = weighted.T @ misses.sum(axis=1)
@@ -49,8 +54,8 @@ def best_translation(lines: LineSet, rotation: Array, translation: Array, weight
     return np.asarray(translation - vectors @ (back * (vectors.T @ moved)))
 
 
-def end_noise(lines: LineSet, vectors: Array) -> Array:
-    """How n . v moves when the observed ends move across their segment by one sigma: (n, k, 2) for v (n, k, 3)."""
+def compute_end_noise(lines: LineSet, vectors: Floats) -> Floats:
+    """Change (n, k, 2) of n . v, v (n, k, 3), when the observed ends move across their segment by one sigma."""
     first, second = lines.rays[:, 0], lines.rays[:, 1]
     along = (second - first)[:, :2] * lines.focal_px
     across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(lines.lengths_px, TINY)[:, None]
@@ -61,15 +66,15 @@ def end_noise(lines: LineSet, vectors: Array) -> Array:
     return np.asarray(vectors @ np.swapaxes(planes, 1, 2))
 
 
-def propagated_covariance(lines: LineSet, rotation: Array, translation: Array, weights: Array) -> Array:
-    """(6, 6) covariance of the minimum of E1 with ``weights`` (n, 2): its noise carried through.
+def propagate_covariance(lines: LineSet, rotation: Floats, translation: Floats, weights: Floats) -> Floats:
+    """(6, 6) covariance of the minimum of E1 with ``weights`` (n, 2): the noise of the ends, propagated.
 
-    E1 is not a likelihood, so the inverse Hessian would not do. For E2 divide the weights by |q|^2.
+    E1 is not a likelihood, so the inverse Hessian is not its covariance. For E2 divide the weights by |q|^2.
     """
     ends = compute_camera_ends(lines, rotation, translation)
     jacobian = compute_plane_jacobian(lines, ends)
     weighted = jacobian * weights[..., None]
     hessian = np.einsum("ika,ikb->ab", weighted, jacobian)
-    spread = np.einsum("ika,ikj->aij", weighted, end_noise(lines, ends)).reshape(6, -1)
+    spread = np.einsum("ika,ikj->aij", weighted, compute_end_noise(lines, ends)).reshape(6, -1)
     gain = invert_information(hessian) @ spread
     return np.asarray(gain @ gain.T)
