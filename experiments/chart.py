@@ -1,4 +1,4 @@
-"""Charts: the pictures of experiments, drawn by matplotlib in one style."""
+"""Charts of experiments, drawn with matplotlib in one style."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 OURS, PEER, PAPER = "#1f6fb4", "#d9822b", "#777777"
-"""Colours: blue is Harvey's, orange a peer's, grey the paper's or a limit."""
+"""Colours: blue for Harvey, orange for a peer, grey for the paper or a limit."""
 SIZE_IN, DOTS = (7.0, 4.5), 130
 
 
 @contextmanager
 def chart(path: Path, title: str, x: str, y: str, size_in: tuple[float, float] = SIZE_IN) -> Iterator[Axes]:
-    """Axes to draw on; when the block ends they are written to ``path`` (PNG) with a legend, if any."""
+    """Yield axes to draw on; at the end of the block they are written to ``path`` (PNG), with a legend if any."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=size_in, dpi=DOTS, layout="constrained")

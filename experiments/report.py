@@ -1,8 +1,9 @@
-"""Report: what every experiment returns, printed as a table or as JSON."""
+"""Report of an experiment: a table with notes and claims, printed as text or JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
@@ -11,24 +12,24 @@ from harvey.tables import table
 
 WIDTH = 120
 Cell = str | int | float | None
-"""None is shown as a dash: nobody has measured it."""
+"""None, shown as a dash: not measured."""
 
 SIDES: Mapping[str, tuple[str, ...]] = {
     "paper": ("paper", "literature"), "peer": ("peer", "py_trees", "clips", "networkx"), "ours": (),
 }
-"""Whose figures a column holds, by a word in its name; ours where there is none of these."""
+"""Source of a column's figures by a word in its name; ours if it has none of these."""
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A table of measurements with what was assumed.
+    """A table of measurements with its assumptions.
 
     Attributes:
-        title: what was measured.
-        columns: names of the columns; by custom what, paper, peer, ours.
+        title: the quantity measured.
+        columns: names of the columns; by convention what, paper, peer, ours.
         rows: as many cells each.
-        notes: every assumption, and what the figures say.
-        claims: what must hold, each with whether it does.
+        notes: assumptions, and the meaning of the figures.
+        claims: statements that must hold, each with whether it does.
     """
 
     title: str
@@ -44,20 +45,20 @@ class Report:
 
     @property
     def holds(self) -> bool:
-        """Whether every claim does."""
+        """Whether every claim holds."""
         return all(held for _, held in self.claims)
 
     def text(self) -> str:
-        """For people."""
-        shown = table(self.columns, [[_shown(cell) for cell in row] for row in self.rows])
+        """The report as text for a terminal."""
+        shown = table(self.columns, [[_format_cell(cell) for cell in row] for row in self.rows])
         claims = [f"{'holds' if held else 'FAILS'}: {claim}" for claim, held in self.claims]
         words = [fill(line, WIDTH, subsequent_indent="  ") for line in (*self.notes, *claims)]
         return "\n".join([self.title, "", shown, *([""] if words else []), *words])
 
     def record(self) -> Mapping[str, Any]:
-        """As JSON types: a row has its cells by the names of their columns, and ``paper``, ``peer`` and ``ours``.
+        """The report as JSON types: each row has its cells by column name, and ``paper``, ``peer`` and ``ours``.
 
-        Each of these three is a figure, or the figures of several columns by their names, or null.
+        Each of these three is one figure, several figures by column name, or null.
         """
         return {
             "title": self.title,
@@ -66,13 +67,18 @@ class Report:
             "claims": [{"claim": claim, "holds": held} for claim, held in self.claims],
         }
 
-
     def _row(self, cells: Mapping[str, Cell]) -> Mapping[str, Any]:
         what, *measured = self.columns
         sides: dict[str, dict[str, Cell]] = {side: {} for side in SIDES}
         for column in measured:
             sides[_side_of(column)][column] = cells[column]
-        return {"what": cells[what], **{side: _alone(figures) for side, figures in sides.items()}, **cells}
+        return {"what": cells[what], **{side: _unpack_single(figures) for side, figures in sides.items()}, **cells}
+
+
+def count_kinds(kinds: Iterable[str]) -> str | None:
+    """Count equal words for a cell: ``"2 lost, 1 blocked"``; None if there are none."""
+    counts = sorted(Counter(kinds).items())
+    return ", ".join(f"{number} {kind}" for kind, number in counts) or None
 
 
 def _side_of(column: str) -> str:
@@ -80,11 +86,11 @@ def _side_of(column: str) -> str:
     return next((side for side, words in SIDES.items() if any(word in name for word in words)), "ours")
 
 
-def _alone(figures: Mapping[str, Cell]) -> Cell | Mapping[str, Cell]:
+def _unpack_single(figures: Mapping[str, Cell]) -> Cell | Mapping[str, Cell]:
     return dict(figures) if len(figures) > 1 else next(iter(figures.values()), None)
 
 
-def _shown(cell: Cell) -> str:
+def _format_cell(cell: Cell) -> str:
     if cell is None:
         return "-"
     if not isinstance(cell, float):

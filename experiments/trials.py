@@ -1,8 +1,7 @@
-"""Many trials over all cores, kept as they are done: a campaign that is broken off goes on where it was.
+"""Run many trials on all cores and keep each result, so that an interrupted campaign continues where it was.
 
-A trial is told by its place in the list alone, and its result follows from it alone; so neither the number of workers
-nor a break changes what a campaign finds. What other code than today's found, or another kind of processor, is found
-anew.
+A result depends on its trial alone, so neither the number of workers nor an interruption changes what a campaign
+finds. Results of other code than today's, or of another kind of processor, are computed anew.
 """
 
 from __future__ import annotations
@@ -25,33 +24,34 @@ from harvey.run_files.run_directory import RUNS
 T = TypeVar("T")
 R = TypeVar("R")
 
+RESULTS = "results.jsonl"
 PACKAGES = ("blackboard", "world_models", "knowledge_sources", "sim", "logs", "harvey")
 
 
 def campaign_folder(name: str, seed: int, *, quick: bool) -> Path:
-    """Where a campaign keeps what it finds, its table and its pictures: ``runs/experiments/...``."""
+    """Make the folder of a campaign's results, table and pictures: ``runs/experiments/NAME/...``."""
     folder = RUNS / "experiments" / name / f"{'quick' if quick else 'full'}-{seed}"
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
-def found_by_all(work: Callable[[T], R], trials: Sequence[T], kind: type[R], folder: Path, unit: str = "trial",
-                 ) -> list[R]:
-    """What ``work`` finds in each trial, in their order; what ``folder`` has of them already is not done again.
+def run_trials(work: Callable[[T], R], trials: Sequence[T], kind: type[R], folder: Path, unit: str = "trial",
+               ) -> list[R]:
+    """Return the result of each trial, in order; results that ``folder`` has already are not computed again.
 
     Args:
-        work: a function of a module, called in worker processes, one a core.
-        kind: the dataclass of what it finds, of plain JSON types.
+        work: a function of a module, called in worker processes, one per core.
+        kind: the dataclass of a result, of plain JSON types.
 
     Raises:
         BadInput: a worker was killed from outside.
     """
     if not is_dataclass(kind):
-        raise ValueError(f"expected a dataclass of what is found, got {kind}")
-    path = folder / "found.jsonl"
-    known: dict[int, R] = dict(_kept(path, len(trials), kind))
+        raise ValueError(f"expected a dataclass of results, got {kind}")
+    path = folder / RESULTS
+    known: dict[int, R] = dict(_read_results(path, len(trials), kind))
     part = path.with_suffix(".part")
-    part.write_text("".join([_line(_finder()), *(_found_line(*kept) for kept in known.items())]), "utf-8")
+    part.write_text("".join([_to_line(_origin()), *(_result_line(*item) for item in known.items())]), "utf-8")
     part.replace(path)
     with (
         path.open("a", encoding="utf-8") as out,
@@ -59,40 +59,40 @@ def found_by_all(work: Callable[[T], R], trials: Sequence[T], kind: type[R], fol
              leave=False) as bar,
     ):
         todo = [number for number in range(len(trials)) if number not in known]
-        for place, found in by_workers(work, [trials[number] for number in todo]):
-            known[todo[place]] = found
-            out.write(_found_line(todo[place], found))
+        for place, result in by_workers(work, [trials[number] for number in todo]):
+            known[todo[place]] = result
+            out.write(_result_line(todo[place], result))
             out.flush()
             bar.update()
     return [known[number] for number in range(len(trials))]
 
 
-def _found_line(number: int, found: Any) -> str:
-    return _line({"number": number, "found": asdict(found)})
+def _result_line(number: int, result: Any) -> str:
+    return _to_line({"number": number, "result": asdict(result)})
 
 
-def _line(record: dict[str, Any]) -> str:
+def _to_line(record: dict[str, Any]) -> str:
     return f"{json.dumps(record)}\n"
 
 
-def _finder() -> dict[str, str]:
-    """Who finds here: a campaign's first line."""
+def _origin() -> dict[str, str]:
+    """Code and processor that compute the results: a campaign's first line."""
     return {"code": code_digest(), "arithmetic": arithmetic()}
 
 
 @cache
 def code_digest() -> str:
-    """The code that decides, as a digest of its files."""
+    """Digest of the code that decides."""
     root = Path(__file__).resolve().parents[1]
     files = [files_in(root, package, (".py", ".toml")) for package in PACKAGES]
-    return digest_of({name: path for found in files for name, path in found.items()})
+    return digest_of({name: path for package in files for name, path in package.items()})
 
 
-def _kept(path: Path, trials: int, kind: type[R]) -> Iterator[tuple[int, R]]:
-    """What an earlier process of the same code found likewise; a line that was cut off is left out."""
+def _read_results(path: Path, trials: int, kind: type[R]) -> Iterator[tuple[int, R]]:
+    """Read the results of an earlier process of the same code; a line that was cut off is left out."""
     lines = path.read_text(encoding="utf-8").split("\n")[:-1] if path.is_file() else []
-    if not lines or json.loads(lines[0]) != _finder():
+    if not lines or json.loads(lines[0]) != _origin():
         return
     for record in map(json.loads, lines[1:]):
         if record["number"] < trials:
-            yield record["number"], kind(**record["found"])
+            yield record["number"], kind(**record["result"])

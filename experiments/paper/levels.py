@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from experiments.report import Cell, Report
+from experiments.report import Cell, Report, count_kinds
 from harvey.campaign.campaign import Task, run_all
 from harvey.campaign.progress import counted
 from harvey.units import INCH_M
@@ -65,10 +65,9 @@ def run(quick: bool, seed: int) -> Report:
 
 def _row(scenario: str, name: str, results: Sequence[MissionResult]) -> tuple[Cell, ...]:
     errors_m = [r.error_m for r in results]
-    others = sorted({r.outcome for r in results} - {"reached"})
     return (
         scenario, name, sum(1 for r in results if r.outcome == "reached"), _within_inch(results),
-        ", ".join(f"{sum(1 for r in results if r.outcome == kind)} {kind}" for kind in others) or None,
+        count_kinds(r.outcome for r in results if r.outcome != "reached"),
         1000.0 * math.fsum(errors_m) / len(errors_m), 1000.0 * max(errors_m),
         1000.0 * max(r.max_cross_track_m or 0.0 for r in results),
         sum(r.collisions or 0 for r in results), sum(r.false_accepts for r in results),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from experiments.chart import OURS, PAPER, PEER, chart
 from experiments.paper.table1_drives import INCREMENTS, Drive, Driven, driven, driven_and_kept, unservoed
 from experiments.report import Cell, Report
-from experiments.trials import campaign_folder, found_by_all
+from experiments.trials import RESULTS, campaign_folder, run_trials
 from harvey.run_files.run_directory import vacant
 
 Floats = NDArray[np.float64]
@@ -38,7 +38,7 @@ def run(quick: bool, seed: int) -> Report:
     moving = [Drive(d.seed, QUICK_FEET if quick else 40, True)
               for d in drives[: QUICK_ON_THE_MOVE if quick else ON_THE_MOVE]]
     folder = campaign_folder("table1", seed, quick=quick)
-    found = found_by_all(driven, [*drives, *moving], Driven, folder, "drive")
+    found = run_trials(driven, [*drives, *moving], Driven, folder, "drive")
     stopping, rolling = found[: len(drives)], found[len(drives):]
     pictures = [folder / "figure11.png", folder / "errors.png"]
     _draw(stopping, rolling, pictures)
@@ -56,7 +56,7 @@ def run(quick: bool, seed: int) -> Report:
             f"On the move: {len(moving)} of the same drives, {moving[0].feet} feet, thirty pictures a second; x is read"
             " where the increments would end.",
             *_worst(stopping, folder),
-            f"Pictures: {', '.join(map(str, pictures))}; every drive in a line: {folder / 'found.jsonl'}",
+            f"Pictures: {', '.join(map(str, pictures))}; every drive in a line: {folder / RESULTS}",
         ),
         claims=(*_claims("servoed", stopping), *_claims("on the move", rolling), _drift_claim(stopping)),
     )

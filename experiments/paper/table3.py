@@ -24,7 +24,7 @@ from experiments.paper.table3_trials import (
     scene_of,
 )
 from experiments.report import Cell, Report
-from experiments.trials import campaign_folder, found_by_all
+from experiments.trials import campaign_folder, run_trials
 
 Array = NDArray[np.float64]
 Claims = list[tuple[str, bool]]
@@ -99,7 +99,7 @@ def _all_found(frames: Sequence[Frame], seed: int, count: int, folder: Path) -> 
         Trials(frame, tuple(seeds[number][k : k + BATCH]))
         for number, frame in enumerate(frames) for k in range(0, count, BATCH)
     ]
-    done = found_by_all(errors_of, jobs, TrialErrors, folder, f"x {BATCH} trials")
+    done = run_trials(errors_of, jobs, TrialErrors, folder, f"x {BATCH} trials")
     each = len(jobs) // len(frames)
     return [_joined(done[i * each : (i + 1) * each]) for i in range(len(frames))]
 

@@ -1,4 +1,4 @@
-"""The corridor photographs and their surveyed lines, where they are beside the repository."""
+"""The corridor photographs with their surveyed lines (Oxford VGG)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.shared_data import CORRIDOR, data_path
 from harvey.errors import BadInput
 from knowledge_sources.methods.features.images import decode
 from world_models.camera import Camera
@@ -18,13 +19,10 @@ from world_models.frames import Pose
 
 Array = NDArray[np.float64]
 
-FOLDER = Path(__file__).parents[3] / "shared" / "data" / "corridor"
-SHOWN = "../shared/data/corridor"
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorridorFrame:
-    """A photograph (h, w), its camera, its reference pose and the segments (k, 2, 2) that its publishers found."""
+    """A photograph (h, w), its camera, its reference pose and its publishers' segments (k, 2, 2)."""
 
     image: NDArray[np.uint8]
     camera: Camera
@@ -34,24 +32,25 @@ class CorridorFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Corridor:
-    """Model lines (m, 2, 3) in a unit of length of their own, and the frames."""
+    """Model lines (m, 2, 3) in the survey's own unit of length, and the frames."""
 
     model_lines: Array
     frames: tuple[CorridorFrame, ...]
 
     @property
     def step(self) -> float:
-        """How far the camera goes between frames, on average."""
+        """Mean distance of the camera between frames."""
         places = np.array([frame.camera_from_world.inverse().translation for frame in self.frames])
         return float(np.mean(np.linalg.norm(np.diff(places, axis=0), axis=1)))
 
 
-def load_corridor(folder: Path = FOLDER) -> Corridor | None:
-    """The data, ``None`` where there are none.
+def load_corridor(folder: Path | None = None) -> Corridor | None:
+    """Load the data; ``None`` if there are none.
 
     Raises:
         BadInput: the file is there but is not what it should be.
     """
+    folder = folder or data_path(CORRIDOR)
     path = folder / "corridor.json"
     if not path.is_file():
         return None
@@ -62,7 +61,7 @@ def load_corridor(folder: Path = FOLDER) -> Corridor | None:
     except KeyError as missing:
         raise BadInput(f"{path}: expected a key {missing}, there is none") from None
     except (ValueError, TypeError, OSError) as wrong:
-        raise BadInput(f"{path}: expected lines and frames of the corridor, got what says: {wrong}") from None
+        raise BadInput(f"{path}: expected lines and frames of the corridor, got {wrong}") from None
     if len(frames) < 2:
         raise BadInput(f"{path}: expected at least 2 frames, got {len(frames)}")
     return Corridor(model, frames)

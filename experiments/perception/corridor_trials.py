@@ -1,4 +1,4 @@
-"""One disturbed pose in a photograph of the corridor: who finds back, and what is said of it."""
+"""Pose recovery from one perturbed pose in a photograph of the corridor: ours, the paper's and the peer's."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.paper.pose_peer import Peer
-from experiments.perception.corridor_data import SHOWN, Corridor, CorridorFrame, load_corridor
+from experiments.perception.corridor_data import Corridor, CorridorFrame, load_corridor
+from experiments.shared_data import CORRIDOR, describe_absence
 from harvey.errors import BadInput
 from knowledge_sources.methods.features.lines import LineSegments, find_lines
 from knowledge_sources.methods.localization.locate_camera import LEAST_LENGTH_PX, CameraFix, PoseVerdict, locate_camera
@@ -21,14 +22,14 @@ from world_models.frames import Pose
 
 Array = NDArray[np.float64]
 
-SHIFT_STEPS, TURN_RAD = 0.5, math.radians(3.0)
-BACK_STEPS, BACK_RAD = 0.05, math.radians(0.3)
-PEER_LIMIT_PX = 3.0
+PERTURB_STEPS, PERTURB_RAD = 0.5, math.radians(3.0)
+MAX_ERROR_STEPS, MAX_ERROR_RAD = 0.05, math.radians(0.3)
+PEER_MAX_RESIDUAL_PX = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Disturbance:
-    """How the reference poses are disturbed: ``scale`` times the stated errors, or up to that; and how often."""
+class Perturbation:
+    """How the reference poses are perturbed: ``scale`` times the stated errors, or up to that; and how often."""
 
     name: str
     scale: float
@@ -39,87 +40,89 @@ class Disturbance:
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """A disturbance of a frame; its seed decides it."""
+    """A perturbation of a frame, determined by its seed."""
 
-    test: Disturbance
+    test: Perturbation
     frame: int
     seed: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """What came of it: who came back, and what ours said of itself.
+    """Result of an attempt.
 
     Attributes:
-        shift_steps, turn_rad: how far off ours is. verdict: ours of itself, the value of a :class:`PoseVerdict`.
+        recovered: whether our pose is right; peer_recovered, paper_recovered: the same of the others.
+        verdict: our own verdict, the value of a :class:`PoseVerdict`.
+        shift_steps, turn_rad: error of our pose.
     """
 
-    back: bool
+    recovered: bool
     verdict: str
-    peer_back: bool
-    paper_back: bool
+    peer_recovered: bool
+    paper_recovered: bool
     shift_steps: float
     turn_rad: float
 
     @property
     def is_verified(self) -> bool:
-        """Whether it said that it was right."""
+        """Whether its own verdict is that it is right."""
         return self.verdict == PoseVerdict.VERIFIED.value
 
     @property
-    def is_silent(self) -> bool:
-        """Whether it was wrong and said that it was right."""
-        return not self.back and self.is_verified
+    def is_false_accept(self) -> bool:
+        """Whether it is wrong and was verified."""
+        return not self.recovered and self.is_verified
 
 
-def tried(attempt: Attempt) -> Trial:
-    """Ours, the paper's way and the peer from one disturbed pose."""
-    data, (prior, rng) = _corridor(), disturbed(attempt)
-    frame, segments = data.frames[attempt.frame], segments_of(attempt.frame)
-    ours = found_from(attempt.frame, prior, rng)
+def run_attempt(attempt: Attempt) -> Trial:
+    """Run ours, the paper's method and the peer from one perturbed pose."""
+    data, (prior, rng) = _corridor(), perturb_reference(attempt)
+    frame, segments = data.frames[attempt.frame], find_segments(attempt.frame)
+    ours = locate_from(attempt.frame, prior, rng)
     shift, turn = _errors(prior if ours is None else ours.camera_from_world, frame, data.step)
     peer = Peer.found()
     return Trial(
-        back=shift <= BACK_STEPS and turn <= BACK_RAD,
+        recovered=shift <= MAX_ERROR_STEPS and turn <= MAX_ERROR_RAD,
         verdict=(PoseVerdict.NOT_TESTABLE if ours is None else ours.verdict).value,
-        peer_back=peer is not None and ours is not None
-        and _is_back(_peers(peer, data, frame, ours, prior), frame, data.step),
-        paper_back=_is_back(_papers(data, frame, segments, prior, rng), frame, data.step),
+        peer_recovered=peer is not None and ours is not None
+        and _is_recovered(_solve_as_peer(peer, data, frame, ours, prior), frame, data.step),
+        paper_recovered=_is_recovered(_solve_as_paper(data, frame, segments, prior, rng), frame, data.step),
         shift_steps=shift,
         turn_rad=turn,
     )
 
 
-def disturbed(attempt: Attempt) -> tuple[Pose, np.random.Generator]:
-    """The reference pose moved and turned in random directions, and the generator that goes on from there."""
+def perturb_reference(attempt: Attempt) -> tuple[Pose, np.random.Generator]:
+    """Move and turn the reference pose in random directions; returned with the generator for the rest."""
     rng, data, test = np.random.default_rng(attempt.seed), _corridor(), attempt.test
     axes = rng.normal(size=(2, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     sizes = test.scale * (rng.uniform(size=2) if test.up_to else np.ones(2))
     pose = data.frames[attempt.frame].camera_from_world
-    return pose.perturbed(TURN_RAD * sizes[0] * axes[0], SHIFT_STEPS * data.step * sizes[1] * axes[1]), rng
+    return pose.perturbed(PERTURB_RAD * sizes[0] * axes[0], PERTURB_STEPS * data.step * sizes[1] * axes[1]), rng
 
 
-def found_from(number: int, prior: Pose, rng: np.random.Generator) -> CameraFix | None:
-    """Ours, from a pose believed to 0.5 step and 3 degrees: 2 deviations."""
+def locate_from(number: int, prior: Pose, rng: np.random.Generator) -> CameraFix | None:
+    """Our pose from a prior whose two standard deviations are 0.5 step and 3 degrees."""
     data = _corridor()
     frame = data.frames[number]
     return locate_camera(
-        data.model_lines, frame.image, frame.camera, prior, _spread(data.step), tolerance_m=BACK_STEPS * data.step,
-        tolerance_rad=BACK_RAD, rng=rng, segments=segments_of(number),
+        data.model_lines, frame.image, frame.camera, prior, _prior_covariance(data.step),
+        tolerance_m=MAX_ERROR_STEPS * data.step, tolerance_rad=MAX_ERROR_RAD, rng=rng, segments=find_segments(number),
     )
 
 
-def in_view(lines: Array, frame: CorridorFrame, pose: Pose) -> tuple[Array, Array]:
-    """Model lines (n, 2, 3) in view at some length, and where (n, 2, 2)."""
+def select_visible(lines: Array, frame: CorridorFrame, pose: Pose) -> tuple[Array, Array]:
+    """Select model lines (n, 2, 3) in view and long enough, with their projections (n, 2, 2) [px]."""
     px, visible = frame.camera.project_segments(lines, pose)
     long = np.nan_to_num(np.linalg.norm(px[:, 1] - px[:, 0], axis=1)) >= LEAST_LENGTH_PX
     return lines[visible & long], px[visible & long]
 
 
 @cache
-def segments_of(number: int) -> LineSegments:
-    """What the line finder finds in a whole photograph."""
+def find_segments(number: int) -> LineSegments:
+    """Find the line segments of a whole photograph."""
     return find_lines(_corridor().frames[number].image)
 
 
@@ -127,20 +130,20 @@ def segments_of(number: int) -> LineSegments:
 def _corridor() -> Corridor:
     data = load_corridor()
     if data is None:
-        raise BadInput(f"expected the photographs in {SHOWN}, there are none")
+        raise BadInput(f"expected the photographs: {describe_absence(CORRIDOR)}")
     return data
 
 
-def _spread(step: float) -> Array:
-    """(6, 6) covariance of a belief."""
-    return np.diag([(TURN_RAD / 2.0) ** 2] * 3 + [(SHIFT_STEPS * step / 2.0) ** 2] * 3)
+def _prior_covariance(step: float) -> Array:
+    """(6, 6) covariance of the prior."""
+    return np.diag([(PERTURB_RAD / 2.0) ** 2] * 3 + [(PERTURB_STEPS * step / 2.0) ** 2] * 3)
 
 
-def _papers(
+def _solve_as_paper(
     data: Corridor, frame: CorridorFrame, segments: LineSegments, prior: Pose, rng: np.random.Generator
 ) -> Pose:
-    """§6 once through: the projected model moved rigidly in the picture, then Med R and T."""
-    model, px = in_view(data.model_lines, frame, prior)
+    """§6 once: rigid 2D match of the projected model, then Med R and T."""
+    model, px = select_visible(data.model_lines, frame, prior)
     match = match_lines(px, segments.segments_px, strategy="first", replace=False, peaks=1)
     i, k = match.pairs.T
     return med_r_and_t(
@@ -149,19 +152,19 @@ def _papers(
     ).camera_from_world
 
 
-def _peers(peer: Peer, data: Corridor, frame: CorridorFrame, ours: CameraFix, prior: Pose) -> Pose:
-    """PoseLib's LO-RANSAC on the pairs that we matched."""
+def _solve_as_peer(peer: Peer, data: Corridor, frame: CorridorFrame, ours: CameraFix, prior: Pose) -> Pose:
+    """PoseLib's LO-RANSAC on our pairs."""
     i, k = ours.pairs.T
-    return peer.ransac(data.model_lines[i], ours.segments_px[k], frame.camera, prior, limit_px=PEER_LIMIT_PX)
+    return peer.ransac(data.model_lines[i], ours.segments_px[k], frame.camera, prior, limit_px=PEER_MAX_RESIDUAL_PX)
 
 
 def _errors(pose: Pose, frame: CorridorFrame, step: float) -> tuple[float, float]:
-    """How far off the camera is [steps] and how far turned [rad]."""
+    """Position error [steps] and rotation error [rad]."""
     truth = frame.camera_from_world
     apart = pose.inverse().translation - truth.inverse().translation
     return float(np.linalg.norm(apart)) / step, pose.angle_to(truth)
 
 
-def _is_back(pose: Pose, frame: CorridorFrame, step: float) -> bool:
+def _is_recovered(pose: Pose, frame: CorridorFrame, step: float) -> bool:
     shift, turn = _errors(pose, frame, step)
-    return shift <= BACK_STEPS and turn <= BACK_RAD
+    return shift <= MAX_ERROR_STEPS and turn <= MAX_ERROR_RAD

@@ -1,7 +1,7 @@
-"""Lines seen through a distorting lens: is the picture straightened first, or are the ends of segments afterwards?
+"""Lines through a distorting lens: rectify the picture first, or the ends of the segments afterwards?
 
-Cards whose edges are known are rendered through lenses; their edges are found both ways, and compared with where a
-camera without distortion would see them.
+Cards with known edges are rendered through lenses. Their edges are found both ways and compared with where a camera
+without distortion would see them.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ LENSES: tuple[tuple[str, tuple[float, ...] | None], ...] = (
     ("none", None), ("k1 = -0.1", (-0.1, 0.01, 0.0, 0.0)), ("k1 = -0.2", (-0.2, 0.05, 0.001, -0.0005)),
     ("k1 = -0.35", (-0.35, 0.12, 0.0, 0.0)), ("k1 = +0.1", (0.1, 0.0, 0.0, 0.0)),
 )
-FLAT_M, NEAR_PX, TURN_RAD = 1e6, 3.0, 0.05
-COLUMNS = ("lens", "way", "edges found %", "pieces an edge", "off by px, RMS")
+TEXTURE_M, MAX_OFFSET_PX, MAX_TURN_RAD = 1e6, 3.0, 0.05
+COLUMNS = ("lens", "rectified", "edges found %", "segments per edge", "error px, RMS")
 Floats = NDArray[np.float64]
 
 
 def run(quick: bool, seed: int) -> Report:
-    """``CARDS`` cards, the same for every lens."""
+    """Measure the same cards with every lens."""
     plain = Camera(400.0, 400.0, 255.5, 255.5, 512, 512)
     cards = QUICK_CARDS if quick else CARDS
     rows: list[tuple[Cell, ...]] = []
@@ -41,7 +41,7 @@ def run(quick: bool, seed: int) -> Report:
     for name, distortion in LENSES:
         lens = replace(plain, distortion=distortion)
         for way in ("picture", "ends") if distortion else ("-",):
-            measured = _measured(lens, way, np.random.default_rng(seed), cards)
+            measured = _measure(lens, way, np.random.default_rng(seed), cards)
             found[name, way] = measured
             rows.append((name, way, 100.0 * float(measured[0]), float(measured[1]), float(measured[2])))
     lenses = [name for name, distortion in LENSES if distortion]
@@ -49,23 +49,24 @@ def run(quick: bool, seed: int) -> Report:
         "Edges seen through a distorting lens", COLUMNS, tuple(rows),
         notes=(
             f"{cards} cards, seed {seed}, 512 x 512 px, f = 400 px, blur 0.5 px, noise, JPEG quality 92.",
-            "picture: it is straightened (cubic) before segments are looked for, as the experts do. ends: segments are "
-            "looked for in the picture as it came, and their ends straightened.",
-            "found: part of the edges' length that lies on a segment; off: of a segment's ends, across the true edge.",
+            "picture: it is rectified (cubic) before segments are found, as in missions. ends: segments are found in "
+            "the distorted picture, and their ends rectified.",
+            "edges found: share of the edges' length that lies on a segment; error: of a segment's ends, across the "
+            "true edge.",
         ),
         claims=(
-            ("straightening the picture finds no less of the edges than straightening ends",
+            ("rectifying the picture finds no less of the edges than rectifying ends",
              all(found[n, "picture"][0] >= found[n, "ends"][0] - 0.005 for n in lenses)),
-            ("and puts them nearer to where they are",
+            ("and its errors are no larger",
              all(found[n, "picture"][2] <= found[n, "ends"][2] for n in lenses)),
-            ("edges are within 0.05 px of being as good as without distortion",
+            ("its error is at most 0.05 px larger than without distortion",
              all(found[n, "picture"][2] <= found["none", "-"][2] + 0.05 for n in lenses)),
         ),
     )
 
 
-def _measured(lens: Camera, way: str, rng: np.random.Generator, cards: int) -> Floats:
-    """Part of the edges found, pieces an edge, RMS error [px]."""
+def _measure(lens: Camera, way: str, rng: np.random.Generator, cards: int) -> Floats:
+    """Measure the share of edges found, the segments per edge, and the RMS error [px]."""
     optics, pinhole = Optics.of(lens), lens.pinhole
     rectified = Rectifier(lens, pinhole)
     covered, length, pieces = 0.0, 0.0, 0
@@ -79,7 +80,7 @@ def _measured(lens: Camera, way: str, rng: np.random.Generator, cards: int) -> F
             segments = pinhole.project(lens.rays(segments))
         for edge in range(4):
             a, b = pinhole.project(corners[[edge, (edge + 1) % 4]])
-            on, off = _on(segments, a, b)
+            on, off = _compare_to_edge(segments, a, b)
             covered, length = covered + on, length + float(np.linalg.norm(b - a))
             pieces, errors = pieces + len(off), [*errors, off.ravel()]
     off = np.concatenate(errors)
@@ -87,24 +88,25 @@ def _measured(lens: Camera, way: str, rng: np.random.Generator, cards: int) -> F
 
 
 def _card(rng: np.random.Generator) -> tuple[Renderer, Floats]:
-    """A bright card before a dark wall, all of it in the picture, and its corners (4, 3) [m]."""
+    """A bright card before a dark wall, fully in view, and its corners (4, 3) [m]."""
     square = np.array([(-1.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, -1.0, 0.0), (-1.0, -1.0, 0.0)]) * rng.uniform(0.5, 0.9)
     place = (*rng.uniform(-0.5, 0.5, 2), rng.uniform(3.0, 4.5))
     corners = Pose.from_rotation_vector(rng.uniform(-0.4, 0.4, 3), place).apply(square)
     wall = np.array([(-60.0, 60.0, 9.0), (60.0, 60.0, 9.0), (60.0, -60.0, 9.0), (-60.0, -60.0, 9.0)])
-    faces = (PatchFace((Patch("wall", wall, (0.1, 0.1, 0.1), "plain", FLAT_M),)),
-             PatchFace((Patch("card", corners, (0.7, 0.7, 0.7), "plain", FLAT_M),)))
+    faces = (PatchFace((Patch("wall", wall, (0.1, 0.1, 0.1), "plain", TEXTURE_M),)),
+             PatchFace((Patch("card", corners, (0.7, 0.7, 0.7), "plain", TEXTURE_M),)))
     return Renderer.of_faces(faces), corners
 
 
-def _on(segments: Floats, a: Floats, b: Floats) -> tuple[float, Floats]:
-    """How much of the edge a-b segments cover [px], and the offsets (k, 2) of their ends across it [px]."""
+def _compare_to_edge(segments: Floats, a: Floats, b: Floats) -> tuple[float, Floats]:
+    """Length of the edge a-b covered by segments [px], and the offsets (k, 2) of their ends across it [px]."""
     length = float(np.linalg.norm(b - a))
     along = (b - a) / length
     across = np.array([-along[1], along[0]])
     t, off = (segments - a) @ along, (segments - a) @ across
-    level = np.abs(off[:, 1] - off[:, 0]) < TURN_RAD * np.maximum(np.abs(t[:, 1] - t[:, 0]), 1e-9)
-    here = level & np.all(np.abs(off) < NEAR_PX, axis=1) & np.all((t > -NEAR_PX) & (t < length + NEAR_PX), axis=1)
+    level = np.abs(off[:, 1] - off[:, 0]) < MAX_TURN_RAD * np.maximum(np.abs(t[:, 1] - t[:, 0]), 1e-9)
+    near = np.all(np.abs(off) < MAX_OFFSET_PX, axis=1)
+    here = level & near & np.all((t > -MAX_OFFSET_PX) & (t < length + MAX_OFFSET_PX), axis=1)
     marks = np.linspace(0.0, length, 400)
     low, high = t[here].min(axis=1), t[here].max(axis=1)
     seen = np.any((marks >= low[:, None] - 1.0) & (marks <= high[:, None] + 1.0), axis=0)

@@ -1,4 +1,4 @@
-"""Made-up 2D matching problems: a model moved in the image, seen in skewed fragments among distractors and clutter."""
+"""Synthetic 2D matching problems: a moved model in skewed fragments among distractors and clutter."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ Index = NDArray[np.intp]
 
 SIDE_PX = 512.0
 MAIN_RAD = (0.0, 1.3, 2.0)
-"""Half of the lines keep near one of these directions, as a building's do; the others take any."""
+"""Half of the lines are near one of these directions, as in a building; the others have any."""
 MODEL_LENGTH_PX = (40.0, 180.0)
 SHIFT_PX, TURN_RAD = 15.0, 0.1
 OMITTED = 0.15
 FRAGMENTS = 3
 GAP_SHARE = 0.2
-"""Of a model line's length, up to so much is missing round each fragment."""
+"""Largest missing share of a fragment's length at each end."""
 SKEW_RAD = 0.015
 OFFSET_PX = 0.5
 DISTRACTED = 0.5
@@ -45,8 +45,8 @@ class MatchScene:
     move: Similarity2
 
 
-def match_scene(lines: int, data: int, rng: np.random.Generator) -> MatchScene:
-    """``lines`` model lines and ``data`` data lines: fragments first, then distractors, then clutter."""
+def generate_match_scene(lines: int, data: int, rng: np.random.Generator) -> MatchScene:
+    """Generate ``lines`` model lines and ``data`` data lines: fragments, then distractors, then clutter."""
     model = _model(lines, rng)
     shift, centre = rng.uniform(-SHIFT_PX, SHIFT_PX, 2), model.reshape(-1, 2).mean(axis=0)
     move = Similarity2(
@@ -57,7 +57,7 @@ def match_scene(lines: int, data: int, rng: np.random.Generator) -> MatchScene:
     seen = np.flatnonzero(rng.random(lines) >= OMITTED)
     pieces = [(piece, int(i)) for i in seen for piece in _fragments(moved[i], rng)]
     beside = np.flatnonzero(rng.random(lines) < DISTRACTED)
-    pieces += [(piece, -1) for i in beside for piece in _fragments(_aside(moved[i], rng), rng)]
+    pieces += [(piece, -1) for i in beside for piece in _fragments(_shift_aside(moved[i], rng), rng)]
     pieces = pieces[:data]
     clutter = _clutter(data - len(pieces), rng)
     segments = np.concatenate([np.array([piece for piece, _ in pieces]).reshape(-1, 2, 2), clutter])
@@ -75,17 +75,17 @@ def _model(count: int, rng: np.random.Generator) -> Array:
 
 
 def _fragments(line: Array, rng: np.random.Generator) -> list[Array]:
-    """1 to 3 pieces (2, 2) of a line, with gaps, each turned and moved a little."""
+    """Cut a line into 1 to 3 pieces (2, 2) with gaps, each turned and moved a little."""
     edges = np.linspace(0.0, 1.0, int(rng.integers(1, FRAGMENTS + 1)) + 1)
     parts = []
     for low, high in pairwise(edges):
         room = GAP_SHARE * (high - low)
         start, end = low + rng.uniform(0.0, room), high - rng.uniform(0.0, room)
-        parts.append(_skewed(line[0] + np.outer([start, end], line[1] - line[0]), rng))
+        parts.append(_skew(line[0] + np.outer([start, end], line[1] - line[0]), rng))
     return parts
 
 
-def _skewed(piece: Array, rng: np.random.Generator) -> Array:
+def _skew(piece: Array, rng: np.random.Generator) -> Array:
     span = piece[1] - piece[0]
     across = np.array([-span[1], span[0]])
     slope = rng.normal(0.0, SKEW_RAD) * 0.5 * across
@@ -93,8 +93,8 @@ def _skewed(piece: Array, rng: np.random.Generator) -> Array:
     return np.asarray(piece + offset + np.stack([-slope, slope]))
 
 
-def _aside(line: Array, rng: np.random.Generator) -> Array:
-    """A parallel line 4 to 12 px beside: a frame, a shadow."""
+def _shift_aside(line: Array, rng: np.random.Generator) -> Array:
+    """Shift a line sideways by 4 to 12 px, as a frame or shadow."""
     span = line[1] - line[0]
     across = np.array([-span[1], span[0]]) / np.linalg.norm(span)
     return np.asarray(line + rng.choice([-1.0, 1.0]) * rng.uniform(*BESIDE_PX) * across)

@@ -15,7 +15,7 @@ from experiments.perception.milestones_picture import draw_case
 from experiments.perception.milestones_trials import BLOCK, FLOOR_M, Judged, Trial, judge_trial
 from experiments.perception.milestones_trials import Found as FoundCases
 from experiments.report import Cell, Report
-from experiments.trials import campaign_folder, found_by_all
+from experiments.trials import campaign_folder, run_trials
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 
 FLOORS, EACH = 25, 420
@@ -61,7 +61,7 @@ def judged_on(first_floor: int, floors: int, each: int, folder: Path) -> list[Ju
     """Every case of so many floors, in order; what the folder has already is not done again."""
     trials = [Trial(first_floor + k, first, min(BLOCK, each - first))
               for k in range(floors) for first in range(0, each, BLOCK)]
-    found = found_by_all(judge_trial, trials, FoundCases, folder, "block")
+    found = run_trials(judge_trial, trials, FoundCases, folder, "block")
     return [Judged(**table) for block in found for table in block.judged]
 
 

@@ -1,8 +1,8 @@
-"""Does the model know what is visible? Its shadow volumes against the simulator's renderer, in made-up houses.
+"""Visibility by the model's shadow volumes against the simulator's renderer, in generated houses.
 
-A pixel's ray meets several surfaces; the renderer draws one of them. For a surface picked from those that the ray meets
-the model is asked whether the point on it is hidden. The two share no code: the renderer projects by itself and keeps
-a depth for every sample, the model cuts by planes and goes through doorways.
+A pixel's ray meets several surfaces, of which the renderer draws one. The model decides whether the point on a surface
+picked from them is hidden. The two share no code: the renderer has its own projection and a depth buffer; the model
+clips by planes and passes through doorways.
 """
 
 from __future__ import annotations
@@ -29,46 +29,46 @@ from world_models.visibility.lines_and_points import hidden
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 256, 256)
 MOUNT = CameraMount(1.0, 0.1)
 HOUSES, QUICK_HOUSES, VIEWS, RAYS = 60, 8, 6, 300
-LEAST = 0.999
+MIN_AGREEMENT = 0.999
 ROBOT_M = 0.35
 """Radius of the robot that carries the camera."""
 SAMPLES = 4
 
 
 def run(quick: bool, seed: int) -> Report:
-    """So many houses, views and rays."""
+    """Compare model and renderer over houses, views and rays."""
     houses = QUICK_HOUSES if quick else HOUSES
     rows, agreed, asked = [], 0, 0
     for number in tqdm(range(houses), file=sys.stderr, disable=not sys.stderr.isatty(), leave=False):
-        same, points = agreement(np.random.default_rng([seed, number]))
+        same, points = count_agreement(np.random.default_rng([seed, number]))
         agreed, asked = agreed + same, asked + points
         rows.append((number, points, points - same))
     worst = max(rows, key=lambda row: row[2] / max(row[1], 1))
-    part = agreed / asked
+    share = agreed / asked
     return Report(
         "Visibility by the model against the renderer", ("what", "ours"),
-        (("houses", houses), ("points", asked), ("agree", agreed), ("agree, part of all", part),
+        (("houses", houses), ("points", asked), ("agree", agreed), ("agree, share of all", share),
          ("most that disagree in one house", worst[2])),
-        notes=(f"Seed {seed}; {VIEWS} views a house from where a robot finds room, up to {RAYS} rays a view.",),
-        claims=((f"the two agree on {LEAST:.1%} of the points ({part:.4%})", part >= LEAST),),
+        notes=(f"Seed {seed}; {VIEWS} views per house from where a robot can stand, up to {RAYS} rays per view.",),
+        claims=((f"the two agree on {MIN_AGREEMENT:.1%} of the points ({share:.4%})", share >= MIN_AGREEMENT),),
     )
 
 
-def agreement(rng: np.random.Generator, views: int = VIEWS, rays: int = RAYS) -> tuple[int, int]:
-    """(points on which model and renderer agree, points) in one made-up house."""
-    world = read_world(Source.parse(house(rng), "house.toml"))
+def count_agreement(rng: np.random.Generator, views: int = VIEWS, rays: int = RAYS) -> tuple[int, int]:
+    """Count the points on which model and renderer agree, and all points, in one generated house."""
+    world = read_world(Source.parse(generate_house(rng), "house.toml"))
     mesh, lens, same, asked = build_mesh(world.faces), Pinhole.of(CAMERA), 0, 0
     for _ in range(views):
-        pose = MOUNT.camera_from_robot @ _somewhere(world, rng).lifted().inverse()
+        pose = MOUNT.camera_from_robot @ _draw_pose(world, rng).lifted().inverse()
         seen = find_visible_patches(mesh, project_mesh(mesh, lens, pose.rotation, pose.translation), lens, SAMPLES)
-        points, drawn = _points(world, pose, seen, rng, rays)
+        points, drawn = _sample_points(world, pose, seen, rng, rays)
         same += int(np.sum(hidden(world, CAMERA, pose, points) == ~drawn))
         asked += len(points)
     return same, asked
 
 
-def house(rng: np.random.Generator) -> str:
-    """Two or three rooms in a row, one of them of odd shape, with open doors, boxes and boards, as a world file."""
+def generate_house(rng: np.random.Generator) -> str:
+    """Generate a world file: two or three rooms in a row, with open doors, boxes and boards."""
     text = ['name = "house"\nunits = "metres"', "[finishes]\nplain = { colour = [0.6, 0.6, 0.6] }",
             '[defaults]\nheight = 2.6\nwalls = "plain"\nbaseboard = "plain"\nframe = "plain"', "[parts]"]
     for part in range(3):
@@ -93,8 +93,8 @@ def house(rng: np.random.Generator) -> str:
     return "\n".join([*text, "[doors]", *doors])
 
 
-def _somewhere(world: World, rng: np.random.Generator) -> Pose2:
-    """Where a robot finds room; a camera nearer to a surface sees into it."""
+def _draw_pose(world: World, rng: np.random.Generator) -> Pose2:
+    """Draw a pose at which a robot can stand; a camera nearer to a surface would see into it."""
     while True:
         room = str(rng.choice(world.rooms))
         outline = world.outline(room)
@@ -103,15 +103,15 @@ def _somewhere(world: World, rng: np.random.Generator) -> Pose2:
             return Pose2(float(point[0]), float(point[1]), float(rng.uniform(-math.pi, math.pi)))
 
 
-def _points(world: World, pose: Pose, seen: NDArray[np.int16], rng: np.random.Generator, rays: int
+def _sample_points(world: World, pose: Pose, seen: NDArray[np.int16], rng: np.random.Generator, rays: int
             ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Points (n, 3) where rays meet surfaces, one a ray, and whether the renderer draws that surface there (n,)."""
+    """Points (n, 3) where rays meet surfaces, and whether the renderer draws that surface there (n,)."""
     scene, eye = world.scene, pose.inverse().translation
     points, drawn = [], []
     for row, part, column in rng.integers((CAMERA.height, SAMPLES, CAMERA.width), size=(rays, 3)):
         pixel = column + sample_offsets(SAMPLES)[part], row + (part + 0.5) / SAMPLES - 0.5
         ray = pose.rotation.T @ CAMERA.rays(np.array([pixel]))[0]
-        met = _met(scene.polygons_world, scene.planes_world, eye, ray)
+        met = _intersect(scene.polygons_world, scene.planes_world, eye, ray)
         if len(met):
             surface = int(rng.choice(met)) if rng.random() < 0.7 else int(seen[row, part, column])
             if surface in met:
@@ -121,9 +121,9 @@ def _points(world: World, pose: Pose, seen: NDArray[np.int16], rng: np.random.Ge
     return np.array(points).reshape(-1, 3), np.array(drawn, bool)
 
 
-def _met(polygons: NDArray[np.float64], planes: NDArray[np.float64], eye: NDArray[np.float64],
+def _intersect(polygons: NDArray[np.float64], planes: NDArray[np.float64], eye: NDArray[np.float64],
          ray: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The surfaces whose front a ray meets."""
+    """Indices of the surfaces whose front a ray meets."""
     spokes = polygons - eye
     inside = np.all(np.cross(spokes, np.roll(spokes, -1, axis=1)) @ ray <= 0.0, axis=1)
     return np.flatnonzero(inside & (planes[:, :3] @ ray < -1e-9) & (planes[:, :3] @ eye > planes[:, 3]))

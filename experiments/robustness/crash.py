@@ -1,7 +1,7 @@
-"""Crash safety: missions are killed (SIGKILL) at random moments and resumed; nothing may be lost, all must arrive.
+"""Crash safety: missions are killed (SIGKILL) at random moments and resumed.
 
-Three claims: every motor command that reached the body stands in the journal, and none reached it twice; a resumed run
-reaches its goal; its whole journal, the crash included, is decided again byte for byte.
+Claimed: every motor command that reached the body is in the journal, and none reached it twice; every resumed run
+reaches its goal; its whole journal, the crash included, is replayed byte for byte.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from pathlib import Path
 import numpy as np
 
 from experiments.report import Cell, Report
-from experiments.trials import campaign_folder, found_by_all
+from experiments.trials import campaign_folder, run_trials
 from harvey.run_files.records import read_records
 from harvey.simulation.body_replay import interrupted_in
 from sim.made_up.short_missions import HALLWAY, OFFICE, fault
 
 CHILD = (sys.executable, "-m", "experiments.robustness.crash_child")
-MOST_S = 600.0
-"""A child that takes longer than this hangs [s]."""
-CYCLE_S = 0.06
-"""A kill falls up to so long after a decision: about what a cycle takes."""
-RETELLING_S = 12.0
-"""A kill of a process that resumes falls up to so long after its start."""
+MAX_CHILD_S = 600.0
+"""Time limit of a child process [s]."""
+MAX_DELAY_S = 0.06
+"""Longest time from a decision to a kill: about the time of a cycle."""
+MAX_RESUME_S = 12.0
+"""Longest time from the start of a process that resumes to its kill."""
 TEXTS: Mapping[str, str] = {
     "office": OFFICE,
     "hallway": HALLWAY,
@@ -44,18 +44,19 @@ FULL: Mapping[str, int] = {"office": 100, "hallway": 30, "hallway, bumped": 30, 
 QUICK: Mapping[str, int] = {"office": 3}
 DECISIONS: Mapping[str, int] = {"office": 45, "hallway": 120, "hallway, bumped": 130, "hallway, dark": 120,
                                 "hallway, link lost": 120, MAIN: 440}
-"""About how many decisions a mission takes: a kill falls after one of them."""
+"""Approximate number of decisions of a mission; a kill falls after one of them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """What to kill, and when.
+    """A mission and when to kill it.
 
     Attributes:
-        number: of the trial; with the experiment's seed it gives all chance.
+        number: of the trial; with the experiment's seed it determines all random numbers.
         seed: of the mission.
-        after: decisions before the first kill; delay_s: between the last of them and the kill.
-        again_s: seconds from the start of the process that resumes to a second kill; None for none.
+        after: decisions before the first kill.
+        delay_s: time between the last of them and the kill.
+        again_s: time from the start of the process that resumes to a second kill; None for none.
     """
 
     number: int
@@ -67,13 +68,13 @@ class Trial:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """What came of a trial.
+class CrashResult:
+    """Result of a trial.
 
     Attributes:
-        kills: how many processes were killed before they ended.
-        in_motion: how many motor commands were broken off.
-        wrong: what was lost, done twice or otherwise not as it must be; "" for nothing.
+        kills: processes that were killed before they ended.
+        in_motion: motor commands that were interrupted.
+        wrong: what was lost or done twice; "" for nothing.
         outcome, error_m: of the mission.
         seconds: wall-clock time.
     """
@@ -89,84 +90,86 @@ class Found:
 
 
 def run(quick: bool, seed: int) -> Report:
-    """Kill and resume; what is done is kept, so that the experiment itself may be cut off."""
-    trials = list(_trials(QUICK if quick else FULL, seed))
+    """Kill and resume; results are kept, so that the experiment itself may be interrupted."""
+    trials = list(_draw_trials(QUICK if quick else FULL, seed))
     folder = campaign_folder("crash", seed, quick=quick)
-    found = found_by_all(partial(_tried, folder=folder), trials, Found, folder)
+    results = run_trials(partial(run_trial, folder=folder), trials, CrashResult, folder)
     names = list(dict.fromkeys(trial.scenario for trial in trials))
-    rows = [_row(name, [f for f in found if f.scenario == name]) for name in names]
-    killed = sum(f.kills for f in found)
-    failed = [f"trial {f.number} ({f.scenario}): {f.wrong or f.outcome}; kept in {folder / str(f.number)}"
-              for f in found if f.wrong or f.outcome != "reached"]
+    rows = [_row(name, [r for r in results if r.scenario == name]) for name in names]
+    killed = sum(r.kills for r in results)
+    failed = [f"trial {r.number} ({r.scenario}): {r.wrong or r.outcome}; kept in {folder / str(r.number)}"
+              for r in results if r.wrong or r.outcome != "reached"]
     return Report(
-        "Missions that are killed at random moments and resumed",
+        "Missions killed at random moments and resumed",
         ("scenario", "missions", "kills", "in motion", "nothing lost", "reached", "worst mm", "seconds"), tuple(rows),
         notes=(
-            f"Trials 0 to {len(trials) - 1} of seed {seed}: SIGKILL after a random decision and up to {CYCLE_S} s; in "
-            f"one of four a second one, up to {RETELLING_S:.0f} s after the start of the process that resumes.",
-            "in motion: motor commands that were written down and not yet reported on; they are not carried out again.",
-            "nothing lost: what reached the body, by its own memory, is in the journal, once; and the whole journal is "
-            "decided again byte for byte.",
+            f"Trials 0 to {len(trials) - 1} of seed {seed}: SIGKILL after a random decision and up to {MAX_DELAY_S} s; "
+            f"in one of four a second kill, up to {MAX_RESUME_S:.0f} s after the start of the process that resumes.",
+            "in motion: motor commands in the journal without a report; they are not executed again.",
+            "nothing lost: every command that reached the body is in the journal once, and the whole journal is "
+            "replayed byte for byte.",
             *failed,
         ),
         claims=(
-            (f"{killed} kills: nothing acknowledged is lost, nothing done twice", not any(f.wrong for f in found)),
-            ("every resumed run reaches its goal", all(f.outcome == "reached" for f in found)),
+            (f"{killed} kills: nothing acknowledged is lost, nothing done twice", not any(r.wrong for r in results)),
+            ("every resumed run reaches its goal", all(r.outcome == "reached" for r in results)),
         ),
     )
 
 
-def _trials(shares: Mapping[str, int], seed: int) -> Iterator[Trial]:
-    """Scenarios in a drawn order, so that what is done when the experiment is cut off is a fair part of it."""
+def _draw_trials(shares: Mapping[str, int], seed: int) -> Iterator[Trial]:
+    """Draw scenarios in random order, so that an interrupted experiment has done a fair part of each."""
     names = [name for name, share in shares.items() for _ in range(share)]
     order = np.random.default_rng(seed).permutation(len(names))
     for number, name in enumerate(names[i] for i in order):
         rng = np.random.default_rng([seed, number])
         after = int(rng.integers(0, DECISIONS[name]))
-        delay_s = float(rng.uniform(0.0, CYCLE_S))
-        again_s = float(rng.uniform(2.0, RETELLING_S)) if rng.random() < 0.25 else None
+        delay_s = float(rng.uniform(0.0, MAX_DELAY_S))
+        again_s = float(rng.uniform(2.0, MAX_RESUME_S)) if rng.random() < 0.25 else None
         yield Trial(number, name, number, after, delay_s, again_s)
 
 
-def _row(name: str, found: Sequence[Found]) -> tuple[Cell, ...]:
+def _row(name: str, results: Sequence[CrashResult]) -> tuple[Cell, ...]:
     return (
-        name, len(found), sum(f.kills for f in found), sum(f.in_motion for f in found),
-        sum(1 for f in found if not f.wrong), sum(1 for f in found if f.outcome == "reached"),
-        1000.0 * max(f.error_m for f in found), float(np.sum([f.seconds for f in found])),
+        name, len(results), sum(r.kills for r in results), sum(r.in_motion for r in results),
+        sum(1 for r in results if not r.wrong), sum(1 for r in results if r.outcome == "reached"),
+        1000.0 * max(r.error_m for r in results), float(np.sum([r.seconds for r in results])),
     )
 
 
-def _tried(trial: Trial, folder: Path) -> Found:
-    """One trial; its files are kept where something is wrong."""
+def run_trial(trial: Trial, folder: Path) -> CrashResult:
+    """Run one trial; its files are kept if something is wrong."""
     began, place = time.perf_counter(), folder / str(trial.number)
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir()
-    out, memories = place / "run", [place / "memory-0.jsonl"]
-    kills = _killed_run(trial, place, memories[0])
+    out, logs = place / "run", [place / "commands-0.jsonl"]
+    kills = _run_and_kill(trial, place, logs[0])
     if trial.again_s is not None:
-        memories.append(place / f"memory-{len(memories)}.jsonl")
-        kills += _killed_after((*CHILD, "resume", str(out), str(memories[-1])), trial.again_s)
-    memories.append(place / f"memory-{len(memories)}.jsonl")
-    done = subprocess.run((*CHILD, "resume", str(out), str(memories[-1])), capture_output=True, text=True, check=False,
-                          timeout=MOST_S)
+        logs.append(place / f"commands-{len(logs)}.jsonl")
+        kills += _kill_after((*CHILD, "resume", str(out), str(logs[-1])), trial.again_s)
+    logs.append(place / f"commands-{len(logs)}.jsonl")
+    done = subprocess.run((*CHILD, "resume", str(out), str(logs[-1])), capture_output=True, text=True, check=False,
+                          timeout=MAX_CHILD_S)
     seconds = time.perf_counter() - began
     if done.returncode:
-        return Found(trial.number, trial.scenario, kills, 0, done.stderr[-400:] or "no result", "none", 0.0, seconds)
+        wrong = done.stderr[-400:] or "no result"
+        return CrashResult(trial.number, trial.scenario, kills, 0, wrong, "none", 0.0, seconds)
     result = json.loads(done.stdout.splitlines()[-1])
-    broken_off, wrong = _compared(out / "journal.jsonl", memories)
-    wrong = wrong or ("" if result["same"] else "the journal is not decided again as it stands")
+    interrupted, wrong = _compare(out / "journal.jsonl", logs)
+    wrong = wrong or ("" if result["same"] else "the journal is not replayed as it is")
     if not wrong and result["outcome"] == "reached":
         shutil.rmtree(place)
-    return Found(trial.number, trial.scenario, kills, broken_off, wrong, result["outcome"], result["error_m"], seconds)
+    return CrashResult(trial.number, trial.scenario, kills, interrupted, wrong, result["outcome"], result["error_m"],
+                       seconds)
 
 
-def _killed_run(trial: Trial, place: Path, memory: Path) -> int:
+def _run_and_kill(trial: Trial, place: Path, log: Path) -> int:
     scenario = trial.scenario
     if scenario in TEXTS:
         scenario = str(place / "scenario.toml")
         Path(scenario).write_text(TEXTS[trial.scenario], encoding="utf-8")
     journal = place / "run" / "journal.jsonl"
-    with subprocess.Popen((*CHILD, "run", scenario, str(trial.seed), str(place / "run"), str(memory)),
+    with subprocess.Popen((*CHILD, "run", scenario, str(trial.seed), str(place / "run"), str(log)),
                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as child:
         while child.poll() is None and _lines(journal) < max(trial.after, 0):
             time.sleep(0.002)
@@ -178,7 +181,7 @@ def _killed_run(trial: Trial, place: Path, memory: Path) -> int:
     return int(running)
 
 
-def _killed_after(command: Sequence[str], seconds: float) -> int:
+def _kill_after(command: Sequence[str], seconds: float) -> int:
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as child:
         try:
             child.wait(seconds)
@@ -192,31 +195,31 @@ def _lines(path: Path) -> int:
     return path.read_bytes().count(b"\n") if path.exists() else 0
 
 
-def _compared(journal: Path, memories: Sequence[Path]) -> tuple[int, str]:
-    """How many commands were broken off, and what the journal and the body's memory do not agree on."""
+def _compare(journal: Path, logs: Sequence[Path]) -> tuple[int, str]:
+    """Count interrupted commands, and describe how journal and body disagree ("" if they do not)."""
     commands: list[tuple[str, list[float]]] = []
-    broken_off: set[str] = set()
+    interrupted: set[str] = set()
     for decision in read_records(journal):
-        broken_off |= interrupted_in(decision.observed)
+        interrupted |= interrupted_in(decision.observed)
         commands += [(record.ref, [record.value["turn_rad"], record.value["move_m"]])
                      for record in decision.made if record.type == "MotorCommand"]
-    lines = (line for memory in memories if memory.exists() for line in memory.read_text("utf-8").splitlines())
+    lines = (line for log in logs if log.exists() for line in log.read_text("utf-8").splitlines())
     done = [item["begun"] for item in map(json.loads, lines) if "begun" in item]
-    return len(broken_off), _disagreement(commands, frozenset(broken_off), done)
+    return len(interrupted), _disagreement(commands, frozenset(interrupted), done)
 
 
 def _disagreement(
     commands: Sequence[tuple[str, list[float]]], excused: frozenset[str], done: Sequence[list[float]]
 ) -> str:
-    """Each command that was done is written down, in order and once; each other one was broken off before it began."""
+    """Check that each executed command is in the journal once, in order, and any other was interrupted before."""
     written = iter(commands)
     for command in done:
         for ref, what in written:
             if what == command:
                 break
             if ref not in excused:
-                return f"{ref} stands in the journal, but never reached the body"
+                return f"{ref} is in the journal, but never reached the body"
         else:
             return f"the command {command} reached the body, but is not in the journal, or was done twice"
     left = [ref for ref, _ in written if ref not in excused]
-    return f"{left[0]} stands in the journal, but never reached the body" if left else ""
+    return f"{left[0]} is in the journal, but never reached the body" if left else ""

@@ -1,7 +1,7 @@
-"""A house that others have drawn (IFC) is imported, checked and driven in: missions between its rooms.
+"""Import a house from IFC, check it, and drive missions between its rooms.
 
-Missions are "Go from ROOM to ROOM", between rooms that a robot on wheels can stand in and get to without stairs. They
-run in worker processes; what is done is kept, so that the experiment may be cut off and goes on where it was.
+Missions are "Go from ROOM to ROOM", between rooms that a robot on wheels can stand in and reach without stairs. They
+run in worker processes; results are kept, so that an interrupted experiment continues where it was.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.building_files import DUPLEX, building_file, where_it_should_be
-from experiments.report import Cell, Report
-from experiments.trials import found_by_all
+from experiments.report import Cell, Report, count_kinds
+from experiments.shared_data import DUPLEX, data_path, describe_absence
+from experiments.trials import run_trials
 from harvey.campaign.campaign import Task, run_task
 from harvey.run_files.run_directory import RUNS
 from world_models.building.checks import check_world
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
     from harvey.runner.result import MissionResult
 
 MISSIONS, QUICK_MISSIONS = 50, 2
-LEAST = 0.96
-"""This part of the missions must reach their goals: 48 of 50."""
-NEAR_M = 0.05
-"""A mission that says that it reached its goal must truly be this near to it."""
-STANDING_M = 0.4
-"""A room must have a place with so much room on all sides for a robot to be put down in it."""
+MIN_REACHED_SHARE = 0.96
+"""Share of the missions that must reach their goals: 48 of 50."""
+MAX_ERROR_M = 0.05
+"""Largest true distance from its goal at which a mission counts as reached."""
+MIN_CLEARANCE_M = 0.4
+"""Free space on all sides at which a robot can be put down in a room."""
 DECLARED = ("lost", "blocked", "failed")
 SCENARIO = """\
 # {name} of harvey experiment imported-building; again: harvey run THIS_FILE --seed {seed}
@@ -48,13 +48,13 @@ heading_deg = {heading_deg:.1f}
 put_down_sigma_m = 0.03
 put_down_sigma_deg = 2.0
 """
-COLUMNS = ("rooms that hang together", "missions", "reached", "otherwise", "mean mm", "max mm", "collisions", "wrong",
+COLUMNS = ("connected rooms", "missions", "reached", "otherwise", "mean mm", "max mm", "collisions", "false accepts",
            "replans", "relocated", "path m", "mean s")
 
 
 @dataclass(frozen=True, slots=True)
-class Errand:
-    """One mission: from room to room, the robot put down with this heading in the first room's frame."""
+class Trip:
+    """One mission: from room to room, starting with this heading in the first room's frame."""
 
     number: int
     origin: str
@@ -63,12 +63,12 @@ class Errand:
 
 
 def run(quick: bool, seed: int) -> Report:
-    """Import, check, drive."""
+    """Import, check, and drive."""
     from harvey.runner.result import MissionResult
 
-    path, title = building_file(DUPLEX), "Missions between the rooms of an imported house"
+    path, title = data_path(DUPLEX), "Missions between the rooms of an imported house"
     if find_spec("ifcopenshell") is None or not path.is_file():
-        lacking = where_it_should_be(DUPLEX) if find_spec("ifcopenshell") else \
+        lacking = describe_absence(DUPLEX) if find_spec("ifcopenshell") else \
             "ifcopenshell is not installed: .venv/bin/pip install '.[ifc]'"
         return Report(title, COLUMNS, (), (f"Nothing was tried: {lacking}.",), (("the house is there", False),))
     text = import_building(path).text
@@ -76,44 +76,44 @@ def run(quick: bool, seed: int) -> Report:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "house.toml").write_text(text, encoding="utf-8")
     world = load_world(folder / "house.toml")
-    errands = list(drawn(world, QUICK_MISSIONS if quick else MISSIONS, seed))
-    ends = found_by_all(run_task, [_task(errand, folder, seed) for errand in errands], MissionResult, folder, "mission")
+    trips = list(draw_trips(world, QUICK_MISSIONS if quick else MISSIONS, seed))
+    ends = run_trials(run_task, [_task(trip, folder, seed) for trip in trips], MissionResult, folder, "mission")
     groups = _groups(world)
     rows = [_row(name, chosen) for name, rooms in groups.items()
-            if (chosen := [end for errand, end in zip(errands, ends, strict=True) if errand.origin in rooms])]
+            if (chosen := [end for trip, end in zip(trips, ends, strict=True) if trip.origin in rooms])]
     return Report(
         title, COLUMNS, (*rows, _row("all", ends)),
         notes=(
             f"{path.name}: {len(world.rooms)} rooms, {len(world.doorways)} open doorways. Rooms that a robot can be put"
             f" down in: {sum(map(len, groups.values()))}; any two of one row can be reached from each other on wheels.",
             f"Rooms and headings are drawn with seed {seed}; mission N has seed {seed} + N. Errors are true distances.",
-            f"Each is a scenario of its own: {folder}/mission-N.toml.",
-            *(_told(errand, end, seed) for errand, end in zip(errands, ends, strict=True)
+            f"Each mission is a scenario file: {folder}/mission-N.toml.",
+            *(_describe(trip, end, seed) for trip, end in zip(trips, ends, strict=True)
               if not _arrived(end) or end.collisions),
         ),
         claims=(
             ("the imported house is a world without faults", not check_world(world)),
-            (f"at least {_least(len(ends))} of {len(ends)} missions reach their goals, and truly are within"
-             f" {1000.0 * NEAR_M:.0f} mm of them", sum(map(_arrived, ends)) >= _least(len(ends))),
+            (f"at least {_min_reached(len(ends))} of {len(ends)} missions reach their goals, and truly are within"
+             f" {1000.0 * MAX_ERROR_M:.0f} mm of them", sum(map(_arrived, ends)) >= _min_reached(len(ends))),
             ("every other one ends in a declared outcome", all(_arrived(r) or _declared(r) for r in ends)),
         ),
     )
 
 
-def drawn(world: World, count: int, seed: int) -> Iterator[Errand]:
-    """So many pairs of different rooms of one group, each room as likely as any other, and headings."""
+def draw_trips(world: World, count: int, seed: int) -> Iterator[Trip]:
+    """Draw pairs of different rooms of one group, each room equally likely, with headings."""
     groups = list(_groups(world).values())
     rooms = [(room, group) for group in groups for room in group]
     rng = np.random.default_rng(seed)
     for number in range(count):
         origin, group = rooms[int(rng.integers(len(rooms)))]
         others = [room for room in group if room != origin]
-        yield Errand(number, origin, others[int(rng.integers(len(others)))], float(rng.uniform(-180.0, 180.0)))
+        yield Trip(number, origin, others[int(rng.integers(len(others)))], float(rng.uniform(-180.0, 180.0)))
 
 
 def _groups(world: World) -> Mapping[str, tuple[str, ...]]:
-    """Rooms in which a robot can stand, two or more that can be reached from each other."""
-    left = [room for room in world.rooms if _room_m(world, room) >= STANDING_M]
+    """Group the rooms in which a robot can stand by whether they can be reached from each other."""
+    left = [room for room in world.rooms if _room_m(world, room) >= MIN_CLEARANCE_M]
     groups: dict[str, tuple[str, ...]] = {}
     while left:
         group = tuple(room for room in left if world.route(left[0], room) is not None)
@@ -129,33 +129,31 @@ def _room_m(world: World, room: str) -> float:
     return min(distance_to_border(middle, border) for border in (world.outline(room), *world.obstacles(room)))
 
 
-def _task(errand: Errand, folder: Path, seed: int) -> Task:
-    path = folder / f"mission-{errand.number}.toml"
-    path.write_text(SCENARIO.format(name=path.stem, seed=seed + errand.number, origin=errand.origin,
-                                    destination=errand.destination, heading_deg=errand.heading_deg), encoding="utf-8")
-    return Task(str(path), (), seed + errand.number)
+def _task(trip: Trip, folder: Path, seed: int) -> Task:
+    path = folder / f"mission-{trip.number}.toml"
+    path.write_text(SCENARIO.format(name=path.stem, seed=seed + trip.number, origin=trip.origin,
+                                    destination=trip.destination, heading_deg=trip.heading_deg), encoding="utf-8")
+    return Task(str(path), (), seed + trip.number)
 
 
 def _arrived(result: MissionResult) -> bool:
-    return result.outcome == "reached" and result.error_m <= NEAR_M
+    return result.outcome == "reached" and result.error_m <= MAX_ERROR_M
 
 
 def _declared(result: MissionResult) -> bool:
-    """Whether somebody on the board, or a limit, said how it ended; an expert that raised is no such thing."""
+    """Whether it ended in a declared outcome, and not because a knowledge source raised an exception."""
     return result.outcome in DECLARED and " raised " not in result.reason
 
 
-def _least(count: int) -> int:
-    return int(np.ceil(LEAST * count - 1e-9))
+def _min_reached(count: int) -> int:
+    return int(np.ceil(MIN_REACHED_SHARE * count - 1e-9))
 
 
 def _row(name: str, results: Sequence[MissionResult]) -> tuple[Cell, ...]:
     errors_mm = [1000.0 * r.error_m for r in results if _arrived(r)]
-    others = sorted({r.outcome for r in results if not _arrived(r)})
     return (
         name, len(results), len(errors_mm),
-        ", ".join(f"{sum(1 for r in results if not _arrived(r) and r.outcome == kind)} {kind}" for kind in others)
-        or None,
+        count_kinds(r.outcome for r in results if not _arrived(r)),
         float(np.mean(errors_mm)) if errors_mm else None, max(errors_mm, default=None),
         sum(r.collisions or 0 for r in results), sum(r.false_accepts for r in results),
         sum(r.replans for r in results), sum(r.relocalizations for r in results),
@@ -163,8 +161,8 @@ def _row(name: str, results: Sequence[MissionResult]) -> tuple[Cell, ...]:
     )
 
 
-def _told(errand: Errand, result: MissionResult, seed: int) -> str:
-    return (f"mission-{errand.number} (seed {seed + errand.number}), {errand.origin} to {errand.destination}:"
+def _describe(trip: Trip, result: MissionResult, seed: int) -> str:
+    return (f"mission-{trip.number} (seed {seed + trip.number}), {trip.origin} to {trip.destination}:"
             f" {result.outcome} ({result.reason}), {1000.0 * result.error_m:.0f} mm from its goal,"
             f" {result.collisions} collisions.")
 

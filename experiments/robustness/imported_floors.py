@@ -1,7 +1,7 @@
-"""A university building that others have surveyed (IndoorGML): is there a plan between any two rooms of its floors?
+"""Plan between any two rooms of different floors of a university, imported from IndoorGML.
 
-Asked of three: the graph that came with the file; the imported world's own doorways, stairs and elevators; and Harvey's
-route for wheels, level by level (Figure 9), refined until nothing is left to refine.
+Three searches: on the graph that came with the file; on the imported world's doorways, stairs and elevators; and
+Harvey's route for wheels, level by level (Figure 9), refined until nothing is left to refine.
 """
 
 from __future__ import annotations
@@ -14,17 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.building_files import UNIVERSITY, building_file, where_it_should_be
 from experiments.report import Cell, Report
+from experiments.shared_data import UNIVERSITY, data_path, describe_absence
 from world_models.building.checks import check_world
 from world_models.building.passages import drivable_passages
 from world_models.building.world import World
 from world_models.files.importers import Network, import_building
 from world_models.files.world_files import load_world
 
-DEEPEST = 20
-"""No route is refined more often."""
-COLUMNS = ("floors", "pairs of rooms", "on the file's graph", "in the imported world", "of them on wheels",
+MAX_REFINEMENTS = 20
+COLUMNS = ("floors", "pairs of rooms", "on the file's graph", "in the imported world", "on wheels",
            "longest m", "most passages")
 TITLE = "Plans between the floors of an imported university"
 
@@ -34,9 +33,9 @@ class Pair:
     """Two rooms of different floors.
 
     Attributes:
-        length_m: of the way on the file's own graph; None where there is none.
-        walked: rooms of the way in the imported world, stairs included.
-        driven: rooms of Harvey's route for wheels, refined; None where only stairs lead there.
+        length_m: length of the path on the file's own graph; None if there is none.
+        walked: rooms of the path in the imported world, stairs included.
+        driven: rooms of Harvey's route for wheels, refined; None if only stairs lead there.
     """
 
     floors: tuple[str, str]
@@ -47,16 +46,16 @@ class Pair:
 
 
 def run(quick: bool, seed: int) -> Report:
-    """All pairs; nothing is drawn by lot."""
-    path = building_file(UNIVERSITY)
+    """Plan between all pairs; nothing is random, so ``quick`` and ``seed`` change nothing."""
+    path = data_path(UNIVERSITY)
     if not path.is_file():
-        return Report(TITLE, COLUMNS, (), (f"Nothing was tried: {where_it_should_be(UNIVERSITY)}.",),
+        return Report(TITLE, COLUMNS, (), (f"Nothing was tried: {describe_absence(UNIVERSITY)}.",),
                       (("the building is there", False),))
     made = import_building(path)
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "university.toml").write_text(made.text, encoding="utf-8")
         world = load_world(Path(folder) / "university.toml")
-        pairs = pairs_of(world, made.network)
+        pairs = plan_pairs(world, made.network)
         faults = check_world(world)
     floors = sorted({pair.floors for pair in pairs})
     rows = [_row(" and ".join(both), [pair for pair in pairs if pair.floors == both]) for both in floors]
@@ -67,31 +66,31 @@ def run(quick: bool, seed: int) -> Report:
             f" {len(world.doorways)} doorways, {sum(link.kind == 'stairs' for link in world.links)} stairs,"
             f" {sum(link.kind == 'elevator' for link in world.links)} elevators.",
             "in the imported world: by its own doorways, stairs and elevators. on wheels: Harvey's route level by"
-            " level, down to rooms; where only stairs lead, it says so and does not set out.",
-            *(f"{pair.rooms[0]} to {pair.rooms[1]}: no way" for pair in pairs if not pair.walked),
+            " level, down to rooms; where only stairs lead there, none is expected.",
+            *(f"{pair.rooms[0]} to {pair.rooms[1]}: no path" for pair in pairs if not pair.walked),
         ),
         claims=(
             ("the imported building is a world without faults", not faults),
             ("a plan between any two rooms of different floors, on the graph that came with the file",
              all(pair.length_m is not None for pair in pairs)),
             ("and one by the doorways, stairs and elevators of the imported world", all(p.walked for p in pairs)),
-            ("each way on wheels leads from room to next room, by a door or an elevator, to its end",
-             all(_hangs_together(world, pair) for pair in pairs if pair.driven)),
-            ("there is one on wheels wherever no stairs are needed",
-             all((pair.driven is not None) == _without_stairs(world, *pair.rooms) for pair in pairs)),
+            ("each route on wheels leads from room to adjacent room, by a door or an elevator, to its end",
+             all(_is_connected(world, pair) for pair in pairs if pair.driven)),
+            ("there is one on wheels exactly where no stairs are needed",
+             all((pair.driven is not None) == _reachable_without_stairs(world, *pair.rooms) for pair in pairs)),
         ),
     )
 
 
-def pairs_of(world: World, network: Network | None) -> list[Pair]:
-    """Any two rooms of different floors."""
-    found = []
+def plan_pairs(world: World, network: Network | None) -> list[Pair]:
+    """Plan between any two rooms of different floors."""
+    pairs = []
     for rooms in combinations(world.rooms, 2):
         a, b = (world.path_of(room)[1] for room in rooms)
         if a != b:
             floors, ends = ((a, b), rooms) if a < b else ((b, a), rooms[::-1])
-            found.append(Pair(floors, ends, _length_m(network, *ends), world.walk(*ends), refined(world, *ends)))
-    return found
+            pairs.append(Pair(floors, ends, _length_m(network, *ends), world.walk(*ends), refine_route(world, *ends)))
+    return pairs
 
 
 def _length_m(network: Network | None, origin: str, destination: str) -> float | None:
@@ -101,16 +100,16 @@ def _length_m(network: Network | None, origin: str, destination: str) -> float |
     return float(np.sum([network.graph.edges[a, b]["length_m"] for a, b in pairwise(way)]))
 
 
-def refined(world: World, origin: str, destination: str, depth: int = 0) -> list[str] | None:
-    """The rooms of the route for wheels, refined until nothing is left to refine; None where there is none."""
+def refine_route(world: World, origin: str, destination: str, depth: int = 0) -> list[str] | None:
+    """Return the rooms of the route for wheels, refined completely; None if there is none."""
     route = world.route(origin, destination)
-    if route is None or depth > DEEPEST:
+    if route is None or depth > MAX_REFINEMENTS:
         return None
     rooms = [origin]
     for step in (*route.steps, None):
         end = step.origin if step is not None else destination
         if rooms[-1] != end:
-            part = refined(world, rooms[-1], end, depth + 1)
+            part = refine_route(world, rooms[-1], end, depth + 1)
             if part is None:
                 return None
             rooms += part[1:]
@@ -119,17 +118,17 @@ def refined(world: World, origin: str, destination: str, depth: int = 0) -> list
 
 
 def _passages(world: World) -> set[frozenset[str]]:
-    """The pairs of rooms that are joined for wheels."""
+    """Pairs of rooms that are connected for wheels."""
     return {frozenset((a, b)) for _, a, b in drivable_passages((*world.doorways, *world.links))}
 
 
-def _hangs_together(world: World, pair: Pair) -> bool:
+def _is_connected(world: World, pair: Pair) -> bool:
     joined, way = _passages(world), pair.driven or []
     return (way[0], way[-1]) == pair.rooms and all(frozenset(both) in joined for both in pairwise(way))
 
 
-def _without_stairs(world: World, origin: str, destination: str) -> bool:
-    """Whether a search that knows nothing of levels finds a way for wheels."""
+def _reachable_without_stairs(world: World, origin: str, destination: str) -> bool:
+    """Whether a flat search, without levels, finds a path for wheels."""
     joined, reached, todo = _passages(world), {origin}, [origin]
     while todo:
         here = todo.pop()

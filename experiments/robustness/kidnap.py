@@ -17,7 +17,7 @@ import numpy as np
 from experiments.chart import OURS, PAPER, PEER, chart
 from experiments.report import Cell, Report
 from experiments.robustness.kidnap_trial import Found, Kidnap, floor_of, found_in, scenario_text
-from experiments.trials import campaign_folder, found_by_all
+from experiments.trials import RESULTS, campaign_folder, run_trials
 
 ROOMS, FLOORS, EACH = 40, 25, 40
 TWIN_ROOMS, TWIN_FLOORS, TWIN_EACH = 12, 10, 20
@@ -39,7 +39,7 @@ def run(quick: bool, seed: int) -> Report:
     twins = [Kidnap(1000 * seed + 500 + f, twin_rooms, True, k) for f in range(twin_floors) for k in range(twin_each)]
     folder = campaign_folder("kidnap", seed, quick=quick)
     trials = [*anywhere, *twins]
-    found = found_by_all(found_in, trials, Found, folder, "kidnap")
+    found = run_trials(found_in, trials, Found, folder, "kidnap")
     split = len(anywhere)
     pictures = [folder / "probes.png", folder / "errors.png", folder / "map.png"]
     _draw(found[:split], pictures)
@@ -53,7 +53,7 @@ def run(quick: bool, seed: int) -> Report:
             " there; undecided: it stays lost, with one place in agent or none. A probe is a look, the first one too.",
             "The paper gives no figures for robots that are lost.",
             *_worst(trials, found, folder),
-            f"Pictures: {', '.join(str(p) for p in pictures)}; every kidnap in a line: {folder / 'found.jsonl'}",
+            f"Pictures: {', '.join(str(p) for p in pictures)}; every kidnap in a line: {folder / RESULTS}",
         ),
         claims=_claims(found[:split], found[split:]),
     )

@@ -1,7 +1,7 @@
-"""A mission's camera stream as a video file, seen once more through OpenCV's VideoCapture: the same milestones?
+"""A mission's camera stream read back through OpenCV's VideoCapture: are the milestones the same?
 
-A mission is driven in the simulator. What its camera delivered is written to video files; then the same mission is
-driven by a body that repeats the recorded motions, and looks through :class:`VideoCamera` at the video.
+A mission is driven in the simulator and its frames are written to video files. Then the same mission is driven by a
+body that repeats the recorded motions and takes its frames from the video with :class:`VideoCamera`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 
 from blackboard.journal import Decision
 from experiments.report import Cell, Report
+from experiments.wrapped_body import WrappedBody
 from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
 from harvey.hardware.drivers.cameras.video_file import write_video
 from harvey.runner.ports import Body
@@ -27,13 +28,13 @@ from world_models.frames import Pose2, wrap_angle
 
 SCENARIO = "lab-to-allens-office"
 QUICK_SCENARIO, QUICK_GOAL = "forty-foot-hallway", "(ptrans (hallway (4,4,0)) (hallway (14,4,0)))"
-LOSSLESS_M, LOSSY_M, LOSSY_RAD = 1e-9, 0.01, math.radians(0.5)
-COLUMNS = ("video", "MB", "looks", "milestones", "same verdicts", "pose differs by mm", "degrees", "outcome")
+MAX_LOSSLESS_M, MAX_LOSSY_M, MAX_LOSSY_RAD = 1e-9, 0.01, math.radians(0.5)
+COLUMNS = ("video", "MB", "looks", "milestones", "same verdicts", "max pose difference mm", "degrees", "outcome")
 
 
 @dataclass(eq=False)
-class Told:
-    """What a mission came to: verdicts and pose fixes in their order, and the outcome."""
+class MissionLog:
+    """Verdicts and pose fixes of a mission in their order, and its outcome."""
 
     verdicts: list[str] = field(default_factory=list)
     poses: list[Pose2] = field(default_factory=list)
@@ -50,48 +51,26 @@ class Told:
                 self.outcome = value.kind
 
 
-class Recording:
-    """A body whose answers are kept."""
+class RecordedBody(WrappedBody):
+    """A body whose motions and frames are kept."""
 
     def __init__(self, body: Body) -> None:
-        self._body = body
+        super().__init__(body)
         self.motions: list[MotionReport | BodyFault] = []
         self.frames: list[Frame] = []
 
     def execute(self, command: MotorCommand) -> MotionReport | BodyFault:
-        """As the body does."""
-        self.motions.append(self._body.execute(command))
+        self.motions.append(super().execute(command))
         return self.motions[-1]
 
-    def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
-        """As the body does."""
-        return self._body.steer(course)
-
-    def claim(self) -> MotionReport | BodyFault:
-        """As the body does."""
-        return self._body.claim()
-
     def look(self, purpose: str) -> Frame | BodyFault:
-        """As the body does."""
-        found = self._body.look(purpose)
-        if isinstance(found, Frame):
-            self.frames.append(found)
-        return found
-
-    def ride(self, ride: Ride) -> RideReport | BodyFault:
-        """As the body does."""
-        return self._body.ride(ride)
-
-    def wait(self, duration_s: float) -> float:
-        """As the body does."""
-        return self._body.wait(duration_s)
-
-    def stop(self) -> None:
-        """As the body does."""
-        self._body.stop()
+        answer = super().look(purpose)
+        if isinstance(answer, Frame):
+            self.frames.append(answer)
+        return answer
 
 
-class Repeating:
+class RepeatingBody:
     """A body that answers commands with recorded motions, in their order, and looks with a camera."""
 
     def __init__(self, motions: list[MotionReport | BodyFault], camera: VideoCamera) -> None:
@@ -99,51 +78,51 @@ class Repeating:
         self._camera = camera
 
     def execute(self, command: MotorCommand) -> MotionReport | BodyFault:
-        """The next recorded motion, whatever is asked for."""
+        """Return the next recorded motion, whatever is asked for."""
         return next(self._motions, None) or BodyFault("base", "link lost", "the recorded motions end here", "", 0.0)
 
     def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
-        """None is recorded."""
+        """Fail: no such motion is recorded."""
         return BodyFault("base", "base refuses", "no motion that is steered on the move is recorded", "", 0.0)
 
     def claim(self) -> MotionReport | BodyFault:
-        """Nothing more is known."""
+        """Return the next recorded motion."""
         return self.execute(MotorCommand(0.0, 0.0))
 
     def look(self, purpose: str) -> Frame | BodyFault:
-        """The video's next picture."""
+        """Return the video's next frame."""
         try:
             return self._camera.look(purpose)
         except CameraFault as fault:
             return BodyFault("camera", fault.kind, fault.detail, "", 0.0)
 
     def ride(self, ride: Ride) -> RideReport | BodyFault:
-        """None is recorded."""
+        """Fail: no ride is recorded."""
         return BodyFault("elevator", "no ride", "none is recorded", "", 0.0)
 
     def wait(self, duration_s: float) -> float:
-        """Nothing changes by waiting."""
+        """Return at once."""
         return duration_s
 
     def stop(self) -> None:
-        """It stands."""
+        """Do nothing: it stands."""
 
 
 def run(quick: bool, seed: int) -> Report:
-    """One mission, and once more from each kind of video."""
+    """Drive one mission, and again from each kind of video."""
     stage = _stage(quick)
     with tempfile.TemporaryDirectory() as folder:
-        recorded, kept = _driven(stage, seed)
+        recorded, body = _drive(stage, seed)
         rows: list[tuple[Cell, ...]] = [
-            ("none: the simulator's camera", None, len(kept.frames), len(recorded.verdicts), None, None, None,
+            ("none: simulated camera", None, len(body.frames), len(recorded.verdicts), None, None, None,
              recorded.outcome)
         ]
         claims: list[tuple[str, bool]] = []
-        for name, path, bound_m, bound_rad in _videos(Path(folder), [f.jpeg for f in kept.frames]):
-            again = _repeated(stage, seed, kept, path)
-            same = _same(recorded.verdicts, again.verdicts)
-            apart_m, turned_rad = _apart(recorded.poses, again.poses)
-            rows.append((name, path.stat().st_size / 1e6, len(kept.frames), len(again.verdicts),
+        for name, path, bound_m, bound_rad in _videos(Path(folder), [f.jpeg for f in body.frames]):
+            again = _drive_from_video(stage, seed, body, path)
+            same = _count_same(recorded.verdicts, again.verdicts)
+            apart_m, turned_rad = _max_difference(recorded.poses, again.poses)
+            rows.append((name, path.stat().st_size / 1e6, len(body.frames), len(again.verdicts),
                          f"{same} of {len(recorded.verdicts)}", 1000.0 * apart_m, math.degrees(turned_rad),
                          again.outcome))
             claims += [
@@ -156,12 +135,12 @@ def run(quick: bool, seed: int) -> Report:
         "A mission's camera stream through a video file and OpenCV's VideoCapture", COLUMNS, tuple(rows),
         notes=(
             f"Mission: {stage.scenario.name}, seed {seed}, goal {stage.scenario.goal}. The body repeats the recorded "
-            "motion reports, so the robot is truly where the pictures were taken.",
-            "camera.mjpeg: the camera's JPEGs one behind the other, as a run directory keeps them; VideoCapture hands "
-            "them over untouched (CAP_PROP_FORMAT -1): nothing is lost but the times.",
-            "FFV1: the decoded pixels are kept to the bit, but VideoCamera has to compress them once more (JPEG "
-            "quality 95). MJPG: OpenCV compresses them once more as it writes.",
-            "Poses: the greatest distance between pose fixes of the same number.",
+            "motion reports, so the robot's true poses are those of the frames.",
+            "camera.mjpeg: the camera's JPEGs one after the other, as in a run directory; VideoCapture returns them "
+            "unchanged (CAP_PROP_FORMAT -1): nothing is lost but the times.",
+            "FFV1: lossless in the decoded pixels, but VideoCamera compresses them again (JPEG quality 95). MJPG: "
+            "OpenCV compresses them again as it writes.",
+            "Poses: the largest difference between pose fixes of the same number.",
         ),
         claims=tuple(claims),
     )
@@ -172,41 +151,41 @@ def _stage(quick: bool) -> Stage:
     return build_stage(with_settings(scenario, {"goal": QUICK_GOAL}) if quick else scenario)
 
 
-def _driven(stage: Stage, seed: int) -> tuple[Told, Recording]:
-    told, kept = Told(), list[Recording]()
+def _drive(stage: Stage, seed: int) -> tuple[MissionLog, RecordedBody]:
+    log, bodies = MissionLog(), list[RecordedBody]()
 
     def around(body: Body, _retelling: Callable[[], bool]) -> Body:
-        kept.append(Recording(body))
-        return kept[-1]
+        bodies.append(RecordedBody(body))
+        return bodies[-1]
 
-    run_mission(stage, seed, sinks=(told,), around=around)
-    return told, kept[0]
+    run_mission(stage, seed, sinks=(log,), around=around)
+    return log, bodies[0]
 
 
-def _repeated(stage: Stage, seed: int, kept: Recording, video: Path) -> Told:
-    told, camera = Told(), stage.scenario.camera.camera
-    with VideoCamera(str(video), (camera.width, camera.height), clock=lambda: 0.0) as eye:
-        body = Repeating(kept.motions, eye)
-        run_mission(stage, seed, sinks=(told,), around=lambda _body, _retelling: body)
-    return told
+def _drive_from_video(stage: Stage, seed: int, recorded: RecordedBody, video: Path) -> MissionLog:
+    log, camera = MissionLog(), stage.scenario.camera.camera
+    with VideoCamera(str(video), (camera.width, camera.height), clock=lambda: 0.0) as video_camera:
+        body = RepeatingBody(recorded.motions, video_camera)
+        run_mission(stage, seed, sinks=(log,), around=lambda _body, _retelling: body)
+    return log
 
 
 def _videos(folder: Path, jpegs: list[bytes]) -> Iterator[tuple[str, Path, float, float]]:
-    """Name, file, and by how much poses may differ [m, rad]."""
+    """Yield name, file, and the largest allowed difference of poses [m, rad]."""
     raw = folder / "camera.mjpeg"
     raw.write_bytes(b"".join(jpegs))
-    yield "camera.mjpeg", raw, LOSSLESS_M, LOSSLESS_M
+    yield "camera.mjpeg", raw, MAX_LOSSLESS_M, MAX_LOSSLESS_M
     for codec in ("FFV1", "MJPG"):
         write_video(folder / f"{codec}.avi", jpegs, codec=codec)
-        yield f"AVI, {codec}", folder / f"{codec}.avi", LOSSY_M, LOSSY_RAD
+        yield f"AVI, {codec}", folder / f"{codec}.avi", MAX_LOSSY_M, MAX_LOSSY_RAD
 
 
-def _same(first: list[str], second: list[str]) -> int:
+def _count_same(first: list[str], second: list[str]) -> int:
     return sum(a == b for a, b in zip(first, second, strict=False))
 
 
-def _apart(first: list[Pose2], second: list[Pose2]) -> tuple[float, float]:
-    """The greatest distance [m] and turn [rad]; infinite where there are not as many."""
+def _max_difference(first: list[Pose2], second: list[Pose2]) -> tuple[float, float]:
+    """Largest distance [m] and turn [rad] between poses; infinite if their numbers differ."""
     if len(first) != len(second):
         return math.inf, math.inf
     pairs = list(zip(first, second, strict=True))

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from experiments.report import Report
 from experiments.scale.long_journal import HOUR_CYCLES, write_hour
-from experiments.trials import campaign_folder, found_by_all
+from experiments.trials import campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
 from harvey.run_files.run_directory import RunDirectory
 from harvey.why.journal import JournalHistory
@@ -67,7 +67,7 @@ def run(quick: bool, seed: int) -> Report:
     """Measure. Quick: three missions of 25 cycles."""
     folder = campaign_folder("explanations", seed, quick=quick)
     tasks = _tasks(quick, seed, folder)
-    found = sorted(found_by_all(explained, tasks, Explained, folder, "mission"), key=lambda e: (e.scenario, e.seed))
+    found = sorted(run_trials(explained, tasks, Explained, folder, "mission"), key=lambda e: (e.scenario, e.seed))
     return _report(found, _hour(tasks[0]), seed, folder)
 
 

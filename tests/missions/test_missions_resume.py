@@ -212,6 +212,6 @@ def _with_room(path: Path, room: int) -> Callable[[int, bytes], int]:
 
 def test_a_process_that_is_killed_loses_nothing(tmp_path: Path) -> None:
     """SIGKILL in the middle of a drive, and again while it is resumed."""
-    found = crash._tried(crash.Trial(0, "office", 1, 25, 0.03, 6.0), tmp_path)
+    found = crash.run_trial(crash.Trial(0, "office", 1, 25, 0.03, 6.0), tmp_path)
     assert (found.wrong, found.outcome) == ("", "reached")
     assert found.kills >= 1

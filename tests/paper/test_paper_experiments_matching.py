@@ -12,12 +12,13 @@ import pytest
 from experiments import trials
 from experiments.paper import figure12
 from experiments.perception import corridor, matcher
-from experiments.perception.corridor_data import FOLDER, load_corridor
+from experiments.perception.corridor_data import load_corridor
 from experiments.report import Report
+from experiments.shared_data import CORRIDOR, data_path
 
 PNG = b"\x89PNG"
 needs_photographs = pytest.mark.skipif(
-    not (FOLDER / "corridor.json").is_file(), reason="the corridor photographs are not beside the repository"
+    not data_path(CORRIDOR).is_dir(), reason="the corridor photographs are not beside the repository"
 )
 
 
@@ -63,7 +64,7 @@ def test_the_matcher_s_figures_come_from_the_seed() -> None:
 
 @needs_photographs
 def test_poses_in_the_photographs_come_back(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(corridor, "found_by_all", here)
+    monkeypatch.setattr(corridor, "run_trials", here)
     assert failing(corridor.run(quick=True, seed=0, seeds=1)) == []
     pictures = sorted((tmp_path / "experiments" / "corridor" / "quick-0").glob("frame-*.png"))
     assert len(pictures) == 6 and all(picture.read_bytes().startswith(PNG) for picture in pictures)
@@ -73,4 +74,4 @@ def test_without_photographs_the_report_says_so(monkeypatch: pytest.MonkeyPatch,
     monkeypatch.setattr(corridor, "load_corridor", lambda: load_corridor(tmp_path))
     report = corridor.run(quick=True, seed=0)
     assert report.rows == () and report.claims == ()
-    assert "not there" in report.text()
+    assert "Nothing was measured" in report.text()

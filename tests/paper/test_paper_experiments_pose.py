@@ -29,7 +29,7 @@ def test_r_and_t_beats_r_then_t_and_both_grow_as_in_table_2() -> None:
 
 def test_med_r_and_t_holds_where_r_and_t_is_off_by_feet(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """And Trunc R and T beyond half of the lines wrong; the peer, if it is there, stays behind."""
-    monkeypatch.setattr(table3, "found_by_all", here)
+    monkeypatch.setattr(table3, "run_trials", here)
     monkeypatch.setattr(table3, "campaign_folder", lambda *_, **__: tmp_path)
     report = table3.run(quick=True, seed=0, samples=20)
     assert failing(report) == []

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.trials import found_by_all
+from experiments.trials import run_trials
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,29 +33,29 @@ FOUND = [square(number) for number in NUMBERS]
 
 
 def test_results_come_in_the_order_of_the_trials_and_are_kept(tmp_path: Path) -> None:
-    assert found_by_all(square, NUMBERS, Square, tmp_path) == FOUND
-    assert found_by_all(spoilt, NUMBERS, Square, tmp_path) == FOUND
+    assert run_trials(square, NUMBERS, Square, tmp_path) == FOUND
+    assert run_trials(spoilt, NUMBERS, Square, tmp_path) == FOUND
 
 
 def test_a_campaign_that_was_broken_off_goes_on_where_it_was(tmp_path: Path) -> None:
-    assert found_by_all(square, NUMBERS[:2], Square, tmp_path) == FOUND[:2]
-    kept = tmp_path / "found.jsonl"
+    assert run_trials(square, NUMBERS[:2], Square, tmp_path) == FOUND[:2]
+    kept = tmp_path / "results.jsonl"
     kept.write_text(kept.read_text(encoding="utf-8") + '{"number": 3, "fou', encoding="utf-8")
-    assert found_by_all(square, NUMBERS, Square, tmp_path) == FOUND
-    assert found_by_all(spoilt, NUMBERS, Square, tmp_path) == FOUND
+    assert run_trials(square, NUMBERS, Square, tmp_path) == FOUND
+    assert run_trials(spoilt, NUMBERS, Square, tmp_path) == FOUND
 
 
 @pytest.mark.parametrize("finder", [{"code": "of yesterday"}, {"arithmetic": "abacus"}])
 def test_what_another_found_is_found_anew(tmp_path: Path, finder: dict[str, str]) -> None:
-    found_by_all(square, [], Square, tmp_path)
-    here = json.loads((tmp_path / "found.jsonl").read_text(encoding="utf-8"))
-    lines = [here | finder, *({"number": n, "found": {"of": 0, "value": 0.0}} for n in range(4))]
-    (tmp_path / "found.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
-    assert found_by_all(square, NUMBERS, Square, tmp_path) == FOUND
+    run_trials(square, [], Square, tmp_path)
+    here = json.loads((tmp_path / "results.jsonl").read_text(encoding="utf-8"))
+    lines = [here | finder, *({"number": n, "result": {"of": 0, "value": 0.0}} for n in range(4))]
+    (tmp_path / "results.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
+    assert run_trials(square, NUMBERS, Square, tmp_path) == FOUND
 
 
 def test_a_trial_that_raises_ends_the_campaign_and_loses_nothing(tmp_path: Path) -> None:
-    found_by_all(square, NUMBERS[:3], Square, tmp_path)
+    run_trials(square, NUMBERS[:3], Square, tmp_path)
     with pytest.raises(RuntimeError, match="trial 1 was done again"):
-        found_by_all(spoilt, NUMBERS, Square, tmp_path)
-    assert found_by_all(spoilt, NUMBERS[:3], Square, tmp_path) == FOUND[:3]
+        run_trials(spoilt, NUMBERS, Square, tmp_path)
+    assert run_trials(spoilt, NUMBERS[:3], Square, tmp_path) == FOUND[:3]

@@ -12,7 +12,7 @@ from blackboard.effect import Post
 from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from experiments.paper.planning import TAKING_PART
-from experiments.perception.visibility import CAMERA, MOUNT, house
+from experiments.perception.visibility import CAMERA, MOUNT, generate_house
 from harvey.dry_run import AcceptEveryMilestone, IdealBodyPort
 from harvey.wiring import knowledge_sources
 from world_models.actuator import ActuatorModel
@@ -63,7 +63,7 @@ def way(world: World, subgoal: Subgoal) -> shapely.LineString:
 @settings(deadline=None, max_examples=5)
 @given(st.integers(0, 100_000))
 def test_sketches_keep_clear_of_barriers_and_keep_what_is_verified(seed: int) -> None:
-    world = read_world(Source.parse(house(np.random.default_rng(seed)), "house.toml"))
+    world = read_world(Source.parse(generate_house(np.random.default_rng(seed)), "house.toml"))
     sketches, outcome = planned(world)
     assert outcome.kind in ("reached", "blocked"), outcome
     solid = barriers(world)

@@ -28,7 +28,7 @@ def test_a_repeating_body_answers_with_what_was_recorded(tmp_path: Path) -> None
     (tmp_path / "one.mjpeg").write_bytes(JPEG)
     done = MotionReport(0.1, 0.6, 2.0, 2.0)
     with VideoCamera(str(tmp_path / "one.mjpeg"), None, clock=lambda: 0.0) as camera:
-        body = video_stream.Repeating([done], camera)
+        body = video_stream.RepeatingBody([done], camera)
         assert body.execute(MotorCommand(0.1, 0.5)) == done
         ended = body.execute(MotorCommand(0.0, 0.5))
         assert isinstance(ended, BodyFault) and "end here" in ended.detail

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.robustness.imported_building import drawn
-from experiments.robustness.imported_floors import pairs_of
+from experiments.robustness.imported_building import draw_trips
+from experiments.robustness.imported_floors import plan_pairs
 from harvey.cli import main
 from world_models.building.checks import check_world
 from world_models.building.world import World
@@ -122,7 +122,7 @@ def test_a_wheeled_robot_changes_floors_of_the_university_by_elevator(university
 @no_gml
 def test_between_floors_of_the_university_only_stairs_are_not_for_wheels(university: Building) -> None:
     world = university[1]
-    pairs = pairs_of(world, university[0].network)
+    pairs = plan_pairs(world, university[0].network)
     assert len(pairs) == 166 and all(pair.walked and pair.length_m for pair in pairs)
     assert sum(pair.driven is not None for pair in pairs) == 63
     assert world.walk("corridor3", "corridor2") is not None and world.route("corridor3", "corridor2") is None
@@ -131,12 +131,12 @@ def test_between_floors_of_the_university_only_stairs_are_not_for_wheels(univers
 
 
 @no_ifc
-def test_errands_in_the_duplex_are_between_rooms_that_wheels_can_reach(duplex: Building) -> None:
+def test_trips_in_the_duplex_are_between_rooms_that_wheels_can_reach(duplex: Building) -> None:
     world = duplex[1]
-    errands = list(drawn(world, 50, 0))
-    assert [e.number for e in errands] == list(range(50)) and errands == list(drawn(world, 50, 0))
-    assert all(e.origin != e.destination and world.route(e.origin, e.destination) for e in errands)
-    rooms = {room for e in errands for room in (e.origin, e.destination)}
+    trips = list(draw_trips(world, 50, 0))
+    assert [e.number for e in trips] == list(range(50)) and trips == list(draw_trips(world, 50, 0))
+    assert all(e.origin != e.destination and world.route(e.origin, e.destination) for e in trips)
+    rooms = {room for e in trips for room in (e.origin, e.destination)}
     assert not rooms & {"a105-stair", "b105-room", "r301-roof"} and len(rooms) == 18
 
 
