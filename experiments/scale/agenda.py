@@ -50,9 +50,9 @@ def run(quick: bool, seed: int) -> Report:
     cycles = QUICK_CYCLES if quick else CYCLES
     with stages(4 + len(LOADS), sys.stderr) as begin:
         begin(f"memory: {cycles} cycles with retention")
-        retained = agenda_memory.long_run(cycles, forgetting=True)
+        retained = agenda_memory.long_run(cycles, retention=True)
         begin(f"memory: {GROWING_CYCLES} cycles without")
-        growing = agenda_memory.long_run(GROWING_CYCLES, forgetting=False)
+        growing = agenda_memory.long_run(GROWING_CYCLES, retention=False)
         speeds: dict[str, list[Speed]] = {}
         for load in LOADS:
             begin(f"{load.name}, {pending[0]} to {pending[-1]} pending")

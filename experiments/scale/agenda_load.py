@@ -14,6 +14,7 @@ import numpy as np
 from blackboard.board import View
 from blackboard.change import Change, Watch
 from blackboard.effect import Effect, Post, Revise
+from blackboard.kinds import inference
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
@@ -25,6 +26,7 @@ PART_CYCLES = 1000
 """Cycles per measurement."""
 
 
+@inference()
 @dataclass(frozen=True, slots=True)
 class Task:
     """A task that is revised for ever.

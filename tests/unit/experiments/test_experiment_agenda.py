@@ -33,9 +33,9 @@ def test_a_measurement_fills_the_agenda_first() -> None:
     assert PART_CYCLES >= 1000
 
 
-def test_with_forgetting_the_board_stays_small() -> None:
-    assert agenda_memory.long_run(500, forgetting=True).entries < 10
-    without = agenda_memory.long_run(500, ())
+def test_with_retention_the_board_stays_small() -> None:
+    assert agenda_memory.long_run(500, retention=True).entries < 10
+    without = agenda_memory.long_run(500, retention=False)
     assert without.entries > 400 and without.posted > 400 and without.early_bytes > 0
 
 
