@@ -1,4 +1,4 @@
-"""Bounds of settings: between what a number must lie, told so that a reader of files can say it in their unit."""
+"""Bounds of settings: allowed ranges of numbers, with an error that file readers can restate in the file's units."""
 
 from __future__ import annotations
 
@@ -9,37 +9,37 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """From ``low`` to ``high``; ``above``: but not ``low`` itself."""
+    """From ``low`` to ``high``, both included; with ``above``, without ``low`` itself."""
 
     low: float
     high: float
     above: bool = False
 
-    def hold(self, value: float) -> bool:
-        """Whether a number lies between; not a number never does."""
+    def contains(self, value: float) -> bool:
+        """Whether a number is within the bounds; NaN is not."""
         return (self.low < value if self.above else self.low <= value) and value <= self.high
 
-    def words(self, unit: float = 1.0) -> str:
-        """In words, in units of so much."""
+    def describe(self, unit: float = 1.0) -> str:
+        """The bounds in words, divided by ``unit``."""
         low, high = f"{self.low / unit:.6g}", f"{self.high / unit:.6g}"
         return f"above {low}, up to {high}" if self.above else f"from {low} to {high}"
 
 
 class OutOfBoundsError(ValueError):
-    """A setting that is out of its bounds.
+    """A setting outside its bounds.
 
     Attributes:
-        key: the setting's; bounds: its.
+        key: name of the setting; bounds: what it was checked against.
     """
 
     def __init__(self, key: str, bounds: Bounds, value: float) -> None:
-        super().__init__(f"expected {key} {bounds.words()}, got {value:g}")
+        super().__init__(f"expected {key} {bounds.describe()}, got {value:g}")
         self.key, self.bounds = key, bounds
 
 
 def check_bounds(settings: Any, bounds: Mapping[str, Bounds]) -> None:
-    """Raises OutOfBoundsError for the first attribute that is out of its bounds."""
+    """Raises OutOfBoundsError for the first attribute of ``settings`` outside its bounds."""
     for key, allowed in bounds.items():
         value = getattr(settings, key)
-        if not allowed.hold(value):
+        if not allowed.contains(value):
             raise OutOfBoundsError(key, allowed, value)

@@ -1,4 +1,4 @@
-"""The sensor model (§3.2): projection, lens distortion, clipping and how the camera is mounted.
+"""The sensor model (§3.2): pinhole projection, lens distortion, clipping, and the camera's mounting.
 
 Pixels: the centre of the top-left pixel is (0.0, 0.0), u to the right, v down (OpenCV's convention).
 """
@@ -16,14 +16,14 @@ from world_models.entries.obstruction import Obstruction
 from world_models.frames import Pose, frozen
 
 NEAR_PLANE_M = 0.05
-"""Nothing nearer than this to the optical centre is projected [m]."""
+"""Near plane: points at a smaller depth are not projected."""
 
-UNDONE_STEPS, UNDONE_END, LEAST_RADIAL = 300, 1e-12, 0.2
-"""Steps to where a ray came from, at the most; how short the last one is; and the strongest barrel that is undone:
-beyond it no ray falls on a pixel."""
+MAX_UNDISTORT_STEPS, UNDISTORT_TOLERANCE, MIN_RADIAL = 300, 1e-12, 0.2
+"""Of the fixed-point iteration that undoes distortion: steps, size of the last step (normalized coordinates), and
+smallest radial factor; at a stronger barrel distortion no ray falls on a pixel."""
 
 _ZOOMS = tuple(1.0 + 0.01 * i for i in range(101))
-"""Focal lengths that are tried for :attr:`Camera.pinhole`, relative to the camera's own."""
+"""Factors on the focal lengths that :attr:`Camera.pinhole` tries, in order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,10 @@ class Camera:
         cx, cy: principal point [px].
         width, height: image size [px].
         distortion: ``None`` or (k1, k2, p1, p2[, k3]), OpenCV's order.
-        obstruction: what stands before it, if anything does, in the picture once distortion is undone.
+        obstruction: what hides a part of the undistorted picture, if anything does.
+
+    Raises:
+        ValueError: focal lengths or size not positive, or not 4 or 5 finite distortion coefficients.
     """
 
     fx: float
@@ -61,7 +64,7 @@ class Camera:
 
     @staticmethod
     def from_field_of_view(horizontal_rad: float, width: int = 512, height: int = 512) -> Camera:
-        """Square pixels, principal point in the middle, no distortion."""
+        """A camera with square pixels, the principal point in the middle and no distortion."""
         f = width / (2.0 * math.tan(horizontal_rad / 2.0))
         return Camera(f, f, (width - 1) / 2.0, (height - 1) / 2.0, width, height)
 
@@ -72,40 +75,41 @@ class Camera:
 
     @property
     def pinhole(self) -> Camera:
-        """The camera without lens distortion that pictures are put into: as this one, with its focal lengths drawn out
-        where the middle of the picture would otherwise not fill it (a pincushion lens).
+        """The distortion-free camera that pictures are rectified to.
+
+        Its focal lengths are this camera's, enlarged where the rectified picture would have empty borders (a
+        pincushion lens).
         """
         if self.distortion is None:
             return self
         plain = replace(self, distortion=None)
-        return next(
-            (c for f in _ZOOMS if self._fills(c := replace(plain, fx=f * self.fx, fy=f * self.fy))), plain
-        )
+        zoomed = (replace(plain, fx=f * self.fx, fy=f * self.fy) for f in _ZOOMS)
+        return next((camera for camera in zoomed if self._fills(camera)), plain)
 
     def distort(self, pixels: Any) -> NDArray[np.float64]:
-        """Where this camera sees what it would see at pixels (..., 2) without its lens distortion."""
+        """Distorted pixels (..., 2) of undistorted pixels (..., 2) with the same focal lengths."""
         p = np.asarray(pixels, float)
         if self.distortion is None:
             return p
         centre, focal = np.array([self.cx, self.cy]), np.array([self.fx, self.fy])
-        return np.asarray(self._distorted((p - centre) / focal) * focal + centre)
+        return np.asarray(self._distort((p - centre) / focal) * focal + centre)
 
     def project(self, points_camera: Any) -> NDArray[np.float64]:
-        """Project points (..., 3) [m, camera frame] to pixels (..., 2).
+        """Pixels (..., 2) of points (..., 3) [m, camera frame], which must lie in front of the camera.
 
-        Points must lie in front of the camera; the caller clips (see :meth:`project_segments`).
+        The caller clips (see :meth:`project_segments`).
         """
         p = np.asarray(points_camera, float)
-        xy = self._distorted(p[..., :2] / p[..., 2:3])
+        xy = self._distort(p[..., :2] / p[..., 2:3])
         return xy * (self.fx, self.fy) + (self.cx, self.cy)
 
     def rays(self, pixels: Any) -> NDArray[np.float64]:
-        """Undistorted directions (..., 3), z = 1, in the camera frame, of pixels (..., 2)."""
-        xy = self._undistorted((np.asarray(pixels, float) - (self.cx, self.cy)) / (self.fx, self.fy))
+        """Directions (..., 3), z = 1, in the camera frame, of distorted pixels (..., 2)."""
+        xy = self._undistort((np.asarray(pixels, float) - (self.cx, self.cy)) / (self.fx, self.fy))
         return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
 
     def undistort(self, pixels: Any) -> NDArray[np.float64]:
-        """Where the same camera without its lens distortion would see pixels (..., 2)."""
+        """Undistorted pixels (..., 2) of distorted pixels (..., 2), with the same focal lengths."""
         if self.distortion is None:
             return np.asarray(pixels, float)
         return self.rays(pixels)[..., :2] * (self.fx, self.fy) + (self.cx, self.cy)
@@ -119,18 +123,19 @@ class Camera:
     def project_segments(
         self, lines_world: Any, camera_from_world: Pose
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Project 3D segments (n, 2, 3), clipped to the near plane and to the image.
+        """Project segments (n, 2, 3) [m, world], clipped to the near plane and to the image.
+
+        Clipping to the image is along the straight undistorted line.
 
         Returns:
-            segments_px (n, 2, 2), NaN where nothing is left, and a mask (n,) of what is left.
-            Clipping to the image is along the straight undistorted line.
+            segments_px (n, 2, 2), NaN where nothing is visible, and the mask (n,) of visible segments.
         """
         lines = np.asarray(lines_world, float).reshape(-1, 2, 3)
         p = camera_from_world.apply(lines)
         out = np.full((len(lines), 2, 2), np.nan)
         if not len(lines):
             return out, np.zeros(0, bool)
-        # Near plane: move the end that is behind it along the segment.
+        # Near plane: an end behind it moves along the segment to the plane.
         z = p[..., 2]
         front = z > NEAR_PLANE_M
         dz = z[:, 1] - z[:, 0]
@@ -150,17 +155,18 @@ class Camera:
         return out, mask
 
     def _fills(self, pinhole: Camera) -> bool:
-        """Whether all that a camera without distortion would see is in this one's picture."""
+        """Whether the whole picture of a distortion-free camera is within this camera's picture."""
         return bool(np.all(self.inside(self.project(pinhole.rays(pinhole.border())), -0.5)))
 
     def border(self, steps: int = 33) -> NDArray[np.float64]:
-        """Points (4 steps, 2) on the outline of the picture [px]."""
+        """(4 steps, 2) points on the border of the picture [px]."""
         u = np.linspace(-0.5, self.width - 0.5, steps)
         v = np.linspace(-0.5, self.height - 0.5, steps)
         sides = [(u, np.full(steps, y)) for y in v[[0, -1]]] + [(np.full(steps, x), v) for x in u[[0, -1]]]
         return np.concatenate([np.column_stack(side) for side in sides])
 
-    def _distorted(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _distort(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distorted normalized coordinates (..., 2)."""
         if self.distortion is None:
             return xy
         k1, k2, p1, p2, k3 = self.distortion
@@ -175,25 +181,26 @@ class Camera:
             axis=-1,
         )
 
-    def _undistorted(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _undistort(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Undistorted normalized coordinates (..., 2), by fixed-point iteration as in OpenCV."""
         if self.distortion is None:
             return xy
         k1, k2, p1, p2, k3 = self.distortion
         x0, y0 = x, y = xy[..., 0], xy[..., 1]
-        for _ in range(UNDONE_STEPS):  # a fixed point, as OpenCV has it
+        for _ in range(MAX_UNDISTORT_STEPS):
             r2 = x * x + y * y
-            radial = np.maximum(1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), LEAST_RADIAL)
+            radial = np.maximum(1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), MIN_RADIAL)
             before = x, y
             x, y = ((x0 - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial,
                     (y0 - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial)
-            if all(np.all(np.abs(now - then) <= UNDONE_END) for now, then in zip((x, y), before, strict=True)):
+            if all(np.all(np.abs(now - then) <= UNDISTORT_TOLERANCE) for now, then in zip((x, y), before, strict=True)):
                 break
         return np.stack([x, y], axis=-1)
 
 
 @dataclass(frozen=True, slots=True)
 class CameraMount:
-    """How the camera sits on the robot.
+    """Pose of the camera on the robot.
 
     Attributes:
         height_m: optical centre above the floor [m].
@@ -216,7 +223,7 @@ class CameraMount:
 def clip_segments(
     segments_px: NDArray[np.float64], width: int, height: int
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Liang-Barsky clipping of segments (n, 2, 2) [px] to the image; the mask (n,) says what is left."""
+    """Liang-Barsky clipping of segments (n, 2, 2) [px] to the image; the mask (n,) marks visible ones."""
     seg = np.asarray(segments_px, float).reshape(-1, 2, 2)
     a, d = seg[:, 0], seg[:, 1] - seg[:, 0]
     t0, t1 = np.zeros(len(seg)), np.ones(len(seg))

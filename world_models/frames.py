@@ -1,6 +1,6 @@
-"""Rigid transforms: the only SE(3) and SE(2) code in the house.
+"""Coordinate frames and rigid transforms: all SE(3) and SE(2) code.
 
-Frames (all right-handed, metres and radians):
+Coordinate frames (all right-handed, metres and radians):
 
 * world   x east, y north, z up; the frame of the root locale.
 * locale  x, y, z of one locale (§3.4); each locale has its own.
@@ -139,6 +139,6 @@ class Pose2:
 
 
 def flattened(pose: Pose) -> Pose2:
-    """The floor pose of an SE(3) pose whose z axis is up (tilt is dropped)."""
+    """The floor pose of an SE(3) pose whose z axis is up; tilt is dropped."""
     r, t = pose.rotation, pose.translation
     return Pose2(float(t[0]), float(t[1]), math.atan2(r[1, 0], r[0, 0]))

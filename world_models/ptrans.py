@@ -1,4 +1,4 @@
-"""Conceptual dependency (§3.3): ``(ptrans (locale (x,y,z)) (locale (x,y,z)))``, from place to place (Figure 17)."""
+"""Goals in conceptual-dependency form (§3.3, Figure 17): ``(ptrans (locale (x,y,z)) (locale (x,y,z)))``."""
 
 from __future__ import annotations
 
@@ -7,28 +7,28 @@ import re
 from world_models.entries.location import Place
 from world_models.units import FOOT_M
 
-FAR_FT = 1e6
+MAX_COORDINATE_FT = 1e6
 _NUMBER = r"\s*([-+]?\d+(?:\.\d*)?)\s*"
 _PLACE = rf"\(\s*([\w'-]+)\s+\({_NUMBER},{_NUMBER},{_NUMBER}\)\s*\)"
 _GOAL = re.compile(rf"\s*\(\s*ptrans\s+{_PLACE}\s*{_PLACE}\s*\)\s*")
 
 
 def parse_ptrans(text: str) -> tuple[Place, Place]:
-    """From where to where; coordinates are feet in each locale's own frame, and z is 0: wheels stand on the floor.
+    """Origin and destination; coordinates are feet in each locale's own frame, and z is 0, the floor.
 
     Raises:
-        ValueError: the text has another form, or names a place above or below the floor, or far off.
+        ValueError: the text has another form, z is not 0, or a coordinate is above MAX_COORDINATE_FT.
     """
-    found = _GOAL.fullmatch(text)
-    if found is None:
+    match = _GOAL.fullmatch(text)
+    if match is None:
         raise ValueError(f"expected a goal like (ptrans (locale (x,y,z)) (locale (x,y,z))), got {text!r}")
-    a, ax, ay, az, b, bx, by, bz = found.groups()
+    a, ax, ay, az, b, bx, by, bz = match.groups()
     return _place(a, ax, ay, az), _place(b, bx, by, bz)
 
 
 def _place(locale: str, x: str, y: str, z: str) -> Place:
     if float(z) != 0.0:
         raise ValueError(f"expected z = 0, the floor of {locale}, got {z}")
-    if max(abs(float(x)), abs(float(y))) > FAR_FT:
-        raise ValueError(f"expected coordinates of at most {FAR_FT:g} ft, got ({x}, {y})")
+    if max(abs(float(x)), abs(float(y))) > MAX_COORDINATE_FT:
+        raise ValueError(f"expected coordinates of at most {MAX_COORDINATE_FT:g} ft, got ({x}, {y})")
     return Place(locale, float(x) * FOOT_M, float(y) * FOOT_M)

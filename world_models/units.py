@@ -1,4 +1,4 @@
-"""Units at the edge: inside everything is metres and radians."""
+"""Units of files and output; inside everything is in metres and radians."""
 
 FOOT_M = 0.3048
 """One foot [m]."""

@@ -24,7 +24,7 @@ from world_models.camera import Camera, CameraMount
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose, Pose2
-from world_models.visibility.lines_and_points import hidden
+from world_models.visibility.lines_and_points import find_hidden
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 256, 256)
 MOUNT = CameraMount(1.0, 0.1)
@@ -62,7 +62,7 @@ def count_agreement(rng: np.random.Generator, views: int = VIEWS, rays: int = RA
         pose = MOUNT.camera_from_robot @ _draw_pose(world, rng).lifted().inverse()
         seen = find_visible_patches(mesh, project_mesh(mesh, lens, pose.rotation, pose.translation), lens, SAMPLES)
         points, drawn = _sample_points(world, pose, seen, rng, rays)
-        same += int(np.sum(hidden(world, CAMERA, pose, points) == ~drawn))
+        same += int(np.sum(find_hidden(world, CAMERA, pose, points) == ~drawn))
         asked += len(points)
     return same, asked
 

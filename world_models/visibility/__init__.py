@@ -1,1 +1,8 @@
-"""What of the building a camera sees."""
+"""Which part of the building does a camera see (§3.4)?
+
+In reading order:
+
+* :mod:`.portals`: the locales in view through chains of doorways, each with a window of the image.
+* :mod:`.shadows`: what convex surfaces hide of segments and points (shadow volumes).
+* :mod:`.lines_and_points`: visible model lines and landmark corners, from both.
+"""

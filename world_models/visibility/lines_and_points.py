@@ -1,9 +1,9 @@
 """Which model lines and corners a camera sees: exact hidden-line removal by shadow volumes.
 
-Seen from the optical centre, a convex one-sided surface hides what lies in its shadow: beyond its plane and within the
-pyramid of its sides. Each of these bounds is linear in a point, so that the hidden part of a segment is an interval,
-computed for all pairs of lines and surfaces at once (:mod:`world_models.visibility.shadows`). Locales that no chain of
-doorways opens to the camera are left out beforehand (§3.4: the locale network as a focusing mechanism).
+Seen from the optical centre, a convex one-sided surface hides what lies in its shadow volume: beyond its plane and
+within the pyramid of its sides. Each of these bounds is linear in a point, so that the hidden part of a segment is an
+interval, computed for all pairs of lines and surfaces at once (:mod:`world_models.visibility.shadows`). Locales that no
+chain of doorways opens to the camera are left out beforehand (§3.4: the locale network as a focusing mechanism).
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose
 from world_models.visibility.portals import Window, find_visible_locales, image_window
 from world_models.visibility.shadows import (
-    SHORTEST_PIECE,
+    MIN_PIECE,
     Shadows,
+    bounding_windows,
+    build_shadows,
     clipped_spans,
+    cut_segments,
     hidden_points,
     lengths_px,
     overlap,
-    pieces,
-    rectangles,
-    shadows_of,
     visible_spans,
 )
 
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-KEPT_VIEWS = 16
-"""How many views are kept: as many as a sketch has milestones, or a milestone directions."""
+MAX_VIEWS = 16
+"""Size of the cache of views: as many as a sketch has milestones, or a milestone directions."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -46,10 +46,10 @@ class VisibleLines:
     """The visible pieces of model lines.
 
     Attributes:
-        segments_px: (n, 2, 2) where they are seen.
-        lines_world: (n, 2, 3) the pieces that are seen [m].
+        segments_px: (n, 2, 2) projections.
+        lines_world: (n, 2, 3) the visible pieces [m].
         landmark, line: (n,) which line (``world.landmarks[landmark].lines_world[line]``).
-        contrast: (n,) the brightness step across it that the model expects, 0..1.
+        contrast: (n,) expected brightness step across the line, 0..1.
     """
 
     segments_px: Floats
@@ -72,10 +72,10 @@ class VisiblePoints:
     """The visible corners of landmarks.
 
     Attributes:
-        points_px: (n, 2) where they are seen.
+        points_px: (n, 2) projections.
         points_world: (n, 3) [m].
         landmark, point: (n,) which corner (``world.landmarks[landmark].points_world[point]``).
-        contrast: (n,) the second strongest brightness step among the lines that meet there, 0..1.
+        contrast: (n,) second largest expected brightness step among the lines that meet there, 0..1.
     """
 
     points_px: Floats
@@ -104,24 +104,21 @@ def visible_lines(
     min_separation_px: float = 2.0,
     max_distance_m: float = 40.0,
 ) -> VisibleLines:
-    """The pieces of model lines that the camera sees, hidden lines removed, clipped to the image.
+    """The visible pieces of model lines, hidden lines removed, clipped to the image; the last views are cached.
 
     Args:
         locales: only lines of landmarks in these (all: ``None``); things elsewhere still hide them.
         min_length_px: shorter pieces are left out.
-        min_contrast: fainter lines are left out.
-        min_separation_px: of lines that fall together within this in the image only the strongest is kept
-            (0: keep all).
-        max_distance_m: pieces that begin further away are left out.
-
-    The same question, asked again soon, has its answer at hand: a view is judged before it is chosen, and chosen again
-    for the sketch above.
+        min_contrast: lines of lower contrast are left out.
+        min_separation_px: of lines within this distance of each other in the image only the one of highest contrast
+            is kept (0: keep all).
+        max_distance_m: pieces whose nearer end is further away are left out.
     """
     wanted = None if locales is None else tuple(sorted(locales))
     key = (camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes(), wanted,
            min_length_px, min_contrast, min_separation_px, max_distance_m)
     return world.cached(
-        "visible lines", KEPT_VIEWS, key,
+        "visible lines", MAX_VIEWS, key,
         lambda: _visible_lines(world, camera, camera_from_world, locales, min_length_px, min_contrast,
                                min_separation_px, max_distance_m))
 
@@ -130,26 +127,26 @@ def _visible_lines(
     world: World, camera: Camera, camera_from_world: Pose, locales: Collection[str] | None, min_length_px: float,
     min_contrast: float, min_separation_px: float, max_distance_m: float,
 ) -> VisibleLines:
-    view = _View(world, camera, camera_from_world)
+    view = _CameraView(world, camera, camera_from_world)
     scene = view.scene
     contrast = scene.edges.contrasts(camera_from_world.inverse().translation)
-    index = np.flatnonzero(_named(scene, scene.line_locales, locales) & (contrast >= min_contrast))
+    index = np.flatnonzero(_in_locales(scene, scene.line_locales, locales) & (contrast >= min_contrast))
     lines = camera_from_world.apply(scene.edges.lines_world[index]).reshape(-1, 2, 3)
     span = clipped_spans(lines, view.window)
-    ahead = np.flatnonzero(span[:, 1] - span[:, 0] > SHORTEST_PIECE)
-    index, lines = index[ahead], pieces(lines[ahead], span[ahead])
+    ahead = np.flatnonzero(span[:, 1] - span[:, 0] > MIN_PIECE)
+    index, lines = index[ahead], cut_segments(lines[ahead], span[ahead])
     keep = lengths_px(camera.project(lines)) >= min_length_px
     keep[keep] &= np.linalg.norm(lines[keep], axis=2).min(axis=1) < max_distance_m
-    keep[keep] &= overlap(rectangles(lines[keep]), view.windows_for(scene.line_locales[index[keep]]))
+    keep[keep] &= overlap(bounding_windows(lines[keep]), view.windows_for(scene.line_locales[index[keep]]))
     index, lines = index[keep], lines[keep]
     owner, span = visible_spans(lines, view.shadows())
-    index, lines = index[owner], pieces(lines[owner], span)
+    index, lines = index[owner], cut_segments(lines[owner], span)
     segments = camera.project(lines)
     found = VisibleLines(segments, camera_from_world.inverse().apply(lines), scene.line_landmark[index],
                          scene.line_index[index], contrast[index])
     found = found[lengths_px(segments) >= min_length_px]
     if min_separation_px > 0:
-        found = found[_distinct(found, min_separation_px)]
+        found = found[_suppress_close_lines(found, min_separation_px)]
     return found if camera.obstruction is None else found[camera.obstruction.shows(found.segments_px)]
 
 
@@ -163,17 +160,18 @@ def visible_points(
     margin_px: float = 0.0,
     max_distance_m: float = 40.0,
 ) -> VisiblePoints:
-    """The landmark corners that the camera sees, at least ``margin_px`` from the border of the image.
+    """The visible landmark corners, at least ``margin_px`` from the border of the image.
 
-    A corner shows where at least two model lines with ``min_contrast`` meet; see :func:`visible_lines` for the rest.
+    A corner is visible where at least two model lines with ``min_contrast`` meet. For the other arguments see
+    :func:`visible_lines`.
     """
-    view = _View(world, camera, camera_from_world)
+    view = _CameraView(world, camera, camera_from_world)
     scene = view.scene
     centre = camera_from_world.inverse().translation
     steps = np.append(scene.edges.contrasts(centre), 0.0)[scene.corner_lines]
     contrast = np.sort(steps, axis=1)[:, -2]
     near = np.linalg.norm(scene.corners_world - centre, axis=1) < max_distance_m
-    index = np.flatnonzero(_named(scene, scene.corner_locales, locales) & near & (contrast >= min_contrast))
+    index = np.flatnonzero(_in_locales(scene, scene.corner_locales, locales) & near & (contrast >= min_contrast))
     points = camera_from_world.apply(scene.corners_world[index]).reshape(-1, 3)
     ahead = points[:, 2] > NEAR_PLANE_M
     index, points = index[ahead], points[ahead]
@@ -187,13 +185,13 @@ def visible_points(
                          scene.corner_index[index], contrast[index])
 
 
-def hidden(world: World, camera: Camera, camera_from_world: Pose, points_world: Any) -> NDArray[np.bool_]:
-    """(n,) which of the points (n, 3) before the camera lie behind something, as the model has it."""
-    return hidden_points(camera_from_world.apply(points_world), _View(world, camera, camera_from_world).shadows())
+def find_hidden(world: World, camera: Camera, camera_from_world: Pose, points_world: Any) -> NDArray[np.bool_]:
+    """(n,) which of the points (n, 3) [m, world] in front of the camera are hidden by surfaces of the model."""
+    return hidden_points(camera_from_world.apply(points_world), _CameraView(world, camera, camera_from_world).shadows())
 
 
-class _View:
-    """What one camera pose opens to the eye."""
+class _CameraView:
+    """The locales and surfaces in view of one camera pose."""
 
     def __init__(self, world: World, camera: Camera, camera_from_world: Pose) -> None:
         self.camera_from_world = camera_from_world
@@ -204,11 +202,12 @@ class _View:
         self.windows = np.array([seen.get(name, nowhere) for name in self.scene.locales]).reshape(-1, 4)
 
     def windows_for(self, locales: NDArray[np.int64]) -> Floats:
-        """(n, 4) the rectangle through which each element, in one or the other of two locales, can be seen."""
+        """(n, 4) the window round both windows of the two locales (n, 2) of each element."""
         one, other = self.windows[locales[:, 0]], self.windows[locales[:, 1]]
         return np.concatenate([np.minimum(one[:, :2], other[:, :2]), np.maximum(one[:, 2:], other[:, 2:])], axis=1)
 
     def shadows(self) -> Shadows:
+        """Shadow volumes of the surfaces that face the camera and are in view."""
         scene, pose = self.scene, self.camera_from_world
         centre = pose.inverse().translation
         facing = scene.planes_world[:, :3] @ centre - scene.planes_world[:, 3] > 1e-6
@@ -216,16 +215,16 @@ class _View:
         depths = scene.polygons_world[index] @ pose.rotation[2]
         index = index[depths.max(axis=1, initial=-np.inf) + pose.translation[2] > NEAR_PLANE_M]
         polygons = pose.apply(scene.polygons_world[index])
-        windows = rectangles(polygons)
+        windows = bounding_windows(polygons)
         keep = overlap(windows, self.windows_for(scene.surface_locales[index]))
         index, polygons, windows = index[keep], polygons[keep], windows[keep]
         planes = np.column_stack([scene.planes_world[index, :3] @ pose.rotation.T, scene.planes_world[index, 3]])
         planes[:, 3] += planes[:, :3] @ pose.translation
-        return shadows_of(polygons, planes, windows)
+        return build_shadows(polygons, planes, windows)
 
 
 def _image_window(world: World, camera: Camera) -> Window:
-    """As :func:`image_window`, worked out once for a world and camera."""
+    """:func:`image_window`, cached in the world for its last cameras."""
     known: list[tuple[Camera, Window]] = world.cache.setdefault("image windows", [])
     for other, window in known:
         if other is camera:
@@ -234,15 +233,18 @@ def _image_window(world: World, camera: Camera) -> Window:
     return known[0][1]
 
 
-def _named(scene: Scene, rooms: NDArray[np.int64], locales: Collection[str] | None) -> Any:
-    """(n,) whether one of the two locales (n, 2) of each element is among those asked for."""
+def _in_locales(scene: Scene, rooms: NDArray[np.int64], locales: Collection[str] | None) -> Any:
+    """(n,) whether one of the two locales (n, 2) of each element is among ``locales``."""
     if locales is None:
         return True
     return np.array([name in locales for name in scene.locales], bool)[rooms].any(axis=1)
 
 
-def _distinct(lines: VisibleLines, separation_px: float) -> NDArray[np.int64]:
-    """Which lines to keep, in order: none that lies for half its length within the separation of a stronger one."""
+def _suppress_close_lines(lines: VisibleLines, separation_px: float) -> NDArray[np.int64]:
+    """Indices of lines to keep, in order: non-maximum suppression by contrast.
+
+    A line is suppressed that lies for half its length within the separation of a line of higher contrast.
+    """
     (ax, ay), (bx, by) = lines.segments_px[:, 0].T, lines.segments_px[:, 1].T
     length = np.hypot(bx - ax, by - ay)
     ux, uy = ((bx - ax) / length)[:, None], ((by - ay) / length)[:, None]

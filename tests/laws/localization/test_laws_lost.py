@@ -34,7 +34,7 @@ from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
-from world_models.visibility.lines_and_points import hidden
+from world_models.visibility.lines_and_points import find_hidden
 
 Floats = NDArray[np.float64]
 CAMERA, MOUNT = Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1)
@@ -271,7 +271,7 @@ def test_what_is_in_sight_is_what_the_exact_computation_sees(room: str) -> None:
             shown = np.flatnonzero(in_sight & (ahead[:, 2] > 0.3))
             px = CAMERA.project(ahead[shown])
             shown = shown[CAMERA.inside(px)]
-            agree.append(~hidden(CENTRE.world, CAMERA, camera_from_world, vantage.points[shown]))
+            agree.append(~find_hidden(CENTRE.world, CAMERA, camera_from_world, vantage.points[shown]))
     assert np.mean(np.concatenate(agree)) > 0.99
 
 

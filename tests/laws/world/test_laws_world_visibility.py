@@ -12,7 +12,7 @@ from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose, Pose2
 from world_models.visibility.lines_and_points import VisibleLines, visible_lines, visible_points
-from world_models.visibility.shadows import TOUCHING_M
+from world_models.visibility.shadows import CONTACT_M
 
 WORLD = load_world(WORLDS / "research_center.toml", details=[])
 CAMERA = Camera.from_field_of_view(math.radians(65.0))
@@ -64,7 +64,7 @@ def hidden_by(centre: NDArray[np.float64], point: NDArray[np.float64]) -> tuple[
         inside = (u > -slack) & (v > -slack) & (u + v < 1 + slack) & (t > 0)
         return bool(np.any(facing & inside & (depth > deeper_m)))
 
-    return any_hit(-1e-6, TOUCHING_M + 1e-6), any_hit(1e-6, TOUCHING_M - 1e-6)
+    return any_hit(-1e-6, CONTACT_M + 1e-6), any_hit(1e-6, CONTACT_M - 1e-6)
 
 
 def covered(found: VisibleLines, landmark: int, line: int, point: NDArray[np.float64]) -> bool:

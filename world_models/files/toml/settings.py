@@ -60,7 +60,7 @@ def read_settings(node: Node, kind: type[T]) -> T:
     except OutOfBoundsError as error:
         key = written[error.key]
         number = "a whole number" if hints[error.key] is int else "a number"
-        raise node[key].fail(f"{number} {error.bounds.words(known[key][1])}") from None
+        raise node[key].fail(f"{number} {error.bounds.describe(known[key][1])}") from None
     except (TypeError, ValueError) as error:
         raise WorldError(f"{node.place}: {error}") from None
 
