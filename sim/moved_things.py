@@ -1,4 +1,4 @@
-"""Things that somebody has moved: they are in the building, but not where the model has them."""
+"""Things that stand elsewhere in the building than in the robot's model."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class MovedThing:
 
     Attributes:
         thing: its name, as "hallway/fire-hose".
-        x_m, y_m: how far it was moved in the world frame [m].
+        x_m, y_m: displacement in the world frame [m].
     """
 
     thing: str
@@ -31,7 +31,7 @@ class MovedThing:
 
 
 def move_things(faces: Sequence[Face], moved: Sequence[MovedThing]) -> tuple[Face, ...]:
-    """The faces of a building in which things stand elsewhere.
+    """The faces of a building after things were moved, in the same order.
 
     Raises:
         ValueError: there is no such thing.
@@ -39,24 +39,24 @@ def move_things(faces: Sequence[Face], moved: Sequence[MovedThing]) -> tuple[Fac
     for thing in moved:
         if not any(belongs_to(face, thing) for face in faces):
             raise ValueError(f"expected a thing of the building, as locale/name, got {thing.thing!r}")
-    return tuple(_put(face, [thing for thing in moved if belongs_to(face, thing)]) for face in faces)
+    return tuple(_shift(face, [thing for thing in moved if belongs_to(face, thing)]) for face in faces)
 
 
 def belongs_to(face: Face, moved: MovedThing) -> bool:
-    """Whether a face is one of the thing's."""
+    """Whether a face is part of a thing."""
     return face.name == moved.thing or face.name.startswith(f"{moved.thing}/")
 
 
-def _put(face: Face, moved: Sequence[MovedThing]) -> Face:
+def _shift(face: Face, moved: Sequence[MovedThing]) -> Face:
     if not moved:
         return face
     by_m = np.sum([(thing.x_m, thing.y_m, 0.0) for thing in moved], axis=0)
     return replace(
         face, polygon_world=face.polygon_world + by_m,
-        front=tuple(_shifted(region, by_m) for region in face.front),
-        back=tuple(_shifted(region, by_m) for region in face.back),
+        front=tuple(_shift_region(region, by_m) for region in face.front),
+        back=tuple(_shift_region(region, by_m) for region in face.back),
     )
 
 
-def _shifted(region: Region, by_m: NDArray[np.float64]) -> Region:
+def _shift_region(region: Region, by_m: NDArray[np.float64]) -> Region:
     return replace(region, polygon_world=region.polygon_world + by_m)

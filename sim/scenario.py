@@ -1,4 +1,4 @@
-"""Scenarios: a mission, the body that tries it and what goes wrong, written in TOML."""
+"""Scenarios: a mission, the simulated body and building, and the faults, in one TOML file."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from world_models.files.toml.settings import MAX_NUMBER, read_settings, suggest_
 from world_models.files.toml.source import Key, Source, WorldError
 
 SCENARIOS = ROOT / "sim" / "scenarios"
-MOST_BENT = 1e4
-"""Coefficients of real lenses are about 1, of long ones some hundreds."""
+MAX_DISTORTION = 1e4
+"""Largest distortion coefficient: those of real lenses are about 1, of long ones some hundreds."""
 
 
 class ScenarioError(ValueError):
@@ -33,7 +33,7 @@ class ScenarioError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class CameraSettings:
-    """The camera and how it is mounted; distortion: none, or k1, k2, p1, p2[, k3] as OpenCV has them."""
+    """The camera and its mounting. Distortion: none, or OpenCV's coefficients k1, k2, p1, p2[, k3]."""
 
     width_px: int = 512
     height_px: int = 512
@@ -49,9 +49,10 @@ class CameraSettings:
                             "mount_height_m": Bounds(0.0, 5.0, above=True),
                             "mount_forward_m": Bounds(-2.0, 2.0),
                             "mount_tilt_rad": Bounds(-math.pi / 2.0, math.pi / 2.0)})
-        bent = max((abs(k) for k in self.distortion), default=0.0)
-        if bent > MOST_BENT:
-            raise ValueError(f"expected distortion coefficients of at most {MOST_BENT:g} in size, got one of {bent:g}")
+        largest = max((abs(k) for k in self.distortion), default=0.0)
+        if largest > MAX_DISTORTION:
+            raise ValueError(
+                f"expected distortion coefficients of at most {MAX_DISTORTION:g} in size, got one of {largest:g}")
         if self.distortion:
             check_lens(self.camera)
 
@@ -67,7 +68,7 @@ class CameraSettings:
 
 @dataclass(frozen=True, slots=True)
 class Render:
-    """Samples a pixel: 1, 4, 8 or 16."""
+    """Settings of the renderer: samples per pixel (1, 4, 8 or 16)."""
 
     samples: int = 8
 
@@ -99,9 +100,9 @@ class Scenario(Mission):
     """One mission in the simulator; the tables of the file are the attributes of the same name.
 
     Attributes:
-        details: the files of what only the building has.
+        details: files of what the building has and the robot's model lacks.
         faults: what goes wrong, in the order of the file.
-        moved: what stands elsewhere in the building than in the robot's model.
+        moved: things that stand elsewhere than in the robot's model.
         rides: who presses the buttons of elevators.
     """
 
@@ -116,7 +117,7 @@ class Scenario(Mission):
     rides: tuple[Helper, ...] = ()
 
     def refused(self, key: Key, why: str) -> ScenarioError:
-        """What to raise where one of its values does not go with the building."""
+        """The error to raise where one of its values does not fit the building."""
         return ScenarioError(f"{self.source.place(key)}: {why}")
 
 

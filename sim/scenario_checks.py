@@ -1,4 +1,4 @@
-"""Whether a scenario goes with its building: what it names is there, and what it puts somewhere has room there."""
+"""Checks of a scenario against its building: names are known, and what is put somewhere has room there."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from world_models.entries.location import Place
 from world_models.files.toml.settings import suggest_keys
 from world_models.units import FOOT_M
 
-STICKS_OUT_M = 0.15
-"""What hangs on a wall is at its border, and a little beyond."""
+MAX_OUTSIDE_M = 0.15
+"""A thing on a wall may reach this far out of its locale's outline [m]."""
 
 
-def named_in(scenario: Scenario) -> list[str]:
-    """The locales that the faults of a scenario name."""
-    return [name for fault in scenario.faults for _, name in _named_by(fault)]
+def find_named_locales(scenario: Scenario) -> list[str]:
+    """The locales that a scenario's faults name."""
+    return [name for fault in scenario.faults for _, name in _locale_keys(fault)]
 
 
-def _named_by(fault: Fault) -> list[tuple[str, str]]:
-    """(key, locale)."""
+def _locale_keys(fault: Fault) -> list[tuple[str, str]]:
+    """The locales that a fault names, as (key, locale)."""
     named = [("in_locale", fault.in_locale)]
     if fault.destination is not None:
         named.append(("to_locale", fault.destination.locale))
@@ -36,9 +36,9 @@ def _named_by(fault: Fault) -> list[tuple[str, str]]:
 
 
 def check_names(scenario: Scenario, world: World) -> None:
-    """Raises ScenarioError where faults or helpers name a locale or a ride that the world lacks."""
+    """Check the locales and rides that faults and helpers name. Raises ScenarioError for an unknown one."""
     for i, fault in enumerate(scenario.faults):
-        for key, name in _named_by(fault):
+        for key, name in _locale_keys(fault):
             if name not in world.locales:
                 near = suggest_keys(name, world.locales)
                 raise scenario.refused(("faults", i, key), f"expected {near}, got {name!r}")
@@ -52,8 +52,8 @@ def check_names(scenario: Scenario, world: World) -> None:
                 raise scenario.refused(("rides", i, key), f"expected {suggest_keys(name, known)}, got {name!r}")
 
 
-def faces_of(scenario: Scenario, world: World, faces: Sequence[Face]) -> Sequence[Face]:
-    """The faces of a building, with what was moved where it is now.
+def move_scenario_things(scenario: Scenario, world: World, faces: Sequence[Face]) -> Sequence[Face]:
+    """The faces of a building with the scenario's ``[[moved]]`` things in their new places.
 
     Raises:
         ScenarioError: there is no such thing, or it was moved out of its locale.
@@ -65,7 +65,7 @@ def faces_of(scenario: Scenario, world: World, faces: Sequence[Face]) -> Sequenc
             raise scenario.refused(("moved", i, "thing"), str(error)) from None
         locale = next(face.locale for face in faces if belongs_to(face, moved))
         corners = np.concatenate([face.polygon_world[:, :2] for face in faces if belongs_to(face, moved)])
-        if not all(inside_polygon(corner, world.outline(locale), STICKS_OUT_M) for corner in corners):
+        if not all(inside_polygon(corner, world.outline(locale), MAX_OUTSIDE_M) for corner in corners):
             raise scenario.refused(("moved", i), f"expected {moved.thing} to stay within {locale}, got it moved out of"
                                    f" it, by x {moved.x_m:g} m and y {moved.y_m:g} m")
     return faces
@@ -74,7 +74,7 @@ def faces_of(scenario: Scenario, world: World, faces: Sequence[Face]) -> Sequenc
 def check_room(
     scenario: Scenario, world: World, start: Place, building: Building, on_floor: Callable[[float], Building]
 ) -> None:
-    """Raises ScenarioError where the robot would be put down, at the start or by a fault, where it cannot stand."""
+    """Check that the robot has room at the start and where a fault puts it. Raises ScenarioError."""
     _check_place(scenario, ("goal",), "start", world, start, building)
     for i, fault in enumerate(scenario.faults):
         there = fault.destination

@@ -1,4 +1,4 @@
-"""From a scenario to a body in a building: the simulator loads the world with the details that the model lacks."""
+"""From a scenario to a body in a building, with the details that the robot's model lacks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sim.body.elevator import Elevators
 from sim.body.simulated_body import SimulatedBody
 from sim.render.renderer import Renderer
 from sim.scenario import Scenario
-from sim.scenario_checks import check_names, check_room, faces_of, named_in
+from sim.scenario_checks import check_names, check_room, find_named_locales, move_scenario_things
 from sim.truth import Score, Truth, score
 from world_models.building.faces import Face
 from world_models.building.locales import Link
@@ -25,20 +25,20 @@ from world_models.entries.location import Place
 from world_models.files.world_files import WorldError, load_world
 from world_models.frames import Pose2
 
-SAME_FLOOR_M = 0.5
-"""Rooms whose floors differ by less are on one floor."""
+MAX_FLOOR_STEP_M = 0.5
+"""Rooms whose floors differ by less are on one storey [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A scenario with its building: what every run of it shares.
+    """A scenario with its building: what all runs of it share.
 
     Attributes:
         scenario: as it was given.
         world: the building with its details; not what the robot believes.
-        building: how it looks and what is solid.
-        start_world, goal_world: where the robot is meant to begin and to end, in the world frame.
-        goal_floor_m: height of the floor that the goal is on.
+        building: the same for the simulated body.
+        start_world, goal_world: intended poses at start and goal, in the world frame.
+        goal_floor_m: height of the goal's floor [m].
     """
 
     scenario: Scenario
@@ -49,7 +49,7 @@ class Stage:
     goal_floor_m: float = 0.0
 
     def body(self, seed: int) -> SimulatedBody:
-        """The robot, put down for a run with this seed."""
+        """A new body, put down at the start, for a run with this seed."""
         s = self.scenario
         return SimulatedBody(
             self.building, self.start_world, s.camera.camera, s.camera.mount,
@@ -59,7 +59,7 @@ class Stage:
         )
 
     def score(self, track: tuple[Truth, ...]) -> Score:
-        """How a run with this true track ended; on another floor than the goal's it is that much further from it."""
+        """Score a run's true track; a difference in height to the goal's floor counts as distance."""
         found = score(track, self.start_world, self.goal_world, heading_matters=self.scenario.arrival.matters)
         there = track[-1].locale
         up_m = self.world.floor_m(there) - self.goal_floor_m if there in self.world.locales else 0.0
@@ -67,17 +67,16 @@ class Stage:
 
 
 def build_stage(scenario: Scenario) -> Stage:
-    """Load the scenario's world and building.
+    """Load a scenario's world and build what its runs share.
 
     Raises:
-        ScenarioError: the world or details cannot be read, or what the scenario names, moves or puts somewhere does not
-            go with the building.
+        ScenarioError: the world or its details cannot be read, or the scenario does not fit the building.
     """
     world = _world(scenario)
     check_names(scenario, world)
     start, goal = _ends(scenario, world)
-    around = _around(world, (start.locale, goal.locale, *named_in(scenario)))
-    faces = faces_of(scenario, world, world.faces_within(around))
+    around = _around(world, (start.locale, goal.locale, *find_named_locales(scenario)))
+    faces = move_scenario_things(scenario, world, world.faces_within(around))
     elevators = Elevators.of_links(_links_in(world, around), world, scenario.rides)
     on_floor = _storeys(world, around, faces, elevators, scenario.render.samples)
     building = on_floor(world.floor_m(start.locale))
@@ -89,7 +88,7 @@ def build_stage(scenario: Scenario) -> Stage:
 
 
 def _world(scenario: Scenario) -> World:
-    """The building. Raises ScenarioError where it or its details cannot be read."""
+    """Load the world with its details. Raises ScenarioError where one cannot be read."""
     try:
         return load_world(scenario.world, details=scenario.details)
     except WorldError as error:
@@ -98,7 +97,7 @@ def _world(scenario: Scenario) -> World:
 
 
 def _ends(scenario: Scenario, world: World) -> tuple[Place, Place]:
-    """Where a scenario's mission begins and ends. Raises ScenarioError where the world has no such place."""
+    """The places where the mission begins and ends. Raises ScenarioError where the world has no such place."""
     try:
         return parse_command(scenario.goal, world)
     except ValueError as error:
@@ -106,7 +105,7 @@ def _ends(scenario: Scenario, world: World) -> tuple[Place, Place]:
 
 
 def _around(world: World, locales: Sequence[str]) -> str:
-    """The smallest locale with all that a scenario names in it, and more than one room: what need be built of it."""
+    """The smallest locale, of more than one room, that contains these: only this part of the world is built."""
     around = world.common(*locales)
     return world.locale(around).parent or around if world.is_room(around) else around
 
@@ -114,7 +113,7 @@ def _around(world: World, locales: Sequence[str]) -> str:
 def _storeys(
     world: World, around: str, faces: Sequence[Face], elevators: Elevators, samples: int
 ) -> Callable[[float], Building]:
-    """The building by the height of the floor that a body stands on; each storey is worked out once."""
+    """A function from the height of the body's floor [m] to the building there; each storey is built once."""
     renderer = Renderer.of_faces(faces, samples)
     known: dict[float, Building] = {}
 
@@ -131,14 +130,14 @@ def _storeys(
 
 
 def _links_in(world: World, around: str) -> tuple[Link, ...]:
-    """The elevators and stairs between rooms of a locale."""
+    """The elevators and stairs between the rooms of a locale."""
     found = {link.name: link for room in world.rooms_in(around) for link in world.links_of(room)}
     return tuple(found.values())
 
 
 def _locale_finder(world: World, around: str, floor_m: float) -> Callable[[Pose2], str]:
-    """As ``world.locale_at``, but quick in the middle of a room: it is asked every two centimetres."""
-    rooms = [name for name in world.rooms_in(around) if abs(world.floor_m(name) - floor_m) < SAME_FLOOR_M]
+    """As ``world.locale_at``, but fast inside a room: it is called every two centimetres of the path."""
+    rooms = [name for name in world.rooms_in(around) if abs(world.floor_m(name) - floor_m) < MAX_FLOOR_STEP_M]
     outlines = [(name, world.outline(name)) for name in rooms]
     boxes = np.array([[*outline.min(axis=0), *outline.max(axis=0)] for _, outline in outlines]).reshape(-1, 4)
 

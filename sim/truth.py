@@ -1,4 +1,4 @@
-"""Where the robot really is. Only the simulator, the recorder and the scores may know."""
+"""The robot's true state, and the score of a run. Only simulator, recorder and referee may read them."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from world_models.frames import Pose2, wrap_angle
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """The simulator's truth at one moment.
+    """The true state at one moment.
 
     Attributes:
-        world_from_robot: the robot's pose.
-        time_s: simulated time since the run began.
-        path_m: length of the way gone, whatever its direction; displacements by faults do not count.
+        world_from_robot: pose.
+        time_s: simulated time since the run began [s].
+        path_m: length of the path driven so far [m]; displacements by faults do not count.
         collisions: contacts so far.
         lights_on: whether the building is lit.
-        locale: the name of the locale it is in, or "" where there is none.
+        locale: the name of the locale that it is in, "" outside all.
     """
 
     world_from_robot: Pose2
@@ -32,13 +32,13 @@ class Truth:
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """How a run really ended.
+    """The true errors at the end of a run.
 
     Attributes:
         position_error_m: distance from the goal.
         error_x_m, error_y_m: robot minus goal, in the world frame.
-        heading_error_rad: robot minus wanted arrival heading; None where none is wanted.
-        max_cross_track_m: largest distance from the straight line from start to goal.
+        heading_error_rad: robot minus arrival heading; None where any heading will do.
+        max_cross_track_m: largest distance from the straight line between start and goal.
         path_m, collisions, time_s: as in :class:`Truth`.
     """
 
@@ -53,7 +53,7 @@ class Score:
 
 
 def score(track: Sequence[Truth], start_world: Pose2, goal_world: Pose2, *, heading_matters: bool = False) -> Score:
-    """Score the true track of a run; ``start_world`` is where it was meant to begin, ``goal_world`` where to end.
+    """Score the true track of a run against the intended start and the goal, both in the world frame.
 
     Raises:
         ValueError: the track is empty.
@@ -77,7 +77,7 @@ def score(track: Sequence[Truth], start_world: Pose2, goal_world: Pose2, *, head
 
 
 def cross_track_m(pose: Pose2, start: Pose2, goal: Pose2) -> float:
-    """Signed distance of a pose from the line from start to goal, positive to its left."""
+    """Signed distance of a pose from the line from start to goal [m], positive to its left."""
     dx, dy = goal.x_m - start.x_m, goal.y_m - start.y_m
     length = math.hypot(dx, dy)
     if length < 1e-9:

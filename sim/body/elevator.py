@@ -1,4 +1,4 @@
-"""Elevators: somebody of the scenario presses the button, and the car carries the robot to another floor."""
+"""Elevators: a helper of the scenario presses the button, and the car takes the robot to another floor."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from world_models.frames import Pose2, flattened
 
 @dataclass(frozen=True, slots=True)
 class Helper:
-    """One of a scenario's ``[[rides]]``: somebody who is about, and presses the button that he is asked to.
+    """One of a scenario's ``[[rides]]``: a person who presses the button that the robot asks for.
 
     Attributes:
-        passage: the ride that he helps with; "" for any.
-        comes_s: how long the robot waits for him.
-        takes_s: from pressing the button to the doors' opening.
-        presses: the locale whose button he presses, by mistake; "" for the one that he is asked for.
-        times: how often he helps; then he has gone home.
+        passage: the elevator ride that this person helps with; "" for any.
+        comes_s: time until the person comes [s].
+        takes_s: time from pressing the button until the doors open [s].
+        presses: the locale whose button is pressed by mistake; "" for the one that is asked for.
+        times: how many rides this person helps with.
     """
 
     passage: str = ""
@@ -32,18 +32,18 @@ class Helper:
     times: int = 1000
 
     def __post_init__(self) -> None:
-        patience, often = Bounds(0.0, 1e6), Bounds(0, 10**9)
-        check_bounds(self, {"comes_s": patience, "takes_s": patience, "times": often})
+        duration = Bounds(0.0, 1e6)
+        check_bounds(self, {"comes_s": duration, "takes_s": duration, "times": Bounds(0, 10**9)})
 
 
 @dataclass(frozen=True, slots=True)
-class Carried:
-    """What a ride does.
+class RideOutcome:
+    """What a ride does to the robot.
 
     Attributes:
-        world_from_robot: where the robot is then; locale: in which car; floor_m: at which height.
-        comes_s, takes_s: how long until somebody came, and from then on.
-        helper: which of the scenario's, by its place in the file.
+        world_from_robot: pose at the end; locale: of the car there; floor_m: height of its floor [m].
+        comes_s, takes_s: time until a helper came, and from then on [s].
+        helper: which of the scenario's, by its position in the file.
     """
 
     world_from_robot: Pose2
@@ -56,12 +56,12 @@ class Carried:
 
 @dataclass(frozen=True, eq=False)
 class Elevators:
-    """All of a building.
+    """All elevators of a building.
 
     Attributes:
-        cars: (place of the car in the world, height of its floor) at each of its landings, by locale.
-        rides: the landings that each ride joins, by the passage's name.
-        helpers: those of the scenario.
+        cars: (world_from_car, height of its floor [m]) at each landing, by the car's locale there.
+        rides: the two landings that each ride joins, by the passage's name.
+        helpers: of the scenario, in the order of the file.
     """
 
     cars: Mapping[str, tuple[Pose2, float]]
@@ -77,10 +77,10 @@ class Elevators:
         cars = {name: (flattened(frame), float(frame.translation[2])) for name, frame in frames.items()}
         return Elevators(cars, {link.name: link.between for link in found}, tuple(helpers))
 
-    def carry(self, ride: Ride, truth: Truth, helped: Mapping[int, int]) -> Carried | str:
-        """Where a ride takes the robot that is truly there; why not, in words.
+    def carry(self, ride: Ride, truth: Truth, helped: Mapping[int, int]) -> RideOutcome | str:
+        """What a ride does to the robot at its true place, or why there is none, in words.
 
-        ``helped``: how often each helper has helped before.
+        ``helped``: how many rides each helper has helped with before.
         """
         ends = self.rides.get(ride.passage)
         if ends is None or truth.locale not in ends or truth.locale == ride.destination:
@@ -91,5 +91,5 @@ class Elevators:
                 car, _ = self.cars[truth.locale]
                 landing, floor_m = self.cars[there]
                 pose = landing @ (car.inverse() @ truth.world_from_robot)
-                return Carried(pose, there, floor_m, helper.comes_s, helper.takes_s, number)
+                return RideOutcome(pose, there, floor_m, helper.comes_s, helper.takes_s, number)
         return "nobody comes by who could press the button"

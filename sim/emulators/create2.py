@@ -1,7 +1,7 @@
 """An emulated iRobot Create 2, written from the Open Interface Specification: no frames, no checksum, no watchdog.
 
-Bytes are taken as they come: an opcode, then as many bytes as belong to it. What the manual leaves open is taken to be
-so: a byte that is no opcode is ignored. Clean, Spot, Max and Dock make it drive about by itself, as they do.
+The host sends an opcode, then the bytes that belong to it. Where the manual says nothing, a byte that is no opcode is
+ignored. Clean, Spot, Max and Dock make it drive about by itself.
 """
 
 from __future__ import annotations
@@ -14,38 +14,38 @@ from sim.emulators.ground import Ground
 STREAM_S = 0.015
 AXLE_M = 0.235
 MM_PER_COUNT = math.pi * 72.0 / 508.8
-MOST_MM_PER_S = 500
+MAX_SPEED_MM_PER_S = 500
 OFF, PASSIVE, SAFE, FULL = range(4)
 LENGTHS: Mapping[int, int] = {
     129: 1, 137: 4, 138: 1, 139: 3, 141: 1, 142: 1, 144: 3, 145: 4, 146: 4, 147: 1, 150: 1, 162: 2, 163: 4, 164: 4,
     165: 2, 167: 15, 168: 3,
 }
-"""Bytes behind an opcode; 140, 148 and 149 say themselves how many, the others have none."""
+"""Data bytes of an opcode; 140, 148 and 149 give their own number, all others have none."""
 
 SIZES: Mapping[int, int] = {7: 1, 35: 1, 41: 2, 42: 2, 43: 2, 44: 2}
-"""Bytes of the sensor packets that this one has; it sends no others."""
+"""Bytes of the sensor packets that it can send."""
 
 WANDERING = (300, 150)
-"""Wheel speeds when it cleans; a spiral of some kind."""
+"""Wheel speeds (right, left) while it cleans: a circle [mm/s]."""
 
 
 class Create2Emulator:
     """The robot's side of the Open Interface.
 
     Attributes:
-        on_command: told of every command that was carried out, as its bytes, if it is there.
+        on_command: called with the bytes of every command that was executed, if given.
         mode: 0 off, 1 passive, 2 safe, 3 full.
-        deaf: whether it was told another baud rate, so that it cannot be understood, nor understand.
+        deaf: whether it was set to another baud rate, so that nothing is understood in either direction.
     """
 
     def __init__(self, ground: Ground, *, count: int = 0, on_command: Callable[[bytes], None] | None = None) -> None:
-        """``count``: where its encoders begin."""
+        """``count``: the first count of its encoders."""
         self._ground, self._count, self.on_command = ground, count, on_command
         self.stops = 0
         self.power_cycle()
 
     def power_cycle(self) -> None:
-        """Off and on again: it stands, and has forgotten everything."""
+        """Off and on again: it stands, and all state is lost."""
         self.mode, self.deaf = OFF, False
         self._pending, self._out = bytearray(), bytearray()
         self._wanted = (0, 0)
@@ -57,7 +57,7 @@ class Create2Emulator:
 
     @property
     def moving(self) -> bool:
-        """Whether its motors run."""
+        """Whether the motors run."""
         return self._speeds != (0, 0)
 
     @property
@@ -67,7 +67,7 @@ class Create2Emulator:
         return self._wanted if self.mode in (SAFE, FULL) else (0, 0)
 
     def receive(self, data: bytes) -> None:
-        """Bytes from the line."""
+        """Take bytes from the line."""
         for byte in data if not self.deaf else b"":
             self._pending.append(byte)
             if len(self._pending) > self._length():
@@ -76,13 +76,13 @@ class Create2Emulator:
                 self._obey(command[0], command[1:], command)
 
     def take(self) -> bytes:
-        """Bytes for the line, each once."""
+        """Return the bytes for the line since the last call."""
         out = b"" if self.deaf else bytes(self._out)
         self._out.clear()
         return out
 
     def advance(self, duration_s: float) -> None:
-        """Time passes."""
+        """Let time pass."""
         left_s = duration_s
         while left_s > 1e-9:
             tick_s = min(left_s, STREAM_S - self._since_s if self._since_s < STREAM_S - 1e-9 else STREAM_S)
@@ -92,10 +92,10 @@ class Create2Emulator:
             if self._since_s >= STREAM_S - 1e-9:
                 self._since_s = 0.0
                 if self._streaming:
-                    self._tell()
+                    self._send_stream()
 
     def _length(self) -> int:
-        """How many bytes belong to the opcode that is pending; more, where it says itself how many and has not yet."""
+        """Data bytes of the pending opcode, as far as it is known how many they are."""
         got, opcode = self._pending, self._pending[0]
         if opcode in (148, 149):
             return 1 + got[1] if len(got) > 1 else 1
@@ -131,7 +131,7 @@ class Create2Emulator:
             self._streaming = values[0] == 1 and bool(self._stream)
 
     def _enter(self, mode: int) -> None:
-        """A change of mode stops it; the same mode again does not."""
+        """Enter a mode. A change of mode stops the wheels, the same mode again does not."""
         if mode != self.mode or self._wandering:
             self._wanted, self._wandering = (0, 0), False
         self.mode = mode
@@ -139,10 +139,10 @@ class Create2Emulator:
     def _drive(self, opcode: int, values: bytes) -> None:
         first, second = (int.from_bytes(values[i:i + 2], "big", signed=True) for i in (0, 2))
         if opcode == 137:
-            first, second = _of_radius(first, second)
+            first, second = _wheel_speeds(first, second)
         elif opcode == 146:
-            first, second = (round(value * MOST_MM_PER_S / 255) for value in (first, second))
-        self._wanted = (_bounded(first), _bounded(second))
+            first, second = (round(value * MAX_SPEED_MM_PER_S / 255) for value in (first, second))
+        self._wanted = (_limit(first), _limit(second))
 
     def _roll(self, tick_s: float) -> None:
         right, left = self._speeds
@@ -152,8 +152,8 @@ class Create2Emulator:
         self._right += 1000.0 * (moved + turned * AXLE_M / 2.0) / MM_PER_COUNT
         self._left += 1000.0 * (moved - turned * AXLE_M / 2.0) / MM_PER_COUNT
 
-    def _tell(self) -> None:
-        """One frame of the stream: with header and checksum its bytes add up to 0 in eight bits."""
+    def _send_stream(self) -> None:
+        """Send one frame of the stream; its bytes sum to 0 modulo 256."""
         body = b"".join(bytes([number]) + self._packet(number) for number in self._stream)
         frame = bytes([19, len(body)]) + body
         self._out += frame + bytes([-sum(int(byte) for byte in frame) % 256])
@@ -166,8 +166,8 @@ class Create2Emulator:
         return (value % (1 << 8 * SIZES[number])).to_bytes(SIZES[number], "big")
 
 
-def _of_radius(speed: int, radius: int) -> tuple[int, int]:
-    """Wheel speeds (right, left) of opcode 137: a speed along a circle, with 32767, -32768, 1 and -1 set apart."""
+def _wheel_speeds(speed: int, radius: int) -> tuple[int, int]:
+    """Wheel speeds (right, left) [mm/s] of opcode 137: straight for 32767 and -32768, in place for 1 and -1 [mm]."""
     if radius in (32767, -32768):
         return speed, speed
     if radius in (1, -1):
@@ -178,5 +178,5 @@ def _of_radius(speed: int, radius: int) -> tuple[int, int]:
     return round(speed * (1.0 + half / radius)), round(speed * (1.0 - half / radius))
 
 
-def _bounded(speed: int) -> int:
-    return max(-MOST_MM_PER_S, min(MOST_MM_PER_S, speed))
+def _limit(speed: int) -> int:
+    return max(-MAX_SPEED_MM_PER_S, min(MAX_SPEED_MM_PER_S, speed))

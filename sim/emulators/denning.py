@@ -10,16 +10,16 @@ from sim.emulators.denning_motion import Claim, Motion
 from world_models.frames import Pose2
 
 WATCHDOG_S = 0.5
-MOST_TURN_RAD, MOST_MOVE_M = 2.0 * math.pi, 20.0
+MAX_TURN_RAD, MAX_MOVE_M = 2.0 * math.pi, 20.0
 
 
 @dataclass(frozen=True, slots=True)
 class Executed:
-    """A command that was carried out, for whoever checks that nothing else was.
+    """A command that was executed.
 
     Attributes:
-        token, seq: which.
-        turn_rad, move_m: as it was understood.
+        token, seq: its session and number.
+        turn_rad, move_m: as the base understood it.
     """
 
     token: str
@@ -33,8 +33,8 @@ class DenningEmulator:
 
     Attributes:
         executed: every command that was begun, in order.
-        rejected: lines that were not understood.
-        stops: how often the watchdog struck.
+        rejected: number of lines that were not understood.
+        stops: how often the watchdog stopped it.
     """
 
     def __init__(self, motion: Motion, *, boot: int = 1, watchdog_s: float = WATCHDOG_S) -> None:
@@ -54,26 +54,26 @@ class DenningEmulator:
         self._heard_s = self._time_s
 
     def power_cycle(self) -> None:
-        """Off and on again: it stands, and has forgotten everything."""
+        """Off and on again: it stands, and all state is lost."""
         self._motion.halt()
         self._boot += 1
         self._reset()
 
     @property
     def moving(self) -> bool:
-        """Whether its motors run."""
+        """Whether the motors run."""
         return self._status == "run"
 
     @property
     def standing_within_s(self) -> float:
-        """It stands at the latest this long after the last line that it understood."""
+        """Longest time from the last line that it understood until it stands [s]."""
         return self._watchdog_s
 
     def receive(self, data: bytes) -> None:
-        """Bytes from the line."""
+        """Take bytes from the line."""
         for byte in data:
             if byte == 0x0A:
-                self._take_line(bytes(self._line))
+                self._read_line(bytes(self._line))
                 self._line.clear()
             elif byte == 0x23 or len(self._line) > 200:
                 self._line[:] = bytes([byte])
@@ -81,13 +81,13 @@ class DenningEmulator:
                 self._line.append(byte)
 
     def take(self) -> bytes:
-        """Bytes for the line, each once."""
+        """Return the bytes for the line since the last call."""
         out = bytes(self._out)
         self._out.clear()
         return out
 
     def advance(self, duration_s: float) -> None:
-        """Time passes; where the watchdog strikes within it, it does so to the moment."""
+        """Let time pass; a watchdog that is due within it acts at its exact time."""
         left_s = duration_s
         if self.moving and self._heard_s + self._watchdog_s < self._time_s + duration_s:
             before_s = max(0.0, self._heard_s + self._watchdog_s - self._time_s)
@@ -104,23 +104,23 @@ class DenningEmulator:
         self._follow()
 
     def _follow(self) -> None:
-        """Take up what the motors have done."""
+        """Update the claim from the motors."""
         if self.moving:
             self._claim = self._motion.claim
             if self._motion.ended:
-                self._settle(self._motion.ended)
+                self._finish(self._motion.ended)
 
     def _end(self, how: str) -> None:
         self._motion.halt()
         self._claim = self._motion.claim
-        self._settle(how)
+        self._finish(how)
 
-    def _settle(self, how: str) -> None:
-        """The command is over: its claim is added to where the robot believes it is."""
+    def _finish(self, how: str) -> None:
+        """End the command; its claim is added to the odometry."""
         self._status = how
         self._pose = self._pose @ Pose2(0.0, 0.0, self._claim.turn_rad) @ Pose2(self._claim.move_m, 0.0, 0.0)
 
-    def _take_line(self, line: bytes) -> None:
+    def _read_line(self, line: bytes) -> None:
         body, star, check = line[1:].rpartition(b"*")
         if line[:1] != b"#" or not star or check != b"%08X" % binascii.crc32(body):
             self.rejected += 1
@@ -138,7 +138,7 @@ class DenningEmulator:
         if self._waiting is not None and token == self._waiting[0]:
             self._begin_session(*self._waiting)
         if not self._token or token != self._token:
-            self._say(token, seq, "NO", "session")
+            self._send(token, seq, "NO", "session")
             return
         self._heard_s = self._time_s
         match verb, words:
@@ -147,12 +147,12 @@ class DenningEmulator:
             case "STOP", []:
                 self._stop(seq)
             case "BEAT", [question]:
-                self._tell_place(seq, question)
+                self._send_odometry(seq, question)
             case _:
-                self._say(token, seq, "NO", "verb")
+                self._send(token, seq, "NO", "verb")
 
     def _greet(self, nonce: str) -> None:
-        """A greeting changes nothing yet: the session begins with the first frame that carries its token."""
+        """Answer a greeting. The session begins only with the first frame that carries its token."""
         if nonce == self._nonce:
             token = self._token
         elif self._waiting is not None and nonce == self._waiting[1]:
@@ -162,7 +162,7 @@ class DenningEmulator:
             token = f"{binascii.crc32(f'{self._boot} {self._sessions} {nonce}'.encode()):08X}"
             self._waiting = (token, nonce)
         limits = (self._watchdog_s, self._motion.turn_rate, self._motion.speed)
-        self._say(token, 0, "HI", nonce, *(repr(value) for value in limits))
+        self._send(token, 0, "HI", nonce, *(repr(value) for value in limits))
 
     def _begin_session(self, token: str, nonce: str) -> None:
         if self.moving:
@@ -172,48 +172,48 @@ class DenningEmulator:
 
     def _go(self, seq: int, turn_rad: float, move_m: float) -> None:
         if seq == self._seq:
-            self._tell_status()
+            self._send_status()
         elif seq != self._seq + 1:
-            self._say(self._token, seq, "NO", "number")
+            self._send(self._token, seq, "NO", "number")
         elif self.moving:
-            self._say(self._token, seq, "NO", "busy")
-        elif not (abs(turn_rad) <= MOST_TURN_RAD and 0.0 <= move_m <= MOST_MOVE_M):
-            self._say(self._token, seq, "NO", "range")
+            self._send(self._token, seq, "NO", "busy")
+        elif not (abs(turn_rad) <= MAX_TURN_RAD and 0.0 <= move_m <= MAX_MOVE_M):
+            self._send(self._token, seq, "NO", "range")
         else:
             self._seq, self._status = seq, "run"
             self.executed.append(Executed(self._token, seq, turn_rad, move_m))
             self._motion.begin(turn_rad, move_m)
             self._follow()
-            self._tell_status()
+            self._send_status()
 
     def _stop(self, seq: int) -> None:
-        """Ends the command of this number; where it has not come yet, it never will begin."""
+        """End the command of this number; one that has not arrived yet will never begin."""
         if self.moving:
             self._end("stopped")
         if seq == self._seq + 1:
             self._seq, self._status, self._claim = seq, "stopped", Claim(time_s=self._claim.time_s)
         if seq == self._seq:
-            self._tell_status()
+            self._send_status()
         else:
-            self._say(self._token, seq, "NO", "number")
+            self._send(self._token, seq, "NO", "number")
 
-    def _tell_status(self) -> None:
+    def _send_status(self) -> None:
         self._follow()
         claim = self._claim
         numbers = [repr(v) for v in (claim.turn_rad, claim.move_m, claim.duration_s, claim.time_s)]
         if self.moving:
-            self._say(self._token, self._seq, "RUN", *numbers)
+            self._send(self._token, self._seq, "RUN", *numbers)
         else:
-            self._say(self._token, self._seq, "DONE", self._status, *numbers)
+            self._send(self._token, self._seq, "DONE", self._status, *numbers)
 
-    def _tell_place(self, seq: int, question: str) -> None:
+    def _send_odometry(self, seq: int, question: str) -> None:
         self._follow()
         pose = self._pose
         if self.moving:
             pose = pose @ Pose2(0.0, 0.0, self._claim.turn_rad) @ Pose2(self._claim.move_m, 0.0, 0.0)
         where = (pose.x_m, pose.y_m, pose.heading_rad, self._motion.claim.time_s)
-        self._say(self._token, seq, "HERE", question, *(repr(v) for v in where))
+        self._send(self._token, seq, "HERE", question, *(repr(v) for v in where))
 
-    def _say(self, token: str, seq: int, verb: str, *words: str) -> None:
+    def _send(self, token: str, seq: int, verb: str, *words: str) -> None:
         body = " ".join((token, str(seq), verb, *words)).encode("ascii")
         self._out += b"#%b*%08X\n" % (body, binascii.crc32(body))

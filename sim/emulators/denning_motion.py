@@ -1,4 +1,4 @@
-"""How an emulated Denning-style base carries a command out: at once on a simulated body, or rolling on the ground."""
+"""How an emulated Denning-style base executes a command: at once on a simulated body, or rolling on the ground."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from world_models.entries.body import MotionReport, MotorCommand
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """What the wheels claim of one command: how far it has come, and when."""
+    """What the encoders report of one command: how far it has come [rad, m], its duration and the time [s]."""
 
     turn_rad: float = 0.0
     move_m: float = 0.0
@@ -21,25 +21,25 @@ class Claim:
 
 
 class Motion(Protocol):
-    """The motors under a protocol.
+    """The motors of a base.
 
     Attributes:
-        turn_rate, speed: how fast they go [rad/s, m/s].
+        turn_rate, speed: of every motion [rad/s, m/s].
     """
 
     turn_rate: float
     speed: float
 
     def begin(self, turn_rad: float, move_m: float) -> None:
-        """TURN, then MOVE."""
+        """Begin a command: TURN, then MOVE."""
         ...
 
     def advance(self, duration_s: float) -> None:
-        """Time passes."""
+        """Let time pass."""
         ...
 
     def halt(self) -> None:
-        """Stand, wherever the command has come to."""
+        """Break the command off."""
         ...
 
     @property
@@ -49,18 +49,18 @@ class Motion(Protocol):
 
     @property
     def claim(self) -> Claim:
-        """Of the command that was begun last."""
+        """Of the last command."""
         ...
 
 
 class Body(Protocol):
-    """Something that carries out a whole command at once."""
+    """Something that executes a whole command in one call."""
 
     def execute(self, command: MotorCommand, /) -> MotionReport: ...
 
 
 class InstantMotion:
-    """Commands are carried out when they come, in the time of the body: nothing of them is seen on the way."""
+    """Executes a command at once, in the time of the body: no state in between is visible."""
 
     turn_rate, speed = math.radians(45.0), 0.4
 
@@ -73,10 +73,10 @@ class InstantMotion:
         self._claim = Claim(report.turn_rad, report.move_m, report.duration_s, report.sim_time_s)
 
     def advance(self, duration_s: float) -> None:
-        """The body's time passes only in what it does."""
+        """Nothing to do: the body's time passes only in commands."""
 
     def halt(self) -> None:
-        """It stands between commands."""
+        """Nothing to do: it stands between commands."""
 
     @property
     def ended(self) -> str:
@@ -88,12 +88,13 @@ class InstantMotion:
 
 
 class ConstantSpeedMotion:
-    """Wheels that turn at one speed and move at one speed, and come to what was commanded exactly.
+    """Turns and moves at constant speeds, and ends exactly where it was commanded to.
 
-    Wheels that do not get on for half a second are stalled.
+    Wheels that are held for half a second are stalled.
     """
 
     turn_rate, speed = math.radians(45.0), 0.4
+    max_held_s = 0.5
 
     def __init__(self, ground: Ground) -> None:
         self._ground = ground
@@ -126,25 +127,25 @@ class ConstantSpeedMotion:
     def claim(self) -> Claim:
         return self._claim
 
-    def _step(self, most_s: float) -> float:
-        """Roll for at most this time, to the end of the turn or of the move; returns the time that it took."""
+    def _step(self, max_s: float) -> float:
+        """Roll for at most this time, or to the end of the turn or move; returns the time that it took [s]."""
         turning = self._claim.turn_rad != self._turn
         to_go = self._turn - self._claim.turn_rad if turning else self._move - self._claim.move_m
         if to_go == 0.0:
             self._ended = "ok"
             return 0.0
         rate = self.turn_rate if turning else self.speed
-        step_s = min(most_s, abs(to_go) / rate)
-        step = to_go if step_s < most_s or abs(to_go) <= rate * most_s else math.copysign(rate * step_s, to_go)
+        step_s = min(max_s, abs(to_go) / rate)
+        step = to_go if step_s < max_s or abs(to_go) <= rate * max_s else math.copysign(rate * step_s, to_go)
         rolled = self._ground.roll(step if turning else 0.0, 0.0 if turning else step, step_s)
         self._held_s = self._held_s + step_s if rolled == (0.0, 0.0) else 0.0
-        if self._held_s > 0.5:
+        if self._held_s > self.max_held_s:
             self._ended = "stalled"
-        self._count(*rolled, finished=step == to_go and rolled != (0.0, 0.0), turning=turning)
+        self._add(*rolled, finished=step == to_go and rolled != (0.0, 0.0), turning=turning)
         return max(step_s, 1e-9)
 
-    def _count(self, turn_rad: float, move_m: float, *, finished: bool, turning: bool) -> None:
-        """A part that is finished claims what was commanded, without the rounding of its steps."""
+    def _add(self, turn_rad: float, move_m: float, *, finished: bool, turning: bool) -> None:
+        """Add a step to the claim; a finished turn or move claims exactly what was commanded."""
         turn, move = self._claim.turn_rad + turn_rad, self._claim.move_m + move_m
         if finished:
             turn, move = (self._turn, move) if turning else (turn, self._move)

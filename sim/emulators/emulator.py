@@ -1,4 +1,4 @@
-"""What every emulated base is to the line that it hangs on."""
+"""What a serial line needs of an emulated base."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ class Emulator(Protocol):
     """The base's side of a protocol: bytes in, bytes out, and time that passes. It does no input or output itself."""
 
     def receive(self, data: bytes) -> None:
-        """Bytes from the line."""
+        """Take bytes from the line."""
         ...
 
     def advance(self, duration_s: float) -> None:
-        """Time passes: motors run, watchdogs strike, what is due is said."""
+        """Let time pass: motors run, watchdogs act, what is due is sent."""
         ...
 
     def take(self) -> bytes:
-        """Bytes for the line, each once."""
+        """Return the bytes for the line since the last call."""
         ...
 
     @property
     def moving(self) -> bool:
-        """Whether its motors run."""
+        """Whether the motors run."""
         ...

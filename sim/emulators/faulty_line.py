@@ -22,7 +22,7 @@ class FaultyLine:
             self._emulator.receive(data)
 
     def advance(self, duration_s: float) -> None:
-        """Time passes on both sides of the line."""
+        """Let time pass on both sides of the line."""
         self._emulator.advance(duration_s)
 
     def take(self) -> bytes:
@@ -37,5 +37,5 @@ class FaultyLine:
 
     @property
     def moving(self) -> bool:
-        """Whether the base's motors run."""
+        """Whether the motors run."""
         return self._emulator.moving

@@ -1,4 +1,4 @@
-"""The ground under an emulated base: what its wheels roll on."""
+"""The ground under an emulated base: ideal, or of a simulated building."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from world_models.frames import Pose2
 
 
 class Ground(Protocol):
-    """Something that wheels roll on, with the clock of the base."""
+    """What wheels roll on, with the clock of the base."""
 
     @property
     def time_s(self) -> float:
-        """Of the base."""
+        """Time of the base [s]."""
         ...
 
     def roll(self, turn_rad: float, move_m: float, duration_s: float) -> tuple[float, float]:
-        """Let time pass and the wheels roll: a turn on the spot or a move. Returns what they could: (turn, move)."""
+        """Roll for a while: a turn in place or a move. Returns what was done, (turn [rad], move [m])."""
         ...
 
 
 class IdealGround:
-    """An endless, even floor on which wheels do exactly as they are told.
+    """An endless plane on which wheels do exactly what they are commanded.
 
     Attributes:
-        pose: where the robot is.
-        turned_rad, moved_m: all that it turned and moved, signs and all.
-        rolled_s: when it last moved.
+        pose: of the robot, from where it began.
+        turned_rad, moved_m: sums of all turns and moves, signed.
+        rolled_s: time of its last motion [s].
         held: whether something holds the wheels.
     """
 
@@ -55,7 +55,7 @@ class IdealGround:
 
 
 class SimulatedGround:
-    """The floor of a simulated building, with wheels that err as a robot's do."""
+    """The floor of a simulated building; the wheels have the errors of the simulated body."""
 
     def __init__(self, body: SimulatedBody) -> None:
         self._body = body

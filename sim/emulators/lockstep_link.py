@@ -1,7 +1,7 @@
-"""A line to an emulated base on which no real time counts: while the host waits for bytes, the base's time passes.
+"""A line to an emulated base without real time: the base's time passes only while the host waits for bytes.
 
-The bytes go through a pseudo-terminal and whatever opened its other end; but nobody is ever late, so that a mission
-over it takes no longer than its decisions, and takes the same ones each time.
+The bytes go through a pseudo-terminal. No byte is ever late, so a mission over this line is deterministic and takes no
+longer than its decisions.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import Protocol
 from sim.emulators.emulator import Emulator
 from sim.emulators.pseudo_terminal import PseudoTerminal
 
-LEAST_S = 1e-6
-"""Every read takes at least so long, so that time goes on whatever the host does."""
+MIN_STEP_S = 1e-6
+"""Every read takes at least this long, so that time always goes on [s]."""
 
 
 class Port(Protocol):
@@ -29,7 +29,7 @@ class Port(Protocol):
 
 
 class LockstepLink:
-    """A link (as the drivers want one) on which time passes only while its host waits."""
+    """A link, as the drivers use it, on which time passes only while the host waits."""
 
     def __init__(
         self, port: Port, terminal: PseudoTerminal, emulator: Emulator, *, clock: Callable[[], float] | None = None,
@@ -39,7 +39,7 @@ class LockstepLink:
 
         Args:
             port: the other end of ``terminal``, opened.
-            clock: tells the time, which the emulator moves on; None: what was waited here.
+            clock: the time [s] where the emulator itself advances it; None: the sum of the waits here.
         """
         self._port, self._terminal, self._emulator, self._tick_s = port, terminal, emulator, tick_s
         self._port.timeout = 2.0
@@ -53,9 +53,9 @@ class LockstepLink:
         self._terminal.exchange(self._written)
 
     def read(self, timeout_s: float) -> bytes:
-        ends_s = self._time_s + max(timeout_s, LEAST_S)
+        ends_s = self._time_s + max(timeout_s, MIN_STEP_S)
         while self._terminal.sent == self._read and self._time_s < ends_s:
-            step_s = max(LEAST_S, min(self._tick_s, ends_s - self._time_s))
+            step_s = max(MIN_STEP_S, min(self._tick_s, ends_s - self._time_s))
             self._time_s += step_s
             self._emulator.advance(step_s)
             self._terminal.exchange(self._written)
@@ -67,7 +67,7 @@ class LockstepLink:
         return self._time_s if self._clock is None else self._clock()
 
     def reopen(self) -> None:
-        """It never was gone."""
+        """Nothing to do: it is always open."""
 
     def close(self) -> None:
         self._port.close()

@@ -1,4 +1,4 @@
-"""An emulated Pioneer: P2OS as its manual describes it, watchdog and all, on whatever ground it is put on."""
+"""An emulated Pioneer, written from the P2OS manual, with its watchdog."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from sim.emulators.ground import Ground
-from sim.emulators.p2os_packets import Reader, Request, counts, sealed, status
+from sim.emulators.p2os_packets import PacketReader, Request, build_encoder_counts, build_packet, build_status
 
 WATCHDOG_S = 2.0
 STATUS_S = 0.1
@@ -17,26 +17,28 @@ NAMES = b"Harvey_0001\0Pioneer\0p3dx-sh\0"
 
 
 class Axis:
-    """One of the two servos, of translation [m] and of rotation [rad]: to a velocity, or to a place and no further.
+    """The controller of one axis, translation [m] or rotation [rad]: to a velocity, or by a distance.
 
     Attributes:
-        rate: how fast it goes now.
-        fastest, quickening: its limits.
+        rate: present velocity.
+        max_rate, max_acceleration: limits.
     """
 
-    def __init__(self, fastest: float, quickening: float) -> None:
-        self.rate, self.fastest, self.quickening = 0.0, fastest, quickening
+    def __init__(self, max_rate: float, max_acceleration: float) -> None:
+        self.rate, self.max_rate, self.max_acceleration = 0.0, max_rate, max_acceleration
         self._wanted_rate = 0.0
         self._to_go: float | None = None
 
     def go_at(self, rate: float) -> None:
-        self._wanted_rate, self._to_go = max(-self.fastest, min(self.fastest, rate)), None
+        """Accelerate to a velocity."""
+        self._wanted_rate, self._to_go = max(-self.max_rate, min(self.max_rate, rate)), None
 
     def go_by(self, way: float) -> None:
+        """Go by a distance, and stop there."""
         self._to_go = way
 
-    def drop(self) -> None:
-        """Stand at once."""
+    def stop_at_once(self) -> None:
+        """Stop without braking."""
         self.rate = 0.0
         self.go_at(0.0)
 
@@ -45,31 +47,31 @@ class Axis:
         return self.rate == 0.0 and self._wanted_rate == 0.0 and self._to_go is None
 
     def step(self, duration_s: float, *, muted: bool) -> float:
-        """How far to go in this time."""
-        most = self.quickening * duration_s
+        """The distance that it goes in this time; muted, it brakes."""
+        change = self.max_acceleration * duration_s
         wanted = self._braking_rate() if self._to_go is not None else self._wanted_rate
-        self.rate += max(-most, min(most, (0.0 if muted else wanted) - self.rate))
+        self.rate += max(-change, min(change, (0.0 if muted else wanted) - self.rate))
         way = self.rate * duration_s
         if self._to_go is not None and not muted and abs(self._to_go) <= max(abs(way), 1e-4):
             way, self.rate, self._to_go, self._wanted_rate = self._to_go, 0.0, None, 0.0
         return way
 
-    def went(self, way: float) -> None:
-        """What it really did of the last step."""
+    def confirm(self, way: float) -> None:
+        """Take what the wheels really did of the last step."""
         if self._to_go is not None:
             self._to_go -= way
 
     def _braking_rate(self) -> float:
         to_go = self._to_go or 0.0
-        return math.copysign(min(self.fastest, math.sqrt(2.0 * self.quickening * abs(to_go)) + 0.002), to_go)
+        return math.copysign(min(self.max_rate, math.sqrt(2.0 * self.max_acceleration * abs(to_go)) + 0.002), to_go)
 
 
 class P2osEmulator:
     """The base's side of P2OS.
 
     Attributes:
-        on_command: told of every command that was accepted, as (number, argument, raw bytes), if it is there.
-        rejected: headers that no packet followed are counted by the reader; stops: how often the watchdog struck.
+        on_command: called with every command that was accepted, if given.
+        stops: how often the watchdog stopped it.
     """
 
     def __init__(self, ground: Ground, *, on_command: Callable[[Request], None] | None = None) -> None:
@@ -78,7 +80,7 @@ class P2osEmulator:
         self._reset()
 
     def _reset(self) -> None:
-        self._reader, self._out = Reader(), bytearray()
+        self._reader, self._out = PacketReader(), bytearray()
         self._synced, self._open, self._enabled, self._muted = 0, False, False, False
         self._travel, self._turning = Axis(0.4, 0.3), Axis(math.radians(50.0), math.radians(100.0))
         self._x = self._y = self._heading = 0.0
@@ -87,25 +89,26 @@ class P2osEmulator:
         self._quiet_s = self._since_status_s = 0.0
 
     def power_cycle(self) -> None:
-        """Off and on again: it stands, and has forgotten everything."""
+        """Off and on again: it stands, and all state is lost."""
         self._reset()
 
     @property
     def rejected(self) -> int:
+        """Number of packets that were not understood."""
         return self._reader.rejected
 
     @property
     def moving(self) -> bool:
-        """Whether its motors run."""
+        """Whether the motors run."""
         return self._travel.rate != 0.0 or self._turning.rate != 0.0
 
     @property
     def standing_within_s(self) -> float:
-        """It stands at the latest this long after the last packet that it accepted: watchdog, then braking."""
-        return WATCHDOG_S + self._travel.fastest / self._travel.quickening + 2 * TICK_S
+        """Longest time from the last accepted packet until it stands [s]: watchdog, then braking."""
+        return WATCHDOG_S + self._travel.max_rate / self._travel.max_acceleration + 2 * TICK_S
 
     def receive(self, data: bytes) -> None:
-        """Bytes from the line."""
+        """Take bytes from the line."""
         for request in self._reader.feed(data):
             if self.on_command is not None:
                 self.on_command(request)
@@ -116,13 +119,13 @@ class P2osEmulator:
                 self._greet(request.number)
 
     def take(self) -> bytes:
-        """Bytes for the line, each once."""
+        """Return the bytes for the line since the last call."""
         out = bytes(self._out)
         self._out.clear()
         return out
 
     def advance(self, duration_s: float) -> None:
-        """Time passes."""
+        """Let time pass."""
         left_s = duration_s
         while left_s > 1e-9:
             tick_s = min(TICK_S, left_s)
@@ -138,15 +141,15 @@ class P2osEmulator:
         self._since_status_s += tick_s
         if self._open and self._since_status_s >= STATUS_S - 1e-9:
             self._since_status_s = 0.0
-            self._tell()
+            self._send_status()
 
     def _roll(self, tick_s: float) -> None:
         muted = self._muted or not self._enabled
         turn, move = self._turning.step(tick_s, muted=muted), self._travel.step(tick_s, muted=muted)
         turned, moved = self._ground.roll(turn, move, tick_s)
         self._stalled = (turn, move) != (0.0, 0.0) and (turned, moved) == (0.0, 0.0)
-        self._turning.went(turned)
-        self._travel.went(moved)
+        self._turning.confirm(turned)
+        self._travel.confirm(moved)
         self._heading += turned
         self._x += moved * math.cos(self._heading)
         self._y += moved * math.sin(self._heading)
@@ -154,12 +157,12 @@ class P2osEmulator:
         self._right += moved + turned * AXLE_M / 2.0
 
     def _greet(self, number: int) -> None:
-        """SYNC0, SYNC1, SYNC2, in this order; OPEN after that."""
+        """Connect: SYNC0, SYNC1, SYNC2 in this order, then OPEN."""
         if number == 1 and self._synced == 3:
             self._open, self._since_status_s = True, 0.0
         elif number <= min(2, self._synced):
             self._synced = number + 1
-            self._out += sealed(bytes([number]) + (NAMES if number == 2 else b""))
+            self._out += build_packet(bytes([number]) + (NAMES if number == 2 else b""))
 
     def _obey(self, number: int, argument: int) -> None:
         travel, turning = self._travel, self._turning
@@ -169,15 +172,15 @@ class P2osEmulator:
             case 4:  # ENABLE
                 self._enabled = argument == 1
             case 5:  # SETA
-                travel.quickening = max(0.05, abs(argument) / 1000.0)
+                travel.max_acceleration = max(0.05, abs(argument) / 1000.0)
             case 6:  # SETV
-                travel.fastest = max(0.0, min(1.2, argument / 1000.0))
+                travel.max_rate = max(0.0, min(1.2, argument / 1000.0))
             case 7:  # SETO
                 self._x = self._y = self._heading = 0.0
             case 8:  # MOVE
                 travel.go_by(argument / 1000.0)
             case 10:  # SETRV
-                turning.fastest = max(0.0, min(math.radians(300.0), math.radians(argument)))
+                turning.max_rate = max(0.0, min(math.radians(300.0), math.radians(argument)))
             case 11:  # VEL
                 travel.go_at(argument / 1000.0)
             case 12:  # HEAD
@@ -189,22 +192,22 @@ class P2osEmulator:
             case 21:  # RVEL
                 turning.go_at(math.radians(argument))
             case 23:  # SETRA
-                turning.quickening = max(0.1, abs(math.radians(argument)))
+                turning.max_acceleration = max(0.1, abs(math.radians(argument)))
             case 29:  # STOP
                 travel.go_at(0.0)
                 turning.go_at(0.0)
             case 55:  # ESTOP
-                travel.drop()
-                turning.drop()
+                travel.stop_at_once()
+                turning.stop_at_once()
 
-    def _tell(self) -> None:
+    def _send_status(self) -> None:
         left, right = (self._travel.rate + side * self._turning.rate * AXLE_M / 2.0 for side in (-1, 1))
         units = round(self._heading / (2.0 * math.pi) * 4096) % 4096
-        self._out += status(
+        self._out += build_status(
             moving=not (self._travel.at_rest and self._turning.at_rest),
             x=round(1000 * self._x), y=round(1000 * self._y), heading=units,
             left=round(1000 * left), right=round(1000 * right), stalled=self._stalled, enabled=self._enabled,
         )
         if self._encoders:
             wrap = (round(COUNTS_PER_M * side) for side in (self._left, self._right))
-            self._out += counts(*((value + (1 << 31)) % (1 << 32) - (1 << 31) for value in wrap))
+            self._out += build_encoder_counts(*((value + (1 << 31)) % (1 << 32) - (1 << 31) for value in wrap))

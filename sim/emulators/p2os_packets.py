@@ -1,4 +1,4 @@
-"""P2OS packets as the base reads and writes them, written from the manual's tables."""
+"""P2OS packets on the base's side, written from the tables of the manual."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Request:
     Attributes:
         number: of the command.
         argument: 0 where there is none.
-        raw: command, type and argument as they came.
+        raw: the bytes of command, type and argument.
     """
 
     number: int
@@ -24,13 +24,13 @@ class Request:
     raw: bytes
 
 
-def sealed(content: bytes) -> bytes:
-    """A packet with this content."""
-    return b"\xfa\xfb" + struct.pack("B", len(content) + 2) + content + struct.pack(">H", check(content))
+def build_packet(content: bytes) -> bytes:
+    """A packet with header, length and checksum."""
+    return b"\xfa\xfb" + struct.pack("B", len(content) + 2) + content + struct.pack(">H", compute_checksum(content))
 
 
-def check(content: bytes) -> int:
-    """The packet-integrity checksum, word by word as the manual has it."""
+def compute_checksum(content: bytes) -> int:
+    """The packet checksum: a sum of 16-bit words, and a last odd byte by exclusive or."""
     total, left = 0, len(content)
     at = 0
     while left > 1:
@@ -41,37 +41,37 @@ def check(content: bytes) -> int:
     return total
 
 
-class Reader:
-    """The base's receiver: a state machine that is fed byte by byte, and begins anew where a packet does not hold."""
+class PacketReader:
+    """The base's receiver: finds commands in a stream of bytes, and resynchronizes after a bad packet."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
         self.rejected = 0
 
     def feed(self, data: bytes) -> list[Request]:
-        """The commands that are complete with these bytes."""
+        """The commands that these bytes complete."""
         requests = []
         for byte in data:
             self._bytes.append(byte)
-            if not self._may_go_on():
+            if not self._may_become_packet():
                 self.rejected += len(self._bytes) > 2
                 self._bytes[:] = b"\xfa" if byte == 0xFA else b""
             elif len(self._bytes) > 3 and len(self._bytes) == 3 + self._bytes[2]:
                 content = bytes(self._bytes[3:-2])
-                if check(content) == self._bytes[-2] << 8 | self._bytes[-1]:
-                    requests.append(_request(content))
+                if compute_checksum(content) == self._bytes[-2] << 8 | self._bytes[-1]:
+                    requests.append(_parse_request(content))
                 else:
                     self.rejected += 1
                 self._bytes.clear()
         return requests
 
-    def _may_go_on(self) -> bool:
-        """Whether what is there may still become a packet: header, then a count that is in bounds."""
+    def _may_become_packet(self) -> bool:
+        """Whether the bytes so far can begin a packet: header, then a length within bounds."""
         got = self._bytes
         return b"\xfa\xfb".startswith(bytes(got[:2])) and (len(got) < 3 or 3 <= got[2] <= 249)
 
 
-def _request(content: bytes) -> Request:
+def _parse_request(content: bytes) -> Request:
     if len(content) < 4 or content[1] == STRING:
         return Request(content[0], 0, content)
     amount: int = struct.unpack_from("<H", content, 2)[0]
@@ -80,17 +80,17 @@ def _request(content: bytes) -> Request:
     return Request(content[0], -amount if content[1] == NEGATIVE else amount, content)
 
 
-def status(
+def build_status(
     *, moving: bool, x: int, y: int, heading: int, left: int, right: int, stalled: bool, enabled: bool
 ) -> bytes:
-    """A standard server information packet; battery full, no sonar, nothing on the ports."""
-    return sealed(struct.pack(
+    """A standard server information packet: battery full, no sonar, nothing on the ports."""
+    return build_packet(struct.pack(
         "<BHHhhhBBBhHBBBBBB",
         0x33 if moving else 0x32, x & 0x7FFF, y & 0x7FFF, heading, left, right, 130,
         1 if stalled else 0, 1 if stalled else 0, 0, 1 if enabled else 0, 0, 0, 0, 0, 0, 0,
     ))
 
 
-def counts(left: int, right: int) -> bytes:
+def build_encoder_counts(left: int, right: int) -> bytes:
     """An encoder packet."""
-    return sealed(struct.pack("<Bii", 0x90, left, right))
+    return build_packet(struct.pack("<Bii", 0x90, left, right))

@@ -1,4 +1,4 @@
-"""A pseudo-terminal with an emulated base behind it: a serial port as far as anybody who opens it can tell."""
+"""An emulated base on a pseudo-terminal: a host opens it as a serial port."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from collections.abc import Callable
 from sim.emulators.emulator import Emulator
 
 Trace = Callable[[str, bytes], None]
-"""Told of the traffic: ``<`` for what came from the host, ``>`` for what the base says, and the bytes."""
+"""Called with the traffic: ``<`` for bytes from the host, ``>`` for bytes from the base."""
 
-MOST_S = 0.25
-"""A server that was held up for longer lets the base's time stand still instead of catching up."""
+MAX_STEP_S = 0.25
+"""A server that was delayed by more than this skips the rest of the base's time instead of catching up [s]."""
 
 
 class PseudoTerminal:
     """An emulated base on a pseudo-terminal.
 
     Attributes:
-        name: what to open, as /dev/pts/7.
-        received, sent: bytes so far, from the host and to it.
+        name: of the device to open, as /dev/pts/7.
+        received, sent: number of bytes so far, from the host and to it.
     """
 
     def __init__(self, emulator: Emulator, trace: Trace | None = None) -> None:
-        """Open a pseudo-terminal in raw mode; the other end stays open here, so that a host may come and go."""
+        """Open a pseudo-terminal in raw mode. Both ends stay open here, so that hosts can come and go."""
         self._emulator, self._trace = emulator, trace
         self._ours, self._theirs = os.openpty()
         tty.setraw(self._theirs)
@@ -35,28 +35,28 @@ class PseudoTerminal:
         self.received = self.sent = 0
 
     def serve(self, speed: float = 1.0, tick_s: float = 0.01, until: Callable[[], bool] = lambda: False) -> None:
-        """Serve in real time, or ``speed`` times as fast, until told otherwise or interrupted."""
+        """Serve in real time, or ``speed`` times as fast, until ``until()`` is true or interrupted."""
         then = time.monotonic()
         while not until():
             select.select([self._ours], [], [], tick_s)
             now = time.monotonic()
-            self._emulator.advance(min(now - then, MOST_S) * speed)
+            self._emulator.advance(min(now - then, MAX_STEP_S) * speed)
             then = now
             self.exchange()
 
     def exchange(self, expected: int = 0) -> None:
-        """Take what has come, and at least ``expected`` bytes of it; pass on what the base says to that."""
+        """Pass the host's bytes to the base, waiting for ``expected`` in all; send what the base answers."""
         while True:
             data = self._read(wait=self.received < expected)
             if not data:
                 break
             self.received += len(data)
-            self._tell("<", data)
+            self._report("<", data)
             self._emulator.receive(data)
-        self._say(self._emulator.take())
+        self._write(self._emulator.take())
 
     def close(self) -> None:
-        """Hang up: the host's end of the line is gone."""
+        """Close both ends."""
         for end in (self._ours, self._theirs):
             os.close(end)
 
@@ -68,15 +68,15 @@ class PseudoTerminal:
         except BlockingIOError:
             return b""
 
-    def _say(self, data: bytes) -> None:
-        """What does not fit, because nobody reads it, is lost, as on a wire."""
+    def _write(self, data: bytes) -> None:
+        """Bytes that do not fit into the buffer are lost, as on a wire."""
         if data:
-            self._tell(">", data)
+            self._report(">", data)
             try:
                 self.sent += os.write(self._ours, data)
             except BlockingIOError:
                 return
 
-    def _tell(self, direction: str, data: bytes) -> None:
+    def _report(self, direction: str, data: bytes) -> None:
         if self._trace is not None:
             self._trace(direction, data)

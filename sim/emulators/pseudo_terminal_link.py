@@ -1,4 +1,4 @@
-"""An emulated base wired to its host by a pseudo-terminal that pyserial opens."""
+"""A lock-step link to an emulated base through a pseudo-terminal that pyserial opens."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from sim.emulators.pseudo_terminal import PseudoTerminal
 
 
 class PseudoTerminalLink(LockstepLink):
-    """A lock-step link, both ends of its pseudo-terminal with it.
+    """A lock-step link that owns both ends of its pseudo-terminal.
 
     Attributes:
-        name: the pseudo-terminal, as /dev/pts/7.
+        name: of the pseudo-terminal, as /dev/pts/7.
     """
 
     def __init__(self, emulator: Emulator, clock: Callable[[], float] | None = None) -> None:
@@ -26,7 +26,7 @@ class PseudoTerminalLink(LockstepLink):
         self._open: PseudoTerminal | None = terminal
 
     def close(self) -> None:
-        """Let go of both ends."""
+        """Close both ends."""
         super().close()
         if self._open is not None:
             self._open.close()

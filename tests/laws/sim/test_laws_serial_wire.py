@@ -83,7 +83,7 @@ def test_both_ends_of_the_denning_line_use_the_same_crc(data: bytes) -> None:
 
 @given(st.integers(0, 255), ARGUMENTS)
 def test_the_pioneer_reads_what_the_driver_says(command: int, argument: int | None) -> None:
-    (request,) = p2os_packets.Reader().feed(p2os_wire.encode(command, argument))
+    (request,) = p2os_packets.PacketReader().feed(p2os_wire.encode(command, argument))
     assert (request.number, request.argument) == (command, argument or 0)
 
 
@@ -93,7 +93,7 @@ def test_both_ends_compute_the_pioneer_checksum_alike(content: bytes) -> None:
     for i in range(0, len(content) - 1, 2):
         total = (total + int.from_bytes(content[i:i + 2], "big")) % 65536
     total ^= content[-1] if len(content) % 2 else 0
-    assert p2os_wire.checksum(content) == p2os_packets.check(content) == total
+    assert p2os_wire.checksum(content) == p2os_packets.compute_checksum(content) == total
 
 
 STATUSES = st.fixed_dictionaries({
@@ -105,20 +105,21 @@ STATUSES = st.fixed_dictionaries({
 
 @given(STATUSES)
 def test_the_driver_reads_what_the_pioneer_tells(told: dict[str, int]) -> None:
-    (heard,) = p2os_wire.Decoder().feed(p2os_packets.status(**told))
+    (heard,) = p2os_wire.Decoder().feed(p2os_packets.build_status(**told))
     assert heard == p2os_wire.Status(**told)
 
 
 @given(st.integers(-2**31, 2**31 - 1), st.integers(-2**31, 2**31 - 1))
 def test_the_driver_reads_encoder_packets(left: int, right: int) -> None:
-    assert list(p2os_wire.Decoder().feed(p2os_packets.counts(left, right))) == [p2os_wire.Counts(left, right)]
+    packet = p2os_packets.build_encoder_counts(left, right)
+    assert list(p2os_wire.Decoder().feed(packet)) == [p2os_wire.Counts(left, right)]
 
 
 @given(NOISE, STATUSES)
 def test_the_pioneer_decoder_goes_on_after_noise(noise: bytes, told: dict[str, int]) -> None:
     decoder = p2os_wire.Decoder()
     list(decoder.feed(noise))
-    heard = [m for _ in range(12) for m in decoder.feed(p2os_packets.status(**told))]
+    heard = [m for _ in range(12) for m in decoder.feed(p2os_packets.build_status(**told))]
     assert p2os_wire.Status(**told) in heard
 
 
