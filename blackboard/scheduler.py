@@ -238,7 +238,9 @@ class Scheduler:
                     self.tell(port.answer(change), port.name)
 
 
-def registry_of(sources: Iterable[KnowledgeSource], kinds: Iterable[type[Any]] = ()) -> Registry:
+def registry_of(
+    sources: Iterable[KnowledgeSource | type[KnowledgeSource]], kinds: Iterable[type[Any]] = ()
+) -> Registry:
     """The kinds that knowledge sources watch and write, with some more.
 
     Raises:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
+
+from blackboard.kinds import Registry
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
+from blackboard.scheduler import registry_of
 from blackboard.servoing import Servoing
 from knowledge_sources.action.correlator_tracker import CorrelatorTracker
 from knowledge_sources.action.dead_reckoner import DeadReckoner
@@ -24,6 +28,7 @@ from knowledge_sources.plan.obstruction_finder import ObstructionFinder
 from knowledge_sources.plan.plan_adjuster import PlanAdjuster
 from knowledge_sources.plan.sketcher import Sketcher
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries import KINDS
 from world_models.files.toml.mission import Servo
 from world_models.robot import RobotModel
 
@@ -53,6 +58,12 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
 def knowledge_sources(robot: RobotModel) -> tuple[KnowledgeSource, ...]:
     """The experts for a robot: each is built with what the robot knows of itself and its world, and nothing else."""
     return tuple(expert(robot) for expert in KNOWLEDGE_SOURCES)
+
+
+@cache
+def known_kinds() -> Registry:
+    """The kinds of entries that may be on a board: those of the project and of every knowledge source."""
+    return registry_of(KNOWLEDGE_SOURCES, KINDS)
 
 
 def servoing(servo: Servo) -> Servoing:

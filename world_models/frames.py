@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 
 def frozen(array: Any, shape: tuple[int | None, ...] | None = None) -> NDArray[np.float64]:
@@ -42,6 +41,13 @@ def wrap_angle(angle_rad: float) -> float:
     """The same angle in (-pi, pi]."""
     wrapped = math.remainder(angle_rad, 2.0 * math.pi)
     return math.pi if wrapped == -math.pi else wrapped
+
+
+def _rotations() -> Any:
+    """scipy's rotations, loaded when first used: a recorded run is explained without them."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +73,7 @@ class Pose:
     @staticmethod
     def from_rotation_vector(rotation_vector_rad: Any, translation: Any) -> Pose:
         """From an axis-angle vector (3,) [rad] and a translation (3,) [m]."""
-        return Pose(Rotation.from_rotvec(np.asarray(rotation_vector_rad, float)).as_matrix(), translation)
+        return Pose(_rotations().from_rotvec(np.asarray(rotation_vector_rad, float)).as_matrix(), translation)
 
     def __matmul__(self, other: Pose) -> Pose:
         return Pose(self.rotation @ other.rotation, self.rotation @ other.translation + self.translation)
@@ -86,11 +92,11 @@ class Pose:
     @cached_property
     def rotation_vector(self) -> NDArray[np.float64]:
         """Axis-angle vector (3,) [rad]."""
-        return frozen(Rotation.from_matrix(self.rotation).as_rotvec())
+        return frozen(_rotations().from_matrix(self.rotation).as_rotvec())
 
     def angle_to(self, other: Pose) -> float:
         """Rotation angle between two poses [rad]."""
-        return float(np.linalg.norm(Rotation.from_matrix(self.rotation.T @ other.rotation).as_rotvec()))
+        return float(np.linalg.norm(_rotations().from_matrix(self.rotation.T @ other.rotation).as_rotvec()))
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,21 +26,34 @@ UNITS: Mapping[str, str] = {
 PROPER_NAMES: Mapping[str, str] = {"med_r_and_t": "Med-R-and-T"}
 
 
-def metres(length_m: float) -> str:
+Number = float | str
+"""A number; a journal writes one that is not finite as text."""
+
+
+def number(value: Any) -> float:
+    """A number as a journal has it. Raises ValueError for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"expected a number, got {value!r}")
+    return float(value)
+
+
+def metres(length_m: Number) -> str:
     """``0.61 m``, ``33 mm`` or ``2.4 mm``."""
-    if abs(length_m) > SMALL_M:
-        return f"{length_m:.2f} m"
-    return f"{1e3 * length_m:.{0 if abs(length_m) >= TINY_M else 1}f} mm"
+    length = number(length_m)
+    if abs(length) > SMALL_M:
+        return f"{length:.2f} m"
+    return f"{1e3 * length:.{0 if abs(length) >= TINY_M else 1}f} mm"
 
 
-def degrees(angle_rad: float) -> str:
+def degrees(angle_rad: Number) -> str:
     """``3.1 degrees``; -0.0 prints as 0.0."""
-    return f"{round(math.degrees(angle_rad), 1) + 0.0:.1f} degrees"
+    return f"{round(math.degrees(number(angle_rad)), 1) + 0.0:.1f} degrees"
 
 
-def turn(angle_rad: float) -> str:
+def turn(angle_rad: Number) -> str:
     """A counter-clockwise angle as a turn to one side: ``3.1 degrees left``."""
-    return f"{degrees(abs(angle_rad))} {'left' if angle_rad >= 0.0 else 'right'}"
+    angle = number(angle_rad)
+    return f"{degrees(abs(angle))} {'left' if angle >= 0.0 else 'right'}"
 
 
 def motion(turn_rad: float, move_m: float) -> str:
@@ -56,9 +69,9 @@ def bend(curvature_per_m: float) -> str:
     return f"{abs(math.degrees(curvature_per_m)):.2f} degrees a metre to the {side}"
 
 
-def point(x_m: float, y_m: float) -> str:
+def point(x_m: Number, y_m: Number) -> str:
     """``(3.96, 3.66) m``."""
-    return f"({x_m:.2f}, {y_m:.2f}) m"
+    return f"({number(x_m):.2f}, {number(y_m):.2f}) m"
 
 
 def pixels(value: float) -> str:
@@ -66,18 +79,18 @@ def pixels(value: float) -> str:
     return f"{value:.1f} px"
 
 
-def quantity(value: float, unit: str) -> str:
+def quantity(value: Number, unit: str) -> str:
     """A number in a unit that the board names; lengths and angles in the units that people use."""
     if unit == "m":
         return metres(value)
     if unit == "px":
-        return f"{value:.2f} px"
-    return degrees(value) if unit == "rad" else f"{value:.3g} {unit}".rstrip()
+        return f"{number(value):.2f} px"
+    return degrees(value) if unit == "rad" else f"{number(value):.3g} {unit}".rstrip()
 
 
-def size(magnitude: float, unit: str) -> str:
+def size(magnitude: Number, unit: str) -> str:
     """How large a discrepancy is; an infinite one was too large to be measured."""
-    return quantity(magnitude, unit) if math.isfinite(magnitude) else "too large to be measured"
+    return quantity(magnitude, unit) if math.isfinite(number(magnitude)) else "too large to be measured"
 
 
 def sigma(covariance: Sequence[Sequence[float]]) -> str:
@@ -106,6 +119,11 @@ def landmark(name: str) -> str:
     """``hallway/pillar-4`` as ``pillar-4 of hallway``."""
     locale, _, thing = name.rpartition("/")
     return f"{thing} of {locale}" if locale else thing
+
+
+def without_locale(name: str) -> str:
+    """``hallway/pillar-4`` as ``pillar-4``, where the locale is clear."""
+    return name.rpartition("/")[2]
 
 
 def listed(items: Sequence[Any], most: int = 3) -> str:

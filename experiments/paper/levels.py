@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from experiments.report import Cell, Report, count_kinds
 from harvey.campaign.campaign import Task, run_all
 from harvey.campaign.progress import counted
-from harvey.units import INCH_M
+from world_models.units import INCH_M
 
 if TYPE_CHECKING:
     from harvey.runner.result import MissionResult

@@ -18,11 +18,10 @@ from harvey.campaign.campaign import Task
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_recorder import RunRecorder
 from harvey.simulation.run import SimulatedRun, head_of
-from harvey.units import INCH_M
 from sim.stage import Stage
 from sim.truth import Truth
 from world_models.entries.body import MotionReport, MotorCommand
-from world_models.units import FOOT_M
+from world_models.units import FOOT_M, INCH_M
 
 SCENARIO = "forty-foot-hallway"
 INCREMENT_M = 2.0 * FOOT_M

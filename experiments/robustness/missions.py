@@ -17,7 +17,8 @@ from experiments.chart import OURS, PAPER, PEER, chart
 from experiments.report import Cell, Report, count_kinds
 from experiments.trials import RESULTS, campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
-from harvey.units import INCH_M, count
+from world_models.units import INCH_M
+from world_models.words import count
 
 NOMINAL, ROUGH = "lab-to-allens-office", "rough-day"
 SCENARIOS = (NOMINAL, ROUGH)

@@ -12,7 +12,7 @@ from blackboard.journal import Decision, Sink
 from harvey.campaign.campaign import Follow, Task
 from harvey.campaign.summary import millimetres
 from harvey.campaign.tally import Tally
-from harvey.units import count
+from world_models.words import count
 
 if TYPE_CHECKING:
     from harvey.runner.result import MissionResult

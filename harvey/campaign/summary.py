@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harvey.tables import table
-from harvey.units import INCH_M, count, degrees
+from world_models.units import INCH_M
+from world_models.words import count, degrees
 
 if TYPE_CHECKING:
     from harvey.dry_run import MilestonePreview
@@ -29,7 +30,7 @@ def one(r: MissionResult, out: Path | None) -> str:
     m = r.milestones
     lines = [
         f"{r.outcome}: {r.reason}",
-        f"  final error   {millimetres(r.error_m)} from the goal, {degrees(r.final_heading_error_rad)} off",
+        f"  final error   {millimetres(r.error_m)} from the goal, {degrees(r.final_heading_error_rad or 0.0)} off",
         f"  milestones    {m['verified']} verified, {m['refuted']} refuted, {m['not_testable']} not testable,"
         f" {m['false_accepts']} accepted wrongly",
         f"  plans         {count(r.sketches, 'sketch', 'sketches')}, {count(r.replans, 'replan')},"

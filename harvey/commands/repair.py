@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 
 from harvey.commands.command import Command
 from harvey.run_files.run_directory import open_run
-from harvey.units import count
+from world_models.words import count
 
 
 def _arguments(parser: ArgumentParser) -> None:

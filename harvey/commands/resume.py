@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from harvey.commands.command import Command
 from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory, open_run
-from harvey.units import count
+from world_models.words import count
 
 if TYPE_CHECKING:
     from harvey.run_files.run_head import RunHead

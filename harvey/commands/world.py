@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.units import count
+from world_models.words import count
 
 if TYPE_CHECKING:
     from world_models.building.world import World

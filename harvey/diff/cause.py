@@ -12,10 +12,10 @@ from harvey.diff.first_difference import differing_leaves, short
 from harvey.run_files.records import DecisionRecord, EntryRecord, as_line
 from harvey.run_files.run_directory import RunDirectory
 from harvey.tables import table
-from harvey.units import count, metres
 from harvey.why.history import History
 from harvey.why.links import STRANGE, reason, words
 from harvey.why.sentences import sentence
+from world_models.words import count, metres
 
 if TYPE_CHECKING:
     from harvey.run_files.run_head import RunHead

@@ -7,8 +7,8 @@ from itertools import zip_longest
 from typing import Any
 
 from harvey.run_files.records import Candidate, DecisionRecord, EntryRecord, as_line
-from harvey.units import count
 from harvey.why.sentences import sentence
+from world_models.words import count
 
 MEANINGS: Mapping[str, str] = {
     "cycle": "the number of the cycle",

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from harvey.errors import BadInput
 from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
-from harvey.units import count
 from knowledge_sources.methods.calibration.chessboard import Pattern, find_corners
 from knowledge_sources.methods.calibration.intrinsics import PARAMETERS, BoardView, Calibration, calibrate
 from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
 from knowledge_sources.methods.features.images import decode
 from world_models.camera import CameraMount
+from world_models.words import count
 
 ENDINGS = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm", ".webp")
 NEW_PX = 0.08

@@ -17,7 +17,6 @@ from harvey.hardware.base import kind_of, open_base
 from harvey.hardware.drivers.bases.base import Base, BaseFault
 from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
 from harvey.hardware.mission import HardwareMission
-from harvey.units import count
 from knowledge_sources.methods.features.images import decode
 from knowledge_sources.plan.milestone_judge import DARK
 from world_models.building.checks import check_world
@@ -29,6 +28,7 @@ from world_models.files.toml.camera_file import load_camera
 from world_models.files.toml.source import WorldError
 from world_models.files.world_files import load_world
 from world_models.robot import RobotModel
+from world_models.words import count
 
 ROOM_BYTES = 500_000_000
 """Free space that a long run's pictures may need."""

@@ -10,8 +10,8 @@ from harvey.replay.counterfactual import Answer, Parting
 from harvey.run_files.records import DecisionRecord
 from harvey.run_files.run_directory import RunDirectory
 from harvey.runner.result import UNFINISHED
-from harvey.units import count
 from harvey.why.sentences import sentence
+from world_models.words import count
 
 
 def told(answer: Answer, run: RunDirectory, changes: Sequence[str]) -> Iterator[str]:

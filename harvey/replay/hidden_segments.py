@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from harvey.agent import segments_named
 from harvey.errors import BadInput
 from harvey.run_files.records import DecisionRecord
-from harvey.why.sentences import listed
+from world_models.words import listed
 
 MOST = 12
 """So many frames are listed."""

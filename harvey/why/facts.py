@@ -11,10 +11,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from harvey.run_files.records import EntryRecord
-from harvey.units import count, degrees, metres, number, point, quantity, turn
 from harvey.why.history import History
 from harvey.why.links import reason
-from harvey.why.sentences import followed, landmark, listed, shift_px, size_of
+from world_models.words import count, degrees, landmark, listed, metres, number, point, quantity, size, turn
 
 Value = Mapping[str, Any]
 SLIGHT_RAD = math.radians(0.05)
@@ -70,6 +69,18 @@ def tracking(tracks: EntryRecord, frame: EntryRecord | None) -> str:
     middle = sorted(math.hypot(*shift_px(t)) for t in found)[len(found) // 2]
     return (f"In {where} it found {len(found)} of the {count(len(old), 'landmark')} that it follows; a corner of"
             f" {off(found[0])}, the furthest of them; half of them were within {middle:.1f} px.")
+
+
+def followed(tracks: Value) -> list[Value]:
+    """The landmarks that were found again, the one furthest from its prediction first."""
+    again = (t for t in tracks["items"] if t["found_px"] is not None and t["template_frame"] != tracks["frame"])
+    return sorted(again, key=lambda t: -math.hypot(*shift_px(t)))
+
+
+def shift_px(track: Value) -> tuple[float, float]:
+    """How far right of and below its prediction a landmark was found."""
+    du, dv = (number(f) - number(p) for f, p in zip(track["found_px"], track["predicted_px"], strict=True))
+    return du, dv
 
 
 def off(track: Value) -> str:
@@ -198,9 +209,9 @@ def puzzled(segments: EntryRecord, frame: EntryRecord | None) -> str:
 
 def doubt(v: Value) -> str:
     """A discrepancy in words."""
-    size = "" if v["magnitude"] is None else f" ({size_of(v['magnitude'], v['unit'])}{_bound(v)})"
+    large = "" if v["magnitude"] is None else f" ({size(v['magnitude'], v['unit'])}{_bound(v)})"
     came = {"escalated": ", so the next level had to deal with it", "corrected": ", and was corrected"}
-    return f"Something was not as expected, to be dealt with {LEVELS[v['level']]}: {v['what']}{size}" + (
+    return f"Something was not as expected, to be dealt with {LEVELS[v['level']]}: {v['what']}{large}" + (
         came.get(v["status"], "") + ".")
 
 

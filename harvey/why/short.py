@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from harvey.run_files.records import EntryRecord
-from harvey.units import turn
 from harvey.why import facts
+from harvey.why.facts import followed
 from harvey.why.history import History
 from harvey.why.links import anchor_of, reason, tracks_of
-from harvey.why.sentences import followed, sentence
+from harvey.why.sentences import sentence
+from world_models.words import turn
 
 
 def in_one_sentence(history: History, command: EntryRecord) -> str:

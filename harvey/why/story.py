@@ -14,12 +14,12 @@ from dataclasses import dataclass, field
 from textwrap import fill
 
 from harvey.run_files.records import Candidate, EntryRecord
-from harvey.units import number
 from harvey.why import facts
 from harvey.why.history import History
 from harvey.why.links import STRANGE, anchor_of, nearest, reason, tracks_of, within, words
-from harvey.why.sentences import PURPOSES, sentence
+from harvey.why.sentences import sentence
 from harvey.why.short import in_one_sentence
+from world_models.words import PURPOSES, number
 
 MOST = 24
 """So many things are told at the most."""

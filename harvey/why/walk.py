@@ -9,10 +9,10 @@ from textwrap import fill
 
 from harvey.diff.first_difference import differing_leaves
 from harvey.run_files.records import DecisionRecord, EntryRecord
-from harvey.units import count
 from harvey.why.history import History
 from harvey.why.sentences import sentence
 from harvey.why.story import decided
+from world_models.words import count
 
 WIDTH = 120
 DEEPEST_INDENT = 20

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from enum import Enum
 
 from harvey.run_files.records import Candidate, DecisionRecord, EntryRecord
-from harvey.units import count
 from harvey.why.history import History
 from harvey.why.links import words
 from harvey.why.sentences import sentence
 from harvey.why.story import headline
+from world_models.words import count
 
 LEVELS = ("action", "plan", "goal")
 REVISED = re.compile(r"newer trigger|is now|no longer held")

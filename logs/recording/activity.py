@@ -31,16 +31,16 @@ class Activity:
 
 
 def activity(mirror: Mirror) -> Activity:
-    """What he is busy with, by what matters most: the end, a fault, a doubt, a look, a drive, a plan."""
+    """What it is busy with, by what matters most: the end, a fault, a doubt, a look, a drive, a plan."""
     if (end := mirror.latest(Outcome)) is not None:
         return Activity(end.value.kind, f"The end: {end.value.kind}")
     if (fault := mirror.latest(BodyFault, lambda f: f.is_open)) is not None:
         return Activity("is in trouble", f"Trouble: {fault.value.what}")
     doubts = [e.value for e in mirror.all(Discrepancy) if e.value.is_open and _is_doubt(e.value)]
     if any(d.level is Level.GOAL for d in doubts):
-        return Activity("is lost", "Lost: nothing fits; finding out where he is")
+        return Activity("is lost", "Lost: nothing fits; finding out where it is")
     if doubts:
-        return Activity("doubts", "In doubt: checking where he is before he goes on")
+        return Activity("doubts", "In doubt: checking where it is before it goes on")
     if mirror.latest(Milestone, lambda m: m.is_open) is not None:
         return Activity("looks", "Looking for a milestone")
     return _under_way(mirror)
@@ -61,7 +61,7 @@ def _under_way(mirror: Mirror) -> Activity:
 
 
 def leg_under_way(mirror: Mirror) -> Leg | None:
-    """The straight line that he is on, if he is on one for the goal that he has now."""
+    """The straight line that it is on, if it is on one for the goal that it has now."""
     leg, goal = mirror.latest(Leg), mirror.latest(Goal)
     if leg is None or leg.value.status != "moving":
         return None

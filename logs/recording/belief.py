@@ -35,7 +35,7 @@ class Belief:
         self._last: Held | None = None
 
     def now(self, mirror: Mirror) -> Held | None:
-        """The belief as of now; None where there is none, as when he is lost."""
+        """The belief as of now; None where there is none, as when it is lost."""
         value = believed(mirror)
         if value is None:
             return None

@@ -70,7 +70,7 @@ def _chapters() -> Any:
 
 
 def _building(world: World) -> Any:
-    return building_view(world, "Where he is: true robot green, believed blue, plan orange")
+    return building_view(world, "Where it is: true robot green, believed blue, plan orange")
 
 
 def building_view(world: World, name: str) -> Any:
@@ -134,7 +134,7 @@ def _sketch() -> Any:
 
 
 def _errors() -> tuple[Any, Any]:
-    place = _plot(paths.POSITION, "How wrong he is [mm]", -POSITION_MM, POSITION_MM)
+    place = _plot(paths.POSITION, "Position error of the belief [mm]", -POSITION_MM, POSITION_MM)
     heading = _plot(paths.HEADING, "in heading [°]", -HEADING_DEG, HEADING_DEG)
     return rrb.Tabs(place, heading), _plot(paths.DEVIATION, "Surprise, and what is allowed [px]", 0.0, DEVIATION_PX)
 
@@ -146,7 +146,8 @@ def _plot(origin: str, name: str, low: float, high: float) -> Any:
 
 
 DESCRIPTION = """\
-Harvey drives from room to room by what his camera shows. Experts round a blackboard decide, **one decision a cycle**.
+Harvey drives from room to room by what its camera shows. Knowledge sources round a blackboard decide,
+**one decision a cycle**.
 Play, or drag the cursor at the bottom; click the number of a turning point to go there.
 
 **Levels:** *action* (blue) corrects moves, *plan* (orange) checks milestones, *goal* (red) finds a lost robot.

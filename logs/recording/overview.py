@@ -37,9 +37,9 @@ from logs.recording.paths import (
     WORLD,
 )
 from logs.recording.stream import RecordingStream
-from logs.recording.words import metres
+from world_models.words import metres
 
-FOUND = "found himself"
+FOUND = "found itself"
 MARKED: Mapping[str, Colour] = {**VERDICTS, FOUND: BELIEVED}
 """What is marked in a run's row of milestones."""
 
@@ -185,7 +185,7 @@ class _Row:
 
 
 def _marks(chapters: Series) -> Iterator[tuple[int, str]]:
-    """Milestones and the moments when he found himself again."""
+    """Milestones and the moments when it found itself again."""
     marks = [(cycle, FOUND if word == "found" else word) for cycle, word in chapters if word in (*VERDICTS, "found")]
     for number, (cycle, word) in enumerate(marks):
         yield cycle, word

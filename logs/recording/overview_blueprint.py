@@ -22,7 +22,7 @@ def overview_blueprint(places: Sequence[Sequence[float]]) -> Any:
     busy = rrb.StateTimelineView(
         origin=f"/{paths.MOODS_OF}", name="Drives blue, looks yellow, plans orange, doubts violet, lost red")
     milestones = rrb.StateTimelineView(
-        origin=f"/{paths.MILESTONES}", name="Milestones: verified green, refuted red, found himself blue")
+        origin=f"/{paths.MILESTONES}", name="Milestones: verified green, refuted red, found itself blue")
     off = rrb.TimeSeriesView(
         origin=f"/{paths.OFF}", name="How far the belief is from the truth [mm]",
         axis_y=rrb.ScalarAxis(range=(0.0, MOST_MM)), plot_legend=rrb.PlotLegend(visible=False))

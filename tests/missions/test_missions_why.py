@@ -209,8 +209,8 @@ def test_a_run_told_over_and_over_is_a_journal_too(runs: tuple[Path, Path], hist
 
 
 def test_an_answer_needs_none_of_the_heavy_libraries(runs: tuple[Path, Path]) -> None:
-    """An explanation starts as fast as it can only where nothing is imported that it does not use."""
+    """An explanation starts fast only where nothing is imported that it does not use; entries hold numpy arrays."""
     code = f"import sys; from harvey.cli import main; main(['why', {str(runs[0])!r}]); print(sorted(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     loaded = set(re.findall(r"'(\w+)'", done.stdout.splitlines()[-1]))
-    assert loaded & {"numpy", "scipy", "cv2", "numba", "rerun", "shapely", "networkx"} == set()
+    assert loaded & {"scipy", "cv2", "numba", "rerun", "shapely", "networkx"} == set()

@@ -123,6 +123,11 @@ class Hypothesis:
         pose = locale_from_world @ world_from_robot
         return Hypothesis(locale, pose, covariance_tuple(own), basis, status, weight, motion, evidence)
 
+    def distance_from(self, other: Hypothesis) -> str:
+        """How far it is from another hypothesis in the same locale, in words."""
+        by = other.locale_from_robot.inverse() @ self.locale_from_robot
+        return f"{words.metres(math.hypot(by.x_m, by.y_m))} and {words.degrees(abs(by.heading_rad))}"
+
     def sentence(self) -> str:
         pose = self.locale_from_robot
         evidence = f"; {self.evidence}" if self.evidence else ""

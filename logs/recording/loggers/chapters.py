@@ -9,12 +9,12 @@ import rerun as rr
 from blackboard.change import Change, Posted
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from logs.recording import words
 from logs.recording.belief import Belief
 from logs.recording.board_mirror import Mirror, Moment
 from logs.recording.palette import BELIEVED, DONE, LEVELS, MATCHED, PLANNED, REJECTED, TRUE, VERDICTS, Colour
 from logs.recording.paths import CHAPTERS
 from logs.recording.stream import RecordingStream
+from world_models import words
 from world_models.entries.body import BodyFault
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch, Resumed
@@ -44,7 +44,7 @@ class Chapters:
             stream.log(CHAPTERS, rr.TextLog, text=[text], level=[level], color=[colour])
 
     def _astray(self, moment: Moment) -> Iterator[Line]:
-        """What Harvey cannot know: that his belief went wrong, or is right again."""
+        """What Harvey cannot know: that its belief went wrong, or is right again."""
         for pose in moment.truth[-1:]:
             self._truth = pose
         held = self._belief.now(moment.mirror) if self._truth is not None and moment.changes else None
@@ -53,11 +53,11 @@ class Chapters:
         off_m = self._truth.distance_to(held.world_from_robot)
         if off_m > (BACK_M if self._is_astray else ASTRAY_M):
             if not self._is_astray:
-                yield "in truth", f"he is {words.metres(off_m)} from where he believes to be", TRUE
+                yield "in truth", f"it is {words.metres(off_m)} from where it believes to be", TRUE
             self._is_astray = True
         elif self._is_astray:
             self._is_astray = False
-            yield "in truth", f"he is right again, to {words.metres(off_m)}", TRUE
+            yield "in truth", f"it is right again, to {words.metres(off_m)}", TRUE
 
 
 def _turn(change: Change, mirror: Mirror) -> Iterator[Line]:
@@ -72,10 +72,10 @@ def _turn(change: Change, mirror: Mirror) -> Iterator[Line]:
         yield value.verdict, _verdict(value, mirror), VERDICTS.get(value.verdict, DONE)
     elif isinstance(value, Discrepancy) and value.status == "escalated":
         lost = value.level.above is Level.GOAL
-        text = "nothing fits: he asks where he is" if lost else value.what
+        text = "nothing fits: it asks where it is" if lost else value.what
         yield "lost" if lost else "doubt", text, REJECTED if lost else LEVELS["plan"]
     elif isinstance(value, Hypothesis) and value.is_held and value.basis == "relocalization":
-        yield "found", f"himself, in {value.locale}", BELIEVED
+        yield "found", f"itself, in {value.locale}", BELIEVED
     else:
         yield from _from_outside(value)
 

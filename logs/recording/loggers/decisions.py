@@ -12,12 +12,12 @@ from blackboard.activation import Activation
 from blackboard.change import Change
 from blackboard.journal import Decision
 from blackboard.servoing import Discrepancy
-from logs.recording import words
 from logs.recording.board_mirror import Moment
-from logs.recording.deeds import Deeds
+from logs.recording.messages import Messages
 from logs.recording.palette import DONE, LEVELS, REJECTED
 from logs.recording.paths import RECORDS, TABLE
 from logs.recording.stream import RecordingStream
+from world_models import words
 
 TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "doubted", "halted")
 """Statuses of milestones, sketches, goals, hypotheses and legs that stand for something gone wrong."""
@@ -56,7 +56,7 @@ class Decisions:
     def __init__(self, line_of: Callable[[Decision], str]) -> None:
         """``line_of`` gives a decision's line in the journal."""
         self._line_of = line_of
-        self._deeds = Deeds()
+        self._messages = Messages()
 
     def begin(self, stream: RecordingStream) -> None:
         """Nothing holds at all times."""
@@ -66,25 +66,25 @@ class Decisions:
         stream.log(RECORDS, Record, **{RECORD: [self._line_of(decision)]})
         level = log_level(decision)
         fields: dict[str, list[Any]] = {name: [value] for name, value in row(decision).items()}
-        stream.log(TABLE, TableRow, text=[MARKS[level] + sentence(decision, self._deeds)], level=[level],
+        stream.log(TABLE, TableRow, text=[MARKS[level] + sentence(decision, self._messages)], level=[level],
                  color=[_colour(decision)], **fields)
 
 
-def sentence(decision: Decision, deeds: Deeds) -> str:
+def sentence(decision: Decision, messages: Messages) -> str:
     """What was seen and decided, in words."""
-    seen = _told(decision.observed, deeds)
+    seen = _told(decision.observed, messages)
     given = f" [{seen}]" if seen else ""
-    done = _told(decision.made, deeds) or "changes nothing"
+    done = _told(decision.made, messages) or "changes nothing"
     if decision.chosen is None:
         return f"nobody had anything to do{given}"
-    who = words.expert(decision.chosen.source.name)
+    who = words.source(decision.chosen.source.name)
     if decision.refused:
         return f"{who}: refused, {decision.refused.splitlines()[-1]}{given}"
     return f"{who}: {done}{given}"
 
 
-def _told(changes: Iterable[Change], deeds: Deeds) -> str:
-    return "; ".join(words.numerous(said for change in changes if (said := deeds.tell(change))))
+def _told(changes: Iterable[Change], messages: Messages) -> str:
+    return "; ".join(words.grouped(said for change in changes if (said := messages.message(change))))
 
 
 def log_level(decision: Decision) -> str:
@@ -116,7 +116,7 @@ def row(decision: Decision) -> dict[str, str | float]:
         chosen.source.name if chosen else "",
         float(chosen.rating) if chosen else 0.0,
         str(chosen.trigger.entry.ref) if chosen else "",
-        _deeds(decision.made),
+        _messages(decision.made),
         _bid(second) if second else "",
         float(decision.pending),
     )
@@ -127,7 +127,7 @@ def _bid(activation: Activation) -> str:
     return f"{activation.source.name} (rating {activation.rating:.2f})"
 
 
-def _deeds(made: tuple[Change, ...]) -> str:
+def _messages(made: tuple[Change, ...]) -> str:
     counts = Counter((change.kind.lower(), type(change.entry.value).__name__) for change in made)
     named = {(c.kind.lower(), type(c.entry.value).__name__): str(c.entry.ref) for c in made}
     parts = [f"{kind} {named[kind, what]}" if count == 1 else f"{kind} {count} x {what}"

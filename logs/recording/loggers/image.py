@@ -18,13 +18,13 @@ from logs.recording.paths import MATCHED as MATCHED_PATH
 from logs.recording.paths import REJECTED as REJECTED_PATH
 from logs.recording.paths import SEGMENTS as SEGMENTS_PATH
 from logs.recording.stream import RecordingStream
-from logs.recording.words import nearby
 from world_models.camera import Camera, clip_segments
 from world_models.entries.body import Frame
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
 from world_models.entries.task import Milestone
 from world_models.frames import frozen
+from world_models.words import without_locale
 
 DRIFT_SCALE = 5.0
 """Drifts of a few pixels would not show: their arrows are drawn longer, and the view's legend says so."""
@@ -137,7 +137,7 @@ class Image:
         self._log_lines(stream, EXPECTED_PATH, clipped[inside])
         names = _largest(milestone, clipped, inside, self._size[0])
         spots = np.array(list(names.values()), float).reshape(-1, 2)
-        stream.log(LANDMARK_NAMES, rr.Points2D, positions=spots, labels=[nearby(name) for name in names])
+        stream.log(LANDMARK_NAMES, rr.Points2D, positions=spots, labels=[without_locale(name) for name in names])
         self._shown[LANDMARK_NAMES] = None
 
     def _inliers(self, stream: RecordingStream, mirror: Mirror, fix: PoseFix) -> None:
@@ -159,7 +159,7 @@ class Image:
         middles = self._bent(np.array([track.found_px or track.predicted_px for track in items], float).reshape(-1, 2))
         last = np.subtract(self._size, 1.0)
         low, high = np.clip(middles - half_px, 0.0, last), np.clip(middles + half_px, 0.0, last)
-        names = [nearby(track.landmark) if len(items) <= MOST_NAMES else "" for track in items]
+        names = [without_locale(track.landmark) if len(items) <= MOST_NAMES else "" for track in items]
         stream.log(WINDOWS, rr.Boxes2D, centers=(low + high) / 2, half_sizes=(high - low) / 2, labels=names,
                  colors=[_track_colour(track) for track in items])
         self._shown[WINDOWS] = None

@@ -1,4 +1,4 @@
-"""The robot as it truly is, as Harvey believes it is, and how sure he is."""
+"""The robot as it truly is, as Harvey believes it is, and how sure it is."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Robots:
             self._move(stream, BELIEVED_ROBOT, BELIEVED_TRAIL, pose)
 
     def _log_candidates(self, stream: RecordingStream, mirror: Mirror) -> None:
-        """Where else he might be: an arrow each, the longer the likelier."""
+        """Where else it might be: an arrow each, the longer the likelier."""
         others = [e.value for e in mirror.all(Hypothesis) if e.value.status == "candidate"]
         if not others and not self._has_candidates:
             return

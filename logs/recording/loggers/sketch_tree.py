@@ -13,8 +13,8 @@ from logs.recording.board_mirror import Mirror, Moment
 from logs.recording.palette import DONE, PLANNED, VERDICTS, WAITING, Colour
 from logs.recording.paths import SKETCH
 from logs.recording.stream import RecordingStream
-from logs.recording.words import short
 from world_models.entries.task import Certificate, Goal, Milestone, PlanSketch, Subgoal
+from world_models.words import short
 
 ROW, INDENT = 26.0, 34.0
 LETTER, BORDER = 5.4, 26.0

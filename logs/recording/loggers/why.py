@@ -10,13 +10,13 @@ import rerun as rr
 
 from blackboard.entry import Entry
 from blackboard.servoing import Discrepancy
-from logs.recording import words
 from logs.recording.activity import ACTIVITY_KINDS, activity, leg_under_way
 from logs.recording.belief import Belief, Held, believed, sigma_m
 from logs.recording.board_mirror import Mirror, Moment
 from logs.recording.loggers.sketch_tree import subgoal_label
 from logs.recording.paths import WHY
 from logs.recording.stream import RecordingStream
+from world_models import words
 from world_models.entries.body import BodyFault, Frame, Look, MotorCommand, Recovery
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, PoseFix, Segments, Tracks
@@ -75,7 +75,7 @@ def in_truth(held: Held | None, truth: Pose2 | None) -> str:
         return ""
     off = truth.inverse() @ held.world_from_robot
     distance = words.metres(math.hypot(off.x_m, off.y_m))
-    return f"that is {distance} and {words.degrees(abs(off.heading_rad))} off, which he cannot know."
+    return f"that is {distance} and {words.degrees(abs(off.heading_rad))} off, which it cannot know."
 
 
 def _headline(mirror: Mirror) -> str:
@@ -101,16 +101,17 @@ def _wants(mirror: Mirror) -> str:
     goal = mirror.latest(Goal)
     if goal is None:
         return ""
-    return f"to be in {words.place(goal.value.destination)}{'' if goal.value.is_active else f' ({goal.value.status})'}."
+    return f"to be in {goal.value.destination.words()}{'' if goal.value.is_active else f' ({goal.value.status})'}."
 
 
 def _believes(mirror: Mirror) -> str:
     held = believed(mirror)
     if held is None:
-        return "nothing about where he is: he is lost."
+        return "nothing about where it is: it is lost."
     pose = held.locale_from_robot
-    return (f"he is in {held.locale} at ({pose.x_m:.2f}, {pose.y_m:.2f}) m, heading {words.degrees(pose.heading_rad)}, "
-            f"give or take {1e3 * sigma_m(held):.0f} mm and {math.degrees(held.sigma_rad):.2f}° (from {held.basis}).")
+    sure = f"{1e3 * sigma_m(held):.0f} mm and {math.degrees(held.sigma_rad):.2f} degrees"
+    return (f"it is in {held.locale} at {words.point(pose.x_m, pose.y_m)}, heading {words.degrees(pose.heading_rad)}, "
+            f"give or take {sure} (from {held.basis}).")
 
 
 def _does(mirror: Mirror) -> str:
@@ -141,7 +142,7 @@ def _expects(mirror: Mirror) -> str:
         return ""
     milestone = last.value
     if milestone.status == "turning":
-        return f"to see {milestone.what}, once he has turned to {words.degrees(milestone.look_heading_rad)}."
+        return f"to see {milestone.what}, once it has turned to {words.degrees(milestone.look_heading_rad)}."
     lines = words.count(len(milestone.expected), "line")
     return f"{milestone.what}: {lines} of {words.listed(milestone.landmarks)}."
 
@@ -156,7 +157,7 @@ def _followed(mirror: Mirror) -> str:
         return ""
     items = tracks.value.items
     found = [track for track in items if track.found_px]
-    return f"{len(found)} of the {len(items)} points that he follows."
+    return f"{len(found)} of the {len(items)} points that it follows."
 
 
 def _verified(mirror: Mirror) -> str:
@@ -180,7 +181,7 @@ def _concludes(mirror: Mirror) -> str:
     c = entry.value
     known = mirror.get(c.milestone)
     what = known.value.what if known and isinstance(known.value, Milestone) else c.milestone
-    off = f"{words.metres(c.deviation_m)} and {words.degrees(abs(c.deviation_rad))} from what he believed"
+    off = f"{words.metres(c.deviation_m)} and {words.degrees(abs(c.deviation_rad))} from what it believed"
     return f"{what}: **{c.verdict}**. {c.reason}; {off}. A wrong place would look so with probability {c.p_false:.1g}."
 
 
@@ -236,7 +237,7 @@ def _reason(entry: Entry[Any]) -> str:
 UNSAID = (Look, Frame, Segments)
 """What stands between an order and its reason, and says nothing to a person."""
 
-BELIEVES, TRULY = "He believes", "In truth"
+BELIEVES, TRULY = "It believes", "In truth"
 
 CHAPTERS: tuple[tuple[str, Tell, tuple[type[Any], ...]], ...] = (
     ("", _headline, ACTIVITY_KINDS),
@@ -244,11 +245,11 @@ CHAPTERS: tuple[tuple[str, Tell, tuple[type[Any], ...]], ...] = (
     ("Trouble:", _ails, (BodyFault, Recovery)),
     ("Harvey wants", _wants, (Goal,)),
     (BELIEVES, _believes, (Hypothesis,)),
-    ("He does:", _does, (*ACTIVITY_KINDS,)),
-    ("He expects", _expects, (Milestone,)),
-    ("He sees", _sees, (Tracks, Milestone, Segments, LineMatch, PoseFix)),
-    ("He doubts:", _doubts, (Discrepancy,)),
-    ("He last judged", _concludes, (Certificate,)),
-    ("His last order:", _because, (MotorCommand,)),
+    ("It does:", _does, (*ACTIVITY_KINDS,)),
+    ("It expects", _expects, (Milestone,)),
+    ("It sees", _sees, (Tracks, Milestone, Segments, LineMatch, PoseFix)),
+    ("It doubts:", _doubts, (Discrepancy,)),
+    ("It last judged", _concludes, (Certificate,)),
+    ("Last order:", _because, (MotorCommand,)),
 )
 """Title, what tells it, and the types of values that it rests on."""

@@ -23,11 +23,12 @@ from harvey.run_files.records import Candidate, DecisionRecord, EntryRecord, as_
 from harvey.why.history import Told
 from harvey.why.journal import JournalHistory
 from harvey.why.reach import SENSOR, accounted, explained_by, reaches
-from harvey.why.sentences import MAKERS, sentence
+from harvey.why.sentences import sentence
 from harvey.why.story import lines_of, story
 from harvey.why.trace import Trace
 from harvey.why.walk import explain, walk
 from harvey.why.why_not import Fate, in_cycle, in_run, of_entry
+from harvey.wiring import known_kinds
 from strategies import Note, Scripted, Tally
 
 LAWS = settings(deadline=None, max_examples=60)
@@ -301,7 +302,7 @@ def test_leaves_differ_where_values_do(a: Any, b: Any) -> None:
 
 
 @settings(deadline=None, max_examples=200)
-@given(st.sampled_from([*MAKERS, "Unheard"]), json_values, st.sampled_from(["Posted", "Revised", "Retracted"]))
+@given(st.sampled_from([*known_kinds(), "Unheard"]), json_values, st.sampled_from(["Posted", "Revised", "Retracted"]))
 def test_every_value_has_a_sentence(kind: str, value: Any, change: str) -> None:
     told = sentence(EntryRecord(change, f"{kind}-1.0", kind, "expert", (), value, 1, False))
     assert isinstance(told, str)
@@ -309,8 +310,9 @@ def test_every_value_has_a_sentence(kind: str, value: Any, change: str) -> None:
 
 
 @settings(deadline=None, max_examples=200)
-@given(st.lists(st.tuples(st.sampled_from([*MAKERS, "Unheard"]), json_values, st.lists(st.integers(0, 14), max_size=4)),
-                min_size=1, max_size=12))
+@given(st.lists(
+    st.tuples(st.sampled_from([*known_kinds(), "Unheard"]), json_values, st.lists(st.integers(0, 14), max_size=4)),
+    min_size=1, max_size=12))
 def test_the_story_of_any_web_of_entries_ends_and_tells_each_thing_once(
     web: list[tuple[str, Any, list[int]]]
 ) -> None:

@@ -19,11 +19,14 @@ from harvey.campaign.campaign import Task, run_all, seeds_of, settings_of
 from harvey.cli import main
 from harvey.errors import BadInput, Terminated
 from harvey.run_files.deciding_code import deciding_code
+from harvey.run_files.observations import entry_of
 from harvey.run_files.records import read_records
-from harvey.why.sentences import MAKERS
+from harvey.why.sentences import sentence
+from harvey.wiring import known_kinds
 from logs.disk import Appended
 from logs.journal_file import read_journal
 from logs.reader import read_decisions
+from world_models import words
 from world_models.frames import Pose2
 
 SHORT = ["--set", "limits.max_cycles=28"]
@@ -68,7 +71,7 @@ def test_why_goes_down_to_the_command(run: Path, capsys: pytest.CaptureFixture[s
     assert "made from match LineMatch-" in out
     assert "MotorCommand-1.0: turn" in out
     assert "the user asked for (ptrans (robot-laboratory (16,2,0))" in out
-    assert "Frame-1.0: camera frame 0" in out
+    assert "Frame-1.0: camera frame at 0.1 s; to verify a milestone" in out
 
 
 def test_why_without_an_entry_tells_the_outcome(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -97,7 +100,8 @@ def test_every_kind_of_entry_has_its_own_sentence(run: Path) -> None:
     records = [r for d in read_records(run / "journal.jsonl") for r in (*d.observed, *d.made)]
     assert len({r.type for r in records}) >= 15
     for record in records:
-        assert len(MAKERS[record.type](record.value)) > 5
+        said = words.sentence(entry_of(record, known_kinds()).value)
+        assert len(said) > 5 and sentence(record).startswith(said)
 
 
 def test_replay_decides_the_same_to_the_byte(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

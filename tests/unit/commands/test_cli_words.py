@@ -22,13 +22,13 @@ from harvey.errors import BadInput
 from harvey.run_files.records import EntryRecord
 from harvey.runner.result import MissionResult
 from harvey.tables import table
-from harvey.units import degrees, metres, turn
 from harvey.why.sentences import sentence
 from world_models.entries.body import MotorCommand
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.percepts import Track, Tracks
 from world_models.entries.task import Leg, Outcome
 from world_models.frames import Pose2
+from world_models.words import degrees, metres, turn
 
 FOUND = Track("door-frame", (1.0, 2.0, 3.0), "Frame-3", (10.0, 20.0), 2.5, (100.0, 80.0), (95.8, 81.5), 0.97, 0.1)
 
@@ -45,16 +45,17 @@ def say(value: Any) -> str:
     (MotorCommand(0.0, 0.05), "move 50 mm ahead"),
     (MotorCommand(0.0, 0.0), "stand still"),
     (Tracks("Frame-4", 7, (FOUND,)),
-     "1 of 1 landmark found in Frame-4; door-frame 4.2 px left and 1.5 px below its prediction (correlation 0.97)"),
+     "1 of 1 landmark found again; in Frame-4; door-frame 4.2 px left and 1.5 px below its prediction"
+     " (correlation 0.97)"),
     (Hypothesis("hallway", Pose2(1.0, 2.0, math.pi / 2), diagonal(0.02, 0.01), "tracks"),
-     "held: in hallway at (1.00, 2.00) m, heading 90.0 degrees (sigma 20 mm, 0.6 degrees), by tracks"),
+     "held: in hallway at (1.00, 2.00) m, heading 90.0 degrees; sigma 20 mm, 0.6 degrees, by tracks"),
     (Discrepancy(Level.ACTION, "a bump", 5.0, (3.0, 9.0), "px"),
      "action-level discrepancy, a bump: 5.00 px, where up to 3.00 px may be corrected; open"),
     (Discrepancy(Level.GOAL, "lost", math.inf, (3.0, 9.0), "px"),
      "goal-level discrepancy, lost: too large to be measured; open"),
     (Leg("PlanSketch-2", 1, 0.0, 0.0, 3.0, 4.0, 0.1, increments=2),
-     "straight leg of 5.00 m from (0.00, 0.00) m to (3.00, 4.00) m in the world (subgoal 1 of PlanSketch-2,"
-     " near enough within 100 mm); moving after 2 increments"),
+     "straight leg of 5.00 m, moving after 2 increments; from (0.00, 0.00) m to (3.00, 4.00) m in the world (subgoal 1"
+     " of PlanSketch-2, near enough within 100 mm)"),
 ])
 def test_values_are_told_with_units(value: Any, told: str) -> None:
     assert say(value) == told

@@ -1,23 +1,22 @@
 """What the recorder says in words: sentences, levels, the tree's labels and the story."""
 
 from blackboard.board import Blackboard
+from blackboard.change import Retracted
 from blackboard.effect import Post, Revise
 from blackboard.entry import Ref
 from blackboard.journal import Decision
-from harvey.simulation.run import robot_model
-from harvey.wiring import knowledge_sources
 from logs.recording.activity import activity
 from logs.recording.board_mirror import Mirror
-from logs.recording.deeds import TELLERS, Deeds
 from logs.recording.loggers.decisions import COLUMNS, log_level, row, sentence
 from logs.recording.loggers.sketch_tree import NO_SKETCH, outline
 from logs.recording.loggers.why import story
-from logs.recording.words import numerous
+from logs.recording.messages import Messages
 from rehearsal import play
-from sim.scenario import load_scenario
 from world_models.entries.body import BodyFault, MotorCommand, Recovery
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Leg
+from world_models.words import grouped
+from world_models.words import sentence as words_of
 
 
 def played(until: str = "") -> tuple[list[Decision], Mirror]:
@@ -34,35 +33,34 @@ def played(until: str = "") -> tuple[list[Decision], Mirror]:
 
 
 def test_a_decision_is_told_in_a_sentence() -> None:
-    deeds = Deeds()
-    told = "\n".join(sentence(d, deeds) for d in played()[0])
-    assert "sketcher: sketches the way of the route: 2 parts; sketches the way through kitchen: 1 part" in told
-    assert "motor: begins a straight leg of 2.24 m; turn 22.9° left, drive 0.60 m" in told
-    assert "tracker: corrects his belief by 0.58 m and 22.9°; follows 1 of 3 landmark points; " in told
-    assert "[the wheels claim: turn 22.9° left, drive 0.60 m; picture 5; prompts tracker" not in told
-    assert "judge: verified: 2 of 2 lines; M0 through kitchen holds" in told
+    messages = Messages()
+    told = "\n".join(sentence(d, messages) for d in played()[0])
+    assert ("sketcher: plan sketch from locale to locale: milestone M0 of M2 yet to be verified; "
+            "plan sketch through kitchen: milestone M0 of M1 yet to be verified") in told
+    assert ("motor: straight leg of 2.24 m, moving after 0 increments; "
+            "turn 22.9 degrees left and move 0.60 m ahead") in told
+    assert "tracker: the belief moves by 0.58 m and 22.9 degrees, by tracks; " in told
+    assert "[the wheels claim: turn 22.9 degrees left and move 0.60 m ahead; camera frame" in told
+    assert "judge: Milestone-1 is verified: 2 of 2 lines; " in told
     assert "clumsy: refused, RuntimeError: fell over its own feet" in told
     assert "nobody had anything to do" in told
 
 
 def test_what_happened_several_times_in_a_row_is_told_once() -> None:
-    assert numerous(["a", "a", "b", "a"]) == ["a (2 times)", "b", "a"]
+    assert grouped(["a", "a", "b", "a"]) == ["a (2 times)", "b", "a"]
 
 
-def test_every_type_on_the_board_has_its_words() -> None:
-    """A new type of entry falls back on its name; those of the mission must not."""
-    deeds = Deeds()
-    kinds = {type(c.entry.value).__name__ for d in played()[0] for c in d.made}
-    assert "Hypothesis" in kinds and "PoseFix" in kinds
+def test_a_change_is_told_by_the_first_clause_of_the_entrys_own_sentence() -> None:
+    """One vocabulary: the recording and ``why`` say the same; the recording has room for less of it."""
+    messages = Messages()
+    kinds = set()
     for decision in played()[0]:
         for change in decision.made:
-            assert not deeds.tell(change).startswith(("posted ", "revised "))
-
-
-def test_whatever_an_expert_may_write_has_its_words() -> None:
-    robot = robot_model(load_scenario("lab-to-allens-office"))
-    written = {kind for expert in knowledge_sources(robot) for kind in expert.writes}
-    assert len(written) > 10 and written <= {*TELLERS, Hypothesis}
+            said, value = messages.message(change), change.entry.value
+            if said and not isinstance(value, Hypothesis) and not isinstance(change, Retracted):
+                kinds.add(type(value).__name__)
+                assert words_of(value).startswith(said) and ";" not in said
+    assert {"PoseFix", "Certificate", "MotorCommand", "PlanSketch", "Discrepancy"} <= kinds
 
 
 def faulty(status: str) -> Mirror:
@@ -116,25 +114,26 @@ def test_the_tree_of_nothing_is_empty() -> None:
     assert outline(Mirror()) == []
 
 
-def test_the_story_says_what_he_wants_expects_sees_doubts_and_does() -> None:
+def test_the_story_says_what_it_wants_expects_sees_doubts_and_does() -> None:
     told = story(played("PoseFix-1.0")[1])
     assert told.startswith("### Looking for a milestone")
     assert "**Harvey wants** to be in parlour (2.00, 2.00) m." in told
-    assert "**He believes** he is in kitchen at (1.00, 1.00) m, heading 0.0°, give or take 20 mm and 0.57°" in told
-    assert "**He expects** the door: 2 lines of kitchen-door." in told
-    assert "**He sees** 3 line segments, 2 matched, 1 of these agree on one pose." in told
-    assert "**He doubts:** nothing at the moment." in told
+    assert ("**It believes** it is in kitchen at (1.00, 1.00) m, heading 0.0 degrees, "
+            "give or take 20 mm and 0.57 degrees") in told
+    assert "**It expects** the door: 2 lines of kitchen-door." in told
+    assert "**It sees** 3 line segments, 2 matched, 1 of these agree on one pose." in told
+    assert "**It doubts:** nothing at the moment." in told
 
 
 def test_the_story_tells_of_a_discrepancy_and_of_being_lost() -> None:
     told = story(played("Discrepancy-2.0")[1])
     assert "the door is not where it was expected: not yet measured (at the plan level" in told
-    assert told.startswith("### In doubt: checking where he is before he goes on")
-    assert "He does:** has halted on a straight leg of 2.24 m" in told
-    assert "turn 22.9° left, drive 0.60 m, to follow Leg-1, as PlanSketch-2 has it for kitchen" in told
+    assert told.startswith("### In doubt: checking where it is before it goes on")
+    assert "It does:** has halted on a straight leg of 2.24 m" in told
+    assert "turn 22.9 degrees left and move 0.60 m ahead, to follow Leg-1, as PlanSketch-2 has it for kitchen" in told
     lost = story(played()[1])
     assert lost.startswith("### The end: reached\n\n**The end:** reached: there.")
-    assert "he is lost" in lost
+    assert "it is lost" in lost
 
 
 def test_an_order_whose_reasons_go_round_in_a_circle_is_told() -> None:
@@ -147,4 +146,4 @@ def test_an_order_whose_reasons_go_round_in_a_circle_is_told() -> None:
     again = Revise(board.view["Leg-1"], leg, (Ref("MotorCommand-1", 0),))
     for change in board.apply([again], author="motor", cycle=2):
         mirror.take(change)
-    assert "**His last order:** turn 5.7° left, to follow Leg-1." in story(mirror)
+    assert "**Last order:** turn 5.7 degrees left, to follow Leg-1." in story(mirror)
