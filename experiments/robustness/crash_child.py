@@ -60,7 +60,7 @@ def main(argv: list[str]) -> int:
     with agent_of(RunHead.read(run.path)) as agent:
         same = all(step.same for step in replay(run, pictures_of(run), agent.scheduler()))
     print(json.dumps({"outcome": result.outcome, "reason": result.reason, "same": same,
-                      "error_m": result.final_error_m, "decisions": result.decisions}))
+                      "error_m": result.error_m, "decisions": result.decisions}))
     return 0
 
 

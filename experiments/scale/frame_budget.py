@@ -1,4 +1,4 @@
-"""What perception costs a frame: tracking and correcting, and a milestone from picture to verdict."""
+"""Time of perception per frame: tracking and correction, and a milestone from frame to verdict."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from world_models.robot import RobotModel
 
 SCENARIOS, QUICK_SCENARIOS = ("forty-foot-hallway", "lab-to-allens-office"), ("forty-foot-hallway",)
 DRIVES = 6
-"""Each mission is driven so often, which gives the same acts in the same order; of each the best time counts: what else
-the machine does is none of its fault. The first drive compiles what is compiled."""
-TRACK, ANEW = "correlator_tracker", "correlator_tracker, anew"
+"""Drives of each mission. They give the same acts in the same order; the best time of each act counts, so that other
+load on the machine counts less. The first drive compiles."""
+TRACK, NEW_LANDMARKS = "correlator_tracker", "correlator_tracker, new landmarks"
 MILESTONE = ("line_finder", "matcher", "med_r_and_t", "milestone_judge")
-MOST_TRACK_MS, MOST_MILESTONE_MS = 5.0, 33.0
+MAX_TRACK_MS, MAX_MILESTONE_MS = 5.0, 33.0
 NOTES = (
-    "Whole acts of the experts, as the scheduler calls them, on frames of 512 x 512 px that the simulator drew:"
-    " decoding the newest JPEG included, making the entries too.",
+    "Whole acts of the knowledge sources, as the scheduler calls them, on simulated frames of 512 x 512 px;"
+    " decoding the JPEG and making the entries are included.",
     f"Processor time of the one thread; of each act the best of {DRIVES} drives of the same mission.",
     "A milestone's time is the sum of its four acts.",
 )
@@ -37,7 +37,7 @@ Times = dict[str, list[float]]
 
 
 class _Timed(KnowledgeSource):
-    """An expert whose acts are timed."""
+    """A knowledge source whose acts are timed."""
 
     def __init__(self, inner: KnowledgeSource, times: Times) -> None:
         self._inner, self._times = inner, times
@@ -62,40 +62,40 @@ class _Timed(KnowledgeSource):
 
 
 def _act(name: str, trigger: Change) -> str:
-    """An expert's acts are told apart by what they are for: landmarks are also taken anew where no frame is tracked."""
-    return ANEW if name == TRACK and not isinstance(trigger.entry.value, Frame) else name
+    """Name an act; the tracker also takes new landmarks, when no frame is tracked."""
+    return NEW_LANDMARKS if name == TRACK and not isinstance(trigger.entry.value, Frame) else name
 
 
 def run(quick: bool, seed: int) -> Report:
-    """The experts' acts in whole missions."""
+    """Time the acts of knowledge sources in whole missions."""
     times: Times = {}
     for scenario in QUICK_SCENARIOS if quick else SCENARIOS:
-        drives = [_driven(scenario, seed) for _ in range(DRIVES)]
+        drives = [_time_acts(scenario, seed) for _ in range(DRIVES)]
         for name in drives[0]:
             times.setdefault(name, []).extend(np.min([drive[name] for drive in drives], axis=0).tolist())
     chain = np.sum([times[name] for name in MILESTONE], axis=0).tolist()
     track = times[TRACK]
     rows = [
-        ("track and correct, one frame", MOST_TRACK_MS, *_figures(track)),
-        ("  landmarks taken anew, after a milestone", None, *_figures(times[ANEW])),
-        ("milestone, picture to verdict", MOST_MILESTONE_MS, *_figures(chain)),
+        ("track and correct, one frame", MAX_TRACK_MS, *_figures(track)),
+        ("  new landmarks, after a milestone", None, *_figures(times[NEW_LANDMARKS])),
+        ("milestone, frame to verdict", MAX_MILESTONE_MS, *_figures(chain)),
         *((f"  {name}", None, *_figures(times[name])) for name in MILESTONE),
     ]
     return Report(
-        "Perception's time for a frame, one core [ms]",
-        ("what", "wanted at most", "frames", "median", "95th percentile"),
+        "Time of perception per frame, one core [ms]",
+        ("what", "required at most", "frames", "median", "95th percentile"),
         tuple(rows),
         (*NOTES, f"Missions: {', '.join(QUICK_SCENARIOS if quick else SCENARIOS)}, seed {seed}."),
         (
-            (f"track and correct within {MOST_TRACK_MS:.0f} ms (median)", float(np.median(track)) <= MOST_TRACK_MS),
-            (f"a milestone within {MOST_MILESTONE_MS:.0f} ms (95th percentile)",
-             float(np.percentile(chain, 95)) <= MOST_MILESTONE_MS),
+            (f"track and correct within {MAX_TRACK_MS:.0f} ms (median)", float(np.median(track)) <= MAX_TRACK_MS),
+            (f"a milestone within {MAX_MILESTONE_MS:.0f} ms (95th percentile)",
+             float(np.percentile(chain, 95)) <= MAX_MILESTONE_MS),
         ),
     )
 
 
-def _driven(scenario: str, seed: int) -> Times:
-    """How long each act of a mission took."""
+def _time_acts(scenario: str, seed: int) -> Times:
+    """Drive a mission and time each act."""
     times: Times = {}
     timed = frozenset((TRACK, *MILESTONE))
 

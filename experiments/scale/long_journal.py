@@ -1,6 +1,6 @@
-"""A long journal from a short one: the same run told over and over, each time with names and cycles of its own.
+"""A long journal made from a short one: the same run repeated, each time with later cycles and higher numbers.
 
-For measuring how fast a long run is explained; it is a journal like any other, but not one of a run that took place.
+It serves to measure how fast a long run is explained.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from pathlib import Path
 ENTRY = re.compile(r'"entry":"(\w+)-(\d+)\.')
 CYCLE = re.compile(r'^\{"cycle":(\d+)|"since":(\d+)|\{"number":(\d+),"source"')
 HOUR_CYCLES = 16_600
-"""How many cycles an hour of driving takes."""
+"""Cycles in an hour of driving."""
 
 
-def lengthened(lines: list[str], cycles: int) -> Iterator[str]:
-    """At least so many lines: the journal's own, then again with later cycles and higher numbers, and so on."""
+def repeat_lines(lines: list[str], cycles: int) -> Iterator[str]:
+    """Yield at least ``cycles`` lines: the journal's own, then again with later cycles and higher numbers."""
     last = json.loads(lines[-1])["cycle"]
     counts = Counter[str]()
     for line in lines:
@@ -29,15 +29,15 @@ def lengthened(lines: list[str], cycles: int) -> Iterator[str]:
     activations = max((int(n) for line in lines for n in re.findall(r'\{"number":(\d+),"source"', line)), default=0)
     for round_ in range(-(-cycles // len(lines))):
         for line in lines:
-            renamed = name.sub(partial(_renamed, counts, round_), line)
-            yield CYCLE.sub(partial(_shifted, round_ * last, round_ * activations), renamed)
+            renamed = name.sub(partial(_rename, counts, round_), line)
+            yield CYCLE.sub(partial(_shift, round_ * last, round_ * activations), renamed)
 
 
-def _renamed(counts: Mapping[str, int], round_: int, match: re.Match[str]) -> str:
+def _rename(counts: Mapping[str, int], round_: int, match: re.Match[str]) -> str:
     return f"{match[1]}-{int(match[2]) + round_ * counts[match[1]]}"
 
 
-def _shifted(cycles: int, activations: int, match: re.Match[str]) -> str:
+def _shift(cycles: int, activations: int, match: re.Match[str]) -> str:
     if match[1]:
         return f'{{"cycle":{int(match[1]) + cycles}'
     if match[2]:
@@ -50,6 +50,6 @@ def write_hour(source: Path, target: Path, cycles: int = HOUR_CYCLES) -> int:
     lines = source.read_text(encoding="utf-8").splitlines()
     target.parent.mkdir(parents=True, exist_ok=True)
     with target.open("w", encoding="utf-8", newline="\n") as file:
-        for line in lengthened(lines, cycles):
+        for line in repeat_lines(lines, cycles):
             file.write(line + "\n")
     return target.stat().st_size

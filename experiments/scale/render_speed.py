@@ -1,4 +1,4 @@
-"""The simulator's camera: frames per second on one core, and where its edges lie."""
+"""Simulated camera: frames per second on one core, and the accuracy of its edges."""
 
 from __future__ import annotations
 
@@ -18,60 +18,61 @@ from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 
 FRAMES, QUICK_FRAMES = 300, 60
-TRIES = 3
-"""Each frame's time is the best of so many: what else the machine does is none of the renderer's fault."""
+REPEATS = 3
+"""A frame's time is the best of this many, so that other load on the machine counts less."""
 CARDS, QUICK_CARDS = 200, 40
 Times = NDArray[np.float64]
-FLAT_M = 1e6
-"""A texture scale at which a plain surface is of one colour."""
+TEXTURE_M = 1e6
+"""Texture scale at which a plain surface has one colour."""
 
 
 def run(quick: bool, seed: int) -> Report:
-    """Frames from all over the building of Figure 17's mission, and the edges of cards turned in all ways."""
+    """Render frames all over the building of Figure 17's mission, and edges of cards in all orientations."""
     stage, rng = build_stage(load_scenario("lab-to-allens-office")), np.random.default_rng(seed)
-    ideal_s, whole_s = _frame_times_s(stage, rng, QUICK_FRAMES if quick else FRAMES)
-    errors_px = _edge_errors_px(stage.scenario.camera.camera, rng, QUICK_CARDS if quick else CARDS)
+    ideal_s, whole_s = _measure_frame_times_s(stage, rng, QUICK_FRAMES if quick else FRAMES)
+    errors_px = _measure_edge_errors_px(stage.scenario.camera.camera, rng, QUICK_CARDS if quick else CARDS)
     speed, rms_px = 1.0 / float(np.mean(whole_s)), math.sqrt(float(np.mean(errors_px**2)))
     return Report(
         "The simulated camera, 512 x 512 px, one core", ("what", "required", "ours"),
         (
-            ("frames a second, as the camera delivers them", 60.0, speed),
-            ("frames a second, before noise and compression", None, 1.0 / float(np.mean(ideal_s))),
+            ("frames per second, with noise and compression", 60.0, speed),
+            ("frames per second, before noise and compression", None, 1.0 / float(np.mean(ideal_s))),
             ("95th percentile of a frame's time [ms]", None, 1000.0 * float(np.percentile(whole_s, 95))),
-            ("edges, RMS offset from their projection [px]", 0.1, rms_px),
-            ("edges, 99th percentile of the offset [px]", None, float(np.percentile(np.abs(errors_px), 99))),
-            ("edges, mean offset [px]", None, float(np.mean(errors_px))),
+            ("edges, RMS error [px]", 0.1, rms_px),
+            ("edges, 99th percentile of the error [px]", None, float(np.percentile(np.abs(errors_px), 99))),
+            ("edges, mean error [px]", None, float(np.mean(errors_px))),
         ),
         notes=(
             f"{len(whole_s)} frames at random free places of the rooms of {stage.world.name}, headings at random.",
-            f"Time is processor time of all threads together, for each frame the best of {TRIES}.",
-            f"{len(errors_px)} rows across the edges of square cards 3 to 5 m away; where a box-filtered edge lies is"
-            " the sum of its profile. The projection is the robot's own, of which the renderer uses nothing.",
+            f"Time is processor time of all threads together, for each frame the best of {REPEATS}.",
+            f"{len(errors_px)} rows across the edges of square cards 3 to 5 m away; the position of a box-filtered"
+            " edge is the sum of its profile. It is compared with the robot's projection, which the renderer does not"
+            " use.",
         ),
-        claims=(("at least 60 frames a second", speed >= 60.0), ("edges within 0.1 px RMS", rms_px < 0.1)),
+        claims=(("at least 60 frames per second", speed >= 60.0), ("edges within 0.1 px RMS", rms_px < 0.1)),
     )
 
 
-def _frame_times_s(stage: Stage, rng: np.random.Generator, frames: int) -> tuple[Times, Times]:
-    """(frames,) seconds of drawing, and of drawing with noise and compression, summed over all threads."""
+def _measure_frame_times_s(stage: Stage, rng: np.random.Generator, frames: int) -> tuple[Times, Times]:
+    """Measure (frames,) seconds of rendering, and of rendering with noise and compression, over all threads."""
     camera, mount, sensor = stage.scenario.camera.camera, stage.scenario.camera.mount, stage.scenario.sensor
     times_s = []
     for _ in range(frames + 1):
-        camera_from_world = mount.camera_from_robot @ _free_pose(stage, rng).lifted().inverse()
-        tries_s = []
-        for _ in range(TRIES):
+        camera_from_world = mount.camera_from_robot @ _draw_free_pose(stage, rng).lifted().inverse()
+        repeats_s = []
+        for _ in range(REPEATS):
             began_s = time.process_time()
             radiance = stage.building.renderer.radiance(camera, camera_from_world)
             drawn_s = time.process_time()
             compress_jpeg(expose(radiance, sensor, rng), sensor.jpeg_quality)
-            tries_s.append((drawn_s - began_s, time.process_time() - began_s))
-        times_s.append(min(tries_s, key=lambda pair: pair[1]))
+            repeats_s.append((drawn_s - began_s, time.process_time() - began_s))
+        times_s.append(min(repeats_s, key=lambda pair: pair[1]))
     ideal_s, whole_s = np.array(times_s[1:]).T  # the first one compiles
     return ideal_s, whole_s
 
 
-def _free_pose(stage: Stage, rng: np.random.Generator) -> Pose2:
-    """A place where the robot fits."""
+def _draw_free_pose(stage: Stage, rng: np.random.Generator) -> Pose2:
+    """Draw a pose at which the robot fits."""
     corners = np.concatenate([stage.world.outline(name) for name in stage.world.rooms])
     low, high = corners.min(axis=0), corners.max(axis=0)
     while True:
@@ -81,29 +82,31 @@ def _free_pose(stage: Stage, rng: np.random.Generator) -> Pose2:
             return pose
 
 
-def _edge_errors_px(camera: Camera, rng: np.random.Generator, cards: int) -> NDArray[np.float64]:
-    """Measured minus projected place of edges, one for each row or column that crosses one."""
-    errors = [_card_errors_px(camera, rng) for _ in range(cards)]
+def _measure_edge_errors_px(camera: Camera, rng: np.random.Generator, cards: int) -> NDArray[np.float64]:
+    """Measured minus projected position of edges, for each row or column that crosses one."""
+    errors = [_measure_card_errors_px(camera, rng) for _ in range(cards)]
     return np.concatenate(errors)
 
 
-def _card_errors_px(camera: Camera, rng: np.random.Generator) -> NDArray[np.float64]:
+def _measure_card_errors_px(camera: Camera, rng: np.random.Generator) -> NDArray[np.float64]:
     square = np.array([(-1.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, -1.0, 0.0), (-1.0, -1.0, 0.0)]) * rng.uniform(0.5, 0.9)
     turn = rng.uniform(-0.4, 0.4, 3)
     corners = Pose.from_rotation_vector(turn, (*rng.uniform(-0.3, 0.3, 2), rng.uniform(3.0, 5.0))).apply(square)
     wall = np.array([(-40.0, 40.0, 9.0), (40.0, 40.0, 9.0), (40.0, -40.0, 9.0), (-40.0, -40.0, 9.0)])
-    faces = (PatchFace((Patch("wall", wall, (0.1, 0.1, 0.1), "plain", FLAT_M),)),
-             PatchFace((Patch("card", corners, (0.9, 0.9, 0.9), "plain", FLAT_M),)))
+    faces = (PatchFace((Patch("wall", wall, (0.1, 0.1, 0.1), "plain", TEXTURE_M),)),
+             PatchFace((Patch("card", corners, (0.9, 0.9, 0.9), "plain", TEXTURE_M),)))
     image = Renderer.of_faces(faces).radiance(camera, Pose.identity())[..., 1].astype(float)
     pixels = camera.project(corners)
-    return np.concatenate([edge_offsets_px(image, pixels[[i, (i + 1) % 4]]) for i in range(4)])
+    return np.concatenate([measure_edge_offsets_px(image, pixels[[i, (i + 1) % 4]]) for i in range(4)])
 
 
-def edge_offsets_px(image: NDArray[np.float64], ends: NDArray[np.float64], reach: int = 5) -> NDArray[np.float64]:
-    """How far an edge of a (rows, columns) image lies from the line between two points (2, 2), (x, y) [px].
+def measure_edge_offsets_px(
+    image: NDArray[np.float64], ends: NDArray[np.float64], reach: int = 5
+) -> NDArray[np.float64]:
+    """Offset of an edge of a (rows, columns) image from the line between two points (2, 2), (x, y) [px].
 
-    A box-filtered edge moves the sum of a profile across it by exactly the step for each pixel that it moves. One value
-    for each row, or column where the edge is flat, that is not near the ends.
+    When a box-filtered edge moves by a pixel, the sum of a profile across it changes by exactly its step. One value
+    for each row (or column, for flat edges) that is not near the ends.
     """
     if abs(ends[1, 1] - ends[0, 1]) < abs(ends[1, 0] - ends[0, 0]):
         image, ends = image.T, ends[:, ::-1]

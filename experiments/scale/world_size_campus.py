@@ -37,24 +37,24 @@ ROOM_M, CORRIDOR_M, HEIGHT_M, WALL_M, DOOR_M, DOOR_HEIGHT_M = 4.0, 2.4, 2.7, 0.1
 FLOOR_PITCH_M = 16.0
 BUILDING_M = (60.0, FLOORS * FLOOR_PITCH_M + 12.0)
 ROW = 30
-"""Buildings in a district."""
+"""Buildings per district."""
 LOCALES_IN_BUILDING = 1 + FLOORS * (2 + ROOMS)
 FIRST_M = 400.0
-"""The generated districts begin so far from the Research Center, out of everybody's sight."""
+"""Distance of the generated districts from the Research Center, out of its sight."""
 WALL, FLOOR, CEILING, FRAME = (Finish((v, v, v)) for v in (0.78, 0.45, 0.9, 0.3))
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
-    """A campus that was written: how many locales and faces it has."""
+class Campus:
+    """A campus file, with its number of locales and faces."""
 
     path: Path
     locales: int
     faces: int
 
 
-def make_campus(locales: int, folder: Path) -> Made:
-    """The campus with at least so many locales, made unless it is there already."""
+def write_campus(locales: int, folder: Path) -> Campus:
+    """Write the campus with at least this many locales, unless it is there already."""
     buildings = max(0, -(-(locales - 12) // LOCALES_IN_BUILDING))
     path = folder / f"campus-{buildings}.world"
     if not path.is_file():
@@ -62,16 +62,16 @@ def make_campus(locales: int, folder: Path) -> Made:
         partial = path.with_name(f"{path.name}.{os.getpid()}")
         try:
             with closing(sqlite3.connect(partial)) as file:
-                _Campus(WorldWriter(file, "campus", [DETAILS.stem])).write(buildings)
+                _CampusWriter(WorldWriter(file, "campus", [DETAILS.stem])).write(buildings)
             os.replace(partial, path)
         finally:
             partial.unlink(missing_ok=True)
     frames = load_world(path).locale_source
-    return Made(path, frames.counts()["locale"], frames.counts()["face"])
+    return Campus(path, frames.counts()["locale"], frames.counts()["face"])
 
 
-class _Campus:
-    """The campus while it is written."""
+class _CampusWriter:
+    """Writes a campus."""
 
     def __init__(self, writer: WorldWriter) -> None:
         self._writer = writer
@@ -87,7 +87,7 @@ class _Campus:
         self._research_center(layers)
         rows = [range(first, min(first + ROW, buildings)) for first in range(0, buildings, ROW)]
         template = _Template()
-        with tqdm(total=buildings, desc="making the campus", unit="building", file=sys.stderr, leave=False,
+        with tqdm(total=buildings, desc="writing the campus", unit="building", file=sys.stderr, leave=False,
                   disable=not sys.stderr.isatty()) as bar:
             before = "hallway"
             for number, row in enumerate(rows):
@@ -106,7 +106,7 @@ class _Campus:
         self._counts["room"] += room
 
     def _research_center(self, layers: Sequence[World]) -> None:
-        """The Research Center and its details as they are, one level further down."""
+        """Write the Research Center and its details as they are, one level further down."""
         model, detailed = layers
         for name, locale in model.locales.items():
             self._add(replace(locale, parent="campus") if name == model.root else locale, room=model.is_room(name))
@@ -125,7 +125,7 @@ class _Campus:
             self._counts[key] += model.counts()[key]
 
     def _district(self, number: int, row: range, before: str, template: _Template, bar: tqdm) -> str:
-        """A row of buildings; returns the name of its grounds, which follow those of ``before``."""
+        """Write a row of buildings; returns the name of its grounds, which follow those of ``before``."""
         y = FIRST_M + number * BUILDING_M[1]
         name, grounds = f"district-{number}", f"grounds-{number}"
         width = BUILDING_M[0] * ROW
@@ -162,8 +162,8 @@ class _Campus:
 
 
 @dataclass(frozen=True, eq=False)
-class _Moulded:
-    """A packet of the template building: what changes from building to building is names, numbers and places."""
+class _TemplatePacket:
+    """A packet of the template building; buildings differ in names, numbers and places."""
 
     locale: str
     neighbour: str | None
@@ -192,7 +192,7 @@ class _Template:
                 _packets(0.0, 0.0), here, east, north, strict=True):
             base = np.frombuffer(numbers, "<f8")
             faces, landmarks = json.loads(words)
-            self.packets.append(_Moulded(
+            self.packets.append(_TemplatePacket(
                 packet.locale[1:], packet.neighbour and packet.neighbour[1:], faces, landmarks, base,
                 np.round(np.frombuffer(moved_x, "<f8") - base), np.round(np.frombuffer(moved_y, "<f8") - base)))
         self.faces = sum(len(p.faces) for p in self.packets)

@@ -1,4 +1,4 @@
-"""Everybody else's way, in a process of its own: all passages of a world as one flat networkx graph."""
+"""The usual method, in a process of its own: all passages of a world as one flat networkx graph."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from pathlib import Path
 
 import networkx as nx
 
-from experiments.scale.world_size_probe import most_mb
+from experiments.scale.world_size_probe import peak_mb
 
 
 def main(path: str) -> None:
-    """Read the graph, ask for a shortest path to the last locale, and print times and memory as JSON."""
+    """Read the graph, find a shortest path to the last locale, and print times and memory as JSON."""
     import sqlite3
 
     began = time.perf_counter()
@@ -29,7 +29,7 @@ def main(path: str) -> None:
     began = time.perf_counter()
     nx.shortest_path(graph, "robot-laboratory", last)
     path_ms = 1000.0 * (time.perf_counter() - began)
-    mb = most_mb()
+    mb = peak_mb()
     print(json.dumps({"load_ms": load_ms, "path_ms": path_ms, "mb": mb}))
 
 

@@ -1,8 +1,8 @@
-"""The same mission in several worlds at once, decision by decision in turn, so that a busy machine delays all alike.
+"""The same mission in several worlds at once, decision by decision in turn, so that a busy machine delays all equally.
 
-One process opens all worlds anew for each repetition and lets their agents decide in turn, each in turn first; as all
-decide the same, the n-th decisions can be compared. Every repetition is told as a line of JSON. Times are of the
-processor; garbage is collected between repetitions only, as in one process it would fall on whichever world is at hand.
+One process opens all worlds for each repetition and lets their agents decide in turn, each in turn first; as all decide
+the same, the n-th decisions can be compared. Each repetition is printed as a line of JSON. Times are of the processor;
+garbage is collected only between repetitions, as its time would be charged to an arbitrary world.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from collections.abc import Callable, Sequence
 
 from blackboard.effect import Post
 from blackboard.scheduler import Scheduler
-from experiments.paper.planning import Thought
-from experiments.scale.world_size_probe import staged
+from experiments.paper.planning import DryMission
+from experiments.scale.world_size_probe import build_probe_stage
 from harvey.runner.ports import BodyPort
 from harvey.simulation.run import robot_model
 from harvey.wiring import knowledge_sources, servoing
@@ -25,23 +25,23 @@ from sim.stage import Stage
 from world_models.entries.body import MotorCommand
 
 Step = Callable[[], bool]
-"""Decides once more; False when it is done."""
+"""Makes one decision; False when done."""
 
 
 def main(goal: str, seed: str, starts: str, plans: str, *paths: str) -> None:
-    """Tell all repetitions of starts (to the first motor command) and of whole missions in thought."""
-    stages = [staged(path, goal) for path in paths]
+    """Print the times of all starts (to the first motor command) and of whole dry runs."""
+    stages = [build_probe_stage(path, goal) for path in paths]
     for turn in range(int(starts)):
         agents = [_start(stage, int(seed)) for stage in stages]
-        print(json.dumps({"start": _in_turn(agents, turn)}), flush=True)
+        print(json.dumps({"start": decide_in_turn(agents, turn)}), flush=True)
     for turn in range(int(plans)):
-        thoughts = [Thought(robot_model(stage.scenario), stage.scenario) for stage in stages]
-        _in_turn([thought.step for thought in thoughts], turn)
-        print(json.dumps({"plan": [thought.clock.steps_ms for thought in thoughts]}), flush=True)
+        missions = [DryMission(robot_model(stage.scenario), stage.scenario) for stage in stages]
+        decide_in_turn([mission.step for mission in missions], turn)
+        print(json.dumps({"plan": [mission.clock.steps_ms for mission in missions]}), flush=True)
 
 
 def _start(stage: Stage, seed: int) -> Step:
-    """A new agent with its body, from the command on; it is done with its first motor command."""
+    """Build a new agent with its body; it is done at its first motor command."""
     robot = robot_model(stage.scenario)
     scheduler = Scheduler(knowledge_sources(robot), ports=(BodyPort(FaultyBody(stage.body(seed))),),
                           servoing=servoing(stage.scenario.servo))
@@ -54,8 +54,8 @@ def _start(stage: Stage, seed: int) -> Step:
     return step
 
 
-def _in_turn(agents: Sequence[Step], turn: int) -> list[list[float]]:
-    """Let all decide until all are done; for each the time of each of its decisions [ms]."""
+def decide_in_turn(agents: Sequence[Step], turn: int) -> list[list[float]]:
+    """Let all decide until all are done; returned are the times of the decisions of each [ms]."""
     times: list[list[float]] = [[] for _ in agents]
     left = list(range(len(agents)))
     gc.collect()

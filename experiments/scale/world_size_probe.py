@@ -1,7 +1,7 @@
-"""One world, one process: runs missions in it when told to on standard input, and answers with a line of JSON.
+"""One world in one process: runs missions on request on standard input, and answers with a line of JSON.
 
-``open``: the file opened anew, and a far route in it. ``drive``: the whole mission in the simulator. ``memory``: what
-the process held at most. Times are of the processor.
+``open``: open the file and find a far route in it. ``drive``: the whole mission in the simulator. ``memory``: peak
+memory of the process. Times are of the processor.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ put_down_sigma_deg = 1.0
 
 
 class _Watcher:
-    """Counts the decisions, and sums up the journal's text."""
+    """Counts the decisions, and computes a digest of the journal's text."""
 
     def __init__(self) -> None:
         self.decisions = 0
@@ -56,38 +56,38 @@ class _Watcher:
 
 def main(path: str, goal: str, seed: str) -> None:
     """Answer until standard input ends."""
-    stage = staged(path, goal)
+    stage = build_probe_stage(path, goal)
     for line in sys.stdin:
         match line.strip():
             case "open":
-                answer = _opened(stage)
+                answer = _open(stage)
             case "drive":
                 answer = _drive(stage, int(seed))
             case _:
-                answer = {"mb": most_mb()}
+                answer = {"mb": peak_mb()}
         print(json.dumps(answer), flush=True)
 
 
-def staged(path: str, goal: str) -> Stage:
-    """The mission in the world of a file, with its building."""
+def build_probe_stage(path: str, goal: str) -> Stage:
+    """Build the mission's stage in the world of a file."""
     return build_stage(parse_scenario(SCENARIO.format(world=Path(path).as_posix(), goal=goal), "world-size"))
 
 
-def most_mb() -> float:
-    """The most memory that this process has held since it was started [MB] (Linux)."""
+def peak_mb() -> float:
+    """Peak memory of this process [MB] (Linux)."""
     status = Path("/proc/self/status").read_text(encoding="ascii")
     return int(status.split("VmHWM:")[1].split()[0]) / 1024.0
 
 
-def _opened(stage: Stage) -> dict[str, Any]:
+def _open(stage: Stage) -> dict[str, Any]:
     began = time.process_time()
     world = robot_model(stage.scenario).world
     open_ms = 1000.0 * (time.process_time() - began)
-    return {"open_ms": open_ms, "far_ms": _far_ms(world)}
+    return {"open_ms": open_ms, "far_ms": _time_far_route_ms(world)}
 
 
-def _far_ms(world: World) -> float:
-    """How long it takes to sketch the way to the last locale, and its first and last stretch."""
+def _time_far_route_ms(world: World) -> float:
+    """Time to find the route to the last locale and refine its first and last step."""
     frames = world.locale_source
     assert isinstance(frames, SqliteLocales)
     last = frames.last_room()

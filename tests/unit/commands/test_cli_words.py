@@ -15,7 +15,7 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from experiments.paper.levels import _row
 from experiments.report import Report
-from experiments.scale.render_speed import edge_offsets_px
+from experiments.scale.render_speed import measure_edge_offsets_px
 from harvey.campaign.summary import foreseen, one, several
 from harvey.dry_run import MilestonePreview
 from harvey.errors import BadInput
@@ -150,6 +150,6 @@ def test_an_edge_is_found_where_it_is(flat: bool) -> None:
     ends = np.array([(30.3, 10.0), (46.3, 90.0)])
     image, ends = (image.T, ends[:, ::-1]) if flat else (image, ends)
     for shift_px in (0.0, 0.25):
-        offsets = edge_offsets_px(image, ends - ((0.0, shift_px) if flat else (shift_px, 0.0)))
+        offsets = measure_edge_offsets_px(image, ends - ((0.0, shift_px) if flat else (shift_px, 0.0)))
         assert len(offsets) > 50
         assert np.allclose(offsets, shift_px, atol=1e-9)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from experiments.scale.world_size import SHORTEST_MS, _Times
-from experiments.scale.world_size_lockstep import _in_turn
+from experiments.scale.world_size import MIN_STEP_MS, _Times
+from experiments.scale.world_size_lockstep import decide_in_turn
 
 
 def times(factor: float, delays: NDArray[np.float64]) -> _Times:
     """40 repetitions of 6 decisions, each repetition delayed as a whole; some steps are too short to be timed."""
-    steps = np.array([0.1 * SHORTEST_MS, 1.0, 5.0, 9.0, 2.0, 30.0])
+    steps = np.array([0.1 * MIN_STEP_MS, 1.0, 5.0, 9.0, 2.0, 30.0])
     whole = delays[:, None] * steps[None, :] * factor
     return _Times(whole, whole)
 
@@ -39,7 +39,7 @@ def test_another_number_of_steps_is_no_likeness() -> None:
     assert _Times(small.decisions_ms, small.steps_ms[:, :4]).worst(small) == float("inf")
 
 
-def test_minds_decide_in_turn_until_each_is_done() -> None:
+def test_agents_decide_in_turn_until_each_is_done() -> None:
     told: list[int] = []
 
     def agent(number: int, decisions: int) -> Callable[[], bool]:
@@ -52,6 +52,6 @@ def test_minds_decide_in_turn_until_each_is_done() -> None:
 
         return step
 
-    taken = _in_turn([agent(0, 2), agent(1, 3)], 0)
+    taken = decide_in_turn([agent(0, 2), agent(1, 3)], 0)
     assert [len(each) for each in taken] == [2, 3] and sorted(told) == [0, 0, 1, 1, 1]
     assert told[:2] != told[2:4], "each in turn is first"
