@@ -64,8 +64,9 @@ def run(quick: bool, seed: int) -> Report:
             "far route: from the laboratory to the last locale of the world, refined down to rooms at both ends.",
             "networkx: one process reads every locale and passage from the same file into a Graph and asks for"
             " shortest_path to that locale.",
-            f"The smallest world against itself, as a measure of the noise: first action"
-            f" {again.first(times[0]):.3f} x, sketching {again.sketching(times[0]):.3f} x, worst step {again.worst(times[0]):.3f} x.",
+            "The smallest world against itself, as a measure of the noise: first action"
+            f" {again.first(times[0]):.3f} x, sketching {again.sketching(times[0]):.3f} x,"
+            f" worst step {again.worst(times[0]):.3f} x.",
         ),
         claims=tuple(claim for each in zip(answers[1:], times[1:], rows[1:], strict=True)
                      for claim in _claims(*each, answers[0], times[0], rows[0])),
