@@ -1,14 +1,13 @@
-"""Minds: the experts of a run round a board, as they were, or with something taken from them or set otherwise.
+"""The agent of a run: its knowledge sources, model, settings and servo levels, as its run head says.
 
-``without`` takes an expert, a landmark or a face of the model, or one segment of one picture; ``constants`` sets the
-servo levels and the numbers that an expert's file states at its top.
+``without`` takes away a knowledge source, a landmark or a face of the model, or one segment of one picture;
+``constants`` replaces servo levels and settings (``harvey settings``).
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence, Set
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any, cast
@@ -22,11 +21,12 @@ from blackboard.kinds import Registry
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Scheduler, registry_of
 from blackboard.servoing import Servoing
+from harvey.agent_settings import build_settings
 from harvey.errors import BadInput
-from harvey.replay.constants import set_for_a_while
 from harvey.run_files.run_head import RunHead
 from harvey.wiring import knowledge_sources, servoing
 from knowledge_sources.plan.line_finder import LineFinder
+from knowledge_sources.settings import Settings
 from world_models.building.landmarks import Edges
 from world_models.building.locale_source import LocaleGeometry, LocaleSource
 from world_models.building.world import World
@@ -38,8 +38,9 @@ from world_models.robot import RobotModel
 
 SEGMENT = re.compile(r"frame[- ](\d{1,9})[ ,-]+segment[- ](\d{1,9})", re.IGNORECASE | re.ASCII)
 SERVO = "servo."
+SERVO_KEYS = tuple(f"{SERVO}{level}" for level in ("action", "plan", "goal"))
 
-Sources = Callable[[RobotModel], Sequence[KnowledgeSource]]
+Sources = Callable[[RobotModel, Settings], Sequence[KnowledgeSource]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +49,14 @@ class Agent:
 
     Attributes:
         robot: the model.
-        sources: the experts.
+        sources: the knowledge sources; settings: their numbers.
         servoing: the servo levels that are on.
     """
 
     robot: RobotModel
     sources: tuple[KnowledgeSource, ...]
     servoing: Servoing
+    settings: Settings
 
     @property
     def kinds(self) -> Registry:
@@ -62,28 +64,28 @@ class Agent:
         return registry_of(self.sources, KINDS)
 
     def scheduler(self, **more: Any) -> Scheduler:
-        """The experts round an empty board; ``more``: ports and sinks."""
+        """The knowledge sources round an empty board; ``more``: ports and sinks."""
         return Scheduler(self.sources, servoing=self.servoing, kinds=KINDS, **more)
 
 
-@contextmanager
-def agent_of(head: RunHead, sources: Sources = knowledge_sources) -> Iterator[Agent]:
-    """The agent of a run; its constants hold until the end of the ``with``.
+def agent_of(head: RunHead, sources: Sources = knowledge_sources) -> Agent:
+    """The agent of a run.
 
     Raises:
         BadInput: something to be taken or set is not there; near names are listed.
     """
     names = [name for name in head.without if SEGMENT.fullmatch(name) is None]
     segments = segments_named(head.without)
+    settings = build_settings([pair for pair in head.constants if not pair[0].startswith(SERVO)], SERVO_KEYS)
     model = head.model()
-    known = [source.name for source in sources(model)]
+    known = [source.name for source in sources(model, settings)]
     robot = replace(model, world=_lacking(model.world, [name for name in names if name not in known], known))
     levels = {key.removeprefix(SERVO): value for key, value in head.constants if key.startswith(SERVO)}
-    experts = tuple(s for s in sources(robot) if s.name not in names)
+    chosen = tuple(s for s in sources(robot, settings) if s.name not in names)
     if segments:
-        experts = tuple(_Blinkered(robot, segments) if isinstance(s, LineFinder) else s for s in experts)
-    with set_for_a_while([(key, value) for key, value in head.constants if not key.startswith(SERVO)]):
-        yield Agent(robot, experts, _servoing(head, levels))
+        chosen = tuple(
+            _SegmentHider(robot, settings, segments) if isinstance(s, LineFinder) else s for s in chosen)
+    return Agent(robot, chosen, _servoing(head, levels), settings)
 
 
 def segments_named(names: Iterable[str]) -> tuple[tuple[int, int], ...]:
@@ -102,7 +104,7 @@ def _servoing(head: RunHead, levels: dict[str, str]) -> Servoing:
     return servoing(servo)
 
 
-def _lacking(world: World, names: Sequence[str], experts: Sequence[str]) -> World:
+def _lacking(world: World, names: Sequence[str], sources: Sequence[str]) -> World:
     """The model without some of its landmarks and faces; the building itself stays as it is."""
     if not names:
         return world
@@ -110,15 +112,15 @@ def _lacking(world: World, names: Sequence[str], experts: Sequence[str]) -> Worl
     there = {mark.name for p in packets for _, mark in p.landmarks} | {f.name for p in packets for _, f in p.faces}
     for name in names:
         if name not in there:
-            raise BadInput(f"--without {name}: expected {_alike(name, experts, there)}, got {name!r}")
+            raise BadInput(f"--without {name}: expected {_alike(name, sources, there)}, got {name!r}")
     return World(cast(LocaleSource, _Lacking(world.locale_source, frozenset(names))))
 
 
-def _alike(name: str, experts: Sequence[str], elements: Set[str]) -> str:
+def _alike(name: str, sources: Sequence[str], elements: Set[str]) -> str:
     """The names that somebody may have meant."""
-    known = sorted({*experts, *elements}, key=lambda known: (known.count("/"), known))
+    known = sorted({*sources, *elements}, key=lambda known: (known.count("/"), known))
     meant = [text for text in known if name.lower() in text.lower()] or get_close_matches(name, known, 6, 0.5)
-    names = ", ".join(meant[:6]) or f"an expert ({', '.join(experts)}), a landmark or a face of the model"
+    names = ", ".join(meant[:6]) or f"a knowledge source ({', '.join(sources)}), a landmark or a face of the model"
     return f"{names}, or as 'frame 88 segment 12'"
 
 
@@ -144,11 +146,11 @@ class _Lacking:
         return replace(packet, faces=tuple(faces), landmarks=tuple(landmarks))
 
 
-class _Blinkered(LineFinder):
+class _SegmentHider(LineFinder):
     """The line finder, with some segments of some pictures left out."""
 
-    def __init__(self, robot: RobotModel, segments: Sequence[tuple[int, int]]) -> None:
-        super().__init__(robot)
+    def __init__(self, robot: RobotModel, settings: Settings, segments: Sequence[tuple[int, int]]) -> None:
+        super().__init__(robot, settings)
         self._segments = tuple(segments)
 
     @property

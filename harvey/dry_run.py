@@ -22,7 +22,6 @@ from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.verification.milestone_preview import find_alias, predict_p_false
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.methods.verification.view_quality import compute_view_quality
-from knowledge_sources.plan.milestone_selector import GOOD_PART, GOOD_RAD, LEAST_LINES
 from knowledge_sources.questions import held
 from knowledge_sources.settings import DEFAULT
 from world_models.entries.body import MotionReport, MotorCommand, Ride, RideReport
@@ -129,12 +128,14 @@ def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Mile
     pose = belief.world_from_robot(robot.world)
     mount = robot.on_floor_of(belief.locale).mount
     quality = compute_view_quality(lines, robot.camera, mount.camera_from_robot, pose, SIGMA_ACROSS_PX)
-    sharp = quality.sigma_m <= GOOD_PART * _tolerance_m(view, milestone) and quality.sigma_rad <= GOOD_RAD
+    s = DEFAULT.plan
+    most_m = s.max_sigma_part * _tolerance_m(view, milestone)
+    sharp = quality.sigma_m <= most_m and quality.sigma_rad <= s.max_sigma_rad
     standing = robot.on_floor_of(belief.locale)
     seen = len(lines) >= DEFAULT.verification.min_matched_lines
     p_false = predict_p_false(standing, pose, lines, np.array(diagonal(SEEN_M, SEEN_RAD))) if seen else 1.0
     other = find_alias(standing, belief.locale, pose, lines) if seen else None
-    clear = sharp and len(lines) >= LEAST_LINES and p_false <= POSE_CONFIDENCE.accept
+    clear = sharp and len(lines) >= s.min_lines and p_false <= POSE_CONFIDENCE.accept
     return MilestonePreview(
         milestone.what, belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m,
         milestone.look_heading_rad, len(milestone.landmarks), len(lines), quality.sigma_m, quality.sigma_rad,
@@ -147,5 +148,5 @@ def _tolerance_m(view: View, milestone: Milestone) -> float:
     """Of the subgoal that the milestone ends."""
     sketch = view.get(milestone.sketch)
     if sketch is None or not isinstance(sketch.value, PlanSketch) or milestone.index < 1:
-        return 0.1
+        return DEFAULT.plan.check_tolerance_m
     return float(sketch.value.subgoals[milestone.index - 1].tolerance_m)

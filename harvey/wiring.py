@@ -1,4 +1,7 @@
-"""The only place where experts, ports and servo levels meet. Adding an expert takes one file and one line here."""
+"""The knowledge sources, servo levels and models of a run, put together from its scenario.
+
+A new knowledge source takes one file in its level's folder and one line here.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +31,7 @@ from knowledge_sources.plan.obstruction_finder import ObstructionFinder
 from knowledge_sources.plan.plan_adjuster import PlanAdjuster
 from knowledge_sources.plan.sketcher import Sketcher
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.settings import DEFAULT, Settings
 from world_models.entries import KINDS
 from world_models.files.toml.mission import Servo
 from world_models.robot import RobotModel
@@ -52,12 +56,12 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     FaultHandler,
     MissionMonitor,
 )
-"""Every expert, in no order that matters: control comes from triggers, ratings and levels."""
+"""Every knowledge source. The order does not matter: control comes from triggers, ratings and levels."""
 
 
-def knowledge_sources(robot: RobotModel) -> tuple[KnowledgeSource, ...]:
-    """The experts for a robot: each is built with what the robot knows of itself and its world, and nothing else."""
-    return tuple(expert(robot) for expert in KNOWLEDGE_SOURCES)
+def knowledge_sources(robot: RobotModel, settings: Settings = DEFAULT) -> tuple[KnowledgeSource, ...]:
+    """The knowledge sources for a robot, each built with the robot's model and the settings, and nothing else."""
+    return tuple(source(robot, settings) for source in KNOWLEDGE_SOURCES)
 
 
 @cache

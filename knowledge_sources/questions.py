@@ -7,6 +7,7 @@ from blackboard.entry import Entry
 from blackboard.index import Index
 from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
+from knowledge_sources.settings.action import ActionSettings
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstruction import Obstruction
@@ -21,11 +22,6 @@ ACTIVE_SKETCH: Index[PlanSketch] = Index(PlanSketch, lambda s: s.goal if s.is_ac
 OPEN_FAULT: Index[BodyFault] = Index(BodyFault, lambda f: f.is_open or None)
 
 
-FOLLOWED = 4
-"""A robot that holds so many landmarks in sight is at no other door: when they are not where they should be, all are
-given up."""
-
-
 def held(view: View) -> Entry[Hypothesis] | None:
     """Where the robot believes it is."""
     return view.newest(HELD, True)
@@ -37,10 +33,16 @@ def standing_in(view: View, robot: RobotModel, locale: str) -> RobotModel:
     return robot.with_obstruction(None if obstruction is None else obstruction.value).on_floor_of(locale)
 
 
-def has_followed(view: View) -> bool:
-    """Whether enough landmarks were in sight in the last frame that was tracked, followed or taken anew there."""
+def has_followed(view: View, settings: ActionSettings) -> bool:
+    """Whether enough landmarks were in sight in the last tracked frame.
+
+    A robot that holds so many landmarks in sight is at no other door: when they are not where they should be, all are
+    given up.
+    """
     tracks = view.latest(Tracks)
-    return tracks is not None and sum(track.found_px is not None for track in tracks.value.items) >= FOLLOWED
+    if tracks is None:
+        return False
+    return sum(track.found_px is not None for track in tracks.value.items) >= settings.min_followed_landmarks
 
 
 def active_goal(view: View) -> Entry[Goal] | None:

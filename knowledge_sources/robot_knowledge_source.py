@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from blackboard.knowledge_source import KnowledgeSource
+from knowledge_sources.settings import DEFAULT, Settings
 from world_models.robot import RobotModel
 
 
 class RobotKnowledgeSource(KnowledgeSource):
-    """A knowledge source that knows, beside the board, what the robot knows of itself and its world; nothing else."""
+    """A knowledge source of a robot: beside the board it knows the robot's model and its settings, and nothing else."""
 
-    def __init__(self, robot: RobotModel) -> None:
+    def __init__(self, robot: RobotModel, settings: Settings = DEFAULT) -> None:
         self._robot = robot
+        self._settings = settings

@@ -8,28 +8,25 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
+from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import NEAR_PLANE_M
 from world_models.entries.location import Hypothesis
 from world_models.robot import RobotModel
 
 Floats = NDArray[np.float64]
 
-PLAN_PX = 30.0
-"""Plan level: as far as the matcher looks for what is expected (§6.1.4)."""
-SIGMAS = 3.0
-FLOOR_PX = 4.0
-"""No deviation smaller than this is worth a thought beyond the action level."""
 
-
-def action_px(robot: RobotModel, belief: Hypothesis, points_world: Floats) -> float:
-    """Action level: how far landmarks may be off, by what the wheels are known to do since the belief was sure (§3.2).
+def action_px(robot: RobotModel, belief: Hypothesis, points_world: Floats, settings: Settings = DEFAULT) -> float:
+    """The action level's tolerance [px]: how far landmarks may be off by the uncertainty of the believed pose (§3.2).
 
     A heading that is wrong moves the image by the focal length times it, a place that is wrong by as much less as the
-    landmarks (n, 3) are far ahead; without any, only the heading counts. Beyond that, ``FLOOR_PX`` are left to what the
-    correlation itself may be wrong by.
+    landmarks (n, 3) are far ahead; without any, only the heading counts. ``min_tolerance_px`` is added for the error of
+    correlation itself.
     """
     pose = belief.world_from_robot(robot.world)
     ahead_m = robot.on_floor_of(belief.locale).camera_from_world(pose).apply(points_world.reshape(-1, 3))[:, 2]
     near = ahead_m[ahead_m > NEAR_PLANE_M]
     spread = math.hypot(belief.sigma_rad, belief.sigma_m / median(near.tolist()) if len(near) else 0.0)
-    return min(FLOOR_PX + SIGMAS * robot.camera.fx * spread, PLAN_PX)
+    action = settings.action
+    return min(action.min_tolerance_px + action.tolerance_sigmas * robot.camera.fx * spread,
+               settings.plan.max_deviation_px)

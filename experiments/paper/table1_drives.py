@@ -26,7 +26,7 @@ from world_models.units import FOOT_M, INCH_M
 SCENARIO = "forty-foot-hallway"
 INCREMENT_M = 2.0 * FOOT_M
 INCREMENTS = 20
-ONE_LEG = (("sketcher.LEG_M", "15"),)
+ONE_LEG = (("plan.max_leg_m", "15"),)
 """The whole way is one leg, so that no milestone corrects anything between its ends: the action level is alone."""
 
 
@@ -76,12 +76,12 @@ def driven_and_kept(drive: Drive, out: Path | None) -> Driven:
     began_s, stage = time.process_time(), _stage(drive.feet, drive.continuous)
     head = replace(head_of(stage, drive.seed), constants=ONE_LEG)
     ends: list[Truth] = []
-    with agent_of(head) as agent:
-        files = None if out is None else RunDirectory(out)
-        recorder = RunRecorder(files, head, agent.robot)
-        with SimulatedRun(stage, head, agent, recorder, (_ends_of_moves(ends, lambda: run),)) as run:
-            result = run.drive(files)
-        body = run.simulated_body
+    agent = agent_of(head)
+    files = None if out is None else RunDirectory(out)
+    recorder = RunRecorder(files, head, agent.robot)
+    with SimulatedRun(stage, head, agent, recorder, (_ends_of_moves(ends, lambda: run),)) as run:
+        result = run.drive(files)
+    body = run.simulated_body
     way = np.array([_beside(stage, truth) for truth in body.track])
     if drive.continuous:
         z_in, x_in = _passing(way, _reach(stage))

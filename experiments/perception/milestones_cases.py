@@ -15,7 +15,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.plan.milestone_selector import GLANCES_RAD, best_heading, expectation
+from knowledge_sources.plan.milestone_selector import best_heading, expectation
+from knowledge_sources.settings import DEFAULT
 from sim.body.building import Building
 from sim.made_up.generated_floors import Floor, generated_floor
 from sim.render.occluder import Occluder
@@ -236,7 +237,7 @@ def _is_free(here: Site, pose: Pose2) -> bool:
 
 
 def _headings(pose: Pose2) -> list[float]:
-    return [pose.heading_rad, *(wrap_angle(pose.heading_rad + glance) for glance in GLANCES_RAD)]
+    return [pose.heading_rad, *(wrap_angle(pose.heading_rad + glance) for glance in DEFAULT.plan.look_turns_rad)]
 
 
 def _spread(actuator: ActuatorModel, pose: Pose2, rng: np.random.Generator) -> Floats:

@@ -57,8 +57,8 @@ def main(argv: list[str]) -> int:
         return 0
     run = RunDirectory(Path(argv[1]))
     result = resume_mission(run, remains_of(run), around=logging_to(Path(argv[2])))
-    with agent_of(RunHead.read(run.path)) as agent:
-        same = all(step.same for step in replay(run, pictures_of(run), agent.scheduler()))
+    agent = agent_of(RunHead.read(run.path))
+    same = all(step.same for step in replay(run, pictures_of(run), agent.scheduler()))
     print(json.dumps({"outcome": result.outcome, "reason": result.reason, "same": same,
                       "error_m": result.error_m, "decisions": result.decisions}))
     return 0

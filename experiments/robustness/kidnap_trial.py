@@ -22,7 +22,7 @@ from knowledge_sources.goal.relocalizer import Relocalizer
 from knowledge_sources.methods.localization.visibility_map import get_visibility_map
 from knowledge_sources.methods.motion.routes import compute_free_space
 from knowledge_sources.plan.line_finder import LineFinder
-from knowledge_sources.tolerances import PLAN_PX
+from knowledge_sources.settings import DEFAULT
 from sim.body.building import Building
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
@@ -161,7 +161,8 @@ def _lost(robot: RobotModel, body: FaultyBody, belief: Place) -> Scheduler:
     scheduler = Scheduler(sources, ports=(BodyPort(body),), servoing=Servoing(), kinds=KINDS)
     held = Hypothesis(belief.locale, Pose2(belief.x_m, belief.y_m, belief.heading_rad or 0.0), diagonal(0.05, 0.02),
                       "milestone")
-    doubt = Discrepancy(Level.GOAL, "somebody carried the robot off", None, (PLAN_PX, PLAN_PX), "px")
+    bound_px = DEFAULT.plan.max_deviation_px
+    doubt = Discrepancy(Level.GOAL, "somebody carried the robot off", None, (bound_px, bound_px), "px")
     scheduler.tell([Post(held), Post(doubt)], "user")
     return scheduler
 

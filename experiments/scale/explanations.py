@@ -98,8 +98,8 @@ def _count_same(run: RunDirectory) -> int:
     from harvey.run_files.run_head import RunHead
     from harvey.runner.replay import pictures_of, replay
 
-    with agent_of(RunHead.read(run.path)) as agent:
-        return sum(1 for step in replay(run, pictures_of(run), agent.scheduler()) if step.same)
+    agent = agent_of(RunHead.read(run.path))
+    return sum(1 for step in replay(run, pictures_of(run), agent.scheduler()) if step.same)
 
 
 def _time_why(run: Path, *more: str) -> tuple[float, float]:

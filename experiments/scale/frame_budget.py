@@ -14,6 +14,7 @@ from blackboard.knowledge_source import KnowledgeSource
 from experiments.report import Cell, Report
 from harvey.simulation.run import run_mission
 from harvey.wiring import knowledge_sources
+from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario
 from sim.stage import build_stage
 from world_models.entries.body import Frame
@@ -99,8 +100,8 @@ def _time_acts(scenario: str, seed: int) -> Times:
     times: Times = {}
     timed = frozenset((TRACK, *MILESTONE))
 
-    def sources(robot: RobotModel) -> Sequence[KnowledgeSource]:
-        return [_Timed(ks, times) if ks.name in timed else ks for ks in knowledge_sources(robot)]
+    def sources(robot: RobotModel, settings: Settings) -> Sequence[KnowledgeSource]:
+        return [_Timed(ks, times) if ks.name in timed else ks for ks in knowledge_sources(robot, settings)]
 
     run_mission(build_stage(load_scenario(scenario)), seed, sources=sources)
     return times

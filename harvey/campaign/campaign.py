@@ -16,6 +16,7 @@ from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory, new_run
 
 if TYPE_CHECKING:
+    from harvey.agent_settings import Pairs
     from harvey.campaign.tally import Tally
     from harvey.runner.result import MissionResult
     from sim.scenario import Scenario
@@ -49,22 +50,40 @@ class Task:
     go_on: bool = False
 
     @property
+    def mission_settings(self) -> Pairs:
+        """Those of the settings that the scenario's file understands. Raises BadInput for what nobody understands."""
+        return self._split()[0]
+
+    @property
+    def agent_settings(self) -> Pairs:
+        """Those of the settings that are numbers of the knowledge sources. Raises BadInput."""
+        return self._split()[1]
+
+    def _split(self) -> tuple[Pairs, Pairs]:
+        from harvey.agent_settings import split_pairs
+        from sim.scenario import FORMAT
+
+        return split_pairs(self.settings, FORMAT.keys())
+
+    @property
     def named(self) -> str:
         """In a line."""
         return " ".join([self.scenario, f"seed {self.seed}", *(f"{key}={value}" for key, value in self.settings)])
 
     def stage(self) -> Stage:
         """Raises BadInput where the scenario or a setting cannot be used."""
+        from harvey.agent_settings import build_settings
         from sim.scenario import ScenarioError, load_scenario, with_settings
         from world_models.files.world_files import WorldError, fingerprint
 
         try:
-            scenario = with_settings(load_scenario(self.scenario), dict(self.settings))
+            build_settings(self.agent_settings)
+            scenario = with_settings(load_scenario(self.scenario), dict(self.mission_settings))
             try:
                 files = tuple(fingerprint(path) for path in (scenario.world, *scenario.details))
             except (OSError, WorldError):
                 files = ()  # whoever reads them says what is wrong
-            return _stage(_Staged((scenario.source.text, str(scenario.folder), self.settings, files), scenario))
+            return _stage(_Staged((scenario.source.text, str(scenario.folder), self.mission_settings, files), scenario))
         except ScenarioError as error:
             raise BadInput(str(error)) from None
 
@@ -113,14 +132,15 @@ def run_task(
     """Run one mission; ``follow`` makes a sink that shows what is counted. Raises BadInput for what the user gave."""
     stage = task.stage()
     from harvey.campaign.tally import Tally
-    from harvey.simulation.run import run_mission
+    from harvey.simulation.run import head_of, run_mission
 
     tally = Tally(stage)
     shown = (tally, follow(tally)) if follow else ()
     if task.go_on and task.out is not None and (task.out / "run.json").exists():
         return _kept_or_resumed(RunDirectory(task.out), task, stage, (*shown, *sinks), live)
     out = None if task.out is None else room_for(task.out, stage.scenario.name, task.seed)
-    return run_mission(stage, task.seed, out=out, sinks=(*shown, *sinks), live=live, body=task.body)
+    head = head_of(stage, task.seed, task.body, task.agent_settings)
+    return run_mission(stage, task.seed, out=out, sinks=(*shown, *sinks), live=live, head=head)
 
 
 def room_for(out: Path, name: str, seed: int) -> Path:
@@ -139,7 +159,7 @@ def _kept_or_resumed(run: RunDirectory, task: Task, stage: Stage, sinks: Sequenc
     from harvey.runner.resume import remains_of
     from harvey.simulation.run import head_of, resume_mission
 
-    if not RunHead.read(run.path).is_like(head_of(stage, task.seed, task.body)):
+    if not RunHead.read(run.path).is_like(head_of(stage, task.seed, task.body, task.agent_settings)):
         raise BadInput(f"{run.path}: expected a run of {task.named}, got one that began otherwise")
     remains, record = remains_of(run), run.read_result()
     if remains.outcome is None or record.get("outcome") != remains.outcome.kind:

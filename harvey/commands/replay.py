@@ -26,7 +26,8 @@ def _arguments(parser: ArgumentParser) -> None:
                          help="without an expert, a landmark or face of its model, or one segment, as 'frame 8 segment"
                               " 12'; may be repeated")
     what_if.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
-                         help="with another constant, as servo.plan=off or tolerances.FLOOR_PX=8; may be repeated")
+                         help="with a servo level off, as servo.plan=off, or another number of harvey settings, as"
+                              " action.min_tolerance_px=8; may be repeated")
     what_if.add_argument("--record-only", action="store_true",
                          help="end where the record no longer answers, instead of going on in the simulator")
     what_if.add_argument("--out", metavar="DIR", help="keep what would have been as a run, for diff, why and view")
@@ -69,12 +70,12 @@ def _again(run: RunDirectory) -> int:
 
     pictures, agreed, head = pictures_of(run), 0, RunHead.read(run.path)
     elsewhere = head.decided_elsewhere()
-    with agent_of(head) as agent:
-        for told in shown(replay(run, pictures, agent.scheduler())):
-            if not told.same:
-                print(f"{_difference(agreed, told)}\n\n{_perhaps(head, elsewhere)}")
-                return 1
-            agreed += 1
+    agent = agent_of(head)
+    for told in shown(replay(run, pictures, agent.scheduler())):
+        if not told.same:
+            print(f"{_difference(agreed, told)}\n\n{_perhaps(head, elsewhere)}")
+            return 1
+        agreed += 1
     if not agreed:
         raise BadInput(f"{run.journal}: expected at least one decision, got none")
     frames = count(len(pictures), "frame")
@@ -119,7 +120,7 @@ COMMAND = Command(
         ("harvey replay runs/bump-0 --without fire-door", "without a landmark of its model"),
         ("harvey replay runs/bump-0 --without 'frame 8 segment 12'", "had it not found one segment"),
         ("harvey replay runs/bump-0 --set servo.plan=off --out runs/bump-no-plan", "and keep it as a run"),
-        ("harvey replay runs/bump-0 --set tolerances.FLOOR_PX=8", "with another number in knowledge_sources/"),
+        ("harvey replay runs/bump-0 --set action.min_tolerance_px=8", "with another number of harvey settings"),
     ),
     _arguments, _run,
     "Neither simulator nor robot takes part. Exit code 0 where every decision is the same, 1 where one is not.\n\n"

@@ -19,7 +19,8 @@ def _arguments(parser: ArgumentParser) -> None:
                         help="where the run is kept (runs/SCENARIO-SEED; several: one each); an older run of the same"
                              " scenario and seed there goes, another one is moved aside")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
-                        help="change a setting of the scenario, as servo.action=off; may be repeated")
+                        help="change a setting of the scenario, as servo.action=off, or a number of harvey settings,"
+                             " as plan.max_leg_m=2; may be repeated")
     parser.add_argument("--body", metavar="BODY", default="simulated",
                         help="how the simulated body is reached: simulated, or over an emulated serial line as"
                              " serial:denning, serial:p2os or serial:create2 (simulated)")
@@ -99,6 +100,7 @@ COMMAND = Command(
         ("harvey run lab-to-allens-office --check", "which milestones it will have, and how well each tells the place"),
         ("harvey run hallway-kidnap --seed 3 --trace", "print what each cycle sees, weighs and does"),
         ("harvey run bump --set servo.action=off", "without correcting on the move"),
+        ("harvey run bump --set plan.max_leg_m=2", "with another number of harvey settings"),
         ("harvey run lab-to-allens-office --body serial:p2os", "the body behind an emulated Pioneer's serial line"),
         ("harvey run my_mission.toml --set start.heading_deg=80 --out runs/try", "a mission of your own"),
     ),

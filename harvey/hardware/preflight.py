@@ -18,7 +18,7 @@ from harvey.hardware.drivers.bases.base import Base, BaseFault
 from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
 from harvey.hardware.mission import HardwareMission
 from knowledge_sources.methods.features.images import decode
-from knowledge_sources.plan.milestone_judge import DARK
+from knowledge_sources.settings import DEFAULT
 from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
@@ -199,8 +199,9 @@ class Preflight:
                     f"[camera] rate_hz = {eye.rate_hz:g} is needed: less light needs longer exposure; try MJPG, a "
                     "shorter cable, fewer devices on the bus" if slow else "")
         contrast = float(decode(pictures[-1].jpeg).std())
+        is_enough = contrast >= DEFAULT.plan.min_contrast
         yield Check("sight", f"contrast {contrast:.0f} of 255",
-                    "" if contrast >= DARK else "too dark, or the lens is covered: nothing can be recognized")
+                    "" if is_enough else "too dark, or the lens is covered: nothing can be recognized")
 
     def _room(self) -> Check:
         there = next(p for p in (self._out.resolve(), *self._out.resolve().parents) if p.exists())

@@ -63,7 +63,8 @@ def _hardware_run(
     """A run whose body can be stopped by a key, and whose base hears a heartbeat; closes the base."""
     body = HardwareBody(base, eye, clock=clock)
     try:
-        with stop_key(body.stop_for_good), Heartbeat(base) as heartbeat, agent_of(head) as agent:
+        agent = agent_of(head)
+        with stop_key(body.stop_for_good), Heartbeat(base) as heartbeat:
             recorder = RunRecorder(files, head, agent.robot, live=live, whole=whole)
             yield Run(head, agent, body, recorder, limits=mission.limits, clock=clock, sinks=sinks,
                       before_cycle=heartbeat.tick)

@@ -89,21 +89,21 @@ def what_if(
     """
     then = RunHead.read(run.path)
     head = replace(then.here(), without=(*then.without, *without), constants=(*then.constants, *constants))
-    with agent_of(head) as agent:
-        player = _Player(run, agent.kinds)
-        check_segments(player.records, without, then.without)
-        if out is not None:
-            room_for(out.path, head.name, head.seed)
-        recorder = RunRecorder(out, head, agent.robot)
-        if head.kind != SIMULATOR:
-            scheduler = agent.scheduler(sinks=(*recorder.sinks, player.heard))
-            try:
-                return player.answer(player.played(scheduler, head, recorder), None)
-            finally:
-                recorder.close()
-        with SimulatedRun(stage_of(head), head, agent, recorder, (player.heard,)) as simulated:
-            result = simulated.drive(out, lambda: _drive_changed(simulated, player, go_on))
-        return player.answer(Outcome(result.outcome, result.reason), result)
+    agent = agent_of(head)
+    player = _Player(run, agent.kinds)
+    check_segments(player.records, without, then.without)
+    if out is not None:
+        room_for(out.path, head.name, head.seed)
+    recorder = RunRecorder(out, head, agent.robot)
+    if head.kind != SIMULATOR:
+        scheduler = agent.scheduler(sinks=(*recorder.sinks, player.heard))
+        try:
+            return player.answer(player.played(scheduler, head, recorder), None)
+        finally:
+            recorder.close()
+    with SimulatedRun(stage_of(head), head, agent, recorder, (player.heard,)) as simulated:
+        result = simulated.drive(out, lambda: _drive_changed(simulated, player, go_on))
+    return player.answer(Outcome(result.outcome, result.reason), result)
 
 
 def _drive_changed(run: SimulatedRun, player: _Player, go_on: bool) -> Outcome:

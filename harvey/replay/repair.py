@@ -24,18 +24,18 @@ def redraw(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
     """
     decisions = remains_of(run).decisions
     head, part = RunHead.read(run.path), run.recording.with_name("recording.rrd.part")
-    with agent_of(head) as agent:
-        recorder = RunRecorder(None, head, agent.robot, drawing=part)
-        try:
-            if head.kind == SIMULATOR:
-                with SimulatedRun(stage_of(head), head, agent, recorder, sinks) as simulated:
-                    replay_run(run, simulated, simulated.body_replay)
-            else:
-                scheduler = agent.scheduler(sinks=(*recorder.sinks, *sinks))
-                for decision in replay(run, pictures_of(run), scheduler):
-                    check_same(run, decision)
-            recorder.close()
-            os.replace(part, run.recording)
-        finally:
-            part.unlink(missing_ok=True)
+    agent = agent_of(head)
+    recorder = RunRecorder(None, head, agent.robot, drawing=part)
+    try:
+        if head.kind == SIMULATOR:
+            with SimulatedRun(stage_of(head), head, agent, recorder, sinks) as simulated:
+                replay_run(run, simulated, simulated.body_replay)
+        else:
+            scheduler = agent.scheduler(sinks=(*recorder.sinks, *sinks))
+            for decision in replay(run, pictures_of(run), scheduler):
+                check_same(run, decision)
+        recorder.close()
+        os.replace(part, run.recording)
+    finally:
+        part.unlink(missing_ok=True)
     return decisions

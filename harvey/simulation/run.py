@@ -8,6 +8,7 @@ from pathlib import Path
 
 from blackboard.journal import Sink
 from harvey.agent import Agent, Sources, agent_of
+from harvey.agent_settings import Pairs
 from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import HARDWARE, SIMULATOR, RunHead, known_world
@@ -62,10 +63,10 @@ def run_mission(
     """
     head = head or head_of(stage, seed, body)
     files = None if out is None else RunDirectory(out)
-    with agent_of(head, sources) as agent:
-        recorder = RunRecorder(files, head, agent.robot, live=live)
-        with SimulatedRun(stage, head, agent, recorder, sinks, around) as run:
-            return run.drive(files)
+    agent = agent_of(head, sources)
+    recorder = RunRecorder(files, head, agent.robot, live=live)
+    with SimulatedRun(stage, head, agent, recorder, sinks, around) as run:
+        return run.drive(files)
 
 
 def resume_mission(
@@ -84,18 +85,18 @@ def resume_mission(
     """
     head = RunHead.read(files.path)
     stage = stage or stage_of(head)
-    with agent_of(head) as agent:
-        recorder = RunRecorder(files, head, agent.robot, live=live, whole=remains.extent)
-        with SimulatedRun(stage, head, agent, recorder, sinks, around) as run:
-            return run.drive(files, lambda: continue_run(files, run, run.body_replay))
+    agent = agent_of(head)
+    recorder = RunRecorder(files, head, agent.robot, live=live, whole=remains.extent)
+    with SimulatedRun(stage, head, agent, recorder, sinks, around) as run:
+        return run.drive(files, lambda: continue_run(files, run, run.body_replay))
 
 
-def head_of(stage: Stage, seed: int, body: str = IN_PROCESS) -> RunHead:
-    """How a run of a scenario begins."""
+def head_of(stage: Stage, seed: int, body: str = IN_PROCESS, settings: Pairs = ()) -> RunHead:
+    """How a run of a scenario begins; ``settings`` are those of the agent."""
     s = stage.scenario
     robot = robot_model(s, known_world(s.world))
     return RunHead.of(SIMULATOR, s.name, seed, s.world, robot, s.servo, s.command, scenario=s.source.data,
-                      folder=str(s.folder), body=body)
+                      folder=str(s.folder), body=body, constants=settings)
 
 
 def stage_of(head: RunHead) -> Stage:

@@ -53,10 +53,10 @@ def _never(run: RunDirectory, source: str) -> Iterator[str]:
     from harvey.agent import agent_of
     from harvey.run_files.run_head import RunHead
 
-    with agent_of(RunHead.read(run.path)) as agent:
-        expert = _named(source, agent.sources)
-        if not agent.servoing.allows(expert.closes):
-            yield f"The {expert.closes} level of servoing was off, and the {words(source)} closes it."
+    agent = agent_of(RunHead.read(run.path))
+    expert = _named(source, agent.sources)
+    if not agent.servoing.allows(expert.closes):
+        yield f"The {expert.closes} level of servoing was off, and the {words(source)} closes it."
 
 
 def _asked_again(run: RunDirectory, history: History, source: str, cycle: int) -> Iterator[str]:
@@ -69,12 +69,12 @@ def _asked_again(run: RunDirectory, history: History, source: str, cycle: int) -
     if source in head.without:
         yield f"The {words(source)} was left out of this run."
         return
-    with agent_of(head) as agent:
-        expert = _named(source, agent.sources)
-        if not agent.servoing.allows(expert.closes):
-            yield f"The {expert.closes} level of servoing was off, and the {words(source)} closes it."
-        else:
-            yield from why_absent(history, expert, cycle, agent.kinds)
+    agent = agent_of(head)
+    expert = _named(source, agent.sources)
+    if not agent.servoing.allows(expert.closes):
+        yield f"The {expert.closes} level of servoing was off, and the {words(source)} closes it."
+    else:
+        yield from why_absent(history, expert, cycle, agent.kinds)
 
 
 def _named(source: str, sources: tuple[KnowledgeSource, ...]) -> KnowledgeSource:

@@ -15,14 +15,10 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.questions import held
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.tolerances import PLAN_PX
 from world_models.entries.body import BodyFault, Course, Look, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis
 from world_models.entries.wheels import Drift
 from world_models.frames import Pose2
-
-STOPPED = 0.7
-"""A move of which the wheels claim less than this part was stopped by something."""
 
 
 class DeadReckoner(RobotKnowledgeSource):
@@ -69,9 +65,10 @@ class DeadReckoner(RobotKnowledgeSource):
         yield Post(Look("track"), (step,))
         if request is None or fault is not None or on_the_move:
             return
-        if report.move_m < STOPPED * request.value.move_m:
+        if report.move_m < self._settings.action.min_claimed_part * request.value.move_m:
             what = f"something stopped the robot: {report.move_m:.2f} m of {request.value.move_m:.2f} m are claimed"
-            stopped = Discrepancy(Level.ACTION, what, math.inf, (PLAN_PX, PLAN_PX), "px")
+            bound_px = self._settings.plan.max_deviation_px
+            stopped = Discrepancy(Level.ACTION, what, math.inf, (bound_px, bound_px), "px")
             yield Post(stopped, (trigger.entry,))
 
     def _lacking(self, request: MotorCommand | Course, report: MotionReport) -> tuple[float, float]:

@@ -21,9 +21,6 @@ from world_models.entries.percepts import Tracks
 from world_models.entries.task import PlanSketch
 from world_models.frames import Pose2
 
-LEVEL_M, LEVEL_RAD = 0.01, 0.003
-"""How much a car stands otherwise at one landing than at another."""
-
 
 class ElevatorRider(RobotKnowledgeSource):
     """Asks for the ride that a verified sketch wants, and takes the belief over to the floor where the doors open.
@@ -94,6 +91,7 @@ class ElevatorRider(RobotKnowledgeSource):
         turn = behind.heading_rad - before.heading_rad
         c, s = np.cos(turn), np.sin(turn)
         turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        uneven = np.diag([LEVEL_M**2, LEVEL_M**2, LEVEL_RAD**2])
+        sigma_m, sigma_rad = self._settings.action.elevator_sigma_m, self._settings.action.elevator_sigma_rad
+        uneven = np.diag([sigma_m**2, sigma_m**2, sigma_rad**2])
         covariance = turned @ belief.covariance_world(world) @ turned.T + uneven
         return Hypothesis.of_world(world, destination, pose, covariance, "ride", motion=belief.motion)

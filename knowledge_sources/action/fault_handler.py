@@ -13,23 +13,15 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.questions import is_over
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.tolerances import PLAN_PX
 from world_models.entries.body import STOP_KEY, BodyFault, Course, MotorCommand, Recovery
 from world_models.entries.task import Outcome
-
-PATIENCE_S = 30.0
-"""A fault that is not over after this long ends the mission [s]."""
-STRIKES = 5
-"""So many motions broken off in a row end it too: the base answers, but it does not get on."""
-FIRST_WAIT_S, LONGEST_WAIT_S = 0.25, 2.0
-"""The first pause before trying again; each is twice the one before, up to the longest [s]."""
 
 
 class FaultHandler(RobotKnowledgeSource):
     """While the body is at fault it keeps the robot standing and tries again; it says when the fault is over, or final.
 
     A motion that was broken off leaves the belief in doubt: it has to be checked by a milestone before anybody moves
-    on. The stop key ends the mission, and so do a fault that does not pass within ``PATIENCE_S`` and a base that never
+    on. The stop key ends the mission, and so do a fault that does not pass within ``max_fault_s`` and a base that never
     gets on.
     """
 
@@ -57,7 +49,7 @@ class FaultHandler(RobotKnowledgeSource):
         if f.what == STOP_KEY:
             yield Post(Outcome("stopped", f.detail), (fault,))
         else:
-            yield Post(Recovery(fault.id, f.request, f.when_s, FIRST_WAIT_S), (fault,))
+            yield Post(Recovery(fault.id, f.request, f.when_s, self._settings.action.min_retry_wait_s), (fault,))
 
     def _in_vain(self, view: View, recovery: Entry[Recovery]) -> Iterable[Effect]:
         """Again after a longer pause, or it is final."""
@@ -66,11 +58,11 @@ class FaultHandler(RobotKnowledgeSource):
             return
         if r.what == STOP_KEY:
             yield Post(Outcome("stopped", r.detail), (recovery,))
-        elif r.waited_s >= PATIENCE_S:
+        elif r.waited_s >= self._settings.action.max_fault_s:
             reason = f"{fault.value.what}, and it was not over after {r.waited_s:.0f} s; nothing more is commanded"
             yield Post(Outcome("failed", reason), (fault, recovery))
         else:
-            wait_s = min(2.0 * r.wait_s, LONGEST_WAIT_S)
+            wait_s = min(2.0 * r.wait_s, self._settings.action.max_retry_wait_s)
             yield Revise(recovery, replace(r, status="asked", wait_s=wait_s), (recovery,))
 
     def _over(self, view: View, recovery: Entry[Recovery]) -> Iterable[Effect]:
@@ -82,17 +74,19 @@ class FaultHandler(RobotKnowledgeSource):
         yield closed
         if request is None or not isinstance(request.value, MotorCommand | Course):
             return
-        if _never_gets_on(view):
-            reason = f"{STRIKES} motions in a row were broken off, the last one by: {fault.value.what}"
+        times = self._settings.action.max_broken_motions
+        if _were_all_broken_off(view, times):
+            reason = f"{times} motions in a row were broken off, the last one by: {fault.value.what}"
             yield Post(Outcome("failed", reason), (closed,))
             return
+        bound_px = self._settings.plan.max_deviation_px
         what = f"{request.id} was broken off: {fault.value.what}"
-        yield Post(Discrepancy(Level.PLAN, what, None, (PLAN_PX, PLAN_PX), "px"), (closed, recovery))
+        yield Post(Discrepancy(Level.PLAN, what, None, (bound_px, bound_px), "px"), (closed, recovery))
 
 
-def _never_gets_on(view: View) -> bool:
-    """Whether each of the last motions was broken off."""
+def _were_all_broken_off(view: View, times: int) -> bool:
+    """Whether each of the last ``times`` motions was broken off."""
     broken = {entry.value.request for entry in view.all(BodyFault)}
     asked = sorted((*view.all(MotorCommand), *view.all(Course)), key=lambda entry: -entry.cycle)
-    last = asked[:STRIKES]
-    return len(last) == STRIKES and all(command.id in broken for command in last)
+    last = asked[:times]
+    return len(last) == times and all(command.id in broken for command in last)

@@ -38,17 +38,6 @@ from world_models.entries.task import Leg, Milestone, PlanSketch
 from world_models.entries.wheels import Drift
 from world_models.frames import Pose2, wrap_angle
 
-LOOKAHEAD_M = 1.2
-"""Steers at the point of the line so far ahead, two increments, so that it comes back to the line and not only to its
-end."""
-FACING_RAD = math.radians(3.0)
-"""Turned to within this, it sets off."""
-AIM_RAD = math.radians(0.5)
-BESIDE_M = 0.15
-"""So near to where a subgoal begins it comes back to the line that was planned; from further off it takes another."""
-CREEP_M = 0.25
-"""Nearer than this it steers straight at the end."""
-
 
 class Motor(RobotKnowledgeSource):
     """Commands the next increment of a leg from where the robot believes it is: this closes the action-level loop.
@@ -102,7 +91,7 @@ class Motor(RobotKnowledgeSource):
             return None
         here = belief.value.world_from_robot(self._robot.world)
         error = wrap_angle(milestone.look_heading_rad - here.heading_rad)
-        return error if abs(error) > FACING_RAD else None
+        return error if abs(error) > self._settings.action.max_heading_error_rad else None
 
     def _set_off(self, view: View, belief: Entry[Hypothesis]) -> Iterable[Effect]:
         sketch = _leg_wanted(view)
@@ -111,7 +100,7 @@ class Motor(RobotKnowledgeSource):
         subgoal, world = sketch.value.current, self._robot.world
         here, end = belief.value.world_from_robot(world), subgoal.destination.in_world(world)
         planned = subgoal.origin.in_world(world)
-        start = planned if planned.distance_to(here) <= BESIDE_M else here
+        start = planned if planned.distance_to(here) <= self._settings.action.max_start_offset_m else here
         heading = None if subgoal.destination.heading_rad is None else end.heading_rad
         leg = Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m, subgoal.tolerance_m, heading)
         yield Post(leg, (sketch, belief))
@@ -120,7 +109,7 @@ class Motor(RobotKnowledgeSource):
         here = belief.value.world_from_robot(self._robot.world)
         drift = view.latest(Drift)
         command = self._next(leg.value, here, 0.0 if drift is None else drift.value.curvature_per_m)
-        seen = update_leg(leg.value, here, _aim(leg.value, here))
+        seen = update_leg(leg.value, here, self._aim(leg.value, here))
         discrepancy = open_discrepancy(view, Level.ACTION)
         corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
         yield from corrected
@@ -133,23 +122,32 @@ class Motor(RobotKnowledgeSource):
 
     def _next(self, leg: Leg, here: Pose2, curvature_per_m: float) -> MotorCommand | None:
         """The next increment; None on arrival. It is an arc, whose chord is to lie in the direction to be gone."""
-        along, left = measure_progress(leg, here)
+        s, (along, left) = self._settings.action, measure_progress(leg, here)
+        within_m = leg.tolerance_m * s.arrival_part
         away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
-        if away <= leg.tolerance_m * 0.8 or (along <= 0.0 and abs(left) <= leg.tolerance_m * 0.8):
+        if away <= within_m or (along <= 0.0 and abs(left) <= within_m):
             return self._final_turn(leg, here)
-        turn = compute_bearing(_aim(leg, here), here)
-        if abs(turn) > FACING_RAD:
+        turn = compute_bearing(self._aim(leg, here), here)
+        if abs(turn) > s.max_heading_error_rad:
             return MotorCommand(self._bounded(turn), 0.0)
         actuator = self._robot.actuator
         distance = min(actuator.increment_m, actuator.compute_command_m(away))
         turn = compute_chord_turn(turn, curvature_per_m, actuator.reach * distance)
-        return MotorCommand(turn if abs(turn) > AIM_RAD / 10 else 0.0, distance)
+        return MotorCommand(turn if abs(turn) > s.max_arrival_heading_error_rad / 10 else 0.0, distance)
+
+    def _aim(self, leg: Leg, here: Pose2) -> tuple[float, float]:
+        """The point of the line to steer at [m, world]: its end, once that is near."""
+        along, _ = measure_progress(leg, here)
+        if along < self._settings.action.aim_at_end_m:
+            return leg.x1_m, leg.y1_m
+        return find_aim_point(leg, along, self._settings.action.lookahead_m)
 
     def _final_turn(self, leg: Leg, here: Pose2) -> MotorCommand | None:
         if leg.heading_rad is None:
             return None
         turn = wrap_angle(leg.heading_rad - here.heading_rad)
-        return MotorCommand(self._bounded(turn), 0.0) if abs(turn) > AIM_RAD else None
+        most = self._settings.action.max_arrival_heading_error_rad
+        return MotorCommand(self._bounded(turn), 0.0) if abs(turn) > most else None
 
     def _bounded(self, turn_rad: float) -> float:
         """One increment of a turn; a long one in equal parts, so that landmarks stay in view from part to part."""
@@ -170,9 +168,3 @@ def _leg_wanted(view: View) -> Entry[PlanSketch] | None:
         return None
     s = sketch.value
     return sketch if s.verified and s.current is not None and s.current.primitive else None
-
-
-def _aim(leg: Leg, here: Pose2) -> tuple[float, float]:
-    """The point of the line to steer at [m, world]: its end, once that is near."""
-    along, _ = measure_progress(leg, here)
-    return (leg.x1_m, leg.y1_m) if along < CREEP_M else find_aim_point(leg, along, LOOKAHEAD_M)

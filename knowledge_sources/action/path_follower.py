@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -37,16 +36,6 @@ from world_models.entries.location import Hypothesis
 from world_models.entries.task import Leg, Milestone, PlanSketch
 from world_models.entries.wheels import Drift
 from world_models.frames import Pose2
-
-LOOKAHEAD_M = 0.75
-"""Steers at the point of the line so far ahead."""
-ROLL_M = 0.3
-"""A leg with less to go than this, beside what it takes to come to a stand, is left to the motor's increments."""
-FACING_RAD = math.radians(3.0)
-"""Turned to within this, it may set off; turned further than ``ASTRAY`` times this, it stops."""
-ASTRAY = 4.0
-SHARPEST_PER_M = 1.0
-"""The most that is steered."""
 
 
 class PathFollower(RobotKnowledgeSource):
@@ -87,8 +76,8 @@ class PathFollower(RobotKnowledgeSource):
     ) -> Iterable[Effect]:
         """The arc to the point of the line ahead, less what the wheels bend it by themselves."""
         here, drift = belief.value.world_from_robot(self._robot.world), view.latest(Drift)
-        along, _ = measure_progress(leg.value, here)
-        point = find_aim_point(leg.value, along, LOOKAHEAD_M)
+        s, (along, _) = self._settings.action, measure_progress(leg.value, here)
+        point = find_aim_point(leg.value, along, s.rolling_lookahead_m)
         discrepancy = open_discrepancy(view, Level.ACTION)
         corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
         yield from corrected
@@ -96,7 +85,7 @@ class PathFollower(RobotKnowledgeSource):
         step = Revise(leg, replace(seen, increments=seen.increments + (course is None)), (leg, belief, *corrected))
         yield step
         wanted = compute_curvature_to(point, here) - (0.0 if drift is None else drift.value.curvature_per_m)
-        curvature = min(max(wanted, -SHARPEST_PER_M), SHARPEST_PER_M)
+        curvature = min(max(wanted, -s.max_curvature_per_m), s.max_curvature_per_m)
         told = Course(leg.id, self._robot.actuator.speed_m_per_s, curvature)
         because = (step, belief, *(() if drift is None else (drift,)))
         yield Post(told, because) if course is None else Revise(course, told, (course, *because))
@@ -109,23 +98,26 @@ class PathFollower(RobotKnowledgeSource):
         if is_over(view) or not is_settled(view) or is_in_doubt(view) or open_milestone(view) is not None:
             return False
         here = belief.value.world_from_robot(self._robot.world)
-        return self._is_worth_it(driving[0].value, here) and abs(_off(driving[0].value, here)) <= FACING_RAD
+        leg, s = driving[0].value, self._settings.action
+        return self._is_worth_it(leg, here) and abs(self._off(leg, here)) <= s.max_rolling_start_error_rad
 
     def _must_stop(self, view: View) -> bool:
         belief, driving = held(view), under_way(view)
         if belief is None or driving is None or is_over(view) or is_in_doubt(view) or open_milestone(view) is not None:
             return True
         here = belief.value.world_from_robot(self._robot.world)
-        return not self._is_worth_it(driving[0].value, here) or abs(_off(driving[0].value, here)) > ASTRAY * FACING_RAD
+        leg, s = driving[0].value, self._settings.action
+        return not self._is_worth_it(leg, here) or abs(self._off(leg, here)) > s.max_rolling_error_rad
 
     def _is_worth_it(self, leg: Leg, here: Pose2) -> bool:
         """Whether there is way enough to come to a stand before the end of the leg."""
-        return measure_progress(leg, here)[0] > self._robot.actuator.stopping_distance_m() + ROLL_M
+        least_m = self._robot.actuator.stopping_distance_m() + self._settings.action.min_rolling_leg_m
+        return measure_progress(leg, here)[0] > least_m
 
-
-def _off(leg: Leg, here: Pose2) -> float:
-    """How far to the left of the robot's heading the point lies that it steers at [rad]."""
-    return compute_bearing(find_aim_point(leg, measure_progress(leg, here)[0], LOOKAHEAD_M), here)
+    def _off(self, leg: Leg, here: Pose2) -> float:
+        """How far to the left of the robot's heading the point lies that it steers at [rad]."""
+        along, _ = measure_progress(leg, here)
+        return compute_bearing(find_aim_point(leg, along, self._settings.action.rolling_lookahead_m), here)
 
 
 def _reasons(view: View) -> tuple[Entry[Discrepancy], ...]:

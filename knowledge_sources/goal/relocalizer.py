@@ -31,17 +31,6 @@ from world_models.entries.percepts import Glimpse, Panorama, Segments
 from world_models.entries.task import Goal, PlanSketch
 from world_models.frames import Pose2
 
-PROBES = 8
-"""Looks, and then it says that it does not know."""
-ROOMS = 80
-"""The most rooms that are searched, the nearest to the last belief first."""
-SAME_FLOOR_M = 0.5
-"""Rooms whose floors differ by less are on one floor."""
-DARK, DIM = 6.0, 40.0
-"""Of a dark frame the contrast and the brightness are less; a bright one without contrast shows a bare wall."""
-WAITS = 150
-"""So many dark frames are waited for light."""
-
 
 class Relocalizer(RobotKnowledgeSource):
     """Keeps every place of the floor that bears out what it sees, and probes until one stands alone.
@@ -75,11 +64,16 @@ class Relocalizer(RobotKnowledgeSource):
         if not isinstance(trigger.entry.value, Segments):
             yield Post(Look("probe"), (trigger.entry, lost))
             return
-        if trigger.entry.value.contrast < DARK and trigger.entry.value.brightness < DIM:
-            if len(_probes_since(view, lost)) < WAITS:
+        if self._is_dark(trigger.entry.value):
+            if len(_probes_since(view, lost)) < self._settings.goal.max_dark_frames:
                 yield Post(Look("probe"), (trigger.entry, lost))
             return
         yield from self._considered(view, trigger.entry, lost, belief)
+
+    def _is_dark(self, segments: Segments) -> bool:
+        """Whether a frame is dark; a bright one without contrast shows a bare wall."""
+        s = self._settings.goal
+        return segments.contrast < s.min_contrast and segments.brightness < s.min_brightness
 
     def _considered(
         self, view: View, segments: Entry[Segments], lost: Entry[Discrepancy], belief: Entry[Hypothesis]
@@ -97,7 +91,8 @@ class Relocalizer(RobotKnowledgeSource):
             because = (segments, lost, hidden if change is None else change)
         robot = self._robot.with_obstruction(obstruction).on_floor_of(belief.value.locale)
         result = localize(robot, looks, self._rooms(belief.value))
-        if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or len(glimpses) >= PROBES:
+        is_last = len(glimpses) >= self._settings.goal.max_probes
+        if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
             result = self._within_reach(result, belief.value.locale)
         for old in view.where(Hypothesis, lambda h: h.status == "candidate"):
             yield Retract(old, (segments,))
@@ -109,7 +104,7 @@ class Relocalizer(RobotKnowledgeSource):
             return
         for c in result.candidates:
             yield Post(self._hypothesis(c, belief.value, "candidate", c.weight), (segments, seen, belief))
-        if result.status is LocalizationStatus.PROBE and result.next_action is not None and len(glimpses) < PROBES:
+        if result.status is LocalizationStatus.PROBE and result.next_action is not None and not is_last:
             yield Post(MotorCommand(result.next_action.turn_rad, result.next_action.move_m), (segments, lost, seen))
 
     def _within_reach(self, result: LocalizationResult, locale: str) -> LocalizationResult:
@@ -143,12 +138,13 @@ class Relocalizer(RobotKnowledgeSource):
         """The rooms of the floor, the nearest to the last belief first: nobody is carried off to another floor."""
         world, here = self._robot.world, belief.world_from_robot(self._robot.world)
         container, level_m = world.locale(belief.locale).parent or belief.locale, world.floor_m(belief.locale)
-        rooms = [name for name in world.rooms_in(container) if abs(world.floor_m(name) - level_m) < SAME_FLOOR_M]
+        same_m = self._settings.goal.max_floor_difference_m
+        rooms = [name for name in world.rooms_in(container) if abs(world.floor_m(name) - level_m) < same_m]
         while len(rooms) < 2 and (above := world.locale(container).parent) is not None:  # as from an elevator's car
             container = above
-            rooms = [name for name in world.rooms_in(container) if abs(world.floor_m(name) - level_m) < SAME_FLOOR_M]
+            rooms = [name for name in world.rooms_in(container) if abs(world.floor_m(name) - level_m) < same_m]
         away = [(_distance(world.outline(name), here), name) for name in rooms]
-        return [name for _, name in sorted(away)[:ROOMS]]
+        return [name for _, name in sorted(away)[:self._settings.goal.max_rooms]]
 
     def _found(
         self, view: View, seen: tuple[Entry[Segments], Effect], lost: Entry[Discrepancy], belief: Entry[Hypothesis],

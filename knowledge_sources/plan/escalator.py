@@ -14,10 +14,6 @@ from knowledge_sources.questions import deepest_sketch, is_over
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.task import Outcome
 
-MOST_CHECKS = 20
-"""So often may the plan level be asked in vain on the way to one subgoal: then something is in the way of it."""
-MOST_LOST = 12
-"""So often may the robot be lost in one mission."""
 GIVEN_UP: Mapping[Level, tuple[str, str]] = {
     Level.PLAN: ("blocked", "on the way to one place it was not as expected {times} times, the last one:"),
     Level.GOAL: ("lost", "lost {times} times, the last one:"),
@@ -46,7 +42,9 @@ class Escalator(RobotKnowledgeSource):
         close = Revise(trigger.entry, replace(closed, tried=tried, times=times), trigger.entry.because)
         yield close
         yield Post(raised, (close,))
-        if times >= (MOST_CHECKS if raised.level is Level.PLAN else MOST_LOST) and not is_over(view):
+        s = self._settings.plan
+        most = s.max_checks_per_subgoal if raised.level is Level.PLAN else s.max_lost_per_mission
+        if times >= most and not is_over(view):
             kind, why = GIVEN_UP[raised.level]
             yield Post(Outcome(kind, f"{why.format(times=times)} {closed.what}"), (close,))
 

@@ -13,13 +13,11 @@ from knowledge_sources.methods.features.lines import find_lines
 from knowledge_sources.methods.features.rectification import Rectifier
 from knowledge_sources.questions import open_milestone
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.settings import DEFAULT, Settings
 from world_models.entries.body import Frame
 from world_models.entries.percepts import Segments
 from world_models.frames import frozen
 from world_models.robot import RobotModel
-
-LEAST_LENGTH_PX = 10.0
-"""Shorter segments belong to what the model lacks more often than to what it has."""
 
 
 class LineFinder(RobotKnowledgeSource):
@@ -32,8 +30,8 @@ class LineFinder(RobotKnowledgeSource):
     watches = (Watch(Frame, (Posted,), lambda f: f.purpose in ("milestone", "probe")),)
     writes = (Segments,)
 
-    def __init__(self, robot: RobotModel) -> None:
-        super().__init__(robot)
+    def __init__(self, robot: RobotModel, settings: Settings = DEFAULT) -> None:
+        super().__init__(robot, settings)
         self._picture = Rectifier(robot.lens, robot.camera)
 
     def rate(self, view: View, trigger: Change) -> float | None:
@@ -42,7 +40,8 @@ class LineFinder(RobotKnowledgeSource):
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         frame = trigger.entry
         image = self._picture(frame.value.jpeg)
-        found = find_lines(image, min_length_px=LEAST_LENGTH_PX)
+        found = find_lines(image, min_length_px=self._settings.plan.min_segment_length_px,
+                           settings=self._settings.features)
         brightness, contrast = compute_mean_and_deviation(image)
         waiting = open_milestone(view) if frame.value.purpose == "milestone" else None
         yield Post(

@@ -21,12 +21,6 @@ from world_models.entries.task import Milestone
 from world_models.frames import frozen
 
 Floats = NDArray[np.float64]
-RIGID_PX = 6.0
-"""Up to this uncertainty in the image the picture moves nearly as one: §6.1's fit in the image is right. Beyond it,
-perspective bends the move, and the fit is made on the floor instead."""
-NEAR_M = 2.5
-"""The distance at which that uncertainty is taken."""
-PAIR_PX = 4.0
 
 
 class Matcher(RobotKnowledgeSource):
@@ -70,9 +64,11 @@ class Matcher(RobotKnowledgeSource):
     def _found(
         self, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
     ) -> Match | FloorMatch:
-        if self._robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / NEAR_M) <= RIGID_PX:
+        s = self._settings.plan
+        sigma_px = self._robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / s.rigid_distance_m)
+        if sigma_px <= s.max_rigid_sigma_px:
             model_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
-            return match_lines(model_px, data_px, pair_px=PAIR_PX, objective="likelihood")
+            return match_lines(model_px, data_px, pair_px=s.max_pair_distance_px, objective="likelihood")
         robot = self._robot.on_floor_of(belief.locale)
         return match_on_floor(
             lines_world, data_px, robot.camera, robot.mount.camera_from_robot,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -11,17 +10,12 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
-from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.questions import held
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.percepts import LineMatch, PoseFix
 from world_models.entries.task import Milestone
 from world_models.frames import frozen
-
-LOOSER = 4.0
-DOUBT = (0.05, math.radians(1.5))
-"""The belief enters as a prior that is looser by a factor and by these (m, rad): the lines shall decide."""
 
 
 class MedRAndT(RobotKnowledgeSource):
@@ -43,8 +37,9 @@ class MedRAndT(RobotKnowledgeSource):
         if belief is None or milestone is None:
             return
         m: Milestone = milestone.value
-        prior = LOOSER * belief.value.covariance_world(self._robot.world)
-        prior = prior + np.diag([DOUBT[0] ** 2, DOUBT[0] ** 2, DOUBT[1] ** 2])
+        s = self._settings.plan
+        prior = s.prior_covariance_factor * belief.value.covariance_world(self._robot.world)
+        prior = prior + np.diag([s.prior_sigma_m**2, s.prior_sigma_m**2, s.prior_sigma_rad**2])
         found = planar_from_lines(
             match.value.lines_world,
             match.value.segments_px,
@@ -53,7 +48,7 @@ class MedRAndT(RobotKnowledgeSource):
             belief.value.world_from_robot(self._robot.world),
             prior_covariance=prior,
             landmark_ids=[m.landmark_of[i] for i in match.value.pairs[:, 0]],
-            sigma_px=SIGMA_ACROSS_PX,
+            sigma_px=self._settings.features.sigma_across_px,
         )
         yield Post(
             PoseFix(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,6 @@ from knowledge_sources.methods.verification.pose_evidence import compute_evidenc
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from knowledge_sources.questions import has_followed, held, open_discrepancy, standing_in
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.tolerances import FLOOR_PX, PLAN_PX
 from world_models.entries.body import Frame
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
@@ -32,25 +30,49 @@ from world_models.entries.task import Certificate, Milestone
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
-WRONG_BEFORE, WRONG_UNFOLLOWED = 0.05, 0.12
-"""Where nothing is in doubt, a belief is taken to be wrong with this probability before the robot looks: if landmarks
-were followed up to here, and if none were."""
-DARK = 6.0
-"""A frame of less contrast (standard deviation of its grey values) shows nothing."""
-
-
-MOST_LOOKS = 3
-"""From so many directions a milestone is looked for before it counts against the belief that it cannot be told."""
-AS_MUCH, AS_LIKELY = 0.8, 0.3
-"""Another place of which this part of the agreement is seen is not ruled out. Of those for which another one was not,
-three in ten were wrong, as counted where half of all are (``harvey experiment milestones``, 993 of 10,289 cases).
-"""
-
-UNMISTAKABLE, CLEAR, LEAST_MARGIN = 2e-4, 2e-3, 1.0
-"""Less likely to be wrong than the first, a place is not compared with others; than the second, only with those at
-which its room repeats itself; else with wherever in its room the picture fits. At least so many lines must speak for it
-that the others do not have."""
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Weighed:
+    """What a picture says of a milestone, before anything is decided.
+
+    Attributes:
+        robot: the model on the floor of the belief, behind what stands before its camera.
+        room: the locale of the belief; "" where there is none.
+        segments: of the picture.
+        pose: as solved for; before: as believed before the look.
+        expected: number of lines that should be seen.
+        lines: how they agree with the segments; faces: how the faces' colours agree.
+        p_false: probability that the pose is wrong, by lines and colours.
+        is_enough: whether that is little enough to accept the pose.
+        shift_px: median distance of the lines from where they were expected.
+        tolerance_px: the largest that may be.
+        is_weak: whether what was believed before adds little: it is in doubt, or no landmarks were followed.
+    """
+
+    robot: RobotModel
+    room: str
+    segments: Segments
+    pose: Pose2
+    before: Pose2
+    expected: int
+    lines: LineCheck
+    faces: ColorCheck
+    p_false: float
+    is_enough: bool
+    shift_px: float
+    tolerance_px: float
+    is_weak: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What is decided: ``verified``, ``refuted`` or ``not testable``, in words why, and how likely it is wrong."""
+
+    kind: str
+    reason: str
+    p_false: float
 
 
 class MilestoneJudge(RobotKnowledgeSource):
@@ -73,77 +95,118 @@ class MilestoneJudge(RobotKnowledgeSource):
         fix, milestone = trigger.entry, _milestone_of(view, trigger.entry.value)
         if milestone is None:
             return
-        certificate = self._certificate(view, fix, milestone)
-        verdict = Post(certificate, (fix, milestone))
-        yield verdict
-        yield Revise(milestone, replace(milestone.value, status=certificate.verdict), (verdict,))
-        c = certificate
-        if _may_look_again(c, milestone.value):
+        weighed = self._weigh(view, fix.value, milestone.value)
+        verdict = self._decide(view, weighed)
+        certificate = Post(_to_certificate(view, fix, milestone, weighed, verdict), (fix, milestone))
+        yield certificate
+        yield Revise(milestone, replace(milestone.value, status=verdict.kind), (certificate,))
+        if self._may_look_again(verdict, milestone.value):
             return
-        magnitude = c.deviation_px if c.verdict == "verified" or c.deviation_px > PLAN_PX else math.inf
-        what = f"{milestone.value.what.partition(', because')[0]} is {c.verdict}"
-        found = Discrepancy(Level.PLAN, what, magnitude, (0.0, PLAN_PX), "px")
+        most_px = self._settings.plan.max_deviation_px
+        is_measured = verdict.kind == "verified" or weighed.shift_px > most_px
+        magnitude = weighed.shift_px if is_measured else math.inf
+        what = f"{milestone.value.what.partition(', because')[0]} is {verdict.kind}"
+        found = Discrepancy(Level.PLAN, what, magnitude, (0.0, most_px), "px")
         last = open_discrepancy(view, Level.PLAN)
-        yield Post(found, (verdict,)) if last is None else Revise(last, found, (verdict,))
+        yield Post(found, (certificate,)) if last is None else Revise(last, found, (certificate,))
 
-    def _certificate(self, view: View, fix: Entry[PoseFix], milestone: Entry[Milestone]) -> Certificate:
-        match: LineMatch = view[fix.value.match].value
+    def _weigh(self, view: View, fix: PoseFix, milestone: Milestone) -> Weighed:
+        """Compare the lines and the colours of faces with the picture, and weigh them to a probability."""
+        s = self._settings
+        match: LineMatch = view[fix.match].value
         segments: Segments = view[match.segments].value
-        m, pose, belief = milestone.value, fix.value.world_from_robot, held(view)
+        frame: Frame = view[segments.frame].value
+        pose, belief = fix.world_from_robot, held(view)
         robot = self._robot if belief is None else standing_in(view, self._robot, belief.value.locale)
         before = pose if belief is None else belief.value.world_from_robot(robot.world)
-        spread = fix.value.covariance if belief is None else belief.value.covariance_world(robot.world)
-        lines = np.array(m.expected, float).reshape(-1, 2, 3)
-        agreed = check_lines(robot, lines, segments.segments_px, pose)
-        frame: Frame = view[segments.frame].value
-        faces = check_colors(robot, pose, decode_small_color(frame.jpeg), m.looks)
-        told = compute_evidence(
-            robot, lines, segments.segments_px, pose, fix.value.covariance, before, spread, agreed, faces)
-        p_false = POSE_CONFIDENCE.p_false(told)
-        tolerance_px = FLOOR_PX + compute_motion_tolerance_px(robot, lines, before, spread + fix.value.covariance)
-        in_doubt, followed = open_discrepancy(view, Level.PLAN) is not None, has_followed(view)
-        sure = POSE_CONFIDENCE.accepts(p_false)  # so much agrees only at the right place, whatever the wheels did
-        if sure or in_doubt or tolerance_px > PLAN_PX:
-            tolerance_px = PLAN_PX
-        wrong_before = 0.5 if in_doubt else WRONG_BEFORE if followed else WRONG_UNFOLLOWED
-        is_enough = POSE_CONFIDENCE.accepts(p_false, wrong_before)
-        shift_px = _median_shift(np.array(m.expected_px, float).reshape(-1, 2, 2), agreed.projected_px)
-        verdict, reason = _verdict(
-            len(lines), segments.contrast, agreed, faces, p_false, is_enough, shift_px, tolerance_px)
-        if verdict == "verified" and belief is not None:
-            other, room = _as_likely(view, robot, before, pose, segments, agreed), belief.value.locale
-            elsewhere = ""
-            if other is not None:
-                elsewhere = f"as much agrees at {other.id}"
-            elif (p_false > UNMISTAKABLE and (in_doubt or not followed)
-                  and _may_be_elsewhere(robot, segments.segments_px, room, pose, p_false)):
-                elsewhere = f"it may be another door of {room}, or its other side"
-            if elsewhere:
-                verdict, reason, p_false = "not testable", f"{reason}; but {elsewhere}", max(p_false, AS_LIKELY)
-        residuals = fix.value.residuals_px[fix.value.inliers]
-        return Certificate(
-            milestone=milestone.id,
-            fix=fix.id,
-            verdict=verdict,
-            reason=reason,
+        covariance = fix.covariance if belief is None else belief.value.covariance_world(robot.world)
+        lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
+        agreed = check_lines(robot, lines, segments.segments_px, pose, s.verification)
+        faces = check_colors(robot, pose, decode_small_color(frame.jpeg), milestone.looks, s.verification)
+        weight = compute_evidence(
+            robot, lines, segments.segments_px, pose, fix.covariance, before, covariance, agreed, faces,
+            s.verification)
+        p_false = POSE_CONFIDENCE.p_false(weight)
+        in_doubt, followed = open_discrepancy(view, Level.PLAN) is not None, has_followed(view, s.action)
+        covariance = covariance + fix.covariance
+        motion_px = compute_motion_tolerance_px(robot, lines, before, covariance, s.verification)
+        tolerance_px = s.action.min_tolerance_px + motion_px
+        is_sure = POSE_CONFIDENCE.accepts(p_false)  # so much agrees only at the right place, whatever the wheels did
+        if is_sure or in_doubt:
+            tolerance_px = s.plan.max_deviation_px
+        p_wrong = s.plan.p_wrong_followed if followed else s.plan.p_wrong_unfollowed
+        return Weighed(
+            robot=robot,
+            room="" if belief is None else belief.value.locale,
+            segments=segments,
+            pose=pose,
+            before=before,
             expected=len(lines),
-            matched=len(np.unique(match.pairs[:, 0])),
-            inliers=int(np.count_nonzero(fix.value.inliers)),
-            coverage=agreed.coverage,
-            residual_px=float(np.sqrt(np.mean(residuals**2))) if len(residuals) else math.inf,
-            deviation_m=pose.distance_to(before),
-            deviation_rad=wrap_angle(pose.heading_rad - before.heading_rad),
-            deviation_px=shift_px,
-            tolerance_px=tolerance_px,
+            lines=agreed,
+            faces=faces,
             p_false=p_false,
-            faces=faces.count,
-            faces_alike=faces.agreeing,
+            is_enough=POSE_CONFIDENCE.accepts(p_false, s.plan.p_wrong_in_doubt if in_doubt else p_wrong),
+            shift_px=_median_shift(np.array(milestone.expected_px, float).reshape(-1, 2, 2), agreed.projected_px),
+            tolerance_px=min(tolerance_px, s.plan.max_deviation_px),
+            is_weak=in_doubt or not followed,
         )
 
+    def _decide(self, view: View, weighed: Weighed) -> Verdict:
+        """Verified, refuted or not testable; what would be verified is first held against other places."""
+        kind, reason = self._first_verdict(weighed)
+        elsewhere = self._elsewhere(view, weighed) if kind == "verified" and weighed.room else ""
+        if elsewhere:
+            p_false = max(weighed.p_false, self._settings.plan.p_false_alias)
+            return Verdict("not testable", f"{reason}; but {elsewhere}", p_false)
+        return Verdict(kind, reason, weighed.p_false)
 
-def _may_look_again(certificate: Certificate, milestone: Milestone) -> bool:
-    """Whether another view may tell what this one could not."""
-    return certificate.verdict == "not testable" and len(milestone.tried) + 1 < MOST_LOOKS
+    def _first_verdict(self, w: Weighed) -> tuple[str, str]:
+        """The verdict by this place alone, and why."""
+        a, faces = w.lines.agreement, w.faces
+        if w.segments.contrast < self._settings.plan.min_contrast:
+            return "not testable", f"the frame is dark (contrast {w.segments.contrast:.1f} of 255)"
+        if w.expected < self._settings.verification.min_matched_lines:
+            return "not testable", f"only {w.expected} lines are expected in this view"
+        colours = f" and {round(faces.agreeing * faces.count)} of {faces.count} faces' colours" * faces.is_testable
+        found = f"{a.matched} of {a.visible} lines, {w.lines.coverage:.0%} of their length,{colours} accounted for"
+        if w.p_false >= POSE_CONFIDENCE.refute:
+            return "refuted", f"{found}; at a wrong place {a.chance:.0%} are by chance"
+        where = f"{found}, {w.shift_px:.1f} px from where expected"
+        if not w.is_enough or a.matched < self._settings.verification.min_matched_lines:
+            return "not testable", f"{where}: not enough to tell the place by"
+        if w.shift_px > w.tolerance_px:
+            return "refuted", f"{where}: more than the {w.tolerance_px:.0f} px that the plan may be adjusted by"
+        return "verified", where
+
+    def _elsewhere(self, view: View, weighed: Weighed) -> str:
+        """Where else the picture may have been taken, in words; "" where nowhere."""
+        other = self._find_likely_hypothesis(view, weighed)
+        if other is not None:
+            return f"as much agrees at {other.id}"
+        s = self._settings.plan
+        if weighed.p_false <= s.max_p_false_unmistakable or not weighed.is_weak:
+            return ""
+        alias = find_strongest_alias(weighed.robot, weighed.segments.segments_px, weighed.room, weighed.pose,
+                                     search=weighed.p_false > s.max_p_false_clear)
+        if alias is not None and alias.margin < s.min_alias_margin:
+            return f"it may be another door of {weighed.room}, or its other side"
+        return ""
+
+    def _find_likely_hypothesis(self, view: View, weighed: Weighed) -> Entry[Hypothesis] | None:
+        """A candidate with which the picture agrees as well, once it is corrected as the belief is."""
+        correction = weighed.before.inverse() @ weighed.pose
+        s = self._settings.verification
+        least = self._settings.plan.min_alias_part * weighed.lines.coverage
+        for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
+            there = other.value.world_from_robot(weighed.robot.world) @ correction
+            lines = predict_lines(weighed.robot, there, s).lines_world
+            if check_lines(weighed.robot, lines, weighed.segments.segments_px, there, s).coverage >= least:
+                return other
+        return None
+
+    def _may_look_again(self, verdict: Verdict, milestone: Milestone) -> bool:
+        """Whether another view may tell what this one could not."""
+        return verdict.kind == "not testable" and len(milestone.tried) + 1 < self._settings.plan.max_looks
 
 
 def _milestone_of(view: View, fix: PoseFix) -> Entry[Milestone] | None:
@@ -152,44 +215,29 @@ def _milestone_of(view: View, fix: PoseFix) -> Entry[Milestone] | None:
     return milestone if milestone is not None and milestone.value.status == "expected" else None
 
 
-def _verdict(
-    expected: int, contrast: float, agreed: LineCheck, faces: ColorCheck, p_false: float, is_enough: bool,
-    shift_px: float, tolerance_px: float,
-) -> tuple[str, str]:
-    a = agreed.agreement
-    if contrast < DARK:
-        return "not testable", f"the frame is dark (contrast {contrast:.1f} of 255)"
-    if expected < DEFAULT.verification.min_matched_lines:
-        return "not testable", f"only {expected} lines are expected in this view"
-    colours = f" and {round(faces.agreeing * faces.count)} of {faces.count} faces' colours" if faces.is_testable else ""
-    found = f"{a.matched} of {a.visible} lines, {agreed.coverage:.0%} of their length,{colours} accounted for"
-    if p_false >= POSE_CONFIDENCE.refute:
-        return "refuted", f"{found}; at a wrong place {a.chance:.0%} are by chance"
-    where = f"{found}, {shift_px:.1f} px from where expected"
-    if not is_enough or a.matched < DEFAULT.verification.min_matched_lines:
-        return "not testable", f"{where}: not enough to tell the place by"
-    if shift_px > tolerance_px:
-        return "refuted", f"{where}: more than the {tolerance_px:.0f} px that the plan may be adjusted by"
-    return "verified", where
-
-
-def _as_likely(
-    view: View, robot: RobotModel, before: Pose2, pose: Pose2, segments: Segments, agreed: LineCheck
-) -> Entry[Hypothesis] | None:
-    """Another hypothesis with which the picture agrees as well, once corrected as the belief is from ``before``."""
-    correction = before.inverse() @ pose
-    for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
-        there = other.value.world_from_robot(robot.world) @ correction
-        lines = predict_lines(robot, there).lines_world
-        if check_lines(robot, lines, segments.segments_px, there).coverage >= AS_MUCH * agreed.coverage:
-            return other
-    return None
-
-
-def _may_be_elsewhere(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, p_false: float) -> bool:
-    """Whether what was seen may be seen, just as well, from elsewhere in the room."""
-    other = find_strongest_alias(robot, segments_px, room, pose, search=p_false > CLEAR)
-    return other is not None and other.margin < LEAST_MARGIN
+def _to_certificate(
+    view: View, fix: Entry[PoseFix], milestone: Entry[Milestone], weighed: Weighed, verdict: Verdict
+) -> Certificate:
+    match: LineMatch = view[fix.value.match].value
+    residuals = fix.value.residuals_px[fix.value.inliers]
+    return Certificate(
+        milestone=milestone.id,
+        fix=fix.id,
+        verdict=verdict.kind,
+        reason=verdict.reason,
+        expected=weighed.expected,
+        matched=len(np.unique(match.pairs[:, 0])),
+        inliers=int(np.count_nonzero(fix.value.inliers)),
+        coverage=weighed.lines.coverage,
+        residual_px=float(np.sqrt(np.mean(residuals**2))) if len(residuals) else math.inf,
+        deviation_m=weighed.pose.distance_to(weighed.before),
+        deviation_rad=wrap_angle(weighed.pose.heading_rad - weighed.before.heading_rad),
+        deviation_px=weighed.shift_px,
+        tolerance_px=weighed.tolerance_px,
+        p_false=verdict.p_false,
+        faces=weighed.faces.count,
+        faces_alike=weighed.faces.agreeing,
+    )
 
 
 def _median_shift(before_px: Floats, after_px: Floats) -> float:

@@ -16,7 +16,6 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.localization.aliasing import precompute_views
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
@@ -33,6 +32,8 @@ from knowledge_sources.questions import (
     unmeasured_doubt,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.settings import DEFAULT, Settings
+from knowledge_sources.settings.plan import PlanSettings
 from world_models.entries.body import Look
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstruction import Obstruction
@@ -40,19 +41,6 @@ from world_models.entries.task import Milestone, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import VisibleLines
-
-FACING_RAD = math.radians(3.5)
-LINES = 60
-"""The most lines that one milestone expects."""
-GOOD_PART = 0.3
-"""A view is good enough when it tells the place to this part of the tolerance there."""
-GOOD_RAD = math.radians(0.25)
-LEAST_LINES = 10
-CHECK_M = 0.1
-"""So well a check of the belief should tell the place."""
-OTHERWISE_RAD = math.radians(20.0)
-"""Looks that differ by less show much the same."""
-GLANCES_RAD = tuple(math.radians(a) for a in (30, -30, 60, -60, 90, -90, 135, -135, 180))
 
 
 class MilestoneSelector(RobotKnowledgeSource):
@@ -123,8 +111,8 @@ class MilestoneSelector(RobotKnowledgeSource):
             yield from self._looked_for(view, None, check, doubt, belief)
             return
         robot, pose = self._standing(view, belief.value)
-        headings = _otherwise(_glances(pose), tried) or [pose.heading_rad]
-        heading = best_heading(robot, pose, headings, CHECK_M)
+        headings = self._otherwise(self._turned(pose), tried) or [pose.heading_rad]
+        heading = best_heading(robot, pose, headings, self._settings.plan.check_tolerance_m, settings=self._settings)
         yield Post(replace(check, look_heading_rad=heading), (doubt, belief))
 
     def _expected_anew(
@@ -135,7 +123,7 @@ class MilestoneSelector(RobotKnowledgeSource):
         if waiting is None:
             return
         m, (robot, pose) = waiting.value, self._standing(view, belief.value)
-        seen = expectation(robot, pose, m, _car_of(view.get(m.sketch), m.index))
+        seen = expectation(robot, pose, m, _car_of(view.get(m.sketch), m.index), self._settings)
         yield Revise(waiting, seen, (hidden, waiting, belief))
 
     def _proposed(self, view: View, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
@@ -156,8 +144,8 @@ class MilestoneSelector(RobotKnowledgeSource):
     ) -> Iterable[Effect]:
         """Predict the landmarks from the believed pose, but those in a car, and ask for the picture."""
         hidden, (robot, pose) = view.latest(Obstruction), self._standing(view, belief.value)
-        expected = expectation(robot, pose, milestone, car)
-        if not has_followed(view) or open_discrepancy(view, Level.PLAN) is not None:
+        expected = expectation(robot, pose, milestone, car, self._settings)
+        if not has_followed(view, self._settings.action) or open_discrepancy(view, Level.PLAN) is not None:
             precompute_views(robot, belief.value.locale, pose)  # the judge will ask whether it is another door
         because = (task, belief) if hidden is None else (task, belief, hidden)
         wish = Post(expected, because) if old is None else Revise(old, expected, because)
@@ -166,8 +154,9 @@ class MilestoneSelector(RobotKnowledgeSource):
 
     def _direction(self, robot: RobotModel, sketch: PlanSketch, pose: Pose2, tried: Sequence[float]) -> float:
         before = sketch.subgoals[sketch.at - 1] if sketch.at else None
-        headings = _otherwise(self._candidates(sketch, pose), tried)
-        return best_heading(robot, pose, headings, before.tolerance_m if before else 0.1, _car(sketch, sketch.at))
+        headings = self._otherwise(self._candidates(sketch, pose), tried)
+        tolerance_m = before.tolerance_m if before else self._settings.plan.check_tolerance_m
+        return best_heading(robot, pose, headings, tolerance_m, _car(sketch, sketch.at), self._settings)
 
     def _candidates(self, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
         wanted = sketch.subgoals[sketch.at - 1].destination if sketch.at else None
@@ -177,7 +166,16 @@ class MilestoneSelector(RobotKnowledgeSource):
         if sketch.current is not None:
             end = sketch.current.destination.in_world(self._robot.world)
             yield math.atan2(end.y_m - pose.y_m, end.x_m - pose.x_m)
-        yield from _glances(pose)
+        yield from self._turned(pose)
+
+    def _turned(self, pose: Pose2) -> Iterator[float]:
+        """The headings that are tried for a better view [rad, world]."""
+        return (wrap_angle(pose.heading_rad + turn) for turn in self._settings.plan.look_turns_rad)
+
+    def _otherwise(self, headings: Iterable[float], tried: Sequence[float]) -> list[float]:
+        """Those that show something else than what was tried."""
+        least = self._settings.plan.min_look_difference_rad
+        return [h for h in headings if all(abs(wrap_angle(h - other)) > least for other in tried)]
 
     def _standing(self, view: View, belief: Hypothesis) -> tuple[RobotModel, Pose2]:
         """The robot where it believes that it stands, and its pose there in the world."""
@@ -187,16 +185,8 @@ class MilestoneSelector(RobotKnowledgeSource):
         return belief.world_from_robot(self._robot.world).heading_rad
 
     def _faces(self, belief: Hypothesis, milestone: Milestone) -> bool:
-        return abs(wrap_angle(self._heading(belief) - milestone.look_heading_rad)) <= FACING_RAD
-
-
-def _glances(pose: Pose2) -> Iterator[float]:
-    return (wrap_angle(pose.heading_rad + glance) for glance in GLANCES_RAD)
-
-
-def _otherwise(headings: Iterable[float], tried: Sequence[float]) -> list[float]:
-    """Those that show something else than what was tried."""
-    return [h for h in headings if all(abs(wrap_angle(h - other)) > OTHERWISE_RAD for other in tried)]
+        error = wrap_angle(self._heading(belief) - milestone.look_heading_rad)
+        return abs(error) <= self._settings.plan.max_look_error_rad
 
 
 def _awaited(view: View) -> Entry[Milestone] | None:
@@ -224,23 +214,31 @@ def _tried(view: View, is_same: Callable[[Entry[Milestone]], bool]) -> tuple[flo
 
 
 def best_heading(
-    robot: RobotModel, pose: Pose2, headings: Iterable[float], tolerance_m: float, car: str = ""
+    robot: RobotModel, pose: Pose2, headings: Iterable[float], tolerance_m: float, car: str = "",
+    settings: Settings = DEFAULT,
 ) -> float:
     """The first heading from which the view is good enough for the tolerance, else the best [rad, world]."""
     rated: list[tuple[ViewQuality, float]] = []
     for heading in headings:
-        quality = _quality(robot, Pose2(pose.x_m, pose.y_m, heading), car)
-        sharp = quality.sigma_m <= GOOD_PART * tolerance_m and quality.sigma_rad <= GOOD_RAD
-        if sharp and quality.lines >= LEAST_LINES:
+        quality = _quality(robot, Pose2(pose.x_m, pose.y_m, heading), car, settings)
+        if is_good_view(quality, tolerance_m, settings.plan):
             return heading
         rated.append((quality, heading))
-    best = min(range(len(rated)), key=lambda i: (rated[i][0].lines < LEAST_LINES, rated[i][0].sigma_m, i))
+    best = min(range(len(rated)), key=lambda i: (rated[i][0].lines < settings.plan.min_lines, rated[i][0].sigma_m, i))
     return rated[best][1]
 
 
-def expectation(robot: RobotModel, pose: Pose2, milestone: Milestone, car: str = "") -> Milestone:
+def is_good_view(quality: ViewQuality, tolerance_m: float, settings: PlanSettings) -> bool:
+    """Whether a view tells place and heading well enough for a tolerance, by enough lines."""
+    sharp = quality.sigma_m <= settings.max_sigma_part * tolerance_m and quality.sigma_rad <= settings.max_sigma_rad
+    return sharp and quality.lines >= settings.min_lines
+
+
+def expectation(
+    robot: RobotModel, pose: Pose2, milestone: Milestone, car: str = "", settings: Settings = DEFAULT
+) -> Milestone:
     """The milestone with what should be seen from a pose; in an elevator's car, what is seen out of it."""
-    lines = _seen_from(robot, pose, car)
+    lines = _seen_from(robot, pose, car, settings)
     marks = sorted({int(i) for i in lines.landmark})
     return replace(
         milestone,
@@ -248,28 +246,29 @@ def expectation(robot: RobotModel, pose: Pose2, milestone: Milestone, car: str =
         expected=_nested(lines.lines_world),
         expected_px=_nested(lines.segments_px),
         landmark_of=tuple(marks.index(int(i)) for i in lines.landmark),
-        looks=predict_face_colors(robot, pose),
+        looks=predict_face_colors(robot, pose, settings.verification),
         status="expected",
     )
 
 
-def _quality(robot: RobotModel, pose: Pose2, car: str) -> ViewQuality:
+def _quality(robot: RobotModel, pose: Pose2, car: str, settings: Settings) -> ViewQuality:
+    lines = _seen_from(robot, pose, car, settings)
     return compute_view_quality(
-        _seen_from(robot, pose, car).lines_world, robot.camera, robot.mount.camera_from_robot, pose, SIGMA_ACROSS_PX
-    )
+        lines.lines_world, robot.camera, robot.mount.camera_from_robot, pose, settings.features.sigma_across_px)
 
 
-def _seen_from(robot: RobotModel, pose: Pose2, car: str = "") -> VisibleLines:
+def _seen_from(robot: RobotModel, pose: Pose2, car: str, settings: Settings) -> VisibleLines:
     """The clearest of the lines that should be seen, long ones with contrast, but none of those in a car."""
-    lines = predict_lines(robot, pose)
+    lines = predict_lines(robot, pose, settings.verification)
     if car:
         marks = robot.world.landmarks
         lines = lines[np.array([car not in (marks[i].locale, marks[i].neighbour) for i in lines.landmark], bool)]
-    if len(lines) <= LINES:
+    s = settings.plan
+    if len(lines) <= s.max_lines:
         return lines
     lengths = np.linalg.norm(lines.segments_px[:, 1] - lines.segments_px[:, 0], axis=1)
-    clear = np.minimum(lengths, 120.0) * np.minimum(lines.contrast, 0.3)
-    return lines[np.sort(np.argsort(-clear, kind="stable")[:LINES])]
+    clear = np.minimum(lengths, s.max_counted_length_px) * np.minimum(lines.contrast, s.max_counted_contrast)
+    return lines[np.sort(np.argsort(-clear, kind="stable")[:s.max_lines])]
 
 
 def _nested(array: NDArray[np.float64]) -> tuple[tuple[tuple[float, ...], ...], ...]:

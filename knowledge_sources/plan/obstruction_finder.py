@@ -16,17 +16,11 @@ from knowledge_sources.methods.localization.obstructions import update_obstructi
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.questions import active_goal, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.settings.plan import PlanSettings
 from world_models.camera import Camera
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import Segments
 from world_models.frames import Pose2
-
-LEAST_LOOKS, LOOKS = 3, 6
-"""What stands still in so many looks at the least is before the camera; of two it may do so by chance. So many are
-asked, the last ones."""
-LEAST_AREA = 0.04
-"""A smaller part of the picture is not asked for: looks from places near each other are much alike, and what is small
-stands still in them by chance too often."""
 
 
 class ObstructionFinder(RobotKnowledgeSource):
@@ -53,27 +47,28 @@ class ObstructionFinder(RobotKnowledgeSource):
 
     def _news(self, view: View) -> Effect | None:
         """What the last looks say that the board does not."""
-        looks, known = _looks(view), view.latest(Obstruction)
+        looks, known = _looks(view, self._settings.plan.max_obstruction_looks), view.latest(Obstruction)
         glances = [CameraView(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
                    for s, heading_rad in looks]
-        if len(glances) < LEAST_LOOKS:
+        if len(glances) < self._settings.plan.min_obstruction_looks:
             return None
-        now = _seen_by_the_last(glances, self._robot.camera, None if known is None else known.value)
+        now = _seen_by_the_last(glances, self._robot.camera, None if known is None else known.value,
+                                self._settings.plan)
         return to_say(known, now, (*(s for s, _ in looks), *(() if known is None else (known,))))
 
 
 def _seen_by_the_last(
-    glances: Sequence[CameraView], camera: Camera, known: Obstruction | None
+    glances: Sequence[CameraView], camera: Camera, known: Obstruction | None, settings: PlanSettings
 ) -> Obstruction | None:
     """What all looks show, the last first; else what fewer of them do, as it was not there in the earlier ones."""
-    for number in range(len(glances), LEAST_LOOKS - 1, -1):
-        found = update_obstruction(glances[:number], camera, known, LEAST_AREA)
+    for number in range(len(glances), settings.min_obstruction_looks - 1, -1):
+        found = update_obstruction(glances[:number], camera, known, settings.min_obstruction_part)
         if found is not None:
             return found
     return None
 
 
-def _looks(view: View) -> list[tuple[Entry[Segments], float]]:
+def _looks(view: View, most: int) -> list[tuple[Entry[Segments], float]]:
     """The last looks for milestones, each with the direction in which it was taken [rad, world].
 
     None from before the goal: the robot was lost then, and did not know in which direction it looked.
@@ -82,4 +77,4 @@ def _looks(view: View) -> list[tuple[Entry[Segments], float]]:
     since = 0 if goal is None else goal.cycle
     looked = ((s, view.get(s.value.milestone)) for s in view.newest_first(Segments) if s.cycle >= since)
     known = ((s, m.value.look_heading_rad) for s, m in looked if m is not None)
-    return list(islice(known, LOOKS))
+    return list(islice(known, most))

@@ -25,27 +25,12 @@ from knowledge_sources.methods.motion.routes import (
 )
 from knowledge_sources.questions import held
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.locales import Link, Passage
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch, Subgoal
 from world_models.frames import wrap_angle
 from world_models.robot import RobotModel
-
-CLEARANCES_M = (0.12, 0.06, 0.03)
-"""Margins round the robot's disc, the most comfortable that leaves a way."""
-THRESHOLD_M = 0.65
-"""How far before and behind a doorway the places are from which it is passed straight [m]."""
-NEARER_M = (0.55, 0.47, 0.40)
-"""The same where what is opposite the doorway leaves no room for that."""
-LEG_M = 3.6
-"""Longer legs get a milestone in between [m]."""
-WAY_TOLERANCE_M = 0.15
-NARROW_M = 0.10
-"""A doorway with less room on both sides of the robot is come up to more exactly."""
-END_TOLERANCE_M = 0.010
-HEADING_TOLERANCE_RAD = 0.02
-ADJUSTMENTS = 8
-"""How often one sketch is adjusted at one milestone before it is said to be blocked."""
 
 
 class Sketcher(RobotKnowledgeSource):
@@ -64,9 +49,9 @@ class Sketcher(RobotKnowledgeSource):
     )
     writes = (PlanSketch, Goal, Outcome)
 
-    def __init__(self, robot: RobotModel) -> None:
-        super().__init__(robot)
-        self._world = robot.world
+    def __init__(self, robot: RobotModel, settings: Settings = DEFAULT) -> None:
+        super().__init__(robot, settings)
+        self._world, self._plan = robot.world, settings.plan
         self._frees: dict[tuple[str, float], Geometry] = {}
 
     def rate(self, view: View, trigger: Change) -> float | None:
@@ -109,7 +94,7 @@ class Sketcher(RobotKnowledgeSource):
         if unfit:
             yield Post(Outcome("blocked", f"the goal {goal.value.destination} {unfit}"), (goal, belief))
             return
-        subgoals = self._between_locales(here, goal.value.destination, END_TOLERANCE_M)
+        subgoals = self._between_locales(here, goal.value.destination, self._plan.goal_tolerance_m)
         if subgoals is None:
             yield Post(Outcome("blocked", self._why_not(here.locale, goal.value.destination.locale)), (goal, belief))
         else:
@@ -142,7 +127,7 @@ class Sketcher(RobotKnowledgeSource):
         near += [(measure_thing_distance_m(t.footprint_world, point), t.name)
                  for t in world.things_of(name) if t.is_obstacle]
         distance_m, what = min(near)
-        radius_m, margin_m = self._robot.radius_m, CLEARANCES_M[-1]
+        radius_m, margin_m = self._robot.radius_m, self._plan.clearances_m[-1]
         if distance_m >= radius_m + margin_m:
             return ""
         return (f"is {distance_m:.2f} m from {what}: the robot cannot stand there, with a radius of {radius_m:.2f} m"
@@ -158,7 +143,8 @@ class Sketcher(RobotKnowledgeSource):
     def _is_off(self, belief: Hypothesis, subgoal: Subgoal) -> bool:
         here, there = belief.world_from_robot(self._world), subgoal.destination.in_world(self._world)
         heading = subgoal.destination.heading_rad
-        turned = heading is not None and abs(wrap_angle(here.heading_rad - there.heading_rad)) > HEADING_TOLERANCE_RAD
+        error = 0.0 if heading is None else wrap_angle(here.heading_rad - there.heading_rad)
+        turned = abs(error) > self._plan.goal_heading_tolerance_rad
         return here.distance_to(there) > subgoal.tolerance_m or turned
 
     def _adjusted(
@@ -166,7 +152,7 @@ class Sketcher(RobotKnowledgeSource):
     ) -> Iterable[Effect]:
         """Plan-level servoing: the subgoal is taken up again from where the robot turned out to be (§6)."""
         s = sketch.value
-        if s.adjustments >= ADJUSTMENTS:
+        if s.adjustments >= self._plan.max_adjustments:
             yield Post(Outcome("blocked", f"{sketch.id} was adjusted {s.adjustments} times in vain"), (milestone,))
             return
         k = s.at - 1
@@ -214,7 +200,7 @@ class Sketcher(RobotKnowledgeSource):
                 return None
             subgoals.append(self._subgoal(here, before, self._way_tolerance_m(step.passage)))
             on_wheels = not isinstance(step.passage, Link)  # else it is a ride: there is nothing to drive
-            subgoals.append(Subgoal(before, behind, on_wheels, step.passage.name, WAY_TOLERANCE_M))
+            subgoals.append(Subgoal(before, behind, on_wheels, step.passage.name, self._plan.way_tolerance_m))
             here = behind
         subgoals.append(self._subgoal(here, destination, tolerance_m))
         return tuple(subgoals)
@@ -222,9 +208,11 @@ class Sketcher(RobotKnowledgeSource):
     def _way_tolerance_m(self, passage: Passage) -> float:
         """How near to the place before a passage the robot must come to pass it straight without touching it."""
         if isinstance(passage, Link):
-            return WAY_TOLERANCE_M
+            return self._plan.way_tolerance_m
         beside = passage.width_m / 2 - self._robot.radius_m
-        return WAY_TOLERANCE_M if beside >= NARROW_M else max(beside, CLEARANCES_M[-1])
+        if beside >= self._plan.min_doorway_clearance_m:
+            return self._plan.way_tolerance_m
+        return max(beside, self._plan.clearances_m[-1])
 
     def _before(self, passage: Passage, locale: str) -> Place | None:
         """Where to stand before a passage, or behind it; None where something bars it."""
@@ -232,8 +220,9 @@ class Sketcher(RobotKnowledgeSource):
             x, y, heading = passage.stop_of(locale)
             return Place.of_world(self._world, locale, float(x), float(y), float(heading))
         middle, outward = passage.threshold_of(locale).mean(axis=0), passage.outward_from(locale)
-        free = self._free(locale, CLEARANCES_M[-1])
-        away = next((m for m in (THRESHOLD_M, *NEARER_M) if free.covers(Point(middle - m * outward))), THRESHOLD_M)
+        free = self._free(locale, self._plan.clearances_m[-1])
+        distances = self._plan.doorway_distances_m
+        away = next((m for m in distances if free.covers(Point(middle - m * outward))), distances[0])
         x, y = middle - away * outward
         if not is_clear(self._free(locale, -self._robot.radius_m), middle, (x, y)):
             return None
@@ -244,29 +233,30 @@ class Sketcher(RobotKnowledgeSource):
         if origin.locale != destination.locale:
             return Subgoal(origin, destination, False, tolerance_m=tolerance_m)
         a, b = origin.in_world(self._world), destination.in_world(self._world)
-        free = self._free(destination.locale, CLEARANCES_M[-1])
-        straight = a.distance_to(b) <= LEG_M and is_clear(free, a.position, b.position)
+        free = self._free(destination.locale, self._plan.clearances_m[-1])
+        straight = a.distance_to(b) <= self._plan.max_leg_m and is_clear(free, a.position, b.position)
         return Subgoal(origin, destination, straight, tolerance_m=tolerance_m)
 
     def _across(self, subgoal: Subgoal, belief: Hypothesis) -> tuple[Subgoal, ...] | None:
-        """Straight legs round the known obstacles of one locale, none longer than LEG_M."""
+        """Straight legs round the known obstacles of one locale, none longer than ``max_leg_m``."""
         locale = subgoal.destination.locale
         here, there = belief.world_from_robot(self._world), subgoal.destination.in_world(self._world)
 
         def floor() -> Geometry:
             return self._free(locale, -self._robot.radius_m)
 
-        for clearance in CLEARANCES_M:
+        for clearance in self._plan.clearances_m:
             route = find_shortest_route(self._free(locale, clearance), here.position, there.position, floor)
             if route is not None:
                 break
         else:
             return None
-        places = [Place.of_world(self._world, locale, float(x), float(y)) for x, y in _divided(route)]
+        points = _divided(route, self._plan.max_leg_m)
+        places = [Place.of_world(self._world, locale, float(x), float(y)) for x, y in points]
         places[-1] = subgoal.destination
         last = len(places) - 2
         return tuple(
-            Subgoal(a, b, True, tolerance_m=subgoal.tolerance_m if i == last else WAY_TOLERANCE_M)
+            Subgoal(a, b, True, tolerance_m=subgoal.tolerance_m if i == last else self._plan.way_tolerance_m)
             for i, (a, b) in enumerate(pairwise(places))
         )
 
@@ -283,11 +273,11 @@ def _place(belief: Hypothesis) -> Place:
     return Place(belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m)
 
 
-def _divided(route: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-    """The same route with way points in between, so that no leg is longer than LEG_M."""
+def _divided(route: list[NDArray[np.float64]], max_leg_m: float) -> list[NDArray[np.float64]]:
+    """The same route with way points in between, so that no leg is longer than ``max_leg_m``."""
     points = route[:1]
     for a, b in pairwise(route):
-        parts = max(1, math.ceil(float(np.linalg.norm(b - a)) / LEG_M))
+        parts = max(1, math.ceil(float(np.linalg.norm(b - a)) / max_leg_m))
         points += [a + (b - a) * (i / parts) for i in range(1, parts + 1)]
     return points
 

@@ -2,9 +2,108 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+from knowledge_sources.settings.setting import setting
 
 
 @dataclass(frozen=True, slots=True)
 class ActionSettings:
     """The numbers of the knowledge sources of the action level (§5)."""
+
+    # Tolerance of the action level
+    min_tolerance_px: float = setting(
+        4.0, "px", "Floor of the tolerance in the image: what correlation alone may be wrong by.",
+        "engineering judgement")
+    tolerance_sigmas: float = setting(
+        3.0, "1", "Standard deviations of the believed pose that the action level may correct.", "§3.2")
+
+    # Motor
+    lookahead_m: float = setting(
+        1.2, "m", "Distance ahead on the line at which the motor steers (pure pursuit): two increments.",
+        "engineering judgement")
+    max_heading_error_rad: float = setting(
+        math.radians(3.0), "rad", "The motor moves when it faces its aim to within this; else it turns.",
+        "engineering judgement")
+    max_arrival_heading_error_rad: float = setting(
+        math.radians(0.5), "rad", "Largest error of a heading that the goal states.", "engineering judgement")
+    max_start_offset_m: float = setting(
+        0.15, "m", "From nearer than this the robot returns to the planned line; from further off it draws a new one.",
+        "engineering judgement")
+    aim_at_end_m: float = setting(
+        0.25, "m", "With less than this to go, the motor steers at the end of the leg itself.", "engineering judgement")
+    arrival_part: float = setting(
+        0.8, "1", "Part of a leg's tolerance within which it has arrived.", "engineering judgement")
+
+    # Path follower
+    rolling_lookahead_m: float = setting(
+        0.75, "m", "Distance ahead on the line at which the path follower steers (pure pursuit).",
+        "engineering judgement")
+    min_rolling_leg_m: float = setting(
+        0.3, "m", "Shortest rest of a leg, beyond the stopping distance, that is driven without stopping.",
+        "engineering judgement")
+    max_rolling_start_error_rad: float = setting(
+        math.radians(3.0), "rad", "The path follower starts when it faces its aim to within this.",
+        "engineering judgement")
+    max_rolling_error_rad: float = setting(
+        math.radians(12.0), "rad", "The path follower stops when its aim is further to the side than this.",
+        "engineering judgement")
+    max_curvature_per_m: float = setting(
+        1.0, "1/m", "Largest curvature that is steered on the move.", "engineering judgement")
+
+    # Dead reckoner
+    min_claimed_part: float = setting(
+        0.7, "1", "If the wheels claim less than this part of a move, something stopped the robot.",
+        "engineering judgement")
+
+    # Correlator tracker
+    min_landmarks: int = setting(
+        5, "count", "With fewer tracked landmarks than this, new ones are always taken.", "engineering judgement")
+    enough_landmarks: int = setting(
+        9, "count", "With this many tracked landmarks or more, no new ones are taken.", "engineering judgement")
+    min_remaining_part: float = setting(
+        0.5, "1", "Between these two, new landmarks are taken below this part of those at the last renewal.",
+        "engineering judgement")
+    max_template_distance_m: float = setting(
+        1.3, "m", "A template is dropped when the robot is further than this from where it was cut: two increments.",
+        "Table 1: increments of two feet")
+    max_template_distance_rolling_m: float = setting(
+        0.8, "m", "The same on the move, where many pictures show the same template.", "engineering judgement")
+    max_misses: int = setting(
+        2, "count", "A landmark that is not found so many times in a row is dropped.", "engineering judgement")
+    min_expected_landmarks: int = setting(
+        4, "count", "Fewest expected landmarks that can make a discrepancy.", "engineering judgement")
+    min_agreeing_part: float = setting(
+        1.0 / 3.0, "1", "If a smaller part of the expected landmarks agrees, tracking has failed.",
+        "engineering judgement")
+    min_followed_landmarks: int = setting(
+        4, "count", "With so many landmarks in the last tracked frame, the robot is taken to be still in its room.",
+        "engineering judgement")
+    min_drift_stretch_m: float = setting(
+        0.3, "m", "Shortest stretch of way from which the drift of the wheels is learnt.", "§3.2")
+    min_edge_length_px: float = setting(
+        16.0, "px", "Shortest projected model edge that the belief is aligned with before templates are cut.",
+        "engineering judgement")
+    min_edge_contrast: float = setting(
+        0.05, "1", "Smallest contrast of such an edge.", "engineering judgement")
+    max_edge_distance_m: float = setting(
+        15.0, "m", "Largest distance of such an edge.", "engineering judgement")
+
+    # Elevator rider
+    elevator_sigma_m: float = setting(
+        0.01, "m", "Standard deviation of where an elevator car stops, from floor to floor.", "engineering judgement")
+    elevator_sigma_rad: float = setting(
+        0.003, "rad", "Standard deviation of the heading of an elevator car, from floor to floor.",
+        "engineering judgement")
+
+    # Fault handler
+    max_fault_s: float = setting(
+        30.0, "s", "A fault that lasts longer ends the mission.", "engineering judgement")
+    max_broken_motions: int = setting(
+        5, "count", "So many motions broken off in a row end the mission.", "engineering judgement", most=8)
+    min_retry_wait_s: float = setting(
+        0.25, "s", "Pause before the first retry after a fault; each further one is twice as long.",
+        "engineering judgement")
+    max_retry_wait_s: float = setting(
+        2.0, "s", "Longest pause between retries.", "engineering judgement")

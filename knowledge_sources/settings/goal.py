@@ -4,7 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from knowledge_sources.settings.setting import setting
+
 
 @dataclass(frozen=True, slots=True)
 class GoalSettings:
     """The numbers of the knowledge sources of the goal level (§2)."""
+
+    # Relocalizer
+    max_probes: int = setting(
+        8, "count", "So many looks are taken when lost; then the robot says that it does not know.",
+        "engineering judgement")
+    max_rooms: int = setting(
+        80, "count", "Most rooms that are searched, the nearest to the last belief first.", "engineering judgement")
+    max_floor_difference_m: float = setting(
+        0.5, "m", "Rooms whose floors differ by less are on one floor.", "engineering judgement")
+    min_contrast: float = setting(
+        6.0, "grey levels", "A dark frame has less contrast (standard deviation of its grey values) than this.",
+        "engineering judgement")
+    min_brightness: float = setting(
+        40.0, "grey levels", "A dark frame also has a lower mean than this; a brighter one shows a bare wall.",
+        "engineering judgement")
+    max_dark_frames: int = setting(
+        150, "count", "So many dark frames are taken while waiting for light.", "engineering judgement")

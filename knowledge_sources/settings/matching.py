@@ -13,9 +13,11 @@ class MatchingSettings:
 
     # The search, in the image or with a pose
     objective: str = setting(
-        "likelihood", "name", "Match error in the image: likelihood, or paper (E_match).", "§6.1.3, experiment matcher")
+        "likelihood", "name", "Match error in the image: likelihood, or paper (E_match).", "§6.1.3, experiment matcher",
+        choices=("likelihood", "paper"))
     strategy: str = setting(
-        "steepest", "name", "Local search in the image: steepest descent, or first improvement (paper).", "§6.1.1")
+        "steepest", "name", "Local search in the image: steepest descent, or first improvement (paper).", "§6.1.1",
+        choices=("steepest", "first"))
     exchange: bool = setting(
         True, "yes/no", "Whether two data lines of a model line may be exchanged at a local minimum (paper: no).",
         "§6.1.1, experiment matcher")

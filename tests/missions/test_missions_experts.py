@@ -17,6 +17,7 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from harvey.simulation.run import robot_model, run_mission
 from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources
+from knowledge_sources.settings import Settings
 from sim.body.simulated_body import SimulatedBody
 from sim.stage import Stage
 from sim.truth import Truth
@@ -34,8 +35,8 @@ the move, ride in elevators, or find what is before the camera."""
 def test_without_any_one_of_them_the_outcome_is_clear(short_stage: Stage, missing: str) -> None:
     refusals: list[str] = []
 
-    def sources(robot: RobotModel) -> Sequence[KnowledgeSource]:
-        return [ks for ks in knowledge_sources(robot) if ks.name != missing]
+    def sources(robot: RobotModel, settings: Settings) -> Sequence[KnowledgeSource]:
+        return [ks for ks in knowledge_sources(robot, settings) if ks.name != missing]
 
     result = run_mission(short_stage, 3, sources=sources, sinks=[lambda d: refusals.append(d.refused)])
     assert result.outcome in {"reached", "lost", "blocked", "failed"}
@@ -62,7 +63,8 @@ def test_adding_one_takes_one_line(short_stage: Stage) -> None:
     def listen(decision: Decision) -> None:
         said.extend(c.entry.value for c in decision.made if c.entry.author == "odometer")
 
-    result = run_mission(short_stage, 3, sources=lambda robot: (*knowledge_sources(robot), Odometer()), sinks=[listen])
+    result = run_mission(
+        short_stage, 3, sources=lambda *known: (*knowledge_sources(*known), Odometer()), sinks=[listen])
     assert result.outcome == "reached"
     assert said
 
@@ -119,7 +121,7 @@ def test_rating_and_acting_are_pure(short_stage: Stage) -> None:
             assert len(view) == size
             return first
 
-    result = run_mission(short_stage, 3, sources=lambda robot: [Asked(ks) for ks in knowledge_sources(robot)])
+    result = run_mission(short_stage, 3, sources=lambda *known: [Asked(ks) for ks in knowledge_sources(*known)])
     assert result.outcome == "reached", result.reason
     assert checked > 100
 

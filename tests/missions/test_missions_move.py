@@ -50,8 +50,8 @@ def run(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
 
 
 def decided_again(run: RunDirectory) -> bool:
-    with agent_of(RunHead.read(run.path)) as agent:
-        return all(told.same for told in replay(run, pictures_of(run), agent.scheduler()))
+    agent = agent_of(RunHead.read(run.path))
+    return all(told.same for told in replay(run, pictures_of(run), agent.scheduler()))
 
 
 def test_each_picture_on_the_move_corrects_the_course_and_all_of_it_is_decided_again_to_the_byte(

@@ -56,8 +56,8 @@ def gone_on(run: RunDirectory, stage: Stage) -> MissionResult:
 
 def decided_again(run: RunDirectory) -> bool:
     """Whether the whole journal, the crash included, comes out again byte for byte."""
-    with agent_of(RunHead.read(run.path)) as agent:
-        return all(told.same for told in replay(run, pictures_of(run), agent.scheduler()))
+    agent = agent_of(RunHead.read(run.path))
+    return all(told.same for told in replay(run, pictures_of(run), agent.scheduler()))
 
 
 def made_by(records: list[DecisionRecord], kind: str, which: int) -> int:

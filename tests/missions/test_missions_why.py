@@ -60,8 +60,8 @@ def history(runs: tuple[Path, Path]) -> History:
 
 @pytest.fixture(scope="module")
 def experts(runs: tuple[Path, Path]) -> Iterator[tuple[KnowledgeSource, ...]]:
-    with agent_of(RunHead.read(runs[0])) as agent:
-        yield agent.sources
+    agent = agent_of(RunHead.read(runs[0]))
+    yield agent.sources
 
 
 def test_every_decision_rests_on_something(runs: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:

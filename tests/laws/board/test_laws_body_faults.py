@@ -16,12 +16,14 @@ from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
 from harvey.runner.ports import BodyPort
-from knowledge_sources.action.fault_handler import FIRST_WAIT_S, LONGEST_WAIT_S, PATIENCE_S, STRIKES, FaultHandler
+from knowledge_sources.action.fault_handler import FaultHandler
+from knowledge_sources.settings import DEFAULT
 from strategies import Note, Scripted
 from world_models.entries.body import STOP_KEY, BodyFault, Frame, Look, MotionReport, MotorCommand, Recovery
 from world_models.entries.task import Outcome
 from world_models.robot import RobotModel
 
+S = DEFAULT.action
 MOST_CYCLES = 2000
 
 
@@ -105,13 +107,13 @@ def test_each_request_is_answered_once_or_the_mission_ends_declared(
 def test_waits_double_and_the_patience_is_the_stated_one(asked: list[str], script: list[str], ever_after: str) -> None:
     body = ScriptedBody(script, ever_after)
     scheduler, told = driven(asked, body)
-    assert all(FIRST_WAIT_S <= wait <= LONGEST_WAIT_S for wait in body.waits)
+    assert all(S.min_retry_wait_s <= wait <= S.max_retry_wait_s for wait in body.waits)
     last: dict[str, float] = {}
     for r in (e.value for e in told if isinstance(e.value, Recovery) and e.value.status == "asked"):
-        assert r.wait_s == min(2.0 * last.get(r.fault, FIRST_WAIT_S / 2.0), LONGEST_WAIT_S)
+        assert r.wait_s == min(2.0 * last.get(r.fault, S.min_retry_wait_s / 2.0), S.max_retry_wait_s)
         last[r.fault] = r.wait_s
     for recovery in scheduler.view.all(Recovery):
-        assert recovery.value.waited_s < PATIENCE_S + LONGEST_WAIT_S
+        assert recovery.value.waited_s < S.max_fault_s + S.max_retry_wait_s
 
 
 @given(st.lists(st.sampled_from(["", "link lost"]), max_size=12))
@@ -131,12 +133,12 @@ def test_a_stop_key_ends_it_at_once_also_while_something_else_is_wrong() -> None
         assert len(body.waits) == len(script) - 1
 
 
-@pytest.mark.parametrize("whole", [0, STRIKES - 1])
+@pytest.mark.parametrize("whole", [0, S.max_broken_motions - 1])
 def test_a_base_that_breaks_off_every_motion_is_given_up(whole: int) -> None:
     """Each fault passes at once, but so many in a row are too many; one whole motion starts the count anew."""
-    script = ["stalled", ""] * (STRIKES - 1) + [""] * bool(whole) + ["stalled", ""] * STRIKES
+    script = ["stalled", ""] * (S.max_broken_motions - 1) + [""] * bool(whole) + ["stalled", ""] * S.max_broken_motions
     scheduler, told = driven(["move"] * 20, ScriptedBody(script, ""))
     outcome = scheduler.view.latest(Outcome)
-    assert outcome is not None and f"{STRIKES} motions in a row" in outcome.value.reason
+    assert outcome is not None and f"{S.max_broken_motions} motions in a row" in outcome.value.reason
     moves = [e for e in told if isinstance(e.value, MotorCommand)]
-    assert len(moves) == (2 * STRIKES if whole else STRIKES)
+    assert len(moves) == (2 * S.max_broken_motions if whole else S.max_broken_motions)

@@ -26,8 +26,6 @@ from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
 from harvey.simulation.run import robot_model
 from harvey.wiring import KNOWLEDGE_SOURCES
-from knowledge_sources.plan.escalator import MOST_CHECKS, MOST_LOST
-from knowledge_sources.plan.milestone_judge import MOST_LOOKS
 from knowledge_sources.questions import (
     active_goal,
     held,
@@ -37,7 +35,7 @@ from knowledge_sources.questions import (
     unmeasured_doubt,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.tolerances import PLAN_PX
+from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario, with_settings
 from world_models.entries import KINDS
 from world_models.entries.body import Course, Frame, Look, MotionReport, MotorCommand
@@ -46,7 +44,7 @@ from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch
 from world_models.robot import RobotModel
 
-ACTION_PX = 6.0
+ACTION_PX, PLAN_PX = 6.0, DEFAULT.plan.max_deviation_px
 PERCEIVERS = {"correlator_tracker", "line_finder", "matcher", "med_r_and_t", "milestone_judge", "relocalizer"}
 SURE = diagonal(0.002, 0.001)
 
@@ -103,7 +101,7 @@ class ScriptedJudge(RobotKnowledgeSource):
         told = Certificate(milestone.id, _next_fix(view), verdict, "", 9, 9, 9, 1.0, 0.5, 0.0, 0.0, px, PLAN_PX, 0.0)
         yield Post(told, (fix, milestone))
         yield Revise(milestone, replace(milestone.value, status=verdict), (fix,))
-        if px == UNTOLD and len(milestone.value.tried) + 1 < MOST_LOOKS:
+        if px == UNTOLD and len(milestone.value.tried) + 1 < DEFAULT.plan.max_looks:
             return
         magnitude = math.inf if px == UNTOLD else px
         found = Discrepancy(Level.PLAN, "a milestone is elsewhere", magnitude, (0.0, PLAN_PX), "px")
@@ -235,7 +233,7 @@ class Ladder:
                 assert unmeasured_doubt(self.view) is not None and Level.GOAL not in above
                 assert any(reason.id.startswith("Milestone") for reason in entry.because)
             elif isinstance(value, Milestone):
-                assert len(value.tried) < MOST_LOOKS
+                assert len(value.tried) < DEFAULT.plan.max_looks
             elif isinstance(value, Course) and value.is_rolling:
                 assert not self.is_in_doubt(above)
 
@@ -323,7 +321,8 @@ def test_whatever_pictures_go_on_saying_the_mission_ends_and_says_how(
     ladder.go_on(6000)
     assert ladder.outcome is not None
     raised = [d for d in ladder.seen.values() if d.times]
-    assert all(d.times <= (MOST_CHECKS if d.level is Level.ACTION else MOST_LOST) for d in raised)
+    checks, lost = DEFAULT.plan.max_checks_per_subgoal, DEFAULT.plan.max_lost_per_mission
+    assert all(d.times <= (checks if d.level is Level.ACTION else lost) for d in raised)
     if track <= ACTION_PX and 0.0 <= milestone <= PLAN_PX:
         assert ladder.outcome.kind == "reached" and not raised
     if milestone > PLAN_PX or milestone == UNTOLD:
@@ -336,14 +335,14 @@ def test_in_doubt_it_looks_in_other_directions_before_it_is_lost() -> None:
     ladder.go_on(30)
     ladder.body.says.update(track=500.0, milestone=UNTOLD)
     looked: list[float] = []
-    while len(looked) < MOST_LOOKS and ladder.outcome is None:
-        if len(looked) == MOST_LOOKS - 1:
+    while len(looked) < DEFAULT.plan.max_looks and ladder.outcome is None:
+        if len(looked) == DEFAULT.plan.max_looks - 1:
             ladder.body.says.update(track=1.0, milestone=1.0)
         ladder.go_on(1)
         milestone = open_milestone(ladder.view)
         if unmeasured_doubt(ladder.view) is not None and milestone is not None and milestone.value.status == "expected":
             looked = [*milestone.value.tried, milestone.value.look_heading_rad]
-    assert len({round(heading, 3) for heading in looked}) == MOST_LOOKS
+    assert len({round(heading, 3) for heading in looked}) == DEFAULT.plan.max_looks
     ladder.go_on(2000)
     assert ladder.outcome is not None and ladder.outcome.kind == "reached"
     assert not any(d.level is Level.GOAL for d in ladder.seen.values())
@@ -354,7 +353,8 @@ def test_a_robot_that_something_stops_again_and_again_gives_up() -> None:
     ladder = Ladder()
     ladder.body.is_stuck = True
     ladder.go_on(3000)
-    assert ladder.outcome is not None and ladder.outcome.kind == "blocked" and str(MOST_CHECKS) in ladder.outcome.reason
+    assert ladder.outcome is not None and ladder.outcome.kind == "blocked"
+    assert str(DEFAULT.plan.max_checks_per_subgoal) in ladder.outcome.reason
 
 
 @settings(max_examples=10, deadline=None)

@@ -14,7 +14,7 @@ from harvey.dry_run import dry_run
 from harvey.hardware.body import BASE_WORDS, CAMERA_WORDS
 from harvey.hardware.mission import load_mission
 from harvey.simulation.run import robot_model
-from knowledge_sources.action.fault_handler import FIRST_WAIT_S, LONGEST_WAIT_S, PATIENCE_S, STRIKES
+from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.actuator import ActuatorModel
 
@@ -66,6 +66,7 @@ def test_every_fault_has_advice(word: str) -> None:
 
 
 def test_its_figures_are_those_of_the_experts() -> None:
-    assert (FIRST_WAIT_S, LONGEST_WAIT_S, PATIENCE_S, STRIKES) == (0.25, 2.0, 30.0, 5)
+    s = DEFAULT.action
+    assert (s.min_retry_wait_s, s.max_retry_wait_s, s.max_fault_s, s.max_broken_motions) == (0.25, 2.0, 30.0, 5)
     assert "after 0.25, 0.5, 1, 2, 2, ... s, and after 30 s" in TEXT and "after five motions in a row" in TEXT
     assert f"the default of {ActuatorModel().reach:.3f}" in TEXT

@@ -78,10 +78,10 @@ def test_what_is_watched_is_written_by_somebody() -> None:
 
 
 @each_expert
-def test_it_receives_the_robots_model_of_itself_and_nothing_else(expert: type[KnowledgeSource]) -> None:
+def test_it_receives_the_robots_model_of_itself_and_settings_and_nothing_else(expert: type[KnowledgeSource]) -> None:
     """So no body and no truth can be handed to it."""
     given = list(inspect.signature(expert).parameters.values())
-    assert [p.annotation for p in given] in ([], ["RobotModel"])
+    assert [p.annotation for p in given] in ([], ["RobotModel"], ["RobotModel", "Settings"])
 
 
 @pytest.mark.parametrize("stem", KNOWLEDGE_SOURCES)
@@ -147,6 +147,6 @@ def test_ratings_and_acts_are_pure() -> None:
     scenario = load_scenario("lab-to-allens-office")
     stage = build_stage(replace(scenario, limits=replace(scenario.limits, max_cycles=90)))
     impure: list[str] = []
-    result = run_mission(stage, 1, sources=lambda robot: [asked_twice(s, impure) for s in knowledge_sources(robot)])
+    result = run_mission(stage, 1, sources=lambda *known: [asked_twice(s, impure) for s in knowledge_sources(*known)])
     assert "90 cycles" in result.reason and result.frames > 2
     assert impure == []

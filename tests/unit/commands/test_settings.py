@@ -1,0 +1,138 @@
+"""Settings: each has unit, meaning and source; setting one changes it and nothing else; mistakes are named."""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harvey.agent_settings import build_settings, names
+from harvey.errors import BadInput
+from knowledge_sources.settings import DEFAULT, Settings
+from knowledge_sources.settings.table import Row, list_rows, replace_value
+from world_models.entries.body import LAST_REQUESTS
+from world_models.entries.percepts import LAST_SEGMENTS
+
+ROWS = list_rows()
+UNITS = {"px", "m", "rad", "s", "1", "count", "1/m", "grey levels", "grey levels/px", "name", "yes/no"}
+FOLDER = Path(__file__).parents[3] / "knowledge_sources"
+WORDS = {word for path in FOLDER.rglob("*.py") if path.parent.name != "settings"
+         for word in re.findall(r"\w+", path.read_text(encoding="utf-8"))}
+each_row = pytest.mark.parametrize("row", ROWS, ids=[row.name for row in ROWS])
+
+
+def numbers(settings: Settings) -> dict[str, Any]:
+    """Every field of every room, read from the dataclasses themselves."""
+    rooms = {f.name: getattr(settings, f.name) for f in fields(settings)}
+    return {f"{name}.{f.name}": getattr(room, f.name) for name, room in rooms.items() for f in fields(room)}
+
+
+def another(row: Row) -> Any:
+    """Another value of the same kind."""
+    value: Any = row.value
+    if row.choices:
+        return next(choice for choice in row.choices if choice != value)
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, tuple):
+        return (*value[:-1], value[-1] + 1.0)
+    return value + 1 if value < row.most else value - 1
+
+
+def test_the_table_has_every_field_of_every_room() -> None:
+    assert len(ROWS) > 80
+    assert {row.name: row.value for row in ROWS} == numbers(DEFAULT)
+    assert all(is_dataclass(getattr(DEFAULT, f.name)) for f in fields(DEFAULT))
+
+
+@each_row
+def test_each_has_a_unit_a_meaning_and_a_source(row: Row) -> None:
+    assert row.unit in UNITS
+    assert len(row.what.split()) >= 3 and row.what.endswith(".") and row.what[0].isupper()
+    assert row.source
+    kind = next(f.type for f in fields(getattr(DEFAULT, row.room)) if f.name == row.field)
+    assert kind == {tuple: "tuple[float, ...]"}.get(type(row.value), type(row.value).__name__)
+    assert isinstance(row.value, str) == bool(row.choices) and (not row.choices or row.value in row.choices)
+
+
+@each_row
+def test_each_is_read(row: Row) -> None:
+    assert row.field in WORDS
+
+
+@each_row
+def test_setting_one_changes_it_and_nothing_else(row: Row) -> None:
+    value = another(row)
+    changed = replace_value(DEFAULT, row.name, value)
+    assert numbers(changed) == {**numbers(DEFAULT), row.name: value}
+    assert type(numbers(changed)[row.name]) is type(row.value)
+    written = list(value) if isinstance(value, tuple) else str(value).lower()
+    assert build_settings([(row.name, str(written))]) == changed
+
+
+def test_no_more_is_asked_of_the_board_than_it_keeps() -> None:
+    most = {row.name: row.most for row in ROWS}
+    assert most["plan.max_obstruction_looks"] == LAST_SEGMENTS
+    assert most["action.max_broken_motions"] == LAST_REQUESTS
+
+
+def test_nothing_set_is_the_default() -> None:
+    assert build_settings([]) == DEFAULT == Settings()
+
+
+@pytest.mark.parametrize(("key", "value", "word"), [
+    ("action.min_tolerence_px", "8", r"action\.min_tolerance_px.*harvey settings lists all"),
+    ("tolerances.FLOOR_PX", "8", "expected one of"),
+    ("action.min_tolerance_px", "off", "expected a number as 4, got 'off'"),
+    ("action.min_tolerance_px", "nan", "expected a number"),
+    ("action.min_tolerance_px", "inf", "expected a number"),
+    ("action.max_misses", "2.5", "expected a whole number as 2, got '2.5'"),
+    ("action.max_misses", "-1", "expected a whole number"),
+    ("plan.clearances_m", "0.1", r"expected a list of numbers as \[0.12, 0.06, 0.03\]"),
+    ("plan.max_obstruction_looks", "9", "expected 8 at most, got '9'"),
+    ("matching.objective", "papre", "expected likelihood or paper, got 'papre'"),
+    ("matching.exchange", "1", "expected on or off"),
+    ("plan.clearances_m", "[]", "expected a list of numbers"),
+])
+def test_mistakes_are_named(key: str, value: str, word: str) -> None:
+    with pytest.raises(BadInput, match=word):
+        build_settings([(key, value)])
+
+
+def test_no_setting_is_called_as_a_key_of_a_mission() -> None:
+    """So --set knows which is meant."""
+    from harvey.hardware.mission import FORMAT as HARDWARE
+    from sim.scenario import FORMAT as SCENARIO
+
+    assert not {*SCENARIO.keys(), *HARDWARE.keys()} & set(names())
+
+
+EXCEPTIONS: dict[str, set[str]] = {}
+"""Numbers that may stand at the top of a module, each with its reason beside it there."""
+ROOMS = ("action", "plan", "goal")
+
+
+def stated_numbers(path: Path) -> set[str]:
+    """The upper-case numbers that a module states at its top."""
+    found = set()
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(
+            node, ast.AnnAssign) else []
+        value = getattr(node, "value", None)
+        leaves = [leaf for target in targets for leaf in ast.walk(target) if isinstance(leaf, ast.Name)]
+        if leaves and value is not None and any(
+                isinstance(n, ast.Constant) and isinstance(n.value, int | float) and not isinstance(n.value, bool)
+                for n in ast.walk(value)):
+            found |= {leaf.id for leaf in leaves if leaf.id.strip("_").isupper()}
+    return found
+
+
+def test_no_number_is_stated_at_the_top_of_a_module() -> None:
+    """A number that can be tuned is a setting."""
+    files = [*FOLDER.glob("*.py"), *(path for room in ROOMS for path in (FOLDER / room).rglob("*.py"))]
+    stated = {str(path.relative_to(FOLDER)): stated_numbers(path) for path in files}
+    assert {path: names for path, names in stated.items() if names} == EXCEPTIONS
