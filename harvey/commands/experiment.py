@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 from argparse import ArgumentParser, Namespace
+from textwrap import fill
 
+from experiments import EXPERIMENTS
 from harvey.commands.command import Command, whole
 
 
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", help="which one; harvey list names them")
-    parser.add_argument("--quick", action="store_true", help="a small version")
+    parser.add_argument("--quick", action="store_true",
+                        help="a small version, of seconds to two minutes; it claims only what it can show")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
-    parser.add_argument("--seed", metavar="N", type=whole, default=0, help="of all chance (0)")
+    parser.add_argument("--seed", metavar="N", type=whole, default=0, help="of all random numbers (0)")
 
 
 def _run(args: Namespace) -> int:
@@ -31,7 +34,14 @@ COMMAND = Command(
         ("harvey experiment levels --json", "for further use"),
     ),
     _arguments, _run,
-    "Exit code 0 where the experiment's claims hold, 1 where they do not. With --json one object is printed: title,\n"
-    "rows (the cells by their columns; beside them paper, peer and ours: a figure, several by name, or null), notes\n"
-    "and claims.",
+    "It prints a table, notes (assumptions, and what the columns mean) and claims, each with 'holds' or 'FAILS'.\n"
+    "Exit code 0 if all claims hold, 1 if one does not. With --json one object is printed: title, rows (the cells by\n"
+    "their columns; beside them paper, peer and ours: a figure, several by name, or null), notes and claims.\n\n"
+    "Long ones keep their results and pictures in runs/experiments/NAME/; one that was interrupted continues there.\n"
+    "Peers (PoseLib, CLIPS, py_trees) and IFC are extras: pip install '.[peers,ifc]'. Photographs and buildings by\n"
+    "others are not shipped: HARVEY_DATA=FOLDER names a folder with corridor/ and buildings/.\n\n"
+    "Names, by what is asked (harvey list says more):\n"
+    + "\n".join(fill(", ".join(group), 100, initial_indent=f"  {folder:<12}", subsequent_indent=" " * 14,
+                     break_on_hyphens=False)
+                for folder, group in EXPERIMENTS.items()),
 )

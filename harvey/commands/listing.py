@@ -21,8 +21,8 @@ def _run(_args: Namespace) -> int:
         print(_item(name, load_scenario(name).description))
     for folder, group in experiments.EXPERIMENTS.items():
         print(f"\nexperiments: {folder} (harvey experiment NAME):")
-        for name, what in group.items():
-            print(_item(name, what))
+        for name, summary in sorted(group.items()):
+            print(_item(name, summary))
     print("\nA seed fixes noise and chance: the same scenario and seed give the same run. Without --seed it is 0;"
           "\n--seed 0..19 runs twenty. A mission of your own is a TOML file like those in sim/scenarios/.")
     return 0

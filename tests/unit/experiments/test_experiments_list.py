@@ -1,0 +1,37 @@
+"""The list of experiments: complete, in order, in lines that fit a terminal."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import experiments
+from harvey.cli import main
+
+FOLDER = Path(experiments.__file__).parent
+RUN = re.compile(r"^def run\(quick: bool", re.MULTILINE)
+
+
+def test_every_experiment_is_listed_in_its_folder_in_alphabetical_order() -> None:
+    assert list(experiments.EXPERIMENTS) == sorted(experiments.EXPERIMENTS)
+    for folder, group in experiments.EXPERIMENTS.items():
+        files = [path for path in (FOLDER / folder).glob("*.py") if RUN.search(path.read_text("utf-8"))]
+        assert list(group) == sorted(path.stem.replace("_", "-") for path in files)
+
+
+def test_the_list_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list"]) == 0
+    lines = capsys.readouterr().out.split("experiments: paper")[1].splitlines()
+    summaries = [line for line in lines if line.startswith("  ")]
+    assert len(summaries) == len(experiments.list_names()), "one line each"
+    assert max(map(len, summaries)) <= 80
+
+
+def test_help_names_every_experiment(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["experiment", "--help"])
+    told = capsys.readouterr().out
+    assert [name for name in experiments.list_names() if name not in told] == []
+    assert "--quick" in told and "claims" in told and "runs/experiments" in told
