@@ -17,9 +17,8 @@ import numpy as np
 
 from experiments.report import Cell, Report, count_kinds
 from experiments.shared_data import DUPLEX, data_path, describe_absence
-from experiments.trials import run_trials
+from experiments.trials import campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
-from harvey.run_files.run_directory import RUNS
 from world_models.building.checks import check_world
 from world_models.building.outlines import distance_to_border
 from world_models.building.world import World
@@ -72,7 +71,7 @@ def run(quick: bool, seed: int) -> Report:
             "ifcopenshell is not installed: .venv/bin/pip install '.[ifc]'"
         return Report(title, COLUMNS, (), (f"Nothing was tried: {lacking}.",), (("the house is there", False),))
     text = import_building(path).text
-    folder = RUNS / "imported-building" / f"{'quick' if quick else 'full'}-{seed}-{_digest(text)}"
+    folder = campaign_folder("imported-building", seed, quick=quick) / _digest(text)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "house.toml").write_text(text, encoding="utf-8")
     world = load_world(folder / "house.toml")
@@ -113,7 +112,7 @@ def draw_trips(world: World, count: int, seed: int) -> Iterator[Trip]:
 
 def _groups(world: World) -> Mapping[str, tuple[str, ...]]:
     """Group the rooms in which a robot can stand by whether they can be reached from each other."""
-    left = [room for room in world.rooms if _room_m(world, room) >= MIN_CLEARANCE_M]
+    left = [room for room in world.rooms if _clearance_m(world, room) >= MIN_CLEARANCE_M]
     groups: dict[str, tuple[str, ...]] = {}
     while left:
         group = tuple(room for room in left if world.route(left[0], room) is not None)
@@ -123,8 +122,8 @@ def _groups(world: World) -> Mapping[str, tuple[str, ...]]:
     return groups
 
 
-def _room_m(world: World, room: str) -> float:
-    """How far the middle of a room is from its walls and from what stands in it [m]."""
+def _clearance_m(world: World, room: str) -> float:
+    """Distance of a room's middle from its walls and from the things in it [m]."""
     middle = find_open_point(world, room).in_world(world).position
     return min(distance_to_border(middle, border) for border in (world.outline(room), *world.obstacles(room)))
 
