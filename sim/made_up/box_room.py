@@ -1,4 +1,4 @@
-"""A small furnished room that needs no world file: for trying the renderer and the body by themselves."""
+"""A small furnished room without a world file, for tests of the renderer and the body."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """A region of a box-room face: a flat convex polygon (k, 3) [m] and its looks."""
+    """A region of a face: a flat convex polygon (k, 3) [m], colour and texture."""
 
     name: str
     polygon_world: Any
@@ -23,16 +23,16 @@ class Patch:
 
 @dataclass(frozen=True, eq=False)
 class PatchFace:
-    """A face with regions in front and behind."""
+    """A face with regions on its two sides."""
 
     front: tuple[Patch, ...]
     back: tuple[Patch, ...] = ()
 
 
-def box_faces(low: Any, high: Any, name: str, *, inside: bool = False, **looks: Any) -> tuple[PatchFace, ...]:
+def box_faces(low: Any, high: Any, name: str, *, inside: bool = False, **appearance: Any) -> tuple[PatchFace, ...]:
     """The six faces of an axis-aligned box from corner ``low`` (3,) to ``high`` (3,) [m], seen from out- or inside."""
     return tuple(
-        PatchFace((Patch(f"{name}-{side}", polygon, seed=index, **looks),))
+        PatchFace((Patch(f"{name}-{side}", polygon, seed=index, **appearance),))
         for index, (side, polygon) in enumerate(_sides(np.asarray(low, float), np.asarray(high, float), inside))
     )
 

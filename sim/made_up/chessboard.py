@@ -1,4 +1,4 @@
-"""A chessboard in front of a camera, for trying a calibration: views as a person would take them."""
+"""A chessboard before a camera, in views as a person would take them, for tests of the calibration."""
 
 from __future__ import annotations
 
@@ -13,34 +13,37 @@ from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from world_models.camera import Camera
 from world_models.frames import Pose
 
-FLAT_M = 1e6
-"""A texture scale at which a plain surface is of one colour."""
+UNIFORM_SCALE_M = 1e6
+"""Texture scale at which a plain surface has one colour."""
 WHITE, BLACK, WALL = (0.75, 0.75, 0.75), (0.05, 0.05, 0.05), (0.4, 0.4, 0.4)
 
 
 def chessboard_renderer(columns: int, rows: int, square_m: float, samples: int = 8) -> Renderer:
-    """A board with (columns, rows) inner corners in the plane z = 0, the first of them at (0, 0), x along a row; it is
-    seen from below (z < 0), where x is to the right and y down. A wall is far behind it.
+    """A renderer of a board with (columns, rows) inner corners, before a wall.
+
+    Board frame: the plane z = 0, origin at the first inner corner, x along a row. It is seen from z < 0, with x to the
+    right and y down.
     """
     def rectangle(x0: float, y0: float, x1: float, y1: float, z: float) -> np.ndarray:
         return np.array([(x0, y0, z), (x0, y1, z), (x1, y1, z), (x1, y0, z)])
 
     low, wide, high = -1.9, columns + 0.9, rows + 0.9
-    paper = Patch("paper", square_m * rectangle(low, low, wide, high, 0.0), WHITE, "plain", FLAT_M)
+    paper = Patch("paper", square_m * rectangle(low, low, wide, high, 0.0), WHITE, "plain", UNIFORM_SCALE_M)
     squares = [
-        Patch(f"{i}-{j}", square_m * rectangle(i, j, i + 1, j + 1, 0.0), BLACK, "plain", FLAT_M)
+        Patch(f"{i}-{j}", square_m * rectangle(i, j, i + 1, j + 1, 0.0), BLACK, "plain", UNIFORM_SCALE_M)
         for i in range(-1, columns) for j in range(-1, rows) if (i + j) % 2 == 0
     ]
-    wall = Patch("wall", rectangle(-40.0, -40.0, 40.0, 40.0, 9.0), WALL, "plain", FLAT_M)
+    wall = Patch("wall", rectangle(-40.0, -40.0, 40.0, 40.0, 9.0), WALL, "plain", UNIFORM_SCALE_M)
     return Renderer.of_faces((PatchFace((wall,)), PatchFace((paper, *squares))), samples)
 
 
 def chessboard_view(
     camera: Camera, columns: int, rows: int, square_m: float, rng: np.random.Generator, reach: float = 1.0
 ) -> Pose:
-    """``camera_from_board`` as a person holds a board: near enough to fill a third to most of the picture, anywhere in
-    it, tilted by up to 45 degrees and turned a little. All of the board is in the picture; ``reach`` 1 lets it come to
-    the rim.
+    """A random ``camera_from_board``, as a person holds a board.
+
+    The board is 35 % to 80 % as wide as the picture, tilted by up to 45 degrees, turned a little, and wholly visible.
+    ``reach`` is the part of the margin at the border that it may enter: 1 leaves 4 px.
     """
     outer = np.array([(x, y, 0.0) for x in (-1.0, columns) for y in (-1.0, rows)]) * square_m
     middle = outer.mean(axis=0)
@@ -60,5 +63,5 @@ def chessboard_view(
 def chessboard_picture(
     renderer: Renderer, optics: Optics, camera_from_board: Pose, sensor: SensorParameters, rng: np.random.Generator
 ) -> bytes:
-    """The JPEG bytes that a camera delivers of it."""
+    """The JPEG bytes of a picture of the board."""
     return compress_jpeg(expose(optics.radiance(renderer, camera_from_board), sensor, rng), sensor.jpeg_quality)

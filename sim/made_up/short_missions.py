@@ -1,4 +1,4 @@
-"""Missions on pixels that take seconds, as scenario texts: for experiments that drive many, and for the tests."""
+"""Scenario texts of missions that take seconds, for tests and for experiments with many missions."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ put_down_sigma_in = 0.5
 
 
 def fault(kind: str, in_locale: str, after_ft: float, **more: float) -> str:
-    """What is added to a scenario's text so that something happens there, or anywhere for "":
-    ``fault("bump", "hallway", 7.0, ...)``.
+    """The text of one ``[[faults]]``, to be appended to a scenario: ``fault("bump", "hallway", 7.0, left_m=0.3)``.
+
+    ``in_locale`` "" is anywhere; ``more`` are the fault's own keys.
     """
     where = [f'in_locale = "{in_locale}"'] if in_locale else []
     lines = [f'kind = "{kind}"', *where, f"after_ft = {after_ft}"]

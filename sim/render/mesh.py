@@ -1,4 +1,4 @@
-"""What the renderer draws: every region of the building as a one-sided, convex, flat patch, in arrays."""
+"""The building as arrays of one-sided, convex, flat patches, one for each region."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from sim.render.textures import POSTER, texture_code
 
-MOST = 32767
-"""The rasteriser counts patches in 16 bits."""
+MAX_PATCHES = 32767
+"""The rasterizer numbers patches with 16 bits."""
 
-COPLANAR_M = 1e-6
-"""Regions of a face that lie this near to its plane share it, so that the later one covers the earlier."""
+MAX_COPLANAR_M = 1e-6
+"""Regions of a face within this distance of a plane share it, so that the later one covers the earlier [m]."""
 
 
 class RegionLike(Protocol):
@@ -47,18 +47,18 @@ class FaceLike(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """P patches with V vertices in all.
+    """P patches with V vertices in total.
 
     Attributes:
         vertices_world: (V, 3) [m], counter-clockwise from the visible side.
         first: (P + 1,) int64; patch i owns the vertices ``first[i]:first[i + 1]``.
         planes_world: (P, 4) unit normal n and offset d of n . p = d; the visible side is n . p > d.
-        axes_world: (P, 2, 3) unit texture axes s, t in the plane; t is as near to "up" as the plane allows.
+        axes_world: (P, 2, 3) unit texture axes s, t in the plane; t points as far up as the plane allows.
         origins_m: (P, 2) texture coordinates of the texture's origin.
         colours: (P, 3) reflectance, 0..1.
         textures: (P,) int64 codes of :mod:`sim.render.textures`.
         scales_m: (P,) size of the texture's cells.
-        seeds: (P,) int64.
+        seeds: (P,) int64, of the texture's random numbers.
     """
 
     vertices_world: NDArray[np.float64]
@@ -76,14 +76,15 @@ class Mesh:
 
 
 def build_mesh(faces: Iterable[FaceLike]) -> Mesh:
-    """One patch for each region on each side of each face, in the order given.
+    """Build one patch for each region on each side of each face, in the order given.
 
     Raises:
-        ValueError: a region is not a flat convex polygon of at least three distinct vertices, or is described wrongly.
+        ValueError: a region is not a flat convex polygon of at least three distinct vertices, or has a bad
+            colour, texture or scale.
     """
-    patches = [patch for face in faces for side in (face.front, face.back) for patch in _side(side)]
-    if len(patches) > MOST:
-        raise ValueError(f"expected at most {MOST} regions, got {len(patches)}")
+    patches = [patch for face in faces for side in (face.front, face.back) for patch in _side_patches(side)]
+    if len(patches) > MAX_PATCHES:
+        raise ValueError(f"expected at most {MAX_PATCHES} regions, got {len(patches)}")
     polygons = [polygon for polygon, _, _ in patches]
     planes = np.array([plane for _, plane, _ in patches]).reshape(-1, 4)
     axes = np.array([_texture_axes(plane[:3]) for plane in planes]).reshape(-1, 2, 3)
@@ -101,8 +102,8 @@ def build_mesh(faces: Iterable[FaceLike]) -> Mesh:
     )
 
 
-def _side(regions: Sequence[RegionLike]) -> list[tuple[NDArray[np.float64], NDArray[np.float64], RegionLike]]:
-    """(polygon, plane, region) of one side of a face; coplanar regions get the first one's plane, to the last bit."""
+def _side_patches(regions: Sequence[RegionLike]) -> list[tuple[NDArray[np.float64], NDArray[np.float64], RegionLike]]:
+    """(polygon, plane, region) of one side of a face; coplanar regions get exactly the first one's plane."""
     out: list[tuple[NDArray[np.float64], NDArray[np.float64], RegionLike]] = []
     for region in regions:
         polygon = np.array(region.polygon_world, dtype=np.float64)
@@ -114,11 +115,11 @@ def _side(regions: Sequence[RegionLike]) -> list[tuple[NDArray[np.float64], NDAr
 
 def _lies_in(polygon: NDArray[np.float64], own: NDArray[np.float64], plane: NDArray[np.float64]) -> bool:
     off = np.abs(polygon @ plane[:3] - plane[3])
-    return bool(own[:3] @ plane[:3] > 0 and off.max() < COPLANAR_M)
+    return bool(own[:3] @ plane[:3] > 0 and off.max() < MAX_COPLANAR_M)
 
 
 def plane_of(polygon_world: NDArray[np.float64], name: str = "polygon") -> NDArray[np.float64]:
-    """The plane (4,) = (unit normal, offset) of a flat convex polygon (k, 3), by Newell's sum.
+    """The plane (4,) = (unit normal, offset) of a flat convex polygon (k, 3), by Newell's method.
 
     Raises:
         ValueError: fewer than three vertices, no area, not flat to 1 mm, or not convex.
@@ -143,21 +144,21 @@ def plane_of(polygon_world: NDArray[np.float64], name: str = "polygon") -> NDArr
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """As numpy's, of rows (n, 3), but without its ado, which counts for a few rows at a time."""
+    """Cross products of rows (n, 3); for few rows faster than ``np.cross``."""
     ax, ay, az = a.T
     bx, by, bz = b.T
     return np.column_stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def _texture_axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(2, 3): s along the plane's horizontal, t up the plane; on floors and ceilings s is world x."""
+    """(2, 3) unit axes: s horizontal in the plane, t up the plane; on floors and ceilings s is world x."""
     level = math.hypot(normal[0], normal[1])
     s = np.array([-normal[1], normal[0], 0.0]) / level if level > 1e-6 else np.array([1.0, 0.0, 0.0])
     return np.stack([s, np.cross(normal, s)])
 
 
 def _origin(region: RegionLike, polygon: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Wall textures are anchored in the world, so that neighbours continue; a poster starts at its own corner."""
+    """(2,) origin of the texture: the world's, so that neighbours continue; for a poster its own corner."""
     return (polygon @ axes.T).min(axis=0) if texture_code(region.texture) == POSTER else np.zeros(2)
 
 

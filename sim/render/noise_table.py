@@ -1,4 +1,4 @@
-"""The random numbers of which textures are made: a table, the same on every machine."""
+"""Value noise for the textures: a table of random numbers, the same on every machine."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def noise_table() -> NDArray[np.float32]:
-    """(65536, 4): cell 256 j + i of smooth noise is c0 + c1 a + c2 b + c3 a b, for a and b that go from 0 to 1 in it.
+def build_noise_table() -> NDArray[np.float32]:
+    """The table (65536, 4) of bilinear forms of a 256 x 256 grid of value noise.
 
-    The noise at the cells' corners, in [-1, 1], is a hash (the finaliser of murmur3) of each pair of integers.
+    In cell 256 j + i the noise is c0 + c1 a + c2 b + c3 a b, for a and b from 0 to 1. At the corners it is in [-1, 1]:
+    a hash (the finalizer of MurmurHash3) of the pair of integers.
     """
     i, j = np.meshgrid(np.arange(256, dtype=np.uint64), np.arange(256, dtype=np.uint64))
     h = i * np.uint64(0x9E3779B97F4A7C15) ^ j * np.uint64(0xC2B2AE3D27D4EB4F) ^ np.uint64(0x165667B19E3779F9)

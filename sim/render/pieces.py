@@ -1,8 +1,8 @@
-"""Deferred shading: what is seen, sorted by patch, so that every patch is coloured at one go.
+"""Deferred shading: what is seen, sorted by patch, so that each patch is coloured in one pass.
 
-A piece is a run of pixels of one row that see one patch at all their samples, or one pixel's part that sees one patch
-where others see another. Jitted functions of this file call only one another, because numba's cache does not follow
-calls into other files.
+A piece is a run of pixels of one row that see one patch at all their samples, or the part of one pixel that sees one
+patch where the rest sees others. Compiled functions of this file call only one another, because numba's cache does not
+follow calls into other files.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ class Pieces(NamedTuple):
     """n pieces; patch p's are ``order[first[p]:first[p + 1]]``.
 
     Attributes:
-        row, column, length: (n,) where the piece begins and how many pixels it has.
-        patch: (n,).
-        weight: (n,) the part of each of its pixels that it takes.
-        u, v: (n,) where the first of its pixels is looked at [px]: amid the samples that see the patch.
+        row, column, length: (n,) the first pixel and the number of pixels.
+        patch: (n,) the patch's number.
+        weight: (n,) the part of each of its pixels that it covers.
+        u, v: (n,) the mean position of its samples in the first pixel [px].
         order, first: (n,) and (P + 1,).
-        bare: (height, width) the part of each pixel that sees nothing.
+        bare: (height, width) the part of each pixel that sees the background.
     """
 
     row: Ints
@@ -42,15 +42,15 @@ class Pieces(NamedTuple):
 
 
 def split_pieces(seen: NDArray[np.int16], offsets: NDArray[np.float64], patches: int) -> Pieces:
-    """The pieces of what is seen, (height, N, width), of P patches, at samples with these (N,) offsets [px]."""
-    ints, floats, bare = _take_apart(seen, offsets)
-    order, first = _sorted(ints[3], patches)
+    """Split the patches seen, (height, N, width), into pieces; ``offsets`` (N,) are those of the samples [px]."""
+    ints, floats, bare = _split_rows(seen, offsets)
+    order, first = _sort_by_patch(ints[3], patches)
     return Pieces(ints[0], ints[1], ints[2], ints[3], floats[0], floats[1], floats[2], order, first, bare)
 
 
 @njit(cache=True, error_model="numpy")
 def _find_mixed(seen: Any) -> Any:
-    """Not 0 for pixels (height, width) that see more than one patch, or nothing, at their samples."""
+    """(height, width), not 0 for pixels that see more than one patch, or the background, at their samples."""
     height, samples, width = seen.shape
     mixed = np.empty((height, width), np.int16)
     for y in range(height):
@@ -65,7 +65,7 @@ def _find_mixed(seen: Any) -> Any:
 
 @njit(cache=True, error_model="numpy")
 def _most_pieces(seen: Any) -> int:
-    """At least as many pieces as there are, and not many more: memory that is given back has to be had again.
+    """An upper bound of the number of pieces, for the memory; a tight one, as allocation takes time.
 
     A pixel with c changes among its samples has at most c + 1 <= 2 c pieces. A run of pixels is the first of its row,
     or differs from its neighbour in the first or last sample, or that has c > 1 and so at most 2 c - 1 pieces.
@@ -84,7 +84,7 @@ def _most_pieces(seen: Any) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def _take_apart(seen: Any, offsets: Any) -> Any:
+def _split_rows(seen: Any, offsets: Any) -> Any:
     """The fields of :class:`Pieces`: row, column, length, patch (4, n); weight, u, v (3, n); bare (height, width)."""
     height, _, width = seen.shape
     mixed, bare = _find_mixed(seen), np.zeros((height, width), np.float32)
@@ -102,13 +102,13 @@ def _take_apart(seen: Any, offsets: Any) -> Any:
                 floats[0, at], floats[1, at], floats[2, at] = 1.0, start, y
                 at += 1
             else:
-                at = _split(seen[y, :, x], x, y, offsets, ints, floats, bare, at)
+                at = _split_pixel(seen[y, :, x], x, y, offsets, ints, floats, bare, at)
                 x += 1
     return ints[:, :at], floats[:, :at], bare
 
 
 @njit(cache=True, error_model="numpy")
-def _split(seen: Any, x: int, y: int, offsets: Any, ints: Any, floats: Any, bare: Any, at: int) -> int:
+def _split_pixel(seen: Any, x: int, y: int, offsets: Any, ints: Any, floats: Any, bare: Any, at: int) -> int:
     """Append the pieces of a pixel with samples ``seen`` (N,); returns the new end."""
     samples = len(offsets)
     done = 0
@@ -133,7 +133,7 @@ def _split(seen: Any, x: int, y: int, offsets: Any, ints: Any, floats: Any, bare
 
 
 @njit(cache=True, error_model="numpy")
-def _sorted(patch: Any, patches: int) -> Any:
+def _sort_by_patch(patch: Any, patches: int) -> Any:
     """``order`` and ``first`` of :class:`Pieces`."""
     order, first = np.empty(len(patch), np.int32), np.zeros(patches + 2, np.int64)
     for i in range(len(patch)):

@@ -1,7 +1,4 @@
-"""How the building falls on the image plane.
-
-Projection is written out here on purpose: it is an independent check on ``world_models.camera``.
-"""
+"""The mesh on the image plane of a pinhole: an independent check on ``world_models.camera``."""
 
 from __future__ import annotations
 
@@ -16,7 +13,7 @@ from world_models.camera import Camera
 
 @dataclass(frozen=True, eq=False)
 class Pinhole:
-    """A pinhole: focal lengths and principal point [px], image size [px]; pixel (0, 0) is the first pixel's centre."""
+    """A pinhole camera: focal lengths, principal point and image size [px]; (0, 0) is the first pixel's centre."""
 
     fx: float
     fy: float
@@ -27,7 +24,7 @@ class Pinhole:
 
     @staticmethod
     def of(camera: Camera) -> Pinhole:
-        """Raises ValueError for a camera with lens distortion."""
+        """The pinhole of a camera. Raises ValueError where the camera has lens distortion."""
         if camera.distortion is not None:
             raise ValueError(f"expected a camera without lens distortion, got {camera.distortion}")
         return Pinhole(camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
@@ -35,10 +32,10 @@ class Pinhole:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """The mesh as linear forms of the pixel (u, v, 1), for one pose of the camera.
+    """The mesh as linear forms of the pixel (u, v, 1), for one camera pose.
 
     Attributes:
-        facing: (P,) which patches turn their visible side to the camera.
+        facing: (P,) which patches face the camera with their visible side.
         inverse_depths: (P, 3); 1 / z [1/m] at a pixel is ``inverse_depths @ (u, v, 1)``.
         textures: (P, 2, 3); a texture coordinate [m] is ``(textures @ (u, v, 1)) / inverse_depth + bases``.
         bases_m: (P, 2).
@@ -53,7 +50,7 @@ class View:
 
 
 def project_mesh(mesh: Mesh, lens: Pinhole, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> View:
-    """The mesh seen by a camera at ``camera_from_world`` = (rotation (3, 3), translation (3,) [m])."""
+    """Project the mesh for a camera at ``camera_from_world`` = (rotation (3, 3), translation (3,) [m])."""
     centre = -rotation.T @ translation
     normals, offsets = mesh.planes_world[:, :3], mesh.planes_world[:, 3]
     beyond = offsets - normals @ centre
@@ -69,6 +66,6 @@ def project_mesh(mesh: Mesh, lens: Pinhole, rotation: NDArray[np.float64], trans
 
 
 def _pixel_forms(directions_camera: NDArray[np.float64], lens: Pinhole) -> NDArray[np.float64]:
-    """Directions d (..., 3) as forms (..., 3): d . ray(u, v) = form @ (u, v, 1)."""
+    """Linear forms (..., 3) of directions d (..., 3): d . ray(u, v) = form @ (u, v, 1)."""
     x, y, z = directions_camera[..., 0], directions_camera[..., 1], directions_camera[..., 2]
     return np.stack([x / lens.fx, y / lens.fy, z - x * lens.cx / lens.fx - y * lens.cy / lens.fy], axis=-1)

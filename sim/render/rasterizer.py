@@ -1,10 +1,10 @@
-"""Hidden-surface removal: which patch is seen at each sample of each pixel.
+"""Hidden-surface removal by a depth buffer: which patch is seen at each sample of each pixel.
 
-Every pixel has N samples on N sub-rows, each at another one of N horizontal offsets (N rooks on a chessboard): a
-vertical or horizontal edge, as a level camera sees on every door, is then placed to 1/N px, where a square grid of N
-samples would place it to 1/sqrt(N) px.
+Every pixel has N samples on N sub-rows, each at a different one of N horizontal offsets (an N-rooks pattern). The
+position of a vertical or horizontal edge, as of a door to a level camera, is then resolved to 1/N px; a square grid
+of N samples would resolve 1/sqrt(N) px.
 
-Jitted functions of this file call only one another, because numba's cache does not follow calls into other files.
+Compiled functions of this file call only one another, because numba's cache does not follow calls into other files.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sim.render.mesh import Mesh
 from sim.render.projection import Pinhole, View
 
 NEAR_M = 0.02
-"""Patches are cut at this depth in front of the optical centre [m]."""
+"""Depth of the near clipping plane [m]."""
 
 ROOKS: Mapping[int, tuple[int, ...]] = {
     1: (0,),
@@ -29,27 +29,27 @@ ROOKS: Mapping[int, tuple[int, ...]] = {
     8: (1, 4, 7, 2, 6, 3, 0, 5),
     16: (3, 8, 15, 12, 2, 7, 5, 10, 14, 1, 6, 11, 4, 0, 13, 9),
 }
-"""The column of the sample on each sub-row, found by search over permutations: the worst direction of an edge has an
-RMS error of 0.29, 0.15, 0.080 and 0.049 px (8 samples in bit-reversed order: 0.107)."""
+"""The column of the sample on each sub-row, by number of samples. Found by a search over permutations: the RMS error
+of an edge in the worst direction is 0.29, 0.15, 0.080 and 0.049 px (8 samples in bit-reversed order: 0.107)."""
 
-SHORT = 24
-"""Spans of fewer samples are filled one by one."""
+MIN_VECTOR_SPAN = 24
+"""Spans of fewer samples are filled one by one, longer ones by vector code."""
 
-TILE = 8
-"""Side of the squares [px] in which patches are first found to be hidden."""
+TILE_PX = 8
+"""Side of the tiles of the coarse visibility test [px]."""
 
-NOTHING = -1
-"""The identity of the background."""
+BACKGROUND = -1
+"""The patch number where nothing is seen."""
 
 
 def find_visible_patches(mesh: Mesh, view: View, lens: Pinhole, samples: int) -> NDArray[np.int16]:
-    """The patch seen at every sample, (height, N, width), ``NOTHING`` where none is."""
+    """The number of the patch seen at every sample, (height, N, width); ``BACKGROUND`` where none is."""
     longest = int(np.diff(mesh.first).max(initial=0)) + 2
     boxes, edges, ends = _outlines(
         view.vertices_camera, mesh.first, view.facing, lens.fx, lens.fy, lens.cx, lens.cy, lens.width, lens.height,
         longest,
     )
-    _hide(boxes, _cover_tiles(boxes, edges, ends, view.inverse_depths, lens.width, lens.height))
+    _cull_hidden(boxes, _cover_tiles(boxes, edges, ends, view.inverse_depths, lens.width, lens.height))
     rows, row_first = _patches_of_rows(boxes, lens.height)
     seen: NDArray[np.int16] = _fill(
         boxes, edges, ends, view.inverse_depths, rows, row_first, sample_offsets(samples), lens.width, lens.height
@@ -89,9 +89,9 @@ def _clip_near(vertices: Any, start: int, end: int, out: Any) -> int:
 
 @njit(cache=True, error_model="numpy")
 def _add_edges(pixels: Any, k: int, down: bool, edges: Any, at: int) -> int:
-    """Append those of a polygon's edges that run down (or up) as upper end x, y and dx/dy; returns the new end.
+    """Append the edges of a polygon that run down (or up) as upper end x, y and dx/dy; returns the new end.
 
-    Level edges bound nothing. Two neighbours get the same line from their common edge, to the last bit.
+    Level edges bound nothing. Two neighbours get exactly the same line from their common edge.
     """
     for i in range(k):
         j = i + 1 if i + 1 < k else 0
@@ -143,7 +143,7 @@ def _outlines(vertices: Any, first: Any, facing: Any, fx: float, fy: float, cx: 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _span(edges: Any, ends: Any, y: float, width: int) -> Any:
-    """Where a convex outline is crossed by the line at ``y``: (left, right) [px]."""
+    """The span (left, right) [px] of a convex outline in the row at ``y``."""
     left, right = -1.5, width + 0.5
     for e in range(ends[0], ends[1]):
         left = max(left, edges[e, 0] + edges[e, 2] * (y - edges[e, 1]))
@@ -154,27 +154,28 @@ def _span(edges: Any, ends: Any, y: float, width: int) -> Any:
 
 @njit(cache=True, error_model="numpy")
 def _cover_tiles(boxes: Any, edges: Any, ends: Any, inverse_depths: Any, width: int, height: int) -> Any:
-    """For each tile of the image, a 1/z that something which covers all of the tile reaches everywhere in it."""
-    covered = np.zeros(((height + TILE - 1) // TILE, (width + TILE - 1) // TILE))
+    """For each tile of the image, the greatest 1/z that a patch which covers the whole tile has everywhere in it."""
+    covered = np.zeros(((height + TILE_PX - 1) // TILE_PX, (width + TILE_PX - 1) // TILE_PX))
     for p in range(len(boxes)):
-        if boxes[p, 1] - boxes[p, 0] < TILE or boxes[p, 3] - boxes[p, 2] < TILE:
+        if boxes[p, 1] - boxes[p, 0] < TILE_PX or boxes[p, 3] - boxes[p, 2] < TILE_PX:
             continue
-        low = min(height, math.floor(boxes[p, 1] + 0.5)) // TILE
-        for ty in range(max(0, math.ceil((boxes[p, 0] + 0.5) / TILE)), low):
-            y = ty * TILE - 0.5
+        low = min(height, math.floor(boxes[p, 1] + 0.5)) // TILE_PX
+        for ty in range(max(0, math.ceil((boxes[p, 0] + 0.5) / TILE_PX)), low):
+            y = ty * TILE_PX - 0.5
             left, right = _span(edges, ends[p], y, width)
-            left_low, right_low = _span(edges, ends[p], y + TILE, width)
+            left_low, right_low = _span(edges, ends[p], y + TILE_PX, width)
             left, right = max(left, left_low), min(right, right_low)
-            for tx in range(max(0, math.ceil((left + 0.5) / TILE)), math.floor(min(right + 0.5, float(width)) / TILE)):
-                w = inverse_depths[p, 0] * (tx * TILE - 0.5) + inverse_depths[p, 1] * y + inverse_depths[p, 2]
-                w += min(0.0, TILE * inverse_depths[p, 0]) + min(0.0, TILE * inverse_depths[p, 1])
+            end = math.floor(min(right + 0.5, float(width)) / TILE_PX)
+            for tx in range(max(0, math.ceil((left + 0.5) / TILE_PX)), end):
+                w = inverse_depths[p, 0] * (tx * TILE_PX - 0.5) + inverse_depths[p, 1] * y + inverse_depths[p, 2]
+                w += min(0.0, TILE_PX * inverse_depths[p, 0]) + min(0.0, TILE_PX * inverse_depths[p, 1])
                 covered[ty, tx] = max(covered[ty, tx], w)
     return covered
 
 
 @njit(cache=True, error_model="numpy")
-def _hide(boxes: Any, covered: Any) -> None:
-    """Empty the boxes of patches that lie behind what covers every tile that they reach into."""
+def _cull_hidden(boxes: Any, covered: Any) -> None:
+    """Empty the boxes of patches that are hidden in every tile that they reach into."""
     high, wide = covered.shape
     for p in range(len(boxes)):
         if boxes[p, 1] <= boxes[p, 0]:
@@ -192,12 +193,12 @@ def _hide(boxes: Any, covered: Any) -> None:
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _tile(at: float, count: int) -> int:
     """The tile, 0..count - 1, in or next to which an image coordinate lies."""
-    return int(min(max(at + 0.5, 0.0) / TILE, count - 1.0))
+    return int(min(max(at + 0.5, 0.0) / TILE_PX, count - 1.0))
 
 
 @njit(cache=True, error_model="numpy")
 def _patches_of_rows(boxes: Any, height: int) -> Any:
-    """The patches that reach into row y, ``rows[row_first[y]:row_first[y + 1]]``, in the mesh's order."""
+    """The patches in row y, ``rows[row_first[y]:row_first[y + 1]]``, in the order of the mesh."""
     spans = np.zeros((len(boxes), 2), np.int64)
     row_first = np.zeros(height + 1, np.int64)
     for p in range(len(boxes)):
@@ -220,9 +221,9 @@ def _patches_of_rows(boxes: Any, height: int) -> Any:
 
 @njit(cache=True, error_model="numpy")
 def _fill_long(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest: Any, seen: Any, front: Any) -> None:
-    """Put a patch into a span of a sub-row wherever it is not farther than what is there.
+    """Write a patch into a span of a sub-row wherever it is not farther than what is there.
 
-    Three plain loops and a mask of all ones or none: LLVM makes vector code of these, and not of one with an "if".
+    Three plain loops with a bit mask: LLVM vectorizes these, but not one loop with an "if".
     """
     for i in range(len(columns)):
         front[i] = -np.int16(inverse_depth + step * columns[i] >= nearest[i])
@@ -235,7 +236,7 @@ def _fill_long(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest:
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _fill_short(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest: Any, seen: Any, r: int, start: int,
                 end: int) -> None:
-    """The same for columns ``start`` to ``end`` of sub-row r, one by one (unsigned: no look for negative indices)."""
+    """The same for columns ``start`` to ``end`` of sub-row r, one by one (unsigned: no test for negative indices)."""
     for i in range(np.uint64(start), np.uint64(end)):
         w = inverse_depth + step * columns[i]
         if w >= nearest[r, i]:
@@ -245,14 +246,14 @@ def _fill_short(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _column(x: float, width: int) -> int:
-    """The first column, 0..width, whose sample is not left of x; cheaper than math.ceil."""
+    """The first column, 0..width, whose sample is not left of x; faster than math.ceil."""
     return width - int(width - min(max(x, 0.0), float(width)))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _fill_patch(p: int, heights: Any, boxes: Any, edges: Any, ends: Any, inverse_depths: Any, offsets: Any,
                 columns: Any, nearest: Any, seen: Any, front: Any) -> None:
-    """Put patch p into the sub-rows (N, width) of one pixel row; they lie at ``heights`` (N,) [px]."""
+    """Write patch p into the sub-rows (N, width) of one pixel row, at ``heights`` (N,) [px]."""
     samples, width = nearest.shape
     patch, step = np.int16(p), np.float32(inverse_depths[p, 0])
     for r in range(samples):
@@ -262,7 +263,7 @@ def _fill_patch(p: int, heights: Any, boxes: Any, edges: Any, ends: Any, inverse
         left, right = _span(edges, ends[p], y, width)
         start, end = _column(left - offsets[r], width), _column(right - offsets[r], width)
         w = np.float32(inverse_depths[p, 0] * offsets[r] + inverse_depths[p, 1] * y + inverse_depths[p, 2])
-        if end - start < SHORT:
+        if end - start < MIN_VECTOR_SPAN:
             _fill_short(w, step, columns, patch, nearest, seen, r, start, end)
         else:
             _fill_long(w, step, columns[start:end], patch, nearest[r, start:end], seen[r, start:end], front[start:end])
@@ -271,7 +272,7 @@ def _fill_patch(p: int, heights: Any, boxes: Any, edges: Any, ends: Any, inverse
 @njit(cache=True, error_model="numpy")
 def _fill(boxes: Any, edges: Any, ends: Any, inverse_depths: Any, rows: Any, row_first: Any, offsets: Any,
           width: int, height: int) -> Any:
-    """Row by row, so that the depth buffer of one pixel row stays in the cache."""
+    """The patch at every sample, row by row, so that the depth buffer of one row stays in the cache."""
     samples = len(offsets)
     seen = np.empty((height, samples, width), np.int16)
     nearest = np.empty((samples, width), np.float32)
@@ -281,7 +282,7 @@ def _fill(boxes: Any, edges: Any, ends: Any, inverse_depths: Any, rows: Any, row
     for row in range(height):
         heights = row - 0.5 + sub_rows
         nearest[:] = 0.0
-        seen[row] = NOTHING
+        seen[row] = BACKGROUND
         for p in rows[row_first[row] : row_first[row + 1]]:
             _fill_patch(p, heights, boxes, edges, ends, inverse_depths, offsets, columns, nearest, seen[row], front)
     return seen

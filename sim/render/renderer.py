@@ -1,4 +1,4 @@
-"""What an ideal camera in the building sees: patches in, an image out; the same pose gives the same bytes."""
+"""Renders what a pinhole camera in the building sees; the same pose gives the same bytes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.render.mesh import FaceLike, Mesh, build_mesh
-from sim.render.noise_table import noise_table
+from sim.render.noise_table import build_noise_table
 from sim.render.pieces import split_pieces
 from sim.render.projection import Pinhole, View, project_mesh
 from sim.render.rasterizer import find_visible_patches, sample_offsets
@@ -18,16 +18,17 @@ from world_models.camera import Camera
 from world_models.frames import Pose
 
 AMBIENT = 0.55
+"""Light on every surface, 0..1."""
 LAMPS = (
     ((0.80, 0.30, 0.52), 0.26),
     ((-0.10, 0.55, 0.83), 0.12),
     ((0.10, -0.70, 0.70), 0.12),
     ((0.0, 0.0, -1.0), 0.15),
 )
-"""Directions towards the lights (the last one is the floor, which lights the ceiling) and their strengths."""
+"""(unit direction to the lamp in the world frame, strength); the last is the floor, which lights the ceiling."""
 
 HAZE_PER_M = 0.012
-"""Things get darker with depth: brightness is divided by 1 + haze * depth."""
+"""Brightness is divided by 1 + haze * depth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +36,10 @@ class Renderer:
     """A building, ready to be drawn.
 
     Attributes:
-        mesh: what is drawn.
+        mesh: its patches.
         light: (P, 3) colour times illumination of each patch, 0..1.
-        noise: the table that the textures are made of.
-        samples: samples a pixel, 1, 4, 8 or 16.
+        noise: the table of the textures' value noise.
+        samples: samples per pixel, 1, 4, 8 or 16.
     """
 
     mesh: Mesh
@@ -48,10 +49,11 @@ class Renderer:
 
     @staticmethod
     def of_faces(faces: Iterable[FaceLike], samples: int = 8) -> Renderer:
-        """Raises ValueError where a region cannot be drawn or there is no pattern of so many samples."""
+        """The renderer of these faces. Raises ValueError for a bad region or number of samples."""
         sample_offsets(samples)
         mesh = build_mesh(faces)
-        return Renderer(mesh, mesh.colours * illumination(mesh.planes_world[:, :3])[:, None], noise_table(), samples)
+        light = mesh.colours * illumination(mesh.planes_world[:, :3])[:, None]
+        return Renderer(mesh, light, build_noise_table(), samples)
 
     def radiance(self, camera: Camera, camera_from_world: Pose) -> NDArray[np.float32]:
         """The noiseless image (height, width, 3), RGB in 0..1."""
@@ -60,24 +62,23 @@ class Renderer:
         pieces = split_pieces(
             find_visible_patches(self.mesh, view, lens, self.samples), sample_offsets(self.samples), len(self.mesh)
         )
-        image: NDArray[np.float32] = shade(pieces, self._looks(view), self.noise, HAZE_PER_M)
+        image: NDArray[np.float32] = shade(pieces, self._appearances(view), self.noise, HAZE_PER_M)
         return image
 
     def image(self, camera: Camera, camera_from_world: Pose) -> NDArray[np.uint8]:
         """The noiseless image (height, width, 3), RGB, uint8."""
         return (self.radiance(camera, camera_from_world) * 255.0 + 0.5).astype(np.uint8)
 
-    def _looks(self, view: View) -> NDArray[np.float64]:
-        """(P, 17), as :func:`sim.render.textures.shade` wants it."""
+    def _appearances(self, view: View) -> NDArray[np.float64]:
+        """(P, 17) the parameters of each patch for :func:`sim.render.textures.shade`."""
         mesh = self.mesh
         columns = (view.inverse_depths, view.textures.reshape(-1, 6), view.bases_m, 1.0 / mesh.scales_m[:, None],
                    self.light, mesh.textures[:, None], mesh.seeds[:, None])
-        looks: NDArray[np.float64] = np.concatenate(columns, axis=1)
-        return looks
+        return np.concatenate(columns, axis=1)
 
 
 def illumination(normals_world: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Light (n,) on surfaces with these normals (n, 3): faces that meet in a crease differ."""
+    """Light (n,), 0..1, on surfaces with normals (n, 3) in the world frame."""
     lit = [strength * np.maximum(0.0, normals_world @ np.array(towards)) for towards, strength in LAMPS]
     total: NDArray[np.float64] = np.minimum(1.0, AMBIENT + np.sum(lit, axis=0))
     return total

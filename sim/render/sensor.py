@@ -1,4 +1,4 @@
-"""The camera behind the lens: blur, exposure, noise, JPEG. What comes out is what a USB camera delivers."""
+"""The image sensor: blur, exposure, noise, JPEG, as a USB camera delivers it."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from world_models.bounds import Bounds, check_bounds
 
-MEAN, SPREAD = np.float32(510.0), np.float32(1.0 / np.sqrt((256.0**2 - 1.0) / 3.0))
-"""Mean and reciprocal of the standard deviation of the sum of four random bytes."""
-LEAST, HALF, MOST = np.float32(0.0), np.float32(0.5), np.float32(255.0)
+MEAN, INVERSE_SIGMA = np.float32(510.0), np.float32(1.0 / np.sqrt((256.0**2 - 1.0) / 3.0))
+"""Mean and reciprocal standard deviation of the sum of four random bytes."""
+MIN_LEVEL, HALF, MAX_LEVEL = np.float32(0.0), np.float32(0.5), np.float32(255.0)
 
 BOUNDS: Mapping[str, Bounds] = {
     "gain": Bounds(0.0, 1000.0),
@@ -28,23 +28,23 @@ BOUNDS: Mapping[str, Bounds] = {
     "exposure_s": Bounds(0.0, 10.0),
     "lights_off_gain": Bounds(0.0, 1000.0),
 }
-"""Up to pictures in which nothing is seen any more."""
+"""Up to values at which a picture shows nothing any more."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensorParameters:
-    """How the camera turns light into bytes.
+    """Exposure, noise and compression of the sensor.
 
     Attributes:
-        gain: brightness of the image over the radiance that is rendered.
-        gain_sigma: relative standard deviation of the gain, drawn for each frame.
-        blur_px: standard deviation of the lens's blur; 0 for none.
-        read_noise: standard deviation [grey levels] in the dark.
-        shot_noise: variance [grey levels^2] that each grey level of brightness adds.
+        gain: brightness of the image over the rendered radiance.
+        gain_sigma: relative standard deviation of the gain from frame to frame.
+        blur_px: standard deviation of the Gaussian blur; 0 for none.
+        read_noise: standard deviation in the dark [grey levels].
+        shot_noise: variance for each grey level of brightness [grey levels].
         jpeg_quality: 1..100.
-        frames_per_s: how often a picture is taken on the move.
+        frames_per_s: frame rate on the move.
         exposure_s: exposure time of a picture on the move; 0: no motion blur.
-        lights_off_gain: what is left of the brightness when the lights are off.
+        lights_off_gain: factor on the brightness while the lights are off.
     """
 
     gain: float = 1.25
@@ -64,14 +64,14 @@ class SensorParameters:
 def expose(
     radiance: NDArray[np.float32], parameters: SensorParameters, rng: np.random.Generator, *, lights_on: bool = True
 ) -> NDArray[np.uint8]:
-    """The image (h, w, 3) uint8 that the sensor reads of a radiance (h, w, 3) in 0..1; draws twice from ``rng``."""
+    """The image (h, w, 3) uint8 of a radiance (h, w, 3), 0..1. Always takes two numbers from ``rng``."""
     gain = parameters.gain * max(0.0, 1.0 + parameters.gain_sigma * float(rng.standard_normal()))
     key = int(rng.integers(0, 2**62))
     if not lights_on:
         gain *= parameters.lights_off_gain
     if parameters.blur_px > 0:
         radiance = np.asarray(cv2.GaussianBlur(radiance, (0, 0), parameters.blur_px), np.float32)
-    image: NDArray[np.uint8] = _noisy(
+    image: NDArray[np.uint8] = _add_noise(
         radiance, np.float32(255.0 * gain), np.float32(parameters.read_noise**2), np.float32(parameters.shot_noise),
         np.uint32(key & 0xFFFFFFFF), np.uint32(key >> 32),
     )
@@ -79,7 +79,7 @@ def expose(
 
 
 def skip_noise_draws(rng: np.random.Generator) -> None:
-    """Draw from ``rng`` what :func:`expose` draws, for a picture that need not be made."""
+    """Take from ``rng`` the numbers that :func:`expose` takes, for a picture that need not be rendered."""
     rng.standard_normal()
     rng.integers(0, 2**62)
 
@@ -93,9 +93,11 @@ def compress_jpeg(image_rgb: NDArray[np.uint8], quality: int) -> bytes:
 
 
 @njit(cache=True, error_model="numpy")
-def _noisy(radiance: Any, gain: Any, read_variance: Any, shot: Any, key: Any, salt: Any) -> Any:
-    """Noise of variance ``read_variance + shot * level``: a counter-based hash (murmur3's finaliser) gives four uniform
-    numbers, whose sum is as good as Gaussian to 3.4 sigma. All is in 32 bits, so that LLVM makes vector code of it.
+def _add_noise(radiance: Any, gain: Any, read_variance: Any, shot: Any, key: Any, salt: Any) -> Any:
+    """Add noise of variance ``read_variance + shot * level`` and round to 8 bits.
+
+    A counter-based hash (MurmurHash3's finalizer) gives four random bytes; their sum is nearly Gaussian to 3.4 sigma.
+    All arithmetic is in 32 bits, so that LLVM vectorizes it.
     """
     levels = radiance.ravel()
     out = np.empty(len(levels), np.uint8)
@@ -107,6 +109,6 @@ def _noisy(radiance: Any, gain: Any, read_variance: Any, shot: Any, key: Any, sa
         pairs = np.uint32((h & np.uint32(0xFF00FF)) + ((h >> np.uint32(8)) & np.uint32(0xFF00FF)))
         total = np.int32(np.uint32((pairs & np.uint32(0xFFFF)) + (pairs >> np.uint32(16))))
         level = gain * levels[i]
-        noise = (np.float32(total) - MEAN) * SPREAD * np.sqrt(read_variance + shot * level)
-        out[i] = np.uint8(np.int32(np.minimum(MOST, np.maximum(LEAST, level + noise + HALF))))
+        noise = (np.float32(total) - MEAN) * INVERSE_SIGMA * np.sqrt(read_variance + shot * level)
+        out[i] = np.uint8(np.int32(np.minimum(MAX_LEVEL, np.maximum(MIN_LEVEL, level + noise + HALF))))
     return out.reshape(radiance.shape)

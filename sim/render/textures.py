@@ -1,13 +1,13 @@
-"""What surfaces look like close up: procedural textures from integer hashes.
+"""Procedural textures: the brightness of a surface from value noise.
 
 A texture is a brightness factor near 1 at plane coordinates (s, t) [m], averaged over the pixel's footprint: joints and
-stripes by their exact box integral, noise by fading out as its cells become smaller than the pixel. Contrast on walls,
-floors and ceilings is low, so that the building's own edges are the strong ones; a poster is loud.
+stripes by the exact box integral, noise by fading out where its cells become smaller than the pixel. Contrast on walls,
+floors and ceilings is low, so that the strong edges are those of the building; a poster has high contrast.
 
-Many points of one patch are coloured at a time, each step for all of them: LLVM makes vector code of loops that are
-short and in single precision, with lookups apart from the arithmetic, and that is three times as fast. What takes
-:class:`Points` is inlined, for it costs a microsecond to hand them over. Jitted functions of this file call
-only one another, because numba's cache does not follow calls into other files.
+Each step is done for a batch of points of one patch. LLVM vectorizes short loops in single precision with the table
+lookups kept apart, which is three times as fast. Functions with :class:`Points` as argument are inlined, as passing
+them takes a microsecond. Compiled functions of this file call only one another, because numba's cache does not follow
+calls into other files.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ TEXTURES = ("plain", "speckle", "wood", "brick", "tiles", "carpet", "stripes", "
 PLAIN, SPECKLE, WOOD, BRICK, TILES, CARPET, STRIPES, POSTER = range(8)
 
 SKY = (0.62, 0.72, 0.84)
-"""Red, green and blue where nothing is seen: indoors that is never so."""
+"""Red, green and blue of the background, which is never seen indoors."""
 
 BATCH = 512
-"""Points that are coloured at a time: few enough for the first cache."""
+"""Points of a batch: few enough for the first-level cache."""
 
 ZERO, HALF, ONE, TWO, THREE, FADE = (np.float32(x) for x in (0.0, 0.5, 1.0, 2.0, 3.0, 1.25))
-LEAST = np.float32(1e-6)
-"""Least half of a footprint that is divided by."""
-FARTHEST = np.float32(1e-4)
-"""Least 1/z [1/m] that is coloured."""
-LAST, ROW = np.int32(255), np.int32(256)
-"""Last column and length of a row of the table of random cells."""
+MIN_HALF = np.float32(1e-6)
+"""Floor of half a footprint, as a divisor."""
+MIN_INVERSE_DEPTH = np.float32(1e-4)
+"""Floor of 1/z [1/m], as a divisor."""
+LAST_COLUMN, ROW_LENGTH = np.int32(255), np.int32(256)
+"""Of the table of random cells."""
 
 
 class Points(NamedTuple):
@@ -45,7 +45,7 @@ class Points(NamedTuple):
         half_s, half_t: half the pixel's footprint, in the same units.
         tone: the texture's brightness factor.
         a, b: place in a random cell; ``cell`` is its place in the table (uint32).
-        left: contrast that is left of the cells; ``value`` is what they give.
+        left: contrast that is left of the cells, 0..1; ``value`` is their noise times this.
     """
 
     u: Any
@@ -76,7 +76,7 @@ def texture_code(name: str) -> int:
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _set_fade(p: Any, n: int, along_s: float, along_t: float) -> bool:
-    """Contrast left when half the pixel's footprint covers so many cells a unit; returns whether there is any."""
+    """Find the contrast that the footprints leave at so many cells a unit; returns whether there is any."""
     fs, ft = np.float32(along_s), np.float32(along_t)
     for k in range(n):
         p.left[k] = np.maximum(ZERO, np.minimum(ONE, FADE - FADE * np.maximum(fs * p.half_s[k], ft * p.half_t[k])))
@@ -85,14 +85,14 @@ def _set_fade(p: Any, n: int, along_s: float, along_t: float) -> bool:
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _cell(i: Any, j: Any, seed: int) -> Any:
-    """Where the cell (i, j), whole float32 numbers, of the texture with this seed stands in the table."""
-    column = np.int32(np.int32(i) + np.int32(113 * seed)) & LAST
-    return np.uint32(column + ROW * (np.int32(np.int32(j) + np.int32(59 * seed)) & LAST))
+    """Index in the table of the cell (i, j), whole float32 numbers, of the texture with this seed."""
+    column = np.int32(np.int32(i) + np.int32(113 * seed)) & LAST_COLUMN
+    return np.uint32(column + ROW_LENGTH * (np.int32(np.int32(j) + np.int32(59 * seed)) & LAST_COLUMN))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _look_up(p: Any, n: int, table: Any) -> None:
-    """The random ``value`` at a place (a, b) in a cell, with the contrast that is left."""
+    """The noise ``value`` at the place (a, b) in a cell, times the contrast that is left."""
     for k in range(n):
         c = table[p.cell[k]]
         p.value[k] = p.left[k] * (c[0] + p.a[k] * c[1] + p.b[k] * (c[2] + p.a[k] * c[3]))
@@ -117,8 +117,8 @@ def _add_noise(p: Any, n: int, table: Any, along_s: float, along_t: float, contr
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _overlap(s: Any, half: Any, i: Any) -> Any:
-    """The part of s - half .. s + half that lies beyond cell i, in which it begins."""
-    return np.minimum(ONE, np.maximum(ZERO, (s + half - i - ONE) / np.maximum(TWO * half, LEAST)))
+    """The part of the interval s - half .. s + half, which begins in cell i, beyond that cell."""
+    return np.minimum(ONE, np.maximum(ZERO, (s + half - i - ONE) / np.maximum(TWO * half, MIN_HALF)))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -136,7 +136,7 @@ def _find_blocks(p: Any, n: int, table: Any, along_s: float, along_t: float, see
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _add_poster(p: Any, n: int, table: Any, seed: int, channel: int) -> None:
-    """Large blocks of colour with rows of small dark ones, as print."""
+    """A poster: large blocks of colour with rows of small dark ones, like print."""
     _find_blocks(p, n, table, 1.0, 1.0, seed + 7 * channel)
     for k in range(n):
         p.tone[k] += np.float32(0.45) * p.value[k]
@@ -147,8 +147,8 @@ def _add_poster(p: Any, n: int, table: Any, seed: int, channel: int) -> None:
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _pulse(x: Any, half: Any, duty: Any) -> Any:
-    """A wave of period 1 that is 1 on the first ``duty`` of each period, averaged over x - half .. x + half."""
-    half = np.maximum(half, LEAST)
+    """A square wave of period 1, which is 1 on the first ``duty`` of it, averaged over x - half .. x + half."""
+    half = np.maximum(half, MIN_HALF)
     low, high = x - half, x + half
     i, j = np.floor(low), np.floor(high)
     return ((j - i) * duty + np.minimum(high - j, duty) - np.minimum(low - i, duty)) / (TWO * half)
@@ -159,7 +159,7 @@ def _add_grid(p: Any, n: int, table: Any, bond: float, courses: float, joint: tu
               dark: float, seed: int) -> None:
     """Bricks or tiles of random tone, and ``dark`` joints that take these parts of their length and height.
 
-    There are so many courses a unit, and every second one is moved by ``bond``.
+    There are ``courses`` rows a unit, and every second one is shifted by ``bond``.
     """
     move, ft, strength, grey = np.float32(bond), np.float32(courses), np.float32(contrast), np.float32(dark)
     duty_s, duty_t = np.float32(joint[0]), np.float32(joint[1])
@@ -205,12 +205,13 @@ def _find_tone(p: Any, n: int, table: Any, code: int, seed: int, channel: int) -
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _place(p: Any, n: int, look: Any) -> None:
-    """Where n pixels (u, v) lie on a patch, and what part of it they cover; ``look`` is its row of :func:`shade`."""
-    f = look.astype(np.float32)
-    scale, base_s, base_t = f[11], np.float32(look[9] * look[11]), np.float32(look[10] * look[11])
+def _locate(p: Any, n: int, appearance: Any) -> None:
+    """Find texture coordinates and footprints of n pixels (u, v); ``appearance`` is a row of :func:`shade`'s."""
+    f = appearance.astype(np.float32)
+    scale = f[11]
+    base_s, base_t = np.float32(appearance[9] * appearance[11]), np.float32(appearance[10] * appearance[11])
     for k in range(n):
-        p.z[k] = ONE / np.maximum(f[0] * p.u[k] + f[1] * p.v[k] + f[2], FARTHEST)
+        p.z[k] = ONE / np.maximum(f[0] * p.u[k] + f[1] * p.v[k] + f[2], MIN_INVERSE_DEPTH)
     for k in range(n):
         p.s[k] = p.z[k] * (f[3] * p.u[k] + f[4] * p.v[k] + f[5])
     for k in range(n):
@@ -226,14 +227,14 @@ def _place(p: Any, n: int, look: Any) -> None:
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _find_colours(p: Any, n: int, look: Any, table: Any, haze_per_m: float, colours: Any) -> None:
+def _find_colours(p: Any, n: int, appearance: Any, table: Any, haze_per_m: float, colours: Any) -> None:
     """Colours (3, n) of a patch at n pixels (u, v)."""
-    _place(p, n, look)
-    code, seed, haze = int(look[15]), int(look[16]), np.float32(haze_per_m)
+    _locate(p, n, appearance)
+    code, seed, haze = int(appearance[15]), int(appearance[16]), np.float32(haze_per_m)
     for channel in range(3):
         if channel == 0 or code == POSTER:
             _find_tone(p, n, table, code, seed, channel)
-        light = np.float32(look[12 + channel])
+        light = np.float32(appearance[12 + channel])
         for k in range(n):
             colours[channel, k] = np.minimum(ONE, light * p.tone[k] / (ONE + haze * p.z[k]))
 
@@ -255,19 +256,19 @@ def _background(bare: Any) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-def shade(pieces: Any, looks: Any, table: Any, haze_per_m: float) -> Any:
-    """The image (height, width, 3) float32, 0..1, that consists of :class:`sim.render.pieces.Pieces`.
+def shade(pieces: Any, appearances: Any, table: Any, haze_per_m: float) -> Any:
+    """The image (height, width, 3) float32, 0..1, of :class:`sim.render.pieces.Pieces`.
 
-    ``looks`` (P, 17) says of each patch: the forms of 1/z, s z^-1 and t z^-1 (9), the texture's base (2), cells a
-    metre, lit colour (3), texture code and seed.
+    ``appearances`` (P, 17) holds of each patch: the forms of 1/z, s z^-1 and t z^-1 (9), the texture's base (2), cells
+    per metre, lit colour (3), texture code and seed.
     """
     image = _background(pieces.bare)
     p, colours = _points(BATCH + image.shape[1]), np.empty((3, BATCH + image.shape[1]), np.float32)
-    for patch in range(len(looks)):
+    for patch in range(len(appearances)):
         start, last = pieces.first[patch], pieces.first[patch + 1]
         while start < last:
             n, end = _gather(pieces, start, last, p)
-            _find_colours(p, n, looks[patch], table, haze_per_m, colours)
+            _find_colours(p, n, appearances[patch], table, haze_per_m, colours)
             _scatter(pieces, start, end, colours, image)
             start = end
     return image
@@ -275,7 +276,7 @@ def shade(pieces: Any, looks: Any, table: Any, haze_per_m: float) -> Any:
 
 @njit(cache=True, error_model="numpy")
 def _gather(pieces: Any, start: int, last: int, p: Any) -> Any:
-    """Pixels (u, v) of a batch of pieces: how many, and with which piece the next batch starts."""
+    """Read the pixels (u, v) of a batch of pieces; returns their number and the first piece of the next batch."""
     n = 0
     while start < last and n < BATCH:
         i = pieces.order[start]
