@@ -1,20 +1,17 @@
 """The command line: ``harvey COMMAND ...``.
 
-Exit codes: 0 reached, or success; 1 not reached; 2 bad input; 130 interrupted; 143 terminated.
+Exit codes: 0 reached, or success; 1 not reached; 2 bad input. A command that was stopped: 130 interrupted, 141 its
+output was closed, 143 terminated.
 """
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
-
-from harvey.commands import COMMANDS
-from harvey.errors import BadInput, Terminated, terminable
-from logs.errors import RecordingError
-from world_models.files.toml.source import WorldError
 
 EPILOG = """examples:
   harvey list                                       what there is to run
@@ -22,34 +19,29 @@ EPILOG = """examples:
   harvey view runs/lab-to-allens-office-0           look at its recording
   harvey why runs/lab-to-allens-office-0 --at 88    ask why it did what it did
 
-exit codes: 0 reached, or success; 1 not reached; 2 bad input.
+exit codes: 0 reached, or success; 1 not reached; 2 bad input; 130 interrupted.
 harvey COMMAND --help tells more and gives examples."""
 
-COLLECT_AFTER = 50_000, 20, 100
-"""Python's search for rings of references goes by how many objects there are more than before. A board's entries are
-many and are in no rings; so it is searched seldom, lest a robot stand still meanwhile."""
+GC_THRESHOLDS = 50_000, 20, 100
+"""A board's entries are many and form no reference cycles, so Python looks for them seldom: the robot waits for it."""
+INTERRUPTED, OUTPUT_CLOSED, TERMINATED = 130, 141, 143
+"""Exit codes as a shell has them: 128 and the number of the signal."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    gc.set_threshold(*COLLECT_AFTER)
+    gc.set_threshold(*GC_THRESHOLDS)
     try:
-        args = _parsed(argv)
-    except SystemExit as stop:
-        return stop.code if isinstance(stop.code, int) else 2
-    try:
-        with terminable():
-            return _answer(args)
-    except KeyboardInterrupt:
-        print("harvey: interrupted; what was recorded so far is kept", file=sys.stderr)
-        return 130
-    except Terminated:
-        print("harvey: terminated; what was recorded so far is kept", file=sys.stderr)
-        return 143
+        return _run(argv)
+    except KeyboardInterrupt as stop:
+        _print_error("interrupted", stop)
+        return INTERRUPTED
 
 
 def parser() -> ArgumentParser:
     """The parser of all commands."""
+    from harvey.commands import COMMANDS
+
     top = ArgumentParser(
         prog="harvey", epilog=EPILOG, formatter_class=RawDescriptionHelpFormatter,
         description="Model-directed mobile robot navigation on a blackboard, after the UMass Mobile Robot system.",
@@ -65,8 +57,24 @@ def parser() -> ArgumentParser:
     return top
 
 
-def _parsed(argv: Sequence[str] | None) -> Namespace:
-    """Raises SystemExit, as argparse does, after telling what is wrong."""
+def _run(argv: Sequence[str] | None) -> int:
+    """The imports are here, not at the top: Ctrl-C is answered while they go on."""
+    from harvey.errors import Terminated, terminable
+
+    try:
+        args = _parse(argv)
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else 2
+    try:
+        with terminable():
+            return _answer(args)
+    except Terminated as stop:
+        _print_error("terminated", stop)
+        return TERMINATED
+
+
+def _parse(argv: Sequence[str] | None) -> Namespace:
+    """Raises SystemExit, as argparse does, after saying what is wrong."""
     args, unknown = parser().parse_known_args(argv)
     if unknown and not args.command.open_ended:
         args.parser.error(f"expected no {unknown[0]!r} here")
@@ -74,19 +82,39 @@ def _parsed(argv: Sequence[str] | None) -> Namespace:
 
 
 def _answer(args: Namespace) -> int:
+    from harvey.errors import BadInput
+    from logs.errors import RecordingError
+    from world_models.files.toml.source import WorldError
+
     try:
         code: int = args.command.run(args)
         sys.stdout.flush()
         return code
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    except BrokenPipeError as error:
+        _discard_output()
+        if hasattr(error, "__notes__"):  # a run was under way
+            _print_error("the output was closed", error)
+        return OUTPUT_CLOSED
     except OSError as error:
-        print(f"harvey: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        name = error.filename
+        if name is None and error.errno == errno.ENOSPC:  # our own files are named; what print writes to is not
+            name = "standard output"
+            _discard_output()
+        _print_error(f"{name}: {error.strerror}" if name else str(error), error)
         return 2
     except (BadInput, WorldError, RecordingError) as error:
-        print(f"harvey: {error}", file=sys.stderr)
+        _print_error(str(error), error)
         return 2
+
+
+def _print_error(text: str, error: BaseException) -> None:
+    """One line on standard error; notes of the error say what was recorded, and how to go on."""
+    print("; ".join([f"harvey: {text}", *getattr(error, "__notes__", ())]), file=sys.stderr)
+
+
+def _discard_output() -> None:
+    """What is still to be printed goes nowhere: standard output takes no more."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 if __name__ == "__main__":

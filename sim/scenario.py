@@ -136,6 +136,8 @@ def load_scenario(path_or_name: str | Path) -> Scenario:
     if path.suffix != ".toml":
         path = SCENARIOS / f"{path_or_name}.toml"
         if str(path_or_name) not in list_scenarios():
+            if Path(path_or_name).is_dir():
+                raise ScenarioError(f"scenario: expected a name or a TOML file, got the directory {path_or_name}")
             near = suggest_keys(str(path_or_name), list_scenarios())
             raise ScenarioError(f"scenario: expected {near}, got {path_or_name!r}")
     try:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import shutil
 import socket
+import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -20,6 +21,7 @@ from rerun.experimental import ViewerClient
 
 from logs.errors import RecordingError
 
+LOCALHOST = "127.0.0.1"
 START_S, SETTLE_S, ATTEMPTS = 6.0, 2.0, 10
 
 NEEDS = "a headless viewer needs a graphics driver; on Debian: apt-get install mesa-vulkan-drivers libvulkan1"
@@ -46,21 +48,35 @@ def look(recording: Path, folder: Path, cycles: Sequence[int]) -> list[str]:
 
 @contextmanager
 def viewer() -> Iterator[Any]:
-    """A viewer without a window; it ends with the block.
+    """A viewer without a window, which only this machine can reach; it ends with the block.
 
     Raises:
         RecordingError: it cannot start.
     """
+    port = str(_free_port())
+    command = [_executable(), "--headless", "--hide-welcome-screen", "--bind", LOCALHOST, "--port", port]
     try:
-        client = ViewerClient.spawn(
-            headless=True, port=_free_port(), hide_welcome_screen=True, executable_path=_executable())
-    except (RuntimeError, OSError, ValueError) as error:
-        raise RecordingError(f"the viewer cannot start ({str(error).strip().splitlines()[0]}); {NEEDS}") from None
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    except OSError as error:
+        raise RecordingError(f"the viewer cannot start ({error.strerror}); {NEEDS}") from None
     try:
+        client = _connect(port)
         _await(client)
         yield client
     finally:
-        client.quit()
+        process.terminate()
+        process.wait()
+
+
+def _connect(port: str) -> Any:
+    """Raises RecordingError where the viewer does not answer."""
+    for _ in range(ATTEMPTS):
+        try:
+            return ViewerClient(f"rerun+http://{LOCALHOST}:{port}/proxy")
+        except (RuntimeError, OSError, ValueError) as error:
+            last = str(error).strip().splitlines()[0]
+            time.sleep(1.0)
+    raise RecordingError(f"the viewer cannot start ({last}); {NEEDS}")
 
 
 def complaints(client: Any) -> list[str]:
@@ -88,14 +104,14 @@ def _await(client: Any) -> None:
     raise RecordingError(f"the viewer draws nothing ({last}); {NEEDS}")
 
 
-def _executable() -> str | None:
+def _executable() -> str:
     """The viewer that is installed beside this Python, whether or not it is on the search path."""
-    return shutil.which("rerun", path=str(Path(sys.executable).parent))
+    return shutil.which("rerun", path=str(Path(sys.executable).parent)) or "rerun"
 
 
 def _free_port() -> int:
     with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
+        probe.bind((LOCALHOST, 0))
         return int(probe.getsockname()[1])
 
 

@@ -70,15 +70,24 @@ class Task:
         """In a line."""
         return " ".join([self.scenario, f"seed {self.seed}", *(f"{key}={value}" for key, value in self.settings)])
 
-    def stage(self) -> Stage:
-        """Raises BadInput where the scenario or a setting cannot be used."""
+    def load(self) -> Scenario:
+        """The scenario with its settings. Raises BadInput where it or a setting cannot be used."""
         from harvey.agent_settings import build_settings
         from sim.scenario import ScenarioError, load_scenario, with_settings
-        from world_models.files.world_files import WorldError, fingerprint
 
         try:
             build_settings(self.agent_settings)
-            scenario = with_settings(load_scenario(self.scenario), dict(self.mission_settings))
+            return with_settings(load_scenario(self.scenario), dict(self.mission_settings))
+        except ScenarioError as error:
+            raise BadInput(str(error)) from None
+
+    def stage(self) -> Stage:
+        """The scenario with its building. Raises BadInput as :meth:`load`, and where the two do not fit."""
+        from sim.scenario import ScenarioError
+        from world_models.files.world_files import WorldError, fingerprint
+
+        try:
+            scenario = self.load()
             try:
                 files = tuple(fingerprint(path) for path in (scenario.world, *scenario.details))
             except (OSError, WorldError):

@@ -10,7 +10,7 @@ from tqdm import tqdm
 
 from blackboard.journal import Decision, Sink
 from harvey.campaign.campaign import Follow, Task
-from harvey.campaign.summary import millimetres
+from harvey.campaign.summary import format_error
 from harvey.campaign.tally import Tally
 from world_models.words import count
 
@@ -95,7 +95,7 @@ def counted(
     with tqdm(total=total, file=out, disable=not out.isatty(), unit="mission", leave=False) as bar:
         for number, (task, result) in enumerate(done, 1):
             if not out.isatty():
-                how = f"{result.outcome}, {millimetres(result.error_m)}"
+                how = f"{result.outcome}, {format_error(result.error_m)}"
                 print(f"{number} of {total}: {task.named}: {how}", file=out, flush=True)
             bar.update()
             yield task, result

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harvey.tables import table
-from world_models.units import INCH_M
+from world_models.units import FOOT_M, INCH_M
 from world_models.words import count, degrees
 
 if TYPE_CHECKING:
@@ -20,8 +20,10 @@ COLUMNS = ("seed", "outcome", "error mm", "inches", "milestones", "refuted", "wr
            "relocated", "collisions", "path m", "robot s", "cycles", "wall s")
 
 
-def millimetres(error_m: float) -> str:
-    """An error in millimetres and inches."""
+def format_error(error_m: float) -> str:
+    """An error in millimetres and inches; beyond a metre in metres and feet."""
+    if abs(error_m) > 1.0:
+        return f"{error_m:.2f} m ({error_m / FOOT_M:.1f} feet)"
     return f"{error_m * 1000.0:.1f} mm ({error_m / INCH_M:.2f} inches)"
 
 
@@ -30,7 +32,7 @@ def one(r: MissionResult, out: Path | None) -> str:
     m = r.milestones
     lines = [
         f"{r.outcome}: {r.reason}",
-        f"  final error   {millimetres(r.error_m)} from the goal, {degrees(r.final_heading_error_rad or 0.0)} off",
+        f"  final error   {format_error(r.error_m)} from the goal, {degrees(r.final_heading_error_rad or 0.0)} off",
         f"  milestones    {m['verified']} verified, {m['refuted']} refuted, {m['not_testable']} not testable,"
         f" {m['false_accepts']} accepted wrongly",
         f"  plans         {count(r.sketches, 'sketch', 'sketches')}, {count(r.replans, 'replan')},"

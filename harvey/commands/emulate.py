@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,10 +14,12 @@ from harvey.errors import BadInput
 
 if TYPE_CHECKING:
     from sim.body.simulated_body import SimulatedBody
+    from sim.emulators.camera_server import CameraServer
     from sim.emulators.emulator import Emulator
     from sim.emulators.ground import Ground
 
 KINDS = ("denning", "p2os", "create2")
+MAX_PORT = 65535
 TELL_S = 1.0
 """How often its place is told, with --trace [s of the base]."""
 
@@ -28,13 +30,19 @@ def _arguments(parser: ArgumentParser) -> None:
                         help="put it where a scenario begins, with the scenario's walls, wheels and faults; else on an"
                              " endless floor")
     parser.add_argument("--seed", metavar="N", type=whole, default=0, help="of the scenario's chance (0)")
-    parser.add_argument("--camera-port", metavar="PORT", type=whole,
+    parser.add_argument("--camera-port", metavar="PORT", type=_port,
                         help="serve what the robot's camera sees as motion JPEG on this port of 127.0.0.1; 0 takes a"
                              " free one")
     parser.add_argument("--calibration", metavar="FILE", help="write what harvey calibrate would find of that camera")
     parser.add_argument("--speed", metavar="X", type=_factor, default=1.0,
                         help="run X times as fast as real time, watchdog and all (1)")
     parser.add_argument("--trace", action="store_true", help="print the traffic, and where the robot is")
+
+
+def _port(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and int(text) <= MAX_PORT):
+        raise ArgumentTypeError(f"expected a port from 0 to {MAX_PORT}, got {text!r}")
+    return int(text)
 
 
 def _factor(text: str) -> float:
@@ -54,30 +62,32 @@ def _run(args: Namespace) -> int:
         raise BadInput("--camera-port and --calibration: expected a --scenario to look at, got none")
     emulator, where, body = _base(args)
     trace = _Trace(args.kind, where) if args.trace else None
-    terminal = PseudoTerminal(emulator, trace)
-    print(f"an emulated {args.kind} base is at {terminal.name}; Ctrl-C ends it", flush=True)
-    try:
-        with _camera(args.camera_port, body):
+    with _camera(args.camera_port, body) as camera, closing(PseudoTerminal(emulator, trace)) as terminal:
+        print(f"an emulated {args.kind} base is at {terminal.name}; Ctrl-C ends it", flush=True)
+        if camera is not None:
+            print(f"its camera is at {camera.url}", flush=True)
+        try:
             terminal.serve(args.speed, until=trace.tell_place if trace else lambda: False)
-    except KeyboardInterrupt:
-        print("the base is gone", file=sys.stderr)
-    finally:
-        terminal.close()
+        except KeyboardInterrupt:
+            print("the base is gone", file=sys.stderr)
     return 0
 
 
 @contextmanager
-def _camera(port: int | None, body: SimulatedBody | None) -> Iterator[None]:
-    """The robot's camera on the network, if it is wanted."""
+def _camera(port: int | None, body: SimulatedBody | None) -> Iterator[CameraServer | None]:
+    """The robot's camera on the network, if it is wanted. Raises BadInput where the port is in use."""
     if port is None or body is None:
-        yield
+        yield None
         return
     from sim.emulators.camera_server import CameraServer
 
     body.picture()  # the renderer is compiled before anybody waits for a picture
-    with CameraServer(body, port) as camera:
-        print(f"its camera is at {camera.url}", flush=True)
-        yield
+    try:
+        server = CameraServer(body, port)
+    except OSError as error:
+        raise BadInput(f"--camera-port {port}: expected a free port, got: {error.strerror}") from None
+    with server as camera:
+        yield camera
 
 
 def _base(args: Namespace) -> tuple[Emulator, Callable[[], tuple[float, str]], SimulatedBody | None]:

@@ -71,11 +71,14 @@ def _again(run: RunDirectory) -> int:
     pictures, agreed, head = pictures_of(run), 0, RunHead.read(run.path)
     elsewhere = head.decided_elsewhere()
     agent = agent_of(head)
-    for told in shown(replay(run, pictures, agent.scheduler())):
-        if not told.same:
-            print(f"{_difference(agreed, told)}\n\n{_perhaps(head, elsewhere)}")
-            return 1
-        agreed += 1
+    try:
+        for decision in shown(replay(run, pictures, agent.scheduler())):
+            if not decision.same:
+                print(f"{_perhaps(head, elsewhere)}\n\n{_difference(agreed, decision)}")
+                return 1
+            agreed += 1
+    except BadInput as error:
+        raise BadInput(f"{error}; the run {elsewhere}" if elsewhere else str(error)) from None
     if not agreed:
         raise BadInput(f"{run.journal}: expected at least one decision, got none")
     frames = count(len(pictures), "frame")

@@ -8,16 +8,18 @@ from pathlib import Path
 
 from harvey.campaign.campaign import Task, run_all, run_task, seeds_of, settings_of
 from harvey.commands.command import Command
-from harvey.errors import BadInput
+from harvey.errors import BadInput, Terminated
 from harvey.run_files.run_directory import RUNS, vacant
 
 
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("scenario", metavar="SCENARIO", help="a name from harvey list, or a TOML file")
-    parser.add_argument("--seed", metavar="N", default="0", help="of all chance: 3, 0..19 or 1,4,9 (0)")
+    parser.add_argument("--seed", metavar="N", default="0",
+                        help="seed of all random numbers: 3, 0..19 or 1,4,9; one run for each (0)")
     parser.add_argument("--out", metavar="DIR",
-                        help="where the run is kept (runs/SCENARIO-SEED; several: one each); an older run of the same"
-                             " scenario and seed there goes, another one is moved aside")
+                        help="directory for the run's files (runs/SCENARIO-SEED; for several seeds a directory for each"
+                             " in it); an older run of the same scenario and seed there is deleted, any other is moved"
+                             " to DIR-older-1")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
                         help="change a setting of the scenario, as servo.action=off, or a number of harvey settings,"
                              " as plan.max_leg_m=2; may be repeated")
@@ -38,6 +40,8 @@ def _run(args: Namespace) -> int:
     tasks = tuple(
         Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1), body, args.go_on) for seed in seeds)
     if args.check:
+        if also := [name for name in ("live", "trace", "go_on") if getattr(args, name)]:
+            raise BadInput(f"--check: expected it without --{also[0].replace('_', '-')}, because nothing is driven")
         return _check(tasks[0])
     if len(tasks) == 1:
         return _one(tasks[0], args)
@@ -73,6 +77,7 @@ def _one(task: Task, args: Namespace) -> int:
     from harvey.why.trace import printing
 
     sinks = (printing(sys.stdout),) if args.trace else ()
+    task.load()  # what is wrong with it is said first
     print(f"{task.named}: setting the stage", file=sys.stderr, flush=True)
     with following(sys.stderr) as follow:
         result = run_task(task, sinks=sinks, follow=None if args.trace else follow, live=args.live)
@@ -85,7 +90,11 @@ def _several(tasks: tuple[Task, ...]) -> int:
     from harvey.campaign.summary import several
 
     tasks[0].stage()
-    results = {task.seed: result for task, result in counted(run_all(tasks), len(tasks), sys.stderr)}
+    try:
+        results = {task.seed: result for task, result in counted(run_all(tasks), len(tasks), sys.stderr)}
+    except (KeyboardInterrupt, Terminated) as stop:
+        stop.add_note("what was recorded is kept; the same command with --go-on goes on")
+        raise
     print(several([results[task.seed] for task in tasks]))
     print(f"the runs are in {tasks[0].out.parent if tasks[0].out else RUNS}")
     return 0 if all(r.outcome == "reached" for r in results.values()) else 1

@@ -109,6 +109,8 @@ def _checked(history: History, as_json: bool) -> int:
     from harvey.why.reach import KINDS, check, named
 
     found = check(history)
+    if not found.decisions:
+        raise BadInput(f"{history.source}: expected at least one decision, got none")
     if as_json:
         print(json.dumps({"decisions": found.decisions, "acts": found.acts, "reached": found.reached, **found.by_kind,
                           "failing": [one.decision.cycle for one in found.failing]}, indent=2))

@@ -192,8 +192,8 @@ def _minds(one: DecisionRecord, other: DecisionRecord, settings: tuple[str, ...]
     for name, sources in only:
         if sources:
             yield f"  able to act only in the {name}: {', '.join(map(words, sources))}"
-    why = "; ".join(settings) or "the runs name no setting that differs"
-    yield f"Until then both were told the same, so the experts, their settings or their code differ: {why}."
+    why = "see \"set differently\" above" if settings else "the runs name no setting that differs"
+    yield f"Until then both observed the same, so the knowledge sources, their settings or their code differ: {why}."
 
 
 def _made(d: DecisionRecord, ref: str) -> EntryRecord | None:

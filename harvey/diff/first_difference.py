@@ -31,6 +31,16 @@ MOST = 6
 LONGEST = 60
 
 
+class _Absent:
+    """A value that is not there."""
+
+    def __str__(self) -> str:
+        return "nothing"
+
+
+ABSENT = _Absent()
+
+
 def first_difference(
     ours: Iterable[DecisionRecord], theirs: Iterable[DecisionRecord]
 ) -> tuple[int, DecisionRecord | None, DecisionRecord | None]:
@@ -97,14 +107,18 @@ def _values(a: EntryRecord, b: EntryRecord) -> list[str]:
 
 
 def differing_leaves(a: Any, b: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """(path, left, right) of each value in which two JSON values differ; lists of other lengths differ as wholes."""
-    if isinstance(a, Mapping) and isinstance(b, Mapping) and a.keys() == b.keys():
-        for key in a:
-            yield from differing_leaves(a[key], b[key], f"{path}.{key}".lstrip("."))
+    """(path, left, right) of each value in which two JSON values differ; lists of other lengths differ as wholes.
+
+    What only one of two objects has is :data:`ABSENT` in the other.
+    """
+    ours, theirs = ({} if x is ABSENT else x for x in (a, b))
+    if isinstance(ours, Mapping) and isinstance(theirs, Mapping) and (ours or theirs):
+        for key in {**ours, **theirs}:
+            yield from differing_leaves(ours.get(key, ABSENT), theirs.get(key, ABSENT), f"{path}.{key}".lstrip("."))
     elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
         for index, (x, y) in enumerate(zip(a, b, strict=True)):
             yield from differing_leaves(x, y, f"{path}[{index}]")
-    elif as_line(a) != as_line(b):
+    elif ABSENT in (a, b) or as_line(a) != as_line(b):
         yield path or "value", a, b
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence, Set
 
-from harvey.campaign.summary import millimetres
+from harvey.campaign.summary import format_error
 from harvey.diff.first_difference import describe, differing_leaves
 from harvey.replay.counterfactual import Answer, Parting
 from harvey.run_files.records import DecisionRecord
@@ -65,9 +65,9 @@ def _end(answer: Answer, run: RunDirectory) -> Iterator[str]:
     yield ""
     yield "How it ends:"
     error_m = before.get("final_error_m")
-    truly = f", {millimetres(error_m)} from the goal" if isinstance(error_m, int | float) else ""
+    truly = f", {format_error(error_m)} from the goal" if isinstance(error_m, int | float) else ""
     yield f"  as recorded:              {before.get('outcome', UNFINISHED)}{truly}"
-    now = f", {millimetres(answer.result.error_m)} from the goal" if answer.result is not None else ""
+    now = f", {format_error(answer.result.error_m)} from the goal" if answer.result is not None else ""
     yield f"  as it would have been:    {answer.outcome.kind}{now}: {answer.outcome.reason}"
 
 

@@ -14,6 +14,7 @@ from blackboard.effect import Post
 from blackboard.journal import Decision, Sink
 from blackboard.scheduler import RAISED, Scheduler
 from harvey.agent import Agent
+from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
 from harvey.run_files.run_recorder import RunRecorder
@@ -117,7 +118,7 @@ class Run:
             outcome = _stopped(files, error)
         except BaseException as error:
             self._close()
-            if files is not None:
+            if files is not None and not isinstance(error, BadInput):
                 error.add_note(f"what was recorded is kept; harvey resume {files.path} goes on with it")
             raise
         not_drawn = self._close()

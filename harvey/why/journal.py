@@ -18,7 +18,7 @@ from harvey.run_files.records import DecisionRecord, EntryRecord, decision_of
 from harvey.why.history import History
 from logs.journal_file import out_of_step
 
-PLAIN = re.compile(rb'\{"cycle":(\d+),"')
+PLAIN = re.compile(rb'\{"cycle":(\d{1,15}),"')
 """How a line begins as the scheduler writes it; a line that begins otherwise is read in full."""
 CHANGE = re.compile(rb'\{"change":"(\w+)","entry":"([^"\\]+)"')
 """How a change begins there. Inside a text every quotation mark has a backslash before it, so no text looks like it."""

@@ -16,6 +16,9 @@ from harvey.why.story import Step, Story, decided
 FOLLOWED = ("Certificate", "Milestone", "Discrepancy")
 """The entries of a verdict; what they wake is what follows."""
 
+MAX_LISTED = 12
+"""So many milestones are named where none is similar."""
+
 
 def milestones(history: History, name: str) -> tuple[str, ...]:
     """Ids of the milestones that a user means: ``Milestone-10``, ``M1 of hallway``, ``M1``, ``check``.
@@ -32,8 +35,10 @@ def milestones(history: History, name: str) -> tuple[str, ...]:
     if not found:
         history.verify()
         there = list(dict.fromkeys(what.partition(", because")[0] for what in called.values()))
-        near = difflib.get_close_matches(name, there, n=4, cutoff=0.4) or there[:4]
-        raise BadInput(f"--milestone: expected a milestone of the run, as {', '.join(near) or 'none'}, got {name!r}")
+        near = difflib.get_close_matches(name, there, n=4, cutoff=0.4) or there[:MAX_LISTED]
+        more = f" ... ({len(there)} in all)" if len(near) == MAX_LISTED < len(there) else ""
+        known = f"{', '.join(near)}{more}" if near else "of which there are none"
+        raise BadInput(f"--milestone: expected a milestone of the run, {known}, got {name!r}")
     return found
 
 

@@ -46,6 +46,8 @@ def find_corners(
     """
     grey = np.ascontiguousarray(image, np.uint8)
     size = (pattern.columns, pattern.rows)
+    if min(grey.shape) < min(size) * settings.min_square_px:
+        return f"the picture is only {grey.shape[1]} x {grey.shape[0]} px"
     found, corners = cv2.findChessboardCorners(grey, size)
     if not found:
         found, corners = cv2.findChessboardCornersSB(grey, size, flags=cv2.CALIB_CB_NORMALIZE_IMAGE)

@@ -345,7 +345,7 @@ def test_sigterm_closes_the_recording(tmp_path: Path) -> None:
     assert "lab-to-allens-office seed 0" in begun
     assert "1 milestone verified" in first
     assert process.returncode == 143
-    assert rest.endswith("harvey: terminated; what was recorded so far is kept\n")
+    assert rest.endswith(f"harvey: terminated; what was recorded is kept; harvey resume {out} goes on with it\n")
     assert "Traceback" not in rest
     assert json.loads((out / "result.json").read_text())["outcome"] == "unfinished"
     journal = list(read_journal(out / "journal.jsonl"))

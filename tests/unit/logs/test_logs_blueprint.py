@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 import rerun.blueprint as rrb
@@ -135,21 +135,30 @@ def test_a_recording_that_is_not_there_is_told(tmp_path: Path) -> None:
 def test_a_viewer_that_dies_of_its_first_frame_is_told(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As one without a graphics driver does, after it has answered."""
+    """As one without a graphics driver does, after it has answered. Only this machine could have reached it."""
     class Dying:
+        commands: ClassVar[list[list[str]]] = []
         quits = 0
 
-        def get_state(self) -> None: ...
+        def __init__(self, command: list[str], **_: object) -> None:
+            self.commands.append(command)
+
+        def terminate(self) -> None:
+            Dying.quits += 1
+
+        def wait(self) -> None: ...
+
+    class Client:
+        def __init__(self, url: str) -> None: ...
 
         def save_screenshot(self, path: str) -> None:
             raise ConnectionError("transport error")
 
-        def quit(self) -> None:
-            self.quits += 1
-
-    dying = Dying()
-    monkeypatch.setattr(looking.ViewerClient, "spawn", lambda **_: dying)
+    monkeypatch.setattr(looking.subprocess, "Popen", Dying)
+    monkeypatch.setattr(looking, "ViewerClient", Client)
     monkeypatch.setattr(looking.time, "sleep", lambda _: None)
     with pytest.raises(RecordingError, match=r"draws nothing \(transport error\); a headless viewer needs a graphics"):
         look(recording, tmp_path / "pictures", [7])
-    assert dying.quits == 1
+    assert Dying.quits == 1
+    [command] = Dying.commands
+    assert command[command.index("--bind") + 1] == "127.0.0.1"

@@ -7,9 +7,11 @@ compressed again here.
 from __future__ import annotations
 
 import re
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Any, Literal, Protocol, get_args
 
 import cv2
@@ -20,6 +22,10 @@ QUALITY = 95
 """JPEG quality of pictures that do not come compressed as JPEG."""
 BLACK_LEVEL, BLACK_SHARE = 8, 0.001
 """A picture in which hardly a pixel is brighter than this grey level is black: noise in the dark stays below it."""
+MAX_DEVICE = 255
+"""Linux numbers no more video devices [/dev/video255]."""
+MAX_OPEN_S = 30.0
+"""A camera that is not open by then does not open: a pipe into which nobody writes, a server that does not answer."""
 MJPG = cv2.VideoWriter.fourcc(*"MJPG")
 
 CameraFaultKind = Literal["unplugged", "late", "dropped", "dark", "wrong size"]
@@ -86,14 +92,41 @@ def open_capture(source: str) -> Capture:
     """VideoCapture of a device by its number, a file or a URL."""
     # What is wrong is told by CameraFault; OpenCV's own words would only come between.
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    if source.isdecimal() and int(source) > MAX_DEVICE:
+        raise CameraFault("unplugged", f"expected a device's number from 0 to {MAX_DEVICE}, got {source}")
     capture = cv2.VideoCapture(int(source) if source.isdecimal() else source)
     return _Untimed(capture) if source.startswith(("http://", "https://")) else capture
 
 
+def open_in_time(open_source: Opener, source: str, max_open_s: float = MAX_OPEN_S) -> Capture:
+    """Open a source in a thread of its own, because OpenCV may wait for ever, and hears no signal meanwhile.
+
+    Raises:
+        CameraFault: it is not open in time.
+    """
+    opened: SimpleQueue[Capture | Exception] = SimpleQueue()
+
+    def work() -> None:
+        try:
+            opened.put(open_source(source))
+        except Exception as error:
+            opened.put(error)
+
+    threading.Thread(target=work, name="camera opener", daemon=True).start()
+    try:
+        capture = opened.get(timeout=max_open_s)
+    except Empty:
+        raise CameraFault("unplugged", f"{source!r} did not open within {max_open_s:g} s") from None
+    if isinstance(capture, Exception):
+        raise capture
+    return capture
+
+
 def is_file(source: str) -> bool:
-    """Whether a source is a file, whose pictures wait for us, and not a device or a stream, whose do not."""
-    special = re.match(r"[a-z][a-z0-9+.-]*://", source) or source.startswith("/dev/")
-    return not (source.isdecimal() or special) or Path(source).is_file()
+    """Whether a source is a file, whose pictures wait for us, and not a device, a pipe or a stream, whose do not."""
+    path = Path(source)
+    special = re.match(r"[a-z][a-z0-9+.-]*://", source) or source.startswith("/dev/") or path.is_fifo()
+    return not (source.isdecimal() or special) or path.is_file()
 
 
 def prepared(capture: Capture, source: str, size: tuple[int, int] | None) -> Capture:

@@ -16,6 +16,7 @@ from harvey.hardware.drivers.cameras.capture import (
     Picture,
     is_file,
     open_capture,
+    open_in_time,
     picture_of,
     prepared,
 )
@@ -70,7 +71,7 @@ class VideoCamera:
         self._frames = 0
 
         def opened() -> Capture:
-            return prepared(capture(source), source, size)
+            return prepared(open_in_time(capture, source), source, size)
 
         self._source: _Source = _Video(opened(), source) if is_file(source) else Newest(opened(), opened, clock)
 

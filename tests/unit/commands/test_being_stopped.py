@@ -1,0 +1,105 @@
+"""What a command says when it is stopped: by a key, by a closed pipe, by a full disk, by a package of another name."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from harvey.cli import main
+from harvey.packages import MARKS
+from harvey.run_files.run_directory import RunDirectory
+
+HARVEY = [sys.executable, "-m", "harvey.cli"]
+
+
+def test_a_closed_pipe_ends_a_run_that_is_not_finished_with_an_error(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    argv = [*HARVEY, "run", "bump", "--trace", "--out", str(out)]
+    with subprocess.Popen(argv, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None and process.stderr is not None
+        process.stdout.readline()
+        process.stdout.close()
+        told = process.stderr.read()
+    assert process.returncode == 141
+    assert RunDirectory(out).read_result()["outcome"] == "unfinished"
+    assert told.splitlines()[-1] == (
+        f"harvey: the output was closed; what was recorded is kept; harvey resume {out} goes on with it")
+
+
+def test_a_closed_pipe_is_no_news_where_nothing_was_under_way() -> None:
+    with subprocess.Popen([*HARVEY, "list"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None and process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 141
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
+def test_a_full_disk_behind_standard_output_is_named() -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([*HARVEY, "list"], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stderr) == (2, "harvey: standard output: No space left on device\n")
+
+
+def test_ctrl_c_where_nothing_is_recorded_says_no_more(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("world_models.files.world_files.load_world", interrupt)
+    assert main(["world", "check", "research_center"]) == 130
+    assert capsys.readouterr().err == "harvey: interrupted\n"
+
+
+def test_ctrl_c_while_modules_are_imported_is_no_traceback() -> None:
+    """The interrupt comes from the module that is imported first of those that a command needs."""
+    program = """
+import sys
+import harvey.cli
+
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == "harvey.commands":
+            raise KeyboardInterrupt
+
+sys.meta_path.insert(0, Interrupting())
+sys.exit(harvey.cli.main(["list"]))
+"""
+    done = subprocess.run([sys.executable, "-c", program], stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stderr) == (130, "harvey: interrupted\n")
+
+
+@pytest.mark.parametrize("command", [["calibrate", "--camera"], ["drive", "--camera"]])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_pipe_into_which_nobody_writes_can_be_interrupted(
+    command: list[str], number: signal.Signals, tmp_path: Path
+) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    world = ["--world", "research_center", "--goal", "(ptrans (hallway (4,4,0)) (hallway (9,4,0)))"]
+    argv = [*HARVEY, *command, str(pipe), *(world if command[0] == "drive" else []), "--out", str(tmp_path / "out")]
+    with subprocess.Popen(argv, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        time.sleep(6.0)
+        assert process.poll() is None
+        process.send_signal(number)
+        assert process.wait(timeout=20.0) == 128 + number
+        assert "Traceback" not in process.stderr.read()
+
+
+@pytest.mark.parametrize("name", MARKS)
+def test_a_package_of_somebody_else_with_the_same_name_is_named(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "__init__.py").write_text("")
+    path = os.pathsep.join([str(tmp_path), *(p for p in sys.path if p)])
+    done = subprocess.run([sys.executable, "-c", "import harvey"], env={**os.environ, "PYTHONPATH": path},
+                          cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1
+    assert f"ImportError: harvey: its package '{name}' is hidden by {tmp_path / name}" in done.stderr
