@@ -16,6 +16,7 @@ from harvey.commands import (
     replay,
     resume,
     run,
+    settings,
     view,
     why,
     world,
@@ -24,5 +25,6 @@ from harvey.commands.command import Command
 
 COMMANDS: tuple[Command, ...] = (
     listing.COMMAND, run.COMMAND, view.COMMAND, why.COMMAND, replay.COMMAND, diff.COMMAND, resume.COMMAND,
-    repair.COMMAND, world.COMMAND, experiment.COMMAND, drive.COMMAND, calibrate.COMMAND, emulate.COMMAND,
+    repair.COMMAND, world.COMMAND, settings.COMMAND, experiment.COMMAND, drive.COMMAND, calibrate.COMMAND,
+    emulate.COMMAND,
 )

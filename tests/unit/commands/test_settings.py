@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -11,6 +12,8 @@ from typing import Any
 import pytest
 
 from harvey.agent_settings import build_settings, names
+from harvey.cli import main
+from harvey.commands.settings import format_value
 from harvey.errors import BadInput
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.table import Row, list_rows, replace_value
@@ -136,3 +139,34 @@ def test_no_number_is_stated_at_the_top_of_a_module() -> None:
     files = [*FOLDER.glob("*.py"), *(path for room in ROOMS for path in (FOLDER / room).rglob("*.py"))]
     stated = {str(path.relative_to(FOLDER)): stated_numbers(path) for path in files}
     assert {path: names for path, names in stated.items() if names} == EXCEPTIONS
+
+
+@each_row
+def test_harvey_settings_prints_it(row: Row, capsys: pytest.CaptureFixture[str]) -> None:
+    """By its room, by its name and in the record; with value, unit, meaning and source."""
+    for name in (row.room, row.name):
+        assert main(["settings", name]) == 0
+        told = " ".join(capsys.readouterr().out.split())
+        assert row.field in told
+        assert " ".join(format_value(row).split()) in told
+    assert main(["settings", row.name, "--json"]) == 0
+    (record,) = json.loads(capsys.readouterr().out)
+    value = list(row.value) if isinstance(row.value, tuple) else row.value
+    assert record == {"name": row.name, "value": value, "unit": row.unit, "meaning": row.what, "source": row.source}
+
+
+def test_harvey_settings_prints_all_within_the_terminals_width(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for width in (120, 160):
+        monkeypatch.setenv("COLUMNS", str(width))
+        assert main(["settings"]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert max(map(len, lines)) <= width
+        assert {line.split()[0] for line in lines if line.startswith("  ") and line[2] != " "} == {
+            row.field for row in ROWS}
+
+
+def test_harvey_settings_names_near_rooms(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["settings", "matchin"]) == 2
+    assert "matching" in capsys.readouterr().err
