@@ -76,7 +76,7 @@ def agent_of(head: RunHead, sources: Sources = knowledge_sources) -> Agent:
     """
     names = [name for name in head.without if SEGMENT.fullmatch(name) is None]
     segments = segments_named(head.without)
-    settings = build_settings([pair for pair in head.constants if not pair[0].startswith(SERVO)], SERVO_KEYS)
+    settings = settings_of(head)
     model = head.model()
     known = [source.name for source in sources(model, settings)]
     robot = replace(model, world=_lacking(model.world, [name for name in names if name not in known], known))
@@ -86,6 +86,11 @@ def agent_of(head: RunHead, sources: Sources = knowledge_sources) -> Agent:
         chosen = tuple(
             _SegmentHider(robot, settings, segments) if isinstance(s, LineFinder) else s for s in chosen)
     return Agent(robot, chosen, _servoing(head, levels), settings)
+
+
+def settings_of(head: RunHead) -> Settings:
+    """The settings of a run. Raises BadInput."""
+    return build_settings([pair for pair in head.constants if not pair[0].startswith(SERVO)], SERVO_KEYS)
 
 
 def segments_named(names: Iterable[str]) -> tuple[tuple[int, int], ...]:

@@ -18,12 +18,11 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import RAISED, Scheduler
 from harvey.wiring import knowledge_sources
-from knowledge_sources.methods.features.lines import SIGMA_ACROSS_PX
 from knowledge_sources.methods.verification.milestone_preview import find_alias, predict_p_false
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.methods.verification.view_quality import compute_view_quality
 from knowledge_sources.questions import held
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings import DEFAULT, Settings
 from world_models.entries.body import MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.task import Command, Milestone, Outcome, PlanSketch
@@ -94,11 +93,13 @@ class IdealBodyPort:
             yield Post(RideReport(value.passage, value.destination, 0.0, 0.0), (change.entry,))
 
 
-def dry_run(robot: RobotModel, task: Command) -> tuple[tuple[MilestonePreview, ...], Outcome]:
+def dry_run(
+    robot: RobotModel, task: Command, settings: Settings = DEFAULT
+) -> tuple[tuple[MilestonePreview, ...], Outcome]:
     """The milestones in the order in which they will come, and how the dry run of the mission ends."""
     robot = replace(robot, continuous=False)
-    experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
-    scheduler = Scheduler([*experts, AcceptEveryMilestone()], ports=(IdealBodyPort(),))
+    sources = [source for source in knowledge_sources(robot, settings) if source.name in TAKING_PART]
+    scheduler = Scheduler([*sources, AcceptEveryMilestone()], ports=(IdealBodyPort(),))
     scheduler.tell([Post(replace(task, start_covariance=diagonal(SEEN_M, SEEN_RAD)))], "user")
     prospects: list[MilestonePreview] = []
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < MOST_CYCLES:
@@ -108,33 +109,37 @@ def dry_run(robot: RobotModel, task: Command) -> tuple[tuple[MilestonePreview, .
         elif decision.refused.startswith(RAISED):
             return tuple(prospects), Outcome("failed", decision.refused.strip().splitlines()[-1])
         else:
-            prospects += _prospects(robot, scheduler.view, decision.made)
+            prospects += _prospects(robot, scheduler.view, decision.made, settings)
     outcome = scheduler.view.latest(Outcome)
     return tuple(prospects), outcome.value if outcome else Outcome("failed", f"not there after {MOST_CYCLES} cycles")
 
 
-def _prospects(robot: RobotModel, view: View, made: Sequence[Change]) -> list[MilestonePreview]:
+def _prospects(
+    robot: RobotModel, view: View, made: Sequence[Change], settings: Settings
+) -> list[MilestonePreview]:
     """Those of the milestones that were just taken for verified."""
     belief = held(view)
     if belief is None:
         return []
     values = (change.entry.value for change in made)
     milestones = (v for v in values if isinstance(v, Milestone) and v.status == "verified")
-    return [_prospect(robot, view, belief.value, milestone) for milestone in milestones]
+    return [_prospect(robot, view, belief.value, milestone, settings) for milestone in milestones]
 
 
-def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Milestone) -> MilestonePreview:
+def _prospect(
+    robot: RobotModel, view: View, belief: Hypothesis, milestone: Milestone, settings: Settings
+) -> MilestonePreview:
     lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
     pose = belief.world_from_robot(robot.world)
     mount = robot.on_floor_of(belief.locale).mount
-    quality = compute_view_quality(lines, robot.camera, mount.camera_from_robot, pose, SIGMA_ACROSS_PX)
-    s = DEFAULT.plan
-    most_m = s.max_sigma_part * _tolerance_m(view, milestone)
+    s, v, sigma_px = settings.plan, settings.verification, settings.features.sigma_across_px
+    quality = compute_view_quality(lines, robot.camera, mount.camera_from_robot, pose, sigma_px)
+    most_m = s.max_sigma_part * (_tolerance_m(view, milestone) or s.check_tolerance_m)
     sharp = quality.sigma_m <= most_m and quality.sigma_rad <= s.max_sigma_rad
     standing = robot.on_floor_of(belief.locale)
-    seen = len(lines) >= DEFAULT.verification.min_matched_lines
-    p_false = predict_p_false(standing, pose, lines, np.array(diagonal(SEEN_M, SEEN_RAD))) if seen else 1.0
-    other = find_alias(standing, belief.locale, pose, lines) if seen else None
+    seen = len(lines) >= v.min_matched_lines
+    p_false = predict_p_false(standing, pose, lines, np.array(diagonal(SEEN_M, SEEN_RAD)), v) if seen else 1.0
+    other = find_alias(standing, belief.locale, pose, lines, v) if seen else None
     clear = sharp and len(lines) >= s.min_lines and p_false <= POSE_CONFIDENCE.accept
     return MilestonePreview(
         milestone.what, belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m,
@@ -144,9 +149,9 @@ def _prospect(robot: RobotModel, view: View, belief: Hypothesis, milestone: Mile
     )
 
 
-def _tolerance_m(view: View, milestone: Milestone) -> float:
-    """Of the subgoal that the milestone ends."""
+def _tolerance_m(view: View, milestone: Milestone) -> float | None:
+    """Of the subgoal that the milestone ends; None where it ends none."""
     sketch = view.get(milestone.sketch)
     if sketch is None or not isinstance(sketch.value, PlanSketch) or milestone.index < 1:
-        return DEFAULT.plan.check_tolerance_m
+        return None
     return float(sketch.value.subgoals[milestone.index - 1].tolerance_m)

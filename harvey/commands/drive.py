@@ -16,6 +16,7 @@ from harvey.run_files.run_directory import RUNS, vacant
 
 if TYPE_CHECKING:
     from blackboard.journal import Decision
+    from harvey.agent_settings import Pairs
     from harvey.hardware.mission import HardwareMission
     from harvey.hardware.preflight import Check, Preflight
     from harvey.runner.result import MissionResult
@@ -36,7 +37,8 @@ def _arguments(parser: ArgumentParser) -> None:
     for name, (_, metavar, text) in OPTIONS.items():
         parser.add_argument(f"--{name}", metavar=metavar, help=text)
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
-                        help="any other key of the file, as start.put_down_sigma_in=2; may be repeated")
+                        help="any other key of the file, as start.put_down_sigma_in=2, or a number of harvey settings;"
+                             " may be repeated")
     parser.add_argument("--dry-run", action="store_true", help="check everything, move nothing")
     parser.add_argument("--out", metavar="DIR", help="where the run is kept (runs/MISSION-drive)")
     parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
@@ -44,23 +46,26 @@ def _arguments(parser: ArgumentParser) -> None:
 
 def _run(args: Namespace) -> int:
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
-    from harvey.campaign.campaign import room_for
+    from harvey.agent_settings import build_settings, split_pairs
+    from harvey.campaign.campaign import room_for, settings_of
+    from harvey.hardware.mission import FORMAT
     from harvey.hardware.preflight import Preflight
 
-    mission = _mission(args)
+    pairs, numbers = split_pairs(settings_of(args.settings), FORMAT.keys())
+    mission = _mission(args, pairs)
     out = vacant(Path(args.out) if args.out else RUNS / f"{mission.name}-drive")
     began = time.monotonic()
 
     def clock() -> float:
         return time.monotonic() - began
 
-    with Preflight(mission, out, clock) as dry:
+    with Preflight(mission, out, clock, build_settings(numbers)) as dry:
         if not checked(dry):
             return 2
         if args.dry_run:
             print("\neverything is ready; nothing was moved")
             return 0
-        return _drive(mission, dry, clock, room_for(out, mission.name, 0), args.live)
+        return _drive(mission, dry, clock, room_for(out, mission.name, 0), args.live, numbers)
 
 
 def checked(dry: Preflight) -> bool:
@@ -73,13 +78,12 @@ def checked(dry: Preflight) -> bool:
     return dry.ok
 
 
-def _mission(args: Namespace) -> HardwareMission:
-    from harvey.campaign.campaign import settings_of
+def _mission(args: Namespace, pairs: Pairs) -> HardwareMission:
     from harvey.hardware.mission import load_mission
     from world_models.files.compiled.schema import SUFFIXES
 
     given = {OPTIONS[name][0]: value for name in OPTIONS if (value := getattr(args, name)) is not None}
-    settings: dict[str, Any] = {**dict(settings_of(args.settings)), **given}
+    settings: dict[str, Any] = {**dict(pairs), **given}
     for key in ("world", "camera.calibration"):  # named on the command line: relative to where we are
         if str(settings.get(key, "")).endswith((".toml", *SUFFIXES)):
             settings[key] = str(Path(settings[key]).resolve())
@@ -94,13 +98,16 @@ def _tell(check: Check) -> None:
         print(f"{'':<21} -> {check.todo}", flush=True)
 
 
-def _drive(mission: HardwareMission, dry: Preflight, clock: Callable[[], float], out: Path, live: bool) -> int:
+def _drive(
+    mission: HardwareMission, dry: Preflight, clock: Callable[[], float], out: Path, live: bool, numbers: Pairs
+) -> int:
     from harvey.hardware.run import drive
 
     if dry.robot is None or dry.base is None or dry.camera is None:
         raise BadInput("expected a world, a base and a camera, and one of them is lacking")
     tell_how_to_stop()
-    result = drive(mission, dry.robot, dry.base, dry.camera, clock, out=out, sinks=[follow], live=live)
+    result = drive(mission, dry.robot, dry.base, dry.camera, clock, out=out, sinks=[follow], live=live,
+                   settings=numbers)
     print(summary(result, out))
     return 0 if result.outcome == "reached" else 1
 

@@ -56,6 +56,7 @@ def _on_hardware(
 ) -> int:
     """Everything is checked as before a first move; then the mission goes on."""
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
+    from harvey.agent import settings_of
     from harvey.commands.drive import checked, follow, summary, tell_how_to_stop
     from harvey.hardware.mission import mission_of
     from harvey.hardware.preflight import Preflight
@@ -67,7 +68,7 @@ def _on_hardware(
     def clock() -> float:
         return time.monotonic() - began_s
 
-    with Preflight(mission, run.path, clock) as dry:
+    with Preflight(mission, run.path, clock, settings_of(head)) as dry:
         if not checked(dry) or dry.base is None or dry.camera is None:
             return 2
         _tell(run, remains, head)

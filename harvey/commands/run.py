@@ -59,12 +59,13 @@ def _out(args: Namespace, seed: int, many: bool) -> Path:
 
 def _check(task: Task) -> int:
     stage = task.stage()
+    from harvey.agent_settings import build_settings
     from harvey.campaign.summary import foreseen, prospects
     from harvey.dry_run import dry_run
     from harvey.simulation.run import robot_model
 
     scenario = stage.scenario
-    ahead, outcome = dry_run(robot_model(scenario), scenario.command)
+    ahead, outcome = dry_run(robot_model(scenario), scenario.command, build_settings(task.agent_settings))
     print(prospects(ahead))
     told, bodes_well = foreseen(ahead, outcome)
     print(f"\nin thought, {scenario.name} {told}")

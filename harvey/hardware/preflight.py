@@ -18,7 +18,7 @@ from harvey.hardware.drivers.bases.base import Base, BaseFault
 from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
 from harvey.hardware.mission import HardwareMission
 from knowledge_sources.methods.features.images import decode
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
@@ -64,8 +64,10 @@ class Preflight:
         prospects: the milestones to come.
     """
 
-    def __init__(self, mission: HardwareMission, out: Path, clock: Callable[[], float]) -> None:
-        self._mission, self._out, self._clock = mission, out, clock
+    def __init__(
+        self, mission: HardwareMission, out: Path, clock: Callable[[], float], settings: Settings = DEFAULT
+    ) -> None:
+        self._mission, self._out, self._clock, self._settings = mission, out, clock, settings
         self._open = ExitStack()
         self.checks: list[Check] = []
         self.robot: RobotModel | None = None
@@ -145,7 +147,7 @@ class Preflight:
             yield Check("goal", f"{lost[0]} is not within its locale", todo)
             return
         yield Check("goal", f"from {origin} to {destination}")
-        self.prospects, outcome = dry_run(robot, self._mission.command)
+        self.prospects, outcome = dry_run(robot, self._mission.command, self._settings)
         if outcome.kind != "reached":
             yield Check("plan", outcome.reason, "another start or goal, or a world with a way between them")
             return
@@ -199,7 +201,7 @@ class Preflight:
                     f"[camera] rate_hz = {eye.rate_hz:g} is needed: less light needs longer exposure; try MJPG, a "
                     "shorter cable, fewer devices on the bus" if slow else "")
         contrast = float(decode(pictures[-1].jpeg).std())
-        is_enough = contrast >= DEFAULT.plan.min_contrast
+        is_enough = contrast >= self._settings.plan.min_contrast
         yield Check("sight", f"contrast {contrast:.0f} of 255",
                     "" if is_enough else "too dark, or the lens is covered: nothing can be recognized")
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from blackboard.journal import Sink
 from harvey.agent import agent_of
+from harvey.agent_settings import Pairs
 from harvey.hardware.body import Eye, HardwareBody, Watching
 from harvey.hardware.drivers.bases.base import Base
 from harvey.hardware.drivers.cameras.video_camera import VideoCamera
@@ -26,11 +27,14 @@ from world_models.robot import RobotModel
 
 def drive(
     mission: HardwareMission, robot: RobotModel, base: Base, camera: VideoCamera, clock: Callable[[], float], *,
-    out: Path, sinks: Sequence[Sink] = (), live: bool = False,
+    out: Path, sinks: Sequence[Sink] = (), live: bool = False, settings: Pairs = (),
 ) -> MissionResult:
-    """Drive to the outcome; however it ends, the base is told to stop, and what was recorded is kept."""
+    """Drive to the outcome; however it ends, the base is told to stop, and what was recorded is kept.
+
+    ``settings`` are those of the agent.
+    """
     head = RunHead.of(HARDWARE, mission.name, 0, mission.world, robot, mission.servo, mission.command,
-                      scenario=mission.source.data, folder=str(mission.folder.resolve()))
+                      scenario=mission.source.data, folder=str(mission.folder.resolve()), constants=settings)
     files = RunDirectory(out)
     eye = Watching(camera, clock, mission.camera.rate_hz)
     with _hardware_run(mission, head, base, eye, clock, files, sinks, live) as run:
