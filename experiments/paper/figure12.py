@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise, zip_longest
 
 import numpy as np
 
 from experiments.report import Cell, Report
 from knowledge_sources.methods.matching import Match, Peak, TraceStep, format_trace, match_lines
+from knowledge_sources.settings.matching import PAPER_MATCHING
 
 NAMES = "ABCD"
 MODEL = (
@@ -90,10 +92,10 @@ def run(quick: bool, seed: int) -> Report:
 
 
 def _search(way: str) -> Match:
-    paper = way == "paper"
+    settings = PAPER_MATCHING if way == "paper" else replace(PAPER_MATCHING, strategy="steepest", exchange=True)
     return match_lines(
-        np.array(MODEL), np.array(DATA), pair_px=PAIR_PX, start=Peak(0.0, (0.0, 0.0), 0.0), first_pairs=FALSE_START,
-        strategy="first" if paper else "steepest", replace=not paper, trace=True,
+        np.array(MODEL), np.array(DATA), settings, pair_px=PAIR_PX, start=Peak(0.0, (0.0, 0.0), 0.0),
+        first_pairs=FALSE_START, trace=True,
     )
 
 

@@ -18,6 +18,7 @@ from knowledge_sources.methods.localization.locate_camera import LEAST_LENGTH_PX
 from knowledge_sources.methods.matching import match_lines
 from knowledge_sources.methods.pose import med_r_and_t
 from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.matching import PAPER_MATCHING
 from world_models.frames import Pose
 
 Array = NDArray[np.float64]
@@ -144,7 +145,7 @@ def _solve_as_paper(
 ) -> Pose:
     """§6 once: rigid 2D match of the projected model, then Med R and T."""
     model, px = select_visible(data.model_lines, frame, prior)
-    match = match_lines(px, segments.segments_px, strategy="first", replace=False, peaks=1)
+    match = match_lines(px, segments.segments_px, PAPER_MATCHING)
     i, k = match.pairs.T
     return med_r_and_t(
         model[i], segments.segments_px[k], frame.camera, prior, landmark_ids=i.tolist(),

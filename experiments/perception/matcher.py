@@ -6,7 +6,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +29,7 @@ from experiments.perception.matcher_scenes import (
 from experiments.report import Cell, Report
 from experiments.trials import campaign_folder
 from knowledge_sources.methods.matching import Similarity2, match_lines
+from knowledge_sources.settings.matching import PAPER_MATCHING
 
 SIZES = ((4, 15), (10, 50), (20, 150), (30, 250), (40, 400))
 MAIN = (20, 150)
@@ -42,20 +43,24 @@ CURVES = (("ours", "ours: likelihood, 3 peaks", OURS), ("peer", "RANSAC + ICP", 
 """Curves of the chart: method, label, colour."""
 TICKS_MS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 
+STEEPEST = replace(PAPER_MATCHING, strategy="steepest", exchange=True, max_starts=3)
+LIKELIHOOD = replace(STEEPEST, objective="likelihood")
+"""Our two searches; with the 3 px of §6.1.4, as the paper's."""
+
 Size = tuple[int, int]
 Method = Callable[[MatchScene, np.random.Generator], Similarity2]
 
 
 def _paper(scene: MatchScene, rng: np.random.Generator) -> Similarity2:
-    return match_lines(scene.model_px, scene.data_px, strategy="first", replace=False, peaks=1).transform
+    return match_lines(scene.model_px, scene.data_px, PAPER_MATCHING).transform
 
 
 def _steepest(scene: MatchScene, rng: np.random.Generator) -> Similarity2:
-    return match_lines(scene.model_px, scene.data_px).transform
+    return match_lines(scene.model_px, scene.data_px, STEEPEST).transform
 
 
 def _likelihood(scene: MatchScene, rng: np.random.Generator) -> Similarity2:
-    return match_lines(scene.model_px, scene.data_px, objective="likelihood").transform
+    return match_lines(scene.model_px, scene.data_px, LIKELIHOOD).transform
 
 
 def _peer(scene: MatchScene, rng: np.random.Generator) -> Similarity2:

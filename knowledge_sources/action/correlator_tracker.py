@@ -166,7 +166,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         world = self._robot.world
         pose, covariance, agreeing = correct_pose(
             self._robot.on_floor_of(belief.locale), seen, anchors, belief.world_from_robot(world),
-            belief.covariance_world(world),
+            belief.covariance_world(world), self._settings,
         )
         hypothesis = Hypothesis.of_world(world, belief.locale, pose, covariance, "tracks", motion=belief.motion)
         return Corrected(hypothesis, agreeing)

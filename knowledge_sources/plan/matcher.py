@@ -68,9 +68,10 @@ class Matcher(RobotKnowledgeSource):
         sigma_px = self._robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / s.rigid_distance_m)
         if sigma_px <= s.max_rigid_sigma_px:
             model_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
-            return match_lines(model_px, data_px, pair_px=s.max_pair_distance_px, objective="likelihood")
+            return match_lines(model_px, data_px, self._settings.matching)
         robot = self._robot.on_floor_of(belief.locale)
         return match_on_floor(
             lines_world, data_px, robot.camera, robot.mount.camera_from_robot,
             belief.world_from_robot(self._robot.world), belief.covariance_world(self._robot.world),
+            self._settings.matching,
         )

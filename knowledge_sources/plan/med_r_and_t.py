@@ -49,6 +49,7 @@ class MedRAndT(RobotKnowledgeSource):
             prior_covariance=prior,
             landmark_ids=[m.landmark_of[i] for i in match.value.pairs[:, 0]],
             sigma_px=self._settings.features.sigma_across_px,
+            settings=self._settings.pose,
         )
         yield Post(
             PoseFix(

@@ -39,7 +39,8 @@ class MatchingSettings:
 
     # In the image
     max_pair_px: float = setting(
-        4.0, "px", "Largest distance of a data end from its model line in the image.", "§6.1.4")
+        4.0, "px", "Largest distance of a data end from its model line in the image.",
+        "§6.1.4 says 3 px; wider for perspective")
     max_pair_rad: float = setting(0.3, "rad", "Largest angle between a data line and its model line.", "§6.1.4")
     pair_sigmas: float = setting(
         3.0, "1", "Standard deviations of a data end in that largest distance, likelihood.", "engineering judgement")
@@ -112,3 +113,9 @@ class MatchingSettings:
     min_pose_difference_sigmas: float = setting(
         0.05, "1", "Poses nearer to each other than this, in the prior's deviations, are one.",
         "engineering judgement")
+
+
+PAPER_MATCHING = MatchingSettings(
+    objective="paper", strategy="first", exchange=False, max_starts=1, max_pair_px=3.0
+)
+"""The paper's own way (§6.1): its match error, first improvement, no exchanges, one start."""

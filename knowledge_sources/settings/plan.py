@@ -90,8 +90,6 @@ class PlanSettings:
         "engineering judgement")
     rigid_distance_m: float = setting(
         2.5, "m", "Distance at which that uncertainty is taken.", "engineering judgement")
-    max_pair_distance_px: float = setting(
-        4.0, "px", "Largest distance of a data line from its model line in the best match.", "engineering judgement")
 
     # Med-R-and-T
     prior_covariance_factor: float = setting(

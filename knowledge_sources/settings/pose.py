@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from knowledge_sources.settings.setting import setting
@@ -102,12 +101,3 @@ class PoseSettings:
         4.0, "1", "A point further than this many standard deviations off is an outlier.", "engineering judgement")
     max_point_rounds: int = setting(
         6, "count", "Rounds in which inliers and pose may still change each other.", "engineering judgement")
-
-    @property
-    def tied_median(self) -> float:
-        """Medians of squared errors up to this are ties: with the most wrong lines, noise alone gives as much.
-
-        The median of all lines is then the quantile 0.5 / (1 - outliers) of the right ones' chi-squared law with two
-        degrees of freedom, 1 - exp(-x / 2).
-        """
-        return -2.0 * math.log(1.0 - 0.5 / (1.0 - self.max_outlier_part))

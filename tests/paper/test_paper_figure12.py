@@ -7,6 +7,7 @@ starts, as there, from C-8 and D-7 alone, both wrong in the end.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 from knowledge_sources.methods.matching import Match, Peak, format_trace, match_lines
+from knowledge_sources.settings.matching import PAPER_MATCHING
 
 MODEL = np.array(
     [
@@ -54,7 +56,7 @@ def solved(**more: Any) -> Match:
         pair_px=10.0,
         start=Peak(0.0, (0.0, 0.0), 0.0),
         trace=True,
-        **{"strategy": "first", "replace": False, "first_pairs": start, **more},
+        **{"settings": PAPER_MATCHING, "first_pairs": start, **more},
     )
 
 
@@ -89,7 +91,8 @@ def test_the_evaluations_span_the_figure_s() -> None:
 
 def test_the_likelihood_agrees_from_the_nearest_pairs() -> None:
     """Its evidence grows with the logarithm of length: from the false start the exchange would come too late."""
-    assert numbered(solved(objective="likelihood", sigma_px=1.0, first_pairs=None, replace=True)) == BELONGS
+    likely = replace(PAPER_MATCHING, objective="likelihood", pair_sigmas=10.0, exchange=True)
+    assert numbered(solved(settings=likely, first_pairs=None)) == BELONGS
 
 
 def test_the_trace_prints_as_a_table() -> None:

@@ -9,8 +9,9 @@ All three search for the correspondence of least match error by local search (§
 
 from knowledge_sources.methods.matching.fit import Similarity2
 from knowledge_sources.methods.matching.hough import Peak
-from knowledge_sources.methods.matching.image_matching import Match, TraceStep, format_trace, match_lines
+from knowledge_sources.methods.matching.image_matching import Match, format_trace, match_lines
 from knowledge_sources.methods.matching.pose_matching import FloorMatch, PoseMatch, match_in_space, match_on_floor
+from knowledge_sources.methods.matching.search import TraceStep
 
 __all__ = [
     "FloorMatch",

@@ -1,46 +1,44 @@
-"""Where to start: a generalised Hough transform over turn and shift (§6.1.4)."""
+"""Where to start: a generalised Hough transform over turn and shift in the image (§6.1.4)."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from knowledge_sources.methods.arrays import Floats, Ints
+from knowledge_sources.settings.matching import MatchingSettings
 
-TURN_STEP_RAD = 0.03
-CELLS = 33
-"""Shift cells along each axis of the accumulator."""
+MIN_LENGTH_PX = 1e-12
+"""Keeps the direction of a segment without length finite."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineTable:
-    """Segments as infinite lines, about a common centre.
+    """n segments as infinite lines, relative to a common centre.
 
     Attributes:
         ends: (n, 2, 2) [px]. middles: (n, 2). directions: (n, 2) unit. normals: (n, 2). offsets: (n,) n . p.
-        lengths: (n,). angles: (n,) of the undirected line.
+        lengths: (n,). angles: (n,) of the undirected line [rad].
     """
 
-    ends: Array
-    middles: Array
-    directions: Array
-    normals: Array
-    offsets: Array
-    lengths: Array
-    angles: Array
+    ends: Floats
+    middles: Floats
+    directions: Floats
+    normals: Floats
+    offsets: Floats
+    lengths: Floats
+    angles: Floats
 
 
-def build_line_table(segments_px: Array, centre: Array) -> LineTable:
-    """Prepare segments (n, 2, 2), coordinates relative to ``centre``."""
+def build_line_table(segments_px: Floats, centre: Floats) -> LineTable:
+    """Prepare segments (n, 2, 2), coordinates relative to ``centre`` (2,)."""
     ends = segments_px - centre
     span = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(span, axis=1)
-    directions = span / np.maximum(lengths, 1e-12)[:, None]
+    directions = span / np.maximum(lengths, MIN_LENGTH_PX)[:, None]
     normals = np.stack([-directions[:, 1], directions[:, 0]], axis=1)
     middles = ends.mean(axis=1)
     return LineTable(
@@ -54,7 +52,7 @@ def build_line_table(segments_px: Array, centre: Array) -> LineTable:
     )
 
 
-def undirected(angles_rad: Array) -> Array:
+def wrap_undirected(angles_rad: Floats) -> Floats:
     """Angles between undirected lines, in [-pi/2, pi/2)."""
     return np.asarray(np.remainder(angles_rad + 0.5 * np.pi, np.pi) - 0.5 * np.pi)
 
@@ -71,48 +69,70 @@ class Peak:
 NO_MOTION = Peak(0.0, (0.0, 0.0), 0.0)
 
 
-def hough_peaks(model: LineTable, data: LineTable, window_px: float, window_rad: float, count: int) -> list[Peak]:
+def find_hough_peaks(model: LineTable, data: LineTable, count: int, settings: MatchingSettings) -> list[Peak]:
     """The best ``count`` separate peaks, best first; no motion if nothing votes.
 
-    A data line near (30 px, 0.3 rad) a model line votes, at each turn that makes them nearly parallel, for the shift
-    across the model line that lays one on the other. A model line's votes at one offset count at most its own length:
-    texture cannot outvote a contour. Gathering each line's votes at n . T gives the accumulator over T.
+    A data line in the window of a model line votes, at each turn that makes them nearly parallel, for the shift across
+    the model line that lays one on the other. A model line's votes at one offset count at most its own length: texture
+    cannot outvote a contour. The sum of each line's votes at n . T is the accumulator over T.
     """
     if not (len(model.ends) and len(data.ends)):
         return [NO_MOTION]
-    turns = _turns(window_rad)
-    step = 2.0 * window_px / (CELLS - 1)
-    votes = _offset_votes(model, data, turns, window_px, window_rad, step)
-    scores = _gathered(model, votes, turns, window_px, step)
-    return _separate_peaks(scores, turns, window_px, step, count)
+    window_px, window_rad = settings.hough_window_px, settings.hough_window_rad
+    half = int(np.ceil(window_rad / settings.hough_step_rad))
+    turns = np.linspace(-half * settings.hough_step_rad, half * settings.hough_step_rad, 2 * half + 1)
+    axis = np.linspace(-window_px, window_px, settings.hough_cells)
+    step = 2.0 * window_px / (settings.hough_cells - 1)
+    votes = _count_offset_votes(model, data, turns, step, settings)
+    scores = _gather(votes, turns, axis, model.normals, step)
+    cells = _suppress_non_maxima(scores, turns, axis, count, window_px, window_rad).tolist()
+    peaks = [
+        Peak(float(turns[t]), (float(axis[u]), float(axis[v])), float(scores[t, v, u]))
+        for t, v, u in cells if scores[t, v, u] > 0.0
+    ]
+    return peaks or [NO_MOTION]
 
 
-def _turns(window_rad: float) -> Array:
-    half = int(np.ceil(window_rad / TURN_STEP_RAD))
-    return np.linspace(-half * TURN_STEP_RAD, half * TURN_STEP_RAD, 2 * half + 1)
+def find_pairs_within(
+    model: LineTable, data: LineTable, window_px: Floats, window_rad: float
+) -> tuple[Ints, Ints]:
+    """Model and data indices (p,) of every pair within the windows.
+
+    Args:
+        window_px: (m,) across the model line, its lever arm for such a turn added, and along it.
+        window_rad: between the directions.
+    """
+    pairs: Ints = _find_pairs_within(
+        np.ascontiguousarray(window_px), window_rad, model.middles, model.normals, model.directions, model.lengths,
+        model.angles, data.middles, data.lengths, data.angles,
+    )
+    return pairs[0], pairs[1]
 
 
-def _offset_votes(
-    model: LineTable, data: LineTable, turns: Array, window_px: float, window_rad: float, step: float
-) -> Array:
-    """(t, m, bins): share of each model line found at each offset across it, at each turn."""
+def _count_offset_votes(
+    model: LineTable, data: LineTable, turns: Floats, step: float, settings: MatchingSettings
+) -> Floats:
+    """(t, m, bins): length of each model line found at each offset across it, at each turn."""
+    window_px, window_rad = settings.hough_window_px, settings.hough_window_rad
     bins = 2 * int(np.ceil(1.5 * window_px / step)) + 1
-    rows, columns = pairs_within(model, data, np.full(len(model.ends), window_px), window_rad)
-    votes: Array = _votes(
-        turns, bins, rows, columns, undirected(data.angles[columns] - model.angles[rows]),
-        model.normals, model.offsets, model.lengths, data.middles, data.lengths, step,
+    rows, columns = find_pairs_within(model, data, np.full(len(model.ends), window_px), window_rad)
+    votes: Floats = _vote(
+        turns, bins, rows, columns, wrap_undirected(data.angles[columns] - model.angles[rows]),
+        model.normals, model.offsets, model.lengths, data.middles, data.lengths, step, settings.hough_step_rad,
     )
     return votes
 
 
 @njit(cache=True, error_model="numpy")
-def _votes(
-    turns: Any, bins: int, rows: Any, columns: Any, angles: Any, normals: Any, offsets: Any, model_lengths: Any,
-    middles: Any, data_lengths: Any, step: float,
-) -> Any:
-    """Each near pair votes, at each turn that makes it nearly parallel, for the offset that lays one on the other; half
-    as much for the offsets beside it."""
-    votes, widest = np.zeros((len(turns), len(normals), bins)), 1.5 * TURN_STEP_RAD
+def _vote(
+    turns: Floats, bins: int, rows: Ints, columns: Ints, angles: Floats, normals: Floats, offsets: Floats,
+    model_lengths: Floats, middles: Floats, data_lengths: Floats, step: float, turn_step: float,
+) -> Floats:
+    """Each near pair votes, at each turn that makes it nearly parallel, for the offset that lays one on the other.
+
+    The offsets beside it get half as much.
+    """
+    votes, widest = np.zeros((len(turns), len(normals), bins)), 1.5 * turn_step
     for t in range(len(turns)):
         c, s = math.cos(turns[t]), math.sin(turns[t])
         for p in range(len(rows)):
@@ -136,24 +156,12 @@ def _votes(
     return votes
 
 
-def pairs_within(
-    model: LineTable, data: LineTable, window_px: Array, window_rad: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Model and data indices (p,) of every pair within the windows: (m,) pixels across the model line, its lever arm
-    for such a turn added, and along it, and an angle."""
-    found: NDArray[np.int64] = _pairs_within(
-        np.ascontiguousarray(window_px), window_rad, model.middles, model.normals, model.directions, model.lengths,
-        model.angles, data.middles, data.lengths, data.angles,
-    )
-    return found[0], found[1]
-
-
 @njit(cache=True, error_model="numpy")
-def _pairs_within(
-    window_px: Any, window_rad: float, middles: Any, normals: Any, directions: Any, lengths: Any, angles: Any,
-    data_middles: Any, data_lengths: Any, data_angles: Any,
-) -> Any:
-    found, count = np.empty((2, len(middles) * len(data_middles)), np.int64), 0
+def _find_pairs_within(
+    window_px: Floats, window_rad: float, middles: Floats, normals: Floats, directions: Floats, lengths: Floats,
+    angles: Floats, data_middles: Floats, data_lengths: Floats, data_angles: Floats,
+) -> Ints:
+    pairs, count = np.empty((2, len(middles) * len(data_middles)), np.int64), 0
     for i in range(len(middles)):
         lever = 0.5 * window_rad * lengths[i]
         for k in range(len(data_middles)):
@@ -162,21 +170,14 @@ def _pairs_within(
             gap = abs(u * directions[i, 0] + v * directions[i, 1]) - 0.5 * (lengths[i] + data_lengths[k])
             angle = abs((data_angles[k] - angles[i] + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
             if across <= window_px[i] + lever and gap <= window_px[i] and angle <= window_rad:
-                found[0, count], found[1, count] = i, k
+                pairs[0, count], pairs[1, count] = i, k
                 count += 1
-    return found[:, :count]
-
-
-def _gathered(model: LineTable, votes: Array, turns: Array, window_px: float, step: float) -> Array:
-    """(t, CELLS, CELLS) accumulator over turn and shift."""
-    axis = np.linspace(-window_px, window_px, CELLS)
-    scores: Array = _gather(votes, turns, axis, model.normals, step)
-    return scores
+    return pairs[:, :count]
 
 
 @njit(cache=True, error_model="numpy")
-def _gather(votes: Any, turns: Any, axis: Any, normals: Any, step: float) -> Any:
-    """At each turn and shift T the sum of what each model line has at its offset n . T."""
+def _gather(votes: Floats, turns: Floats, axis: Floats, normals: Floats, step: float) -> Floats:
+    """(t, cells, cells) accumulator: at each turn and shift T the sum of each model line's votes at its n . T."""
     bins, cells = votes.shape[2], len(axis)
     scores = np.zeros((len(turns), cells, cells))
     across = np.empty(cells)
@@ -198,36 +199,33 @@ def _gather(votes: Any, turns: Any, axis: Any, normals: Any, step: float) -> Any
     return scores
 
 
-def _separate_peaks(scores: Array, turns: Array, window_px: float, step: float, count: int) -> list[Peak]:
-    """Highest cells first, each clearing its neighbourhood (2 turns, 2 cells); ties go to the smaller motion."""
-    axis = np.linspace(-window_px, window_px, CELLS)
-    cells = [cell for cell in _highest(scores, turns, axis, count).tolist() if scores[tuple(cell)] > 0.0]
-    peaks = [Peak(float(turns[t]), (float(axis[u]), float(axis[v])), float(scores[t, v, u])) for t, v, u in cells]
-    return peaks or [NO_MOTION]
-
-
 @njit(cache=True, error_model="numpy")
-def _highest(scores: Any, turns: Any, axis: Any, count: int) -> Any:
-    """(n, 3) cells (turn, v, u), each the highest that those before it leave; a hair lower the larger its motion."""
+def _suppress_non_maxima(
+    scores: Floats, turns: Floats, axis: Floats, count: int, window_px: float, window_rad: float
+) -> Ints:
+    """(n, 3) cells (turn, v, u), highest first; each suppresses those within 2 turns and 2 cells.
+
+    Ties go to the smaller motion.
+    """
     free = np.ones(scores.shape, np.bool_)
     tops, at = np.full(len(turns), -math.inf), np.zeros((len(turns), 3), np.int64)
-    found = np.empty((count, 3), np.int64)
+    cells = np.empty((count, 3), np.int64)
     first, last = 0, len(turns)
     for n in range(count):
-        for t in range(first, last):  # of these turns the highest cell is not known, or taken
+        for t in range(first, last):  # the turns whose highest free cell is not known
             tops[t] = -math.inf
             for v in range(len(axis)):
                 for u in range(len(axis)):
                     if free[t, v, u] and scores[t, v, u] > tops[t]:
-                        motion = abs(turns[t]) / 0.3 + math.hypot(axis[u], axis[v]) / 30.0
+                        motion = abs(turns[t]) / window_rad + math.hypot(axis[u], axis[v]) / window_px
                         if scores[t, v, u] - 1e-6 * motion > tops[t]:
                             tops[t] = scores[t, v, u] - 1e-6 * motion
                             at[t, 0], at[t, 1], at[t, 2] = t, v, u
         best = np.argmax(tops)
         if tops[best] == -math.inf:
-            return found[:n]
-        found[n] = at[best]
-        t, v, u = found[n]
+            return cells[:n]
+        cells[n] = at[best]
+        t, v, u = cells[n]
         first, last = max(t - 2, 0), min(t + 3, len(turns))
         free[first:last, max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3] = False
-    return found
+    return cells

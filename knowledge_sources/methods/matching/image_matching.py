@@ -1,4 +1,4 @@
-"""2D model matching: which data lines show which model lines (§6.1)?"""
+"""2D model matching in the image: which data lines show which model lines (§6.1)?"""
 
 from __future__ import annotations
 
@@ -7,41 +7,36 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching.fit import Fits, Fitting, Similarity2
-from knowledge_sources.methods.matching.hough import LineTable, Peak, build_line_table, hough_peaks
-from knowledge_sources.methods.matching.objective import Objective, Terms, likelihood_terms, paper_terms
+from knowledge_sources.methods.arrays import Floats, Indices, Mask
+from knowledge_sources.methods.matching.fit import Fitting, Similarity2
+from knowledge_sources.methods.matching.hough import LineTable, Peak, build_line_table, find_hough_peaks
+from knowledge_sources.methods.matching.objective import Terms, build_likelihood_terms, build_paper_terms
 from knowledge_sources.methods.matching.pairs import (
-    SETTLE_PX,
     PairTable,
+    build_anchors,
     build_pair_table,
     compute_model_motion,
-    gated,
-    placement_of,
-    settled,
-    start_anchor,
+    compute_placement,
+    find_gated,
+    refine_placements,
 )
 from knowledge_sources.methods.matching.search import (
-    Found,
     PairSpace,
-    Strategy,
+    SearchResult,
     TraceStep,
-    coverage,
-    fit_of,
-    local_search,
-    nearest,
+    build_masks,
+    choose_nearest,
+    compute_coverage,
+    fit_state,
+    list_pairs,
+    search_pairs,
 )
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.matching import MatchingSettings
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-COVER_CELLS = 48
-"""Cells along a model line by which its coverage is counted."""
-SETTLED_A_PEAK = 4
-"""So many Hough peaks are settled for each that the search may start from."""
-
-__all__ = ["Match", "Peak", "Similarity2", "TraceStep", "format_trace", "match_lines"]
+Pair = tuple[int, int]
+"""Model index, data index."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,22 +44,22 @@ class Match:
     """The best correspondence found.
 
     Attributes:
-        pairs: (p, 2) model index, data index; many data lines may go to one model line, sorted.
+        pairs: (p, 2) model index, data index, sorted; many data lines may go to one model line.
         transform: moves the model onto the data, in the image.
         e_fit, e_omission: the two terms of the match error, the second with its weight.
-        coverage: (m,) share of each model line accounted for.
+        coverage: (m,) share of each model line that data lines cover.
         residuals_px: (p, 2) distances of the data ends to the moved model lines.
         objective: under which objective. steps: moves made from the start to this state.
         trace: the states of the search, first to last, if asked for.
     """
 
-    pairs: NDArray[np.intp]
+    pairs: Indices
     transform: Similarity2
     e_fit: float
     e_omission: float
-    coverage: Array
-    residuals_px: Array
-    objective: Objective
+    coverage: Floats
+    residuals_px: Floats
+    objective: str
     steps: int
     trace: tuple[TraceStep, ...] = ()
 
@@ -77,68 +72,49 @@ class Match:
 def match_lines(
     model_px: Any,
     data_px: Any,
+    settings: MatchingSettings = DEFAULT.matching,
     *,
-    hough_px: float = 30.0,
-    hough_rad: float = 0.3,
-    pair_px: Any = 3.0,
-    pair_rad: float = 0.3,
-    alpha: float = 0.5,
-    beta: float = 4.0,
-    objective: Objective = "paper",
-    sigma_px: float | None = None,
-    chance_exponent: float = 3.0,
-    chance_px: float = 10.0,
-    with_scale: bool = False,
-    strategy: Strategy = "steepest",
-    replace: bool = True,
-    peaks: int = 3,
+    pair_px: Any = None,
     start: Peak | None = None,
-    first_pairs: Collection[tuple[int, int]] | None = None,
+    first_pairs: Collection[Pair] | None = None,
     trace: bool = False,
 ) -> Match:
-    """Match the projected model to the data lines.
+    """Match the projected model to the data lines, the model moving as a rigid figure in the image.
 
-    Source: §6.1: a generalised Hough transform over data within (``hough_px``, ``hough_rad``) of the model places
-    the model; pairs within (``pair_px``, ``pair_rad``) of that place form the space; local search finds the state of
-    least match error. The paper's own way is ``strategy="first", replace=False, peaks=1``.
+    Source: §6.1: a generalised Hough transform over the data within a window of the model places the model; the pairs
+    near that place form the space; local search finds the state of least match error. The paper's own way is
+    ``replace(settings, objective="paper", strategy="first", exchange=False, max_starts=1)``.
 
     Args:
         model_px: (m, 2, 2) projected model lines. data_px: (k, 2, 2) data lines.
-        pair_px: how far a data end may lie from its model line; one number, or (m,) when some model lines are
-            predicted worse than others. Wider than 3 px when perspective bends the prediction (large pose error).
-        alpha, beta: of the objective "paper".
-        sigma_px: of a data end about its model line, for "likelihood"; ``None``: a third of ``pair_px``, at least 1.
-        chance_exponent, chance_px: of "likelihood", see :func:`likelihood_terms`.
-        with_scale: fit a scale too.
-        strategy: "steepest", or the paper's "first" improvement. replace: allow exchanges at local minima.
-        peaks: placements tried. start: this placement (about the mean of the model's ends) instead of Hough's.
-        first_pairs: (model, data) pairs of the first state; ``None``: each near data line to its nearest model line.
-        trace: keep the states of the search.
+        pair_px: how far a data end may lie from its model line, in place of ``settings.max_pair_px``: one number, or
+            (m,) when some model lines are predicted worse than others. Wider when perspective bends the prediction.
+        start: this placement (about the mean of the model's ends) instead of Hough's.
+        first_pairs: pairs of the first state; ``None``: each near data line to its nearest model line.
+        trace: keep the states of the search, see :func:`format_trace`.
+
+    Raises:
+        ValueError: a wrong shape, a distance that is not > 0, an unknown objective or strategy.
     """
-    model, data = _checked(model_px, "model_px"), _checked(data_px, "data_px")
+    model, data = _check_lines(model_px, "model_px"), _check_lines(data_px, "data_px")
     centre = model.reshape(-1, 2).mean(axis=0) if len(model) else np.zeros(2)
     still, scene = build_line_table(model, centre), build_line_table(data, centre)
-    gates = _gates(pair_px, len(model))
-    width = float(np.median(gates)) if len(gates) else 3.0
-    if objective == "paper":
-        terms = paper_terms(still.lengths, scene.lengths, alpha, beta)
-    elif objective == "likelihood":
-        sigma = max(1.0, width / 3.0) if sigma_px is None else sigma_px
-        start_px = max(width, 3.0)
-        terms = likelihood_terms(still.lengths, len(data), sigma, chance_exponent, chance_px, start_px)
-    else:
-        raise ValueError(f'expected objective "paper" or "likelihood", got {objective!r}')
-    table = build_pair_table(still, scene, hough_px + np.maximum(gates, SETTLE_PX[0]), hough_rad + pair_rad)
-    placements = [placement_of(start)] if start else _starts(still, scene, table, hough_px, hough_rad, peaks)
+    gates = _check_gates(settings.max_pair_px if pair_px is None else pair_px, len(model))
+    terms = _build_terms(still, scene, gates, settings)
+    window_px = settings.hough_window_px + np.maximum(gates, settings.start_widths_px[0])
+    table = build_pair_table(still, scene, window_px, settings.hough_window_rad + settings.max_pair_rad)
+    placements = [compute_placement(start)] if start else _find_starts(still, scene, table, settings)
     tries = []
     for placement in placements:
-        space, first = _pair_space(table, placement, gates, pair_rad, terms, with_scale)
+        space, first = _build_space(table, placement, gates, terms, settings)
         if first_pairs is not None:
             first = np.array([pair in first_pairs for pair in zip(space.model, space.data, strict=True)], bool)
-        found = local_search(space, terms, first, strategy=strategy, replace=replace, keep_trace=trace)
-        tries.append((space, found))
-    space, found = min(tries, key=lambda tried: tried[1].error)
-    return _match(space, found, table, fit_of(space, found.chosen), centre, terms, objective)
+        result = search_pairs(
+            space, terms, first, settings, strategy=settings.strategy, exchange=settings.exchange, keep_trace=trace
+        )
+        tries.append((space, result))
+    space, result = min(tries, key=lambda tried: tried[1].error)
+    return _build_match(space, result, table, centre, terms, settings.objective)
 
 
 def format_trace(match: Match) -> str:
@@ -155,67 +131,84 @@ def format_trace(match: Match) -> str:
     return "\n".join(rows)
 
 
-def _starts(
-    still: LineTable, scene: LineTable, table: PairTable, hough_px: float, hough_rad: float, count: int
-) -> Array:
-    """Placements (k, 5) to search from: Hough's peaks, settled, the best supported that differ."""
-    found = hough_peaks(still, scene, hough_px, hough_rad, SETTLED_A_PEAK * count)
-    placements, support = settled(table, np.stack([placement_of(peak) for peak in found]))
+def _build_terms(model: LineTable, data: LineTable, gates: Floats, settings: MatchingSettings) -> Terms:
+    """The objective, its noise taken from the median distance (m,) within which pairs are looked for [px]."""
+    if settings.objective == "paper":
+        return build_paper_terms(model.lengths, data.lengths, settings)
+    if settings.objective != "likelihood":
+        raise ValueError(f'expected objective "paper" or "likelihood", got {settings.objective!r}')
+    width = float(np.median(gates)) if len(gates) else settings.max_pair_px
+    sigma_px = max(settings.min_sigma_px, width / settings.pair_sigmas)
+    start_px = max(width, settings.min_start_error_px)
+    return build_likelihood_terms(model.lengths, len(data.ends), sigma_px, start_px, settings)
+
+
+def _find_starts(still: LineTable, scene: LineTable, table: PairTable, settings: MatchingSettings) -> Floats:
+    """Placements (k, 5) to search from: Hough's peaks, refined, the best supported that differ.
+
+    They differ by 1 px of shift, or 0.01 of turn or scale.
+    """
+    peaks = find_hough_peaks(still, scene, settings.hough_peaks_per_start * settings.max_starts, settings)
+    coarse = np.stack([compute_placement(peak) for peak in peaks])
+    placements, support = refine_placements(table, coarse, settings.start_widths_px)
     kept: list[int] = []
     for i in np.argsort(-support, kind="stable"):
         apart = [np.abs((placements[i] - placements[j]) * (100.0, 100.0, 1.0, 1.0, 100.0)).max() for j in kept]
         if all(a > 1.0 for a in apart):
             kept.append(int(i))
-    return placements[kept[:count]]
+    return placements[kept[: settings.max_starts]]
 
 
-def _pair_space(
-    table: PairTable, placement: Array, gates: Array, pair_rad: float, terms: Terms, with_scale: bool
+def _build_space(
+    table: PairTable, placement: Floats, gates: Floats, terms: Terms, settings: MatchingSettings
 ) -> tuple[PairSpace, Mask]:
     """The restricted space at a placement, and the state to start from: each near data line to its nearest line."""
-    members = np.flatnonzero(gated(table, placement, gates, pair_rad))
+    members = np.flatnonzero(find_gated(table, placement, gates, settings.max_pair_rad))
     model, data = table.model[members], table.data[members]
     rows = table.across[members]
     weights = terms.end_weights[data]
-    along = table.along[members] @ placement
-    cells = (np.arange(COVER_CELLS) + 0.5) / COVER_CELLS * table.lengths[members][:, None]
-    masks = (cells >= along.min(axis=1)[:, None]) & (cells <= along.max(axis=1)[:, None])
-    forms = np.swapaxes(rows * weights[:, None, None], 1, 2) @ rows
     shift, turn, scale = (np.array([w]) for w in terms.anchor_weights)
-    anchor = start_anchor(placement[None], shift, turn, scale)[0]
-    fitting = Fitting.of_figure(with_scale, placement)
-    space = PairSpace(members, model, data, forms, masks, table.lines, anchor, fitting)
+    space = PairSpace(
+        members=members,
+        model=model,
+        data=data,
+        forms=np.swapaxes(rows * weights[:, None, None], 1, 2) @ rows,
+        masks=build_masks(table.along[members] @ placement, table.lengths[members], settings.coverage_cells),
+        lines=table.lines,
+        anchor=build_anchors(placement[None], shift, turn, scale)[0],
+        fitting=Fitting.in_image(settings.with_scale, placement),
+    )
     distances = np.sqrt(np.mean((rows @ placement) ** 2, axis=1))
-    return space, nearest(data, distances, distances <= 0.5 * gates[model])
+    return space, choose_nearest(data, distances, distances <= 0.5 * gates[model])
 
 
-def _match(
-    space: PairSpace, found: Found, table: PairTable, fit: Fits, centre: Array, terms: Terms, objective: Objective
+def _build_match(
+    space: PairSpace, result: SearchResult, table: PairTable, centre: Floats, terms: Terms, objective: str
 ) -> Match:
-    covered = coverage(space, found.chosen)
-    chosen = np.flatnonzero(found.chosen)
-    chosen = chosen[np.lexsort((space.data[chosen], space.model[chosen]))]
+    fit = fit_state(space, result.chosen)
+    covered = compute_coverage(space, result.chosen)
+    rows, pairs = list_pairs(space, result.chosen)
     return Match(
-        pairs=np.stack([space.model[chosen], space.data[chosen]], axis=1),
+        pairs=pairs,
         transform=compute_model_motion(fit.placements[0], centre),
         e_fit=float(fit.errors[0]),
-        e_omission=float(terms.omission(1.0 - covered, np.arange(space.lines)).sum()),
+        e_omission=float(terms.compute_omission(1.0 - covered, np.arange(space.lines)).sum()),
         coverage=covered,
-        residuals_px=np.asarray(table.across[space.members[chosen]] @ fit.placements[0]),
+        residuals_px=np.asarray(table.across[space.members[rows]] @ fit.placements[0]),
         objective=objective,
-        steps=found.steps,
-        trace=found.trace,
+        steps=result.steps,
+        trace=result.trace,
     )
 
 
-def _gates(pair_px: Any, count: int) -> Array:
+def _check_gates(pair_px: Any, count: int) -> Floats:
     gates = np.asarray(pair_px, float)
     if gates.shape not in ((), (count,)) or np.any(~(gates > 0)):
         raise ValueError(f"expected pair_px > 0, one number or {count}, got {pair_px!r}")
     return np.broadcast_to(gates, (count,))
 
 
-def _checked(values: Any, name: str) -> Array:
+def _check_lines(values: Any, name: str) -> Floats:
     array = np.asarray(values, float)
     if array.size == 0:
         return np.zeros((0, 2, 2))

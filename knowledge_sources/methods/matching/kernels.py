@@ -1,31 +1,43 @@
-"""The inner loops of matching, compiled: the best fit of a state, and the descent from state to state (§6.1).
+"""The inner loops of matching, compiled by numba: the best fit of a state, and the local search over states (§6.1).
 
-Jitted functions of this file call only one another, because numba's cache does not follow calls into other files.
-
-``space`` is (forms (p, d, d), masks (p, c), model (p,), data (p,), anchor (d, d)) of a :class:`PairSpace`, ``terms``
-(scale (m,), lengths (m,), rate) of :class:`Terms`' omission; ``chosen`` (p,) is the state.
+Compiled functions call only functions of their own file: numba's cache does not notice a change in another one.
+A state is the chosen pairs, a mask (p,).
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numba import njit
+
+from knowledge_sources.methods.arrays import Floats, Indices, Ints, Mask
+
+SpaceArrays = tuple[Floats, Mask, Indices, Indices, Floats]
+"""Forms (p, d, d), masks (p, c), model and data indices (p,), anchor (d, d) of a :class:`PairSpace`."""
+TermArrays = tuple[Floats, Floats, float]
+"""Scale (m,), lengths (m,) and rate of the omission, see :class:`Terms`."""
+StateArrays = tuple[Ints, Floats, Floats, Floats, Ints]
+Scratch = tuple[Floats, Floats, Floats]
 
 compiled = njit(cache=True, error_model="numpy")
 
 RIGID, SCALED, STEP = 0, 1, 2
 """What is fitted: a turn and a shift in the image; a scale too; or a step of a pose, to first order."""
 NEWTON_STEPS = 4
+"""Newton's method doubles the digits at each step: from a start near the turn so many reach rounding."""
 
 
 @compiled
-def descend(
-    space: Any, terms: Any, kind: int, turn: float, start: Any, first: bool, replace: bool, most: int, gain: float
-) -> tuple[Any, Any, Any]:
+def search_locally(
+    space: SpaceArrays, terms: TermArrays, kind: int, turn: float, start: Mask, first: bool, exchange: bool,
+    most: int, gain: float,
+) -> tuple[Mask, Ints, Floats]:
     """Add or delete one pair at a time, or exchange two of a model line, while the match error falls by ``gain``.
+
+    Args:
+        kind, turn: see :func:`compute_fits`.
+        first: take the first improvement, not the steepest. exchange: exchange at local minima. most: moves.
 
     Returns:
         The last state (p,); the moves (k, 2), each (pair flipped, -1) or (pair put in, pair taken out); and the match
@@ -35,30 +47,30 @@ def descend(
     chosen, last, count = start.copy(), -1, 0
     moves, errors = np.empty((most, 2), np.int64), np.empty(most + 1)
     scratch = np.empty(space[0].shape[1:]), np.empty((8, 8)), np.empty(8)
-    state = _state(space, terms, chosen)
-    errors[0] = _fit(state[3], kind, turn, scratch[1], scratch[2]) + state[2].sum()
+    state = _summarise(space, terms, chosen)
+    errors[0] = _fit_form(state[3], kind, turn, scratch[1], scratch[2]) + state[2].sum()
     while count < most:
         below = errors[count] - gain
-        move, out, error = _best_flip(space, terms, kind, turn, chosen, state, first, last, below, scratch)
-        if move < 0 and replace:
-            move, out, error = _best_swap(space, terms, kind, turn, chosen, state, below, scratch)
+        move, out, error = _find_best_flip(space, terms, kind, turn, chosen, state, first, last, below, scratch)
+        if move < 0 and exchange:
+            move, out, error = _find_best_exchange(space, terms, kind, turn, chosen, state, below, scratch)
         if move < 0:
             break
         if out < 0:
             last = move
-        carry_out(data, chosen, move, out)
+        apply_move(data, chosen, move, out)
         moves[count, 0], moves[count, 1] = move, out
         count += 1
         errors[count] = error
-        state = _state(space, terms, chosen)
+        state = _summarise(space, terms, chosen)
     return chosen, moves[:count], errors[: count + 1]
 
 
 @compiled
-def carry_out(data: Any, chosen: Any, move: int, out: int) -> None:
-    """Change a state (p,): flip pair ``move``, or put it in for ``out``.
+def apply_move(data: Indices, chosen: Mask, move: int, out: int) -> None:
+    """Change a state: flip pair ``move``, or exchange pair ``out`` for it; ``out`` is -1 if there is none.
 
-    What is put in takes its data line from the pair that has it.
+    A pair that is added takes its data line from the pair that has it.
     """
     is_in = chosen[move]
     for p in range(len(data)):
@@ -70,35 +82,38 @@ def carry_out(data: Any, chosen: Any, move: int, out: int) -> None:
 
 
 @compiled
-def _best_flip(
-    space: Any, terms: Any, kind: int, turn: float, chosen: Any, state: Any, first: bool, last: int, below: float,
-    scratch: Any,
+def _find_best_flip(
+    space: SpaceArrays, terms: TermArrays, kind: int, turn: float, chosen: Mask, state: StateArrays, first: bool,
+    last: int, below: float, scratch: Scratch,
 ) -> tuple[int, int, float]:
-    """The pair (or -1) by which to get furthest ``below``, -1, and the match error then; or the first in turn that
-    does. What cannot get there by its omission alone is not fitted: pairs more never fit better."""
+    """The pair whose flip lowers the match error most, -1, and the match error then; pair -1 if none gets ``below``.
+
+    With ``first`` it is the first such pair after ``last``. A pair that cannot get there by its omission alone is not
+    fitted, as more pairs never fit better.
+    """
     forms, masks, model, data, _ = space
     counts, covered, now, base, holder = state
     form = scratch[0]
-    total, here = now.sum(), _fit(base, kind, turn, scratch[1], scratch[2])
+    total, here = now.sum(), _fit_form(base, kind, turn, scratch[1], scratch[2])
     best, move = below, -1
     for i in range(len(model)):
         p = (last + 1 + i) % len(model) if first else i
-        line, rival, bound = model[p], -1, 0.0
+        line, holder_pair, bound = model[p], -1, 0.0
         if chosen[p]:
-            left = covered[line] - _share(masks[p], counts[line], 1)
+            left = covered[line] - _compute_share(masks[p], counts[line], 1)
         else:
-            left = covered[line] + _share(masks[p], counts[line], 0)
-            rival = holder[data[p]]
-            bound = 0.0 if rival >= 0 else here
-        omission = total + _omission(1.0 - left, line, terms) - now[line]
-        if rival >= 0:
-            omission += _loss(rival, space, terms, counts, covered, now)
+            left = covered[line] + _compute_share(masks[p], counts[line], 0)
+            holder_pair = holder[data[p]]
+            bound = 0.0 if holder_pair >= 0 else here
+        omission = total + _compute_omission(1.0 - left, line, terms) - now[line]
+        if holder_pair >= 0:
+            omission += _compute_growth(holder_pair, space, terms, counts, covered, now)
         if omission + bound >= best:
             continue
-        _sum(form, base, forms[p], -1.0 if chosen[p] else 1.0)
-        if rival >= 0:
-            _sum(form, form, forms[rival], -1.0)
-        error = _fit(form, kind, turn, scratch[1], scratch[2]) + omission
+        _add_scaled(form, base, forms[p], -1.0 if chosen[p] else 1.0)
+        if holder_pair >= 0:
+            _add_scaled(form, form, forms[holder_pair], -1.0)
+        error = _fit_form(form, kind, turn, scratch[1], scratch[2]) + omission
         if error < best:
             best, move = error, p
             if first:
@@ -107,8 +122,9 @@ def _best_flip(
 
 
 @compiled
-def _best_swap(
-    space: Any, terms: Any, kind: int, turn: float, chosen: Any, state: Any, below: float, scratch: Any
+def _find_best_exchange(
+    space: SpaceArrays, terms: TermArrays, kind: int, turn: float, chosen: Mask, state: StateArrays, below: float,
+    scratch: Scratch,
 ) -> tuple[int, int, float]:
     """The best exchange (pair in, pair out, match error) of a chosen pair for another of its line, or -1, -1."""
     forms, masks, model, data, _ = space
@@ -125,33 +141,38 @@ def _best_swap(
             held = 0
             for c in range(cells):
                 held += counts[line, c] - masks[a, c] + masks[b, c] > 0
-            omission = total + _omission(1.0 - held / cells, line, terms) - now[line]
-            rival = holder[data[b]]
-            if rival >= 0:
-                omission += _loss(rival, space, terms, counts, covered, now)
+            omission = total + _compute_omission(1.0 - held / cells, line, terms) - now[line]
+            holder_pair = holder[data[b]]
+            if holder_pair >= 0:
+                omission += _compute_growth(holder_pair, space, terms, counts, covered, now)
             if omission >= best:
                 continue
-            _sum(form, base, forms[b], 1.0)
-            _sum(form, form, forms[a], -1.0)
-            if rival >= 0:
-                _sum(form, form, forms[rival], -1.0)
-            error = _fit(form, kind, turn, scratch[1], scratch[2]) + omission
+            _add_scaled(form, base, forms[b], 1.0)
+            _add_scaled(form, form, forms[a], -1.0)
+            if holder_pair >= 0:
+                _add_scaled(form, form, forms[holder_pair], -1.0)
+            error = _fit_form(form, kind, turn, scratch[1], scratch[2]) + omission
             if error < best:
                 best, into, out = error, b, a
     return into, out, best
 
 
 @compiled
-def _sum(out: Any, one: Any, other: Any, times: float) -> None:
+def _add_scaled(out: Floats, one: Floats, other: Floats, times: float) -> None:
+    """Fill out = one + times other."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = one[i, j] + times * other[i, j]
 
 
 @compiled
-def _state(space: Any, terms: Any, chosen: Any) -> tuple[Any, Any, Any, Any, Any]:
-    """Of a state: how many data lines cover each cell (m, c), the share covered (m,), the omission (m,) of each model
-    line, the form (d, d), and which chosen pair holds each data line, or -1."""
+def _summarise(space: SpaceArrays, terms: TermArrays, chosen: Mask) -> StateArrays:
+    """What the moves from a state need.
+
+    Returns:
+        how many data lines cover each cell (m, c); the share covered (m,) and the omission (m,) of each model line;
+        the form (d, d); the chosen pair (k,) that holds each data line, or -1.
+    """
     forms, masks, model, data, anchor = space
     lines, cells = len(terms[0]), masks.shape[1]
     counts, covered, now = np.zeros((lines, cells), np.int64), np.zeros(lines), np.empty(lines)
@@ -169,21 +190,23 @@ def _state(space: Any, terms: Any, chosen: Any) -> tuple[Any, Any, Any, Any, Any
         for c in range(cells):
             covered[line] += counts[line, c] > 0
         covered[line] /= cells
-        now[line] = _omission(1.0 - covered[line], line, terms)
+        now[line] = _compute_omission(1.0 - covered[line], line, terms)
     return counts, covered, now, base, holder
 
 
 @compiled
-def _loss(pair: int, space: Any, terms: Any, counts: Any, covered: Any, now: Any) -> Any:
-    """By how much the omission of a chosen pair's model line grows without it."""
+def _compute_growth(
+    pair: int, space: SpaceArrays, terms: TermArrays, counts: Ints, covered: Floats, now: Floats
+) -> float:
+    """By how much the omission of a chosen pair's model line grows without the pair."""
     line = space[2][pair]
-    left = covered[line] - _share(space[1][pair], counts[line], 1)
-    return _omission(1.0 - left, line, terms) - now[line]
+    left = covered[line] - _compute_share(space[1][pair], counts[line], 1)
+    return float(_compute_omission(1.0 - left, line, terms) - now[line])
 
 
 @compiled
-def _share(mask: Any, counts: Any, count: int) -> float:
-    """Share of the cells that a data line covers, and that so many of the chosen ones do."""
+def _compute_share(mask: Mask, counts: Ints, count: int) -> float:
+    """Share of the cells (c,) that a data line covers and that ``count`` of the chosen ones cover."""
     found = 0
     for c in range(len(mask)):
         found += mask[c] and counts[c] == count
@@ -191,37 +214,40 @@ def _share(mask: Any, counts: Any, count: int) -> float:
 
 
 @compiled
-def _omission(uncovered: float, line: int, terms: Any) -> Any:
-    """As :meth:`Terms.omission`."""
+def _compute_omission(uncovered: float, line: int, terms: TermArrays) -> float:
+    """As :meth:`Terms.compute_omission`."""
     scale, lengths, rate = terms
     if rate == 0.0:
         size = lengths[line]
-        return scale[line] * math.log((1.0 + size) / (1.0 + size * (1.0 - uncovered)))
-    return scale[line] * math.exp(rate * uncovered)
+        return float(scale[line] * math.log((1.0 + size) / (1.0 + size * (1.0 - uncovered))))
+    return float(scale[line] * math.exp(rate * uncovered))
 
 
 @compiled
-def fits(forms: Any, kind: int, turns: Any) -> tuple[Any, Any]:
-    """Errors (k,) and placements of the best fits of forms (k, d, d)."""
+def compute_fits(forms: Floats, kind: int, turns: Floats) -> tuple[Floats, Floats]:
+    """Errors (k,) and placements of the best fits of quadratic forms (k, d, d).
+
+    ``kind`` is RIGID, SCALED or STEP; a rigid fit starts from ``turns`` (k,) [rad].
+    """
     errors, work = np.empty(len(forms)), np.empty((8, 8))
     placements = np.empty((len(forms), forms.shape[1] - 1 if kind == STEP else 5))
     for k in range(len(forms)):
-        errors[k] = _fit(forms[k], kind, turns[k], work, placements[k])
+        errors[k] = _fit_form(forms[k], kind, turns[k], work, placements[k])
     return errors, placements
 
 
 @compiled
-def _fit(form: Any, kind: int, turn: float, work: Any, placement: Any) -> Any:
-    """The error of the best fit of a form (d, d); its ``placement`` is filled in, ``work`` (8, 8) is scratch."""
+def _fit_form(form: Floats, kind: int, turn: float, work: Floats, placement: Floats) -> float:
+    """The error of the best fit of a form (d, d); fills its ``placement``; ``work`` (8, 8) is scratch."""
     if kind == STEP:
-        return _step(form, work, placement)
+        return _fit_step(form, work, placement)
     back, q = work[:2], work[2:5]
-    _without_shift(form, back, q)
+    _eliminate_shift(form, back, q)
     scale = 1.0
     if kind == SCALED:
-        c, s, scale = _circle_with_scale(q)
+        c, s, scale = _fit_turn_and_scale(q)
     else:
-        c, s = _circle(q, turn)
+        c, s = _fit_turn(q, turn)
     rest = (c, s, scale)
     error = 0.0
     for a in range(3):
@@ -234,8 +260,8 @@ def _fit(form: Any, kind: int, turn: float, work: Any, placement: Any) -> Any:
 
 
 @compiled
-def _step(form: Any, factor: Any, step: Any) -> Any:
-    """By Cholesky's factors L: the error is what is left of the last pivot, the step solves L' step = -(last row)."""
+def _fit_step(form: Floats, factor: Floats, step: Floats) -> float:
+    """By Cholesky's factor L: the error is the rest of the last pivot, the step solves L' step = -(last row)."""
     unknowns = form.shape[0] - 1
     for a in range(unknowns + 1):
         for b in range(a + 1):
@@ -251,11 +277,11 @@ def _step(form: Any, factor: Any, step: Any) -> Any:
         for c in range(a + 1, unknowns):
             rest -= factor[c, a] * step[c]
         step[a] = rest / factor[a, a]
-    return max(factor[unknowns, unknowns], 0.0)
+    return float(max(factor[unknowns, unknowns], 0.0))
 
 
 @compiled
-def _without_shift(form: Any, back: Any, reduced: Any) -> None:
+def _eliminate_shift(form: Floats, back: Floats, reduced: Floats) -> None:
     """Eliminate T: ``reduced`` (3, 3) in (cos, sin, s) and ``back`` (2, 3) with T = -back @ (cos, sin, s)."""
     a, b, d = form[2, 2], form[2, 3], form[3, 3]
     determinant = a * d - b * b
@@ -270,7 +296,7 @@ def _without_shift(form: Any, back: Any, reduced: Any) -> None:
 
 
 @compiled
-def _circle_with_scale(q: Any) -> tuple[float, float, float]:
+def _fit_turn_and_scale(q: Floats) -> tuple[float, float, float]:
     """Eliminate s from (3, 3), then the smaller root of the second-order equation."""
     pull = (q[0, 2] / q[2, 2], q[1, 2] / q[2, 2])
     xx, xy, yy = q[0, 0] - q[0, 2] * pull[0], q[0, 1] - q[0, 2] * pull[1], q[1, 1] - q[1, 2] * pull[1]
@@ -282,8 +308,8 @@ def _circle_with_scale(q: Any) -> tuple[float, float, float]:
 
 
 @compiled
-def _circle(q: Any, turn: float) -> tuple[float, float]:
-    """Newton on the turn for x'Ax + 2 b'x, x = (cos, sin), with s = 1."""
+def _fit_turn(q: Floats, turn: float) -> tuple[float, float]:
+    """Newton's method on the turn for x'Ax + 2 b'x, x = (cos, sin), with s = 1."""
     a, b, d, e, f = q[0, 0], q[0, 1], q[1, 1], q[0, 2], q[1, 2]
     for _ in range(NEWTON_STEPS):
         c, s = math.cos(turn), math.sin(turn)

@@ -1,23 +1,16 @@
-"""Possible pairs of model and data lines, as linear forms in the placement that lays the data on the model."""
+"""Possible pairs of model and data lines in the image, linear in the placement that lays the data on the model."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.matching.fit import Similarity2, compute_best_fits
-from knowledge_sources.methods.matching.hough import LineTable, Peak, pairs_within, undirected
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-
-SETTLE_PX = (8.0, 6.0, 4.0, 3.0, 2.0, 1.5)
-"""Widths of the loss, from the Hough cell's reach down to the pairs' own error."""
+from knowledge_sources.methods.matching.hough import LineTable, Peak, find_pairs_within, wrap_undirected
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,58 +20,46 @@ class PairTable:
     Attributes:
         model, data: (p,) indices. angles: (p,) data line's angle from the model line's [rad].
         across, along: (p, 2, 5) rows that give, times a placement, the data ends' distances across the model line
-            and along it from its first end. lengths: (p,) of the model line. shares: (p,) the shorter of both lengths.
+            and along it from its first end [px]. lengths: (p,) of the model line [px].
+        shares: (p,) the shorter of both lengths [px].
         lines: number of model lines.
     """
 
-    model: Index
-    data: Index
-    angles: Array
-    across: Array
-    along: Array
-    lengths: Array
-    shares: Array
+    model: Indices
+    data: Indices
+    angles: Floats
+    across: Floats
+    along: Floats
+    lengths: Floats
+    shares: Floats
     lines: int
 
-    def take(self, chosen: NDArray[np.bool_]) -> PairTable:
-        """The pairs of a mask."""
-        return PairTable(
-            self.model[chosen],
-            self.data[chosen],
-            self.angles[chosen],
-            self.across[chosen],
-            self.along[chosen],
-            self.lengths[chosen],
-            self.shares[chosen],
-            self.lines,
-        )
 
-
-def build_pair_table(model: LineTable, data: LineTable, window_px: Array, window_rad: float) -> PairTable:
+def build_pair_table(model: LineTable, data: LineTable, window_px: Floats, window_rad: float) -> PairTable:
     """Every pair within the windows: (m,) pixels across and along, and an angle; the turn's lever arm is added."""
-    i, k = pairs_within(model, data, window_px, window_rad)
+    i, k = find_pairs_within(model, data, window_px, window_rad)
     starts = np.sum(model.directions * model.ends[:, 0], axis=1)
     return PairTable(
         model=i,
         data=k,
-        angles=undirected(data.angles[k] - model.angles[i]),
-        across=_rows(model.normals[i], model.offsets[i], data.ends[k]),
-        along=_rows(model.directions[i], starts[i], data.ends[k]),
+        angles=wrap_undirected(data.angles[k] - model.angles[i]),
+        across=_build_rows(model.normals[i], model.offsets[i], data.ends[k]),
+        along=_build_rows(model.directions[i], starts[i], data.ends[k]),
         lengths=model.lengths[i],
         shares=np.minimum(data.lengths[k], model.lengths[i]),
         lines=len(model.ends),
     )
 
 
-def placement_of(peak: Peak) -> Array:
-    """(5,) the placement of the data on the model that undoes the peak's move of the model."""
+def compute_placement(peak: Peak) -> Floats:
+    """(5,) the placement of the data on the model: the inverse of the peak's motion of the model."""
     c, s = np.cos(peak.turn_rad), np.sin(peak.turn_rad)
     u, v = peak.shift_px
     return np.array([c, -s, -(c * u + s * v), -(-s * u + c * v), 1.0])
 
 
-def compute_model_motion(placement: Array, centre: Array) -> Similarity2:
-    """The move of the model onto the data: the placement turned round."""
+def compute_model_motion(placement: Floats, centre: Floats) -> Similarity2:
+    """The motion of the model onto the data: the inverse of a placement (5,), about ``centre`` (2,) [px]."""
     c, s, u, v, scale = placement
     return Similarity2(
         float(np.arctan2(-s, c)),
@@ -88,8 +69,8 @@ def compute_model_motion(placement: Array, centre: Array) -> Similarity2:
     )
 
 
-def gated(table: PairTable, placement: Array, gates: Array, window_rad: float) -> NDArray[np.bool_]:
-    """(p,) pairs that, so placed, lie within (m,) ``gates`` across, overlap along and are nearly parallel."""
+def find_gated(table: PairTable, placement: Floats, gates: Floats, window_rad: float) -> Mask:
+    """(p,) pairs that, so placed, lie within (m,) ``gates`` [px] across, overlap along and are nearly parallel."""
     gate = gates[table.model]
     across = np.abs(table.across @ placement)
     along = table.along @ placement
@@ -99,30 +80,31 @@ def gated(table: PairTable, placement: Array, gates: Array, window_rad: float) -
     return np.asarray(near & (high >= -gate) & (low <= table.lengths + gate))
 
 
-def settled(table: PairTable, placements: Array) -> tuple[Array, Array]:
+def refine_placements(table: PairTable, placements: Floats, widths_px: tuple[float, ...]) -> tuple[Floats, Floats]:
     """Placements (k, 5) moved to where close pairs agree, and their support (k,) [px of model line].
 
-    Weights 1 / (1 + (d / width)^2)^2 with a narrowing width take the coarseness of the accumulator away.
+    Iteratively reweighted least squares on Geman and McClure's loss, weights 1 / (1 + (d / width)^2)^2, with a width
+    that narrows from round to round (graduated non-convexity). It removes the coarseness of the accumulator.
     """
     forms = np.einsum("pea,peb->pab", table.across, table.across).reshape(len(table.model), 25)
     at = placements
-    for width in SETTLE_PX:
-        weights = _closeness(table, at, width) ** 2 * table.shares
+    for width in widths_px:
+        weights = _compute_closeness(table, at, width) ** 2 * table.shares
         total = weights.sum(axis=1)
-        anchors = start_anchor(at, 1e-3 * total + 1e-9, 10.0 * total + 1e-9, total + 1e-9)
+        anchors = build_anchors(at, 1e-3 * total + 1e-9, 10.0 * total + 1e-9, total + 1e-9)
         at = compute_best_fits((weights @ forms).reshape(-1, 5, 5) + anchors, False, at).placements
-    return at, _support(table, at)
+    return at, _compute_support(table, at, widths_px[-1])
 
 
-def start_anchor(placements: Array, shift_weight: Array, turn_weight: Array, scale_weight: Array) -> Array:
-    """(k, 5, 5) weak pulls to placements (k, 5): few or parallel pairs still have one best fit."""
+def build_anchors(placements: Floats, shift_weight: Floats, turn_weight: Floats, scale_weight: Floats) -> Floats:
+    """(k, 5, 5) weak pulls to placements (k, 5), so that few or parallel pairs still have one best fit."""
     weights = [np.ascontiguousarray(w, float) for w in (shift_weight, turn_weight, scale_weight)]
-    pulls: Array = _pulls(np.ascontiguousarray(placements), *weights)
+    pulls: Floats = _build_pulls(np.ascontiguousarray(placements), *weights)
     return pulls
 
 
 @njit(cache=True, error_model="numpy")
-def _pulls(placements: Any, shift_weight: Any, turn_weight: Any, scale_weight: Any) -> Any:
+def _build_pulls(placements: Floats, shift_weight: Floats, turn_weight: Floats, scale_weight: Floats) -> Floats:
     out = np.zeros((len(placements), 5, 5))
     row = np.zeros((4, 5))
     for k in range(len(placements)):
@@ -137,25 +119,25 @@ def _pulls(placements: Any, shift_weight: Any, turn_weight: Any, scale_weight: A
     return out
 
 
-def _support(table: PairTable, placements: Array) -> Array:
-    """(k,) length of the model that close data lines account for, each model line at most its own."""
-    closeness = _closeness(table, placements, SETTLE_PX[-1]) * table.shares
-    found = np.zeros((len(placements), table.lines))
+def _compute_support(table: PairTable, placements: Floats, width: float) -> Floats:
+    """(k,) length of the model that close data lines cover, each model line at most its own."""
+    closeness = _compute_closeness(table, placements, width) * table.shares
+    covered = np.zeros((len(placements), table.lines))
     full = np.zeros(table.lines)
     full[table.model] = table.lengths
     for k, row in enumerate(closeness):
-        found[k] = np.bincount(table.model, row, table.lines)
-    return np.asarray(np.minimum(found, full).sum(axis=1))
+        covered[k] = np.bincount(table.model, row, table.lines)
+    return np.asarray(np.minimum(covered, full).sum(axis=1))
 
 
-def _closeness(table: PairTable, placements: Array, width: float) -> Array:
-    """(k, p) from 1, on the model line and find_overlapping it, to 0."""
-    close: Array = _close(table.across, table.along, table.lengths, np.ascontiguousarray(placements), width)
+def _compute_closeness(table: PairTable, placements: Floats, width: float) -> Floats:
+    """(k, p) from 1, on the model line and overlapping it, to 0."""
+    close: Floats = _compute_close(table.across, table.along, table.lengths, np.ascontiguousarray(placements), width)
     return close
 
 
 @njit(cache=True, error_model="numpy")
-def _close(across: Any, along: Any, lengths: Any, placements: Any, width: float) -> Any:
+def _compute_close(across: Floats, along: Floats, lengths: Floats, placements: Floats, width: float) -> Floats:
     out = np.zeros((len(placements), len(lengths)))
     for k in range(len(placements)):
         at = placements[k]
@@ -172,7 +154,7 @@ def _close(across: Any, along: Any, lengths: Any, placements: Any, width: float)
     return out
 
 
-def _rows(unit: Array, offset: Array, ends: Array) -> Array:
+def _build_rows(unit: Floats, offset: Floats, ends: Floats) -> Floats:
     """(p, 2, 5) with unit . (R p + T) - s offset = row @ (cos, sin, T_u, T_v, s)."""
     rows = np.empty((len(ends), 2, 5))
     rows[..., 0] = np.sum(unit[:, None, :] * ends, axis=-1)

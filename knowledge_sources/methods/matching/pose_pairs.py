@@ -1,4 +1,4 @@
-"""Model and data lines that may belong together, given where the camera may be: pairs linear in its unknowns."""
+"""Pairs of model and data lines that may belong together near a camera pose, linear in its unknowns."""
 
 from __future__ import annotations
 
@@ -8,61 +8,76 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching.pose_parameters import Array, PoseParameters
+from knowledge_sources.methods.arrays import Floats, Indices, Mask
+from knowledge_sources.methods.matching.pose_parameters import PoseParameters
 from knowledge_sources.methods.pose.line_set import LineSet, build_line_set
+from knowledge_sources.settings.matching import MatchingSettings
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose
 
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 compiled = njit(cache=True, error_model="numpy")
 
-GATE_SIGMAS = 3.0
-GATE_PX = 3.0
-GATE_RAD = 0.12
-"""Beyond what the prior allows, a pair may be off by this much: the segment's own error."""
-GATE_ALONG_PX = 30.0
-STEEPEST_RAD = 0.6
-"""Pairs that differ more in direction are not looked at."""
 TINY = 1e-12
+"""Keeps the length of an image line's normal from zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineScene:
-    """The call's givens: model lines; data lines (k, 2, 2) without distortion and their rays (k, 2, 3); the prior."""
+    """The data of one call.
+
+    Attributes:
+        model: model lines. data: (k, 2, 2) data lines without distortion [px]. rays: (k, 2, 3) of their ends.
+        camera: without distortion. parameters: the prior and its unknowns.
+    """
 
     model: LineSet
-    data: Array
-    rays: Array
+    data: Floats
+    rays: Floats
     camera: Camera
-    freedom: PoseParameters
+    parameters: PoseParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosePairs:
-    """p pairs at a pose: distances (p, 2) [px], slopes (p, 2, d), along (p, 2) from 0 to ``lengths`` (p,) [px].
+    """p pairs at a pose.
 
-    ``angles`` (p,) are those of the data lines from their model lines [rad], ``shares`` (p,) the shorter lengths [px].
+    Attributes:
+        model, data: (p,) indices.
+        distances: (p, 2) of the data ends to their model line [px]. slopes: (p, 2, d) derivatives by the unknowns.
+        along: (p, 2) of the data ends along the model line, from 0 to ``lengths`` (p,) [px].
+        angles: (p,) of the data lines from their model lines [rad]. shares: (p,) the shorter lengths [px].
     """
 
-    model: Index
-    data: Index
-    distances: Array
-    slopes: Array
-    along: Array
-    lengths: Array
-    angles: Array
-    shares: Array
+    model: Indices
+    data: Indices
+    distances: Floats
+    slopes: Floats
+    along: Floats
+    lengths: Floats
+    angles: Floats
+    shares: Floats
 
     def take(self, chosen: Mask) -> PosePairs:
         """The pairs of a mask."""
-        return PosePairs(*(getattr(self, name)[chosen] for name in PosePairs.__slots__))
+        return PosePairs(
+            self.model[chosen],
+            self.data[chosen],
+            self.distances[chosen],
+            self.slopes[chosen],
+            self.along[chosen],
+            self.lengths[chosen],
+            self.angles[chosen],
+            self.shares[chosen],
+        )
 
 
-def build_scene(model: Any, data: Any, camera: Camera, freedom: PoseParameters) -> LineScene:
-    """Prepare the lines. Raises ValueError: no model line, or a wrong shape."""
+def build_scene(model: Any, data: Any, camera: Camera, parameters: PoseParameters) -> LineScene:
+    """Prepare model lines (m, 2, 3) [m] and data lines (k, 2, 2) [px].
+
+    Raises:
+        ValueError: no model line, or a wrong shape.
+    """
     lines = np.asarray(model, float).reshape(-1, 2, 3)
     if not len(lines):
         raise ValueError("expected at least one model line, got none")
@@ -74,44 +89,49 @@ def build_scene(model: Any, data: Any, camera: Camera, freedom: PoseParameters) 
         np.ascontiguousarray(camera.undistort(segments)),
         seen.rays,
         replace(camera, distortion=None),
-        freedom,
+        parameters,
     )
 
 
-def projected(scene: LineScene, pose: Pose) -> tuple[Array, Array, Mask]:
-    """(m, 2, 2) model lines in the image plane, cut at the near plane but not at the border; lengths; what is left."""
+def project_model(scene: LineScene, pose: Pose) -> tuple[Floats, Floats, Mask]:
+    """Model lines in the image plane, cut at the near plane but not at the image's border.
+
+    Returns:
+        (m, 2, 2) [px]; lengths (m,) [px]; (m,) which are in front of the near plane, at least in part.
+    """
     c = scene.camera
-    seen: tuple[Array, Array, Mask] = _projected(
+    projected: tuple[Floats, Floats, Mask] = _project(
         scene.model.points, np.array(pose.rotation), np.array(pose.translation), c.fx, c.fy, c.cx, c.cy
     )
-    return seen
+    return projected
 
 
-def gated_pairs(scene: LineScene) -> PosePairs:
-    """Pairs within 3 deviations of the prediction, in offset at both ends and in angle."""
-    px, _, visible = projected(scene, scene.freedom.prior)
-    i, k = _nearly_parallel(px, visible, scene.data)
-    pairs = linearise_pairs(scene, scene.freedom.prior, i, k)
+def find_allowed_pairs(scene: LineScene, settings: MatchingSettings) -> PosePairs:
+    """Pairs that the prior allows: near the prediction in offset at both ends, in angle, and along the line."""
+    parameters = scene.parameters
+    px, _, visible = project_model(scene, parameters.prior)
+    i, k = _find_nearly_parallel(px, visible, scene.data, settings.max_gate_rad)
+    pairs = linearise_pairs(scene, parameters.prior, i, k)
     data_lengths = np.linalg.norm(scene.data[:, 1] - scene.data[:, 0], axis=1)
+    gates = settings.gate_sigmas, settings.gate_px, settings.gate_rad, settings.gate_along_px
     return pairs.take(
-        _within(pairs.distances, pairs.slopes, pairs.along, pairs.lengths, pairs.angles, data_lengths[k],
-                scene.freedom.root)
+        _find_within_prior(pairs.distances, pairs.slopes, pairs.along, pairs.lengths, pairs.angles, data_lengths[k],
+                           parameters.root, gates)
     )
 
 
-def linearise_pairs(scene: LineScene, pose: Pose, i: Index, k: Index) -> PosePairs:
-    """Model lines ``i`` with data lines ``k``, linearised at a pose."""
-    px, lengths, _ = projected(scene, pose)
+def linearise_pairs(scene: LineScene, pose: Pose, i: Indices, k: Indices) -> PosePairs:
+    """Model lines ``i`` (p,) with data lines ``k`` (p,), linearised at a pose."""
+    px, lengths, _ = project_model(scene, pose)
     model = scene.model
-    found = _linearised(
+    distances, slopes, along, angles, shares = _linearise(
         model.directions, model.moments, px, scene.data, scene.rays, model.focal_px, np.array(pose.rotation),
-        np.array(pose.translation), scene.freedom.basis(pose), i, k,
+        np.array(pose.translation), scene.parameters.compute_basis(pose), i, k,
     )
-    distances, slopes, along, angles, shares = found
     return PosePairs(i, k, distances, slopes, along, lengths[i], angles, shares)
 
 
-def near_pairs(pairs: PosePairs, pair_px: float, pair_rad: float) -> Mask:
+def find_near_pairs(pairs: PosePairs, pair_px: float, pair_rad: float) -> Mask:
     """(p,) which lie within the limits across, overlap along and are nearly parallel."""
     near = (np.abs(pairs.distances).max(axis=1) <= pair_px) & (np.abs(pairs.angles) <= pair_rad)
     beside = (pairs.along.max(axis=1) < -pair_px) | (pairs.along.min(axis=1) > pairs.lengths + pair_px)
@@ -119,12 +139,12 @@ def near_pairs(pairs: PosePairs, pair_px: float, pair_rad: float) -> Mask:
 
 
 @compiled
-def _projected(
-    points: Any, turn: Any, shift: Any, fx: float, fy: float, cx: float, cy: float
-) -> tuple[Any, Any, Any]:
+def _project(
+    points: Floats, rotation: Floats, translation: Floats, fx: float, fy: float, cx: float, cy: float
+) -> tuple[Floats, Floats, Mask]:
     px, lengths, visible = np.empty((len(points), 2, 2)), np.ones(len(points)), np.ones(len(points), np.bool_)
     for m in range(len(points)):
-        first, second = turn @ points[m, 0] + shift, turn @ points[m, 1] + shift
+        first, second = rotation @ points[m, 0] + translation, rotation @ points[m, 1] + translation
         visible[m] = first[2] >= NEAR_PLANE_M or second[2] >= NEAR_PLANE_M
         if not visible[m]:
             px[m, :, 0], px[m, :, 1] = cx, cy
@@ -140,8 +160,10 @@ def _projected(
 
 
 @compiled
-def _nearly_parallel(px: Any, visible: Any, data: Any) -> tuple[Any, Any]:
-    """Indices of the model and data lines of every pair whose directions differ by :data:`STEEPEST_RAD` at the most."""
+def _find_nearly_parallel(
+    px: Floats, visible: Mask, data: Floats, max_angle_rad: float
+) -> tuple[Indices, Indices]:
+    """Indices (p,) of the model and data lines of every pair whose directions differ by at most ``max_angle_rad``."""
     i, k = np.empty(len(px) * len(data), np.intp), np.empty(len(px) * len(data), np.intp)
     angles = np.empty(len(data))
     for d in range(len(data)):
@@ -150,17 +172,22 @@ def _nearly_parallel(px: Any, visible: Any, data: Any) -> tuple[Any, Any]:
     for m in range(len(px)):
         angle = math.atan2(px[m, 1, 1] - px[m, 0, 1], px[m, 1, 0] - px[m, 0, 0])
         for d in range(len(data)):
-            if visible[m] and abs(_undirected(angles[d] - angle)) <= STEEPEST_RAD:
+            if visible[m] and abs(_wrap_undirected(angles[d] - angle)) <= max_angle_rad:
                 i[count], k[count] = m, d
                 count += 1
     return i[:count].copy(), k[:count].copy()
 
 
 @compiled
-def _within(
-    distances: Any, slopes: Any, along: Any, lengths: Any, angles: Any, data_lengths: Any, root: Any
-) -> Any:
-    """(p,) which pairs lie where the prior, ``root``, allows them."""
+def _find_within_prior(
+    distances: Floats, slopes: Floats, along: Floats, lengths: Floats, angles: Floats, data_lengths: Floats,
+    root: Floats, gates: tuple[float, float, float, float],
+) -> Mask:
+    """(p,) which pairs lie where the prior, ``root``, allows them.
+
+    ``gates`` are the deviations of the prior, and a segment's own error across [px], in angle [rad] and along [px].
+    """
+    sigmas, gate_px, gate_rad, gate_along_px = gates
     pairs, _, unknowns = slopes.shape
     near = np.empty(pairs, np.bool_)
     for p in range(pairs):
@@ -172,11 +199,11 @@ def _within(
             spreads[0], spreads[1] = spreads[0] + first * first, spreads[1] + second * second
             turned += (second - first) ** 2
         spreads = np.sqrt(spreads)
-        reach = GATE_SIGMAS * spreads.max() + GATE_ALONG_PX
+        reach = sigmas * spreads.max() + gate_along_px
         near[p] = (
-            abs(distances[p, 0]) <= GATE_SIGMAS * spreads[0] + GATE_PX
-            and abs(distances[p, 1]) <= GATE_SIGMAS * spreads[1] + GATE_PX
-            and abs(angles[p]) <= GATE_SIGMAS * math.sqrt(turned) / max(data_lengths[p], 1.0) + GATE_RAD
+            abs(distances[p, 0]) <= sigmas * spreads[0] + gate_px
+            and abs(distances[p, 1]) <= sigmas * spreads[1] + gate_px
+            and abs(angles[p]) <= sigmas * math.sqrt(turned) / max(data_lengths[p], 1.0) + gate_rad
             and max(along[p, 0], along[p, 1]) >= -reach
             and min(along[p, 0], along[p, 1]) <= lengths[p] + reach
         )
@@ -184,10 +211,10 @@ def _within(
 
 
 @compiled
-def _linearised(
-    directions: Any, moments: Any, px: Any, data: Any, rays: Any, focal: Any, turn: Any, shift: Any, basis: Any,
-    i: Any, k: Any,
-) -> tuple[Any, Any, Any, Any, Any]:
+def _linearise(
+    directions: Floats, moments: Floats, px: Floats, data: Floats, rays: Floats, focal: Floats, rotation: Floats,
+    translation: Floats, basis: Floats, i: Indices, k: Indices,
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """Distances (p, 2), slopes (p, 2, d), along (p, 2), angles (p,) and shares (p,) of pairs at a pose.
 
     A turn w moves a projection plane's normal m by w x m; a shift t by t x d, d the model line's direction.
@@ -195,13 +222,13 @@ def _linearised(
     pairs, unknowns = len(i), basis.shape[1]
     distances, along = np.empty((pairs, 2)), np.empty((pairs, 2))
     slopes, angles, shares = np.empty((pairs, 2, unknowns)), np.empty(pairs), np.empty(pairs)
-    planes, tilts, reaches, moves = _planes(directions, moments, focal, turn, shift, basis)
+    planes, tilts, reaches, moves = _project_planes(directions, moments, focal, rotation, translation, basis)
     for p in range(pairs):
         m, n = i[p], k[p]
         u, v = px[m, 1, 0] - px[m, 0, 0], px[m, 1, 1] - px[m, 0, 1]
         length = max(math.hypot(u, v), 1.0)
         data_u, data_v = data[n, 1, 0] - data[n, 0, 0], data[n, 1, 1] - data[n, 0, 1]
-        angles[p] = _undirected(math.atan2(data_v, data_u) - math.atan2(v, u))
+        angles[p] = _wrap_undirected(math.atan2(data_v, data_u) - math.atan2(v, u))
         shares[p] = min(math.hypot(data_u, data_v), length)
         for e in range(2):
             along[p, e] = ((data[n, e, 0] - px[m, 0, 0]) * u + (data[n, e, 1] - px[m, 0, 1]) * v) / length
@@ -218,23 +245,26 @@ def _linearised(
 
 
 @compiled
-def _planes(
-    directions: Any, moments: Any, focal: Any, turn: Any, shift: Any, basis: Any
-) -> tuple[Any, Any, Any, Any]:
-    """Projection planes' normals (m, 3), what a distance loses by their tilt (m, 3), their reach in the image (m,).
+def _project_planes(
+    directions: Floats, moments: Floats, focal: Floats, rotation: Floats, translation: Floats, basis: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """The model lines' projection planes in the camera frame.
 
-    And (m, d, 3) how each unknown moves the normals.
+    Returns:
+        normals (m, 3); derivatives (m, 3) of the length of the image line's normal by them; that length (m,);
+        derivatives (m, d, 3) of the normals by each unknown.
     """
     lines, unknowns = len(directions), basis.shape[1]
     planes, tilts, reaches = np.empty((lines, 3)), np.zeros((lines, 3)), np.empty(lines)
     moves, direction = np.empty((lines, unknowns, 3)), np.empty(3)
     for m in range(lines):
         for a in range(3):
-            direction[a] = turn[a, 0] * directions[m, 0] + turn[a, 1] * directions[m, 1] + turn[a, 2] * directions[m, 2]
-            planes[m, a] = turn[a, 0] * moments[m, 0] + turn[a, 1] * moments[m, 1] + turn[a, 2] * moments[m, 2]
+            x, y, z = rotation[a, 0], rotation[a, 1], rotation[a, 2]
+            direction[a] = x * directions[m, 0] + y * directions[m, 1] + z * directions[m, 2]
+            planes[m, a] = x * moments[m, 0] + y * moments[m, 1] + z * moments[m, 2]
         for a in range(3):
             b, c = (a + 1) % 3, (a + 2) % 3
-            planes[m, a] += shift[b] * direction[c] - shift[c] * direction[b]
+            planes[m, a] += translation[b] * direction[c] - translation[c] * direction[b]
         x, y = planes[m, 0] / focal[0], planes[m, 1] / focal[1]
         reaches[m] = max(math.hypot(x, y), TINY)
         tilts[m, 0], tilts[m, 1] = x / focal[0] / reaches[m], y / focal[1] / reaches[m]
@@ -249,6 +279,6 @@ def _planes(
 
 
 @compiled
-def _undirected(angle: float) -> float:
+def _wrap_undirected(angle: float) -> float:
     """The angle between undirected lines, in [-pi/2, pi/2)."""
     return (angle + 0.5 * math.pi) % math.pi - 0.5 * math.pi

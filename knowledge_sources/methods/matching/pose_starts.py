@@ -1,93 +1,106 @@
-"""Poses from which a correspondence is worth searching: a robust vote of the pairs."""
+"""Poses from which a correspondence is worth searching: starts all over the prior, refined by a robust loss."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from numba import njit
 
+from knowledge_sources.methods.arrays import Floats, Indices
 from knowledge_sources.methods.matching.pose_pairs import LineScene, PosePairs, linearise_pairs
-from knowledge_sources.methods.matching.pose_parameters import Array, Widths
+from knowledge_sources.methods.matching.pose_parameters import Widths
+from knowledge_sources.settings.matching import MatchingSettings
 from world_models.frames import Pose
 
 compiled = njit(cache=True, error_model="numpy")
 
-CLOSE_PX = 40.0
-"""Pairs further than this from a place are left out when it is settled exactly."""
-SHARE_PX = 20.0
-"""A pair of this length weighs like one measurement."""
-BESIDE_PX = 20.0
-"""A data line that lies further than this past a model line's end supports nothing."""
-FARTHEST = 25.0
-"""Pairs whose mean square distance is more than so many squared widths do not pull at all."""
-FINALISTS = 8
-SEARCHED = 4
 
+def find_start_poses(scene: LineScene, wide: PosePairs, settings: MatchingSettings) -> list[Pose]:
+    """Poses to search from, best supported first.
 
-def settled_poses(scene: LineScene, wide: PosePairs) -> list[Pose]:
-    """Poses to search from: starts all over the prior, settled, the best settled again at their own places."""
-    freedom = scene.freedom
+    Starts all over the prior are refined to first order, by iteratively reweighted least squares on Geman and
+    McClure's loss with a narrowing width (graduated non-convexity); the best, linearised at their own poses, again.
+
+    Args:
+        wide: the pairs that the prior allows, linearised at the prior.
+    """
+    parameters = scene.parameters
     if not len(wide.model):
-        return [freedom.prior]
-    reach_px = np.median(np.sqrt(np.mean((wide.slopes @ freedom.root) ** 2, axis=1)), axis=0)
-    starts = freedom.starts(reach_px) @ freedom.root.T
-    steps, support = _settled(wide, starts, freedom.information, np.zeros(starts.shape[1]), freedom.first_widths)
-    poses = [freedom.moved(freedom.prior, steps[i]) for i in _distinct(steps, support, FINALISTS, scene)]
-    exact = [_settled_exactly(scene, wide, pose, freedom.later_widths) for pose in poses]
-    reached = np.stack([freedom.away(pose) for pose, _ in exact])
-    best = _distinct(reached, np.array([score for _, score in exact]), SEARCHED, scene)
-    last = (freedom.later_widths[-1][-2:],)
-    return [_settled_exactly(scene, wide, exact[i][0], last)[0] for i in best]
+        return [parameters.prior]
+    reach_px = np.median(np.sqrt(np.mean((wide.slopes @ parameters.root) ** 2, axis=1)), axis=0)
+    starts = parameters.list_starts(reach_px, settings) @ parameters.root.T
+    steps, support = _refine_steps(
+        wide, starts, parameters.information, np.zeros(starts.shape[1]), parameters.get_widths(settings), settings
+    )
+    poses = [
+        parameters.move(parameters.prior, steps[i])
+        for i in _select_distinct(steps, support, settings.pose_finalists, scene, settings)
+    ]
+    widths, size = settings.last_widths_px, parameters.widths_per_linearisation
+    groups = [widths[i : i + size] for i in range(0, len(widths), size)]
+    exact = [_refine_pose(scene, wide, pose, groups, settings) for pose in poses]
+    reached = np.stack([parameters.compute_step(pose) for pose, _ in exact])
+    scores = np.array([score for _, score in exact])
+    best = _select_distinct(reached, scores, settings.max_pose_starts, scene, settings)
+    return [_refine_pose(scene, wide, exact[i][0], [groups[-1][-2:]], settings)[0] for i in best]
 
 
-def _settled_exactly(
-    scene: LineScene, wide: PosePairs, pose: Pose, widths: tuple[Widths, ...]
+def _refine_pose(
+    scene: LineScene, wide: PosePairs, pose: Pose, groups: list[Widths], settings: MatchingSettings
 ) -> tuple[Pose, float]:
-    """A pose settled with the pairs linearised there, group of widths by group; its support."""
-    freedom, support = scene.freedom, 0.0
-    for group in widths:
+    """A pose refined with the pairs linearised there, anew for each group of widths; and its support."""
+    parameters, support = scene.parameters, 0.0
+    for group in groups:
         pairs = linearise_pairs(scene, pose, wide.model, wide.data)
-        pairs = pairs.take(np.abs(pairs.distances).max(axis=1) < CLOSE_PX)
+        pairs = pairs.take(np.abs(pairs.distances).max(axis=1) < settings.max_refined_pair_px)
         if not len(pairs.model):
             break
-        still = np.zeros((1, len(freedom.root)))
-        more, found = _settled(pairs, still, freedom.information, freedom.away(pose), group)
-        pose, support = freedom.moved(pose, more[0]), float(found[0])
+        still = np.zeros((1, len(parameters.root)))
+        offset = parameters.compute_step(pose)
+        steps, supports = _refine_steps(pairs, still, parameters.information, offset, group, settings)
+        pose, support = parameters.move(pose, steps[0]), float(supports[0])
     return pose, support
 
 
-def _distinct(steps: Array, scores: Array, count: int, scene: LineScene) -> list[int]:
-    """The best ``count`` that differ by more than a twentieth of the prior's deviation."""
-    whitened = steps @ np.linalg.inv(scene.freedom.root).T
+def _select_distinct(
+    steps: Floats, scores: Floats, count: int, scene: LineScene, settings: MatchingSettings
+) -> list[int]:
+    """The best ``count`` of the steps (s, d) that differ, in the prior's deviations (non-maximum suppression)."""
+    whitened = steps @ np.linalg.inv(scene.parameters.root).T
     free = np.ones(len(steps), np.bool_)
     kept: list[int] = []
     for i in np.argsort(-scores, kind="stable"):
         if free[i]:
             kept.append(int(i))
-            free &= np.abs(whitened - whitened[i]).max(axis=1) > 0.05
+            free &= np.abs(whitened - whitened[i]).max(axis=1) > settings.min_pose_difference_sigmas
         if len(kept) == count:
             break
     return kept
 
 
-def _settled(
-    pairs: PosePairs, steps: Array, information: Array, offset: Array, widths: Widths
-) -> tuple[Array, Array]:
-    """Steps (s, d) moved to where close pairs agree, to first order, and their support (s,) [px of model line]."""
-    moved: Array = _descended(
-        pairs.distances, pairs.slopes, pairs.shares, np.array(steps), information, offset, np.array(widths)
+def _refine_steps(
+    pairs: PosePairs, steps: Floats, information: Floats, offset: Floats, widths: Widths, settings: MatchingSettings
+) -> tuple[Floats, Floats]:
+    """Steps (s, d) moved to where close pairs agree, to first order, and their support (s,) [px of model line].
+
+    ``information`` (d, d) is the prior's, ``offset`` (d,) the step from the prior to where the pairs are linearised.
+    """
+    max_square = settings.max_width_ratio**2
+    moved: Floats = _reweight(
+        pairs.distances, pairs.slopes, pairs.shares, np.array(steps), information, offset, np.array(widths),
+        settings.unit_length_px, max_square,
     )
-    support: Array = _supported(
-        pairs.model, pairs.distances, pairs.slopes, pairs.along, pairs.lengths, pairs.shares, moved, widths[-1]
+    support: Floats = _compute_support(
+        pairs.model, pairs.distances, pairs.slopes, pairs.along, pairs.lengths, pairs.shares, moved, widths[-1],
+        settings.max_beside_px, max_square,
     )
     return moved, support
 
 
 @compiled
-def _descended(
-    distances: Any, slopes: Any, shares: Any, steps: Any, information: Any, offset: Any, widths: Any
-) -> Any:
+def _reweight(
+    distances: Floats, slopes: Floats, shares: Floats, steps: Floats, information: Floats, offset: Floats,
+    widths: Floats, unit_length_px: float, max_square: float,
+) -> Floats:
     """Steps (s, d), each reweighted and solved once a width: weights 1 / (1 + (distance / width)^2)^2."""
     pairs, _, unknowns = slopes.shape
     squares, pulls = np.zeros((pairs, unknowns * (unknowns + 1) // 2)), np.zeros((pairs, unknowns))
@@ -103,10 +116,10 @@ def _descended(
         for width in widths:
             totals[:], gradient[:] = 0.0, information @ offset
             for p in range(pairs):
-                close = _closeness(distances, slopes, p, steps[s], width)
+                close = _compute_closeness(distances, slopes, p, steps[s], width, max_square)
                 if close == 0.0:
                     continue
-                weight = close * close * shares[p] / (SHARE_PX * width * width)
+                weight = close * close * shares[p] / (unit_length_px * width * width)
                 for c in range(len(totals)):
                     totals[c] += weight * squares[p, c]
                 for a in range(unknowns):
@@ -121,29 +134,32 @@ def _descended(
 
 
 @compiled
-def _supported(
-    model: Any, distances: Any, slopes: Any, along: Any, lengths: Any, shares: Any, steps: Any, width: float
-) -> Any:
-    """(s,) model length that close data account for, each model line at most its own."""
-    support, found, full = np.zeros(len(steps)), np.zeros(model.max() + 1), np.zeros(model.max() + 1)
+def _compute_support(
+    model: Indices, distances: Floats, slopes: Floats, along: Floats, lengths: Floats, shares: Floats, steps: Floats,
+    width: float, max_beside_px: float, max_square: float,
+) -> Floats:
+    """(s,) model length that close data lines cover, each model line at most its own."""
+    support, covered, full = np.zeros(len(steps)), np.zeros(model.max() + 1), np.zeros(model.max() + 1)
     for p in range(len(model)):
         full[model[p]] = lengths[p]
     for s in range(len(steps)):
-        found[:] = 0.0
+        covered[:] = 0.0
         for p in range(len(model)):
             low, high = min(along[p, 0], along[p, 1]), max(along[p, 0], along[p, 1])
-            if high >= -BESIDE_PX and low <= lengths[p] + BESIDE_PX:
-                found[model[p]] += _closeness(distances, slopes, p, steps[s], width) * shares[p]
-        for m in range(len(found)):
-            support[s] += min(found[m], full[m])
+            if high >= -max_beside_px and low <= lengths[p] + max_beside_px:
+                covered[model[p]] += _compute_closeness(distances, slopes, p, steps[s], width, max_square) * shares[p]
+        for m in range(len(covered)):
+            support[s] += min(covered[m], full[m])
     return support
 
 
 @compiled
-def _closeness(distances: Any, slopes: Any, p: int, step: Any, width: float) -> float:
-    """From 1, on the model line, to 1 / 26 at 5 widths, root mean square; 0 beyond."""
+def _compute_closeness(
+    distances: Floats, slopes: Floats, p: int, step: Floats, width: float, max_square: float
+) -> float:
+    """From 1, on the model line, down; 0 where the mean square distance exceeds ``max_square`` squared widths."""
     first, second = distances[p, 0], distances[p, 1]
     for a in range(len(step)):
         first, second = first + slopes[p, 0, a] * step[a], second + slopes[p, 1, a] * step[a]
     square = (first * first + second * second) * (0.5 / (width * width))
-    return 1.0 / (1.0 + square) if square < FARTHEST else 0.0
+    return 1.0 / (1.0 + square) if square < max_square else 0.0

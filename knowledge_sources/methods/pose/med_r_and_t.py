@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -78,7 +79,7 @@ def med_r_and_t(
     medians = np.median(errors, axis=1)
     least = float(medians.min())
     bound = 2.0 * (settings.outlier_sigmas * _compute_robust_scale(least, len(lines), settings)) ** 2
-    tied = np.flatnonzero(medians <= max(least, settings.tied_median))
+    tied = np.flatnonzero(medians <= max(least, _compute_tied_median(settings)))
     best = int(tied[np.argmin(np.minimum(errors[tied], bound).sum(axis=1))])
     start = rotations[best], translations[best]
     return refine_on_inliers(lines, prior, start, errors[best] <= bound, bound, settings)
@@ -142,6 +143,15 @@ def _add_concentrated(
     half = (len(lines) + SUBSET_SIZE) // 2
     more = concentrate(lines, rotations[few], translations[few], half, settings)
     return np.concatenate([rotations, more[0]]), np.concatenate([translations, more[1]])
+
+
+def _compute_tied_median(settings: PoseSettings) -> float:
+    """Medians of squared errors up to this are ties: with the most wrong lines, noise alone gives as much.
+
+    The median of all lines is then the quantile 0.5 / (1 - outliers) of the right ones' chi-squared law with two
+    degrees of freedom, 1 - exp(-x / 2).
+    """
+    return -2.0 * math.log(1.0 - 0.5 / (1.0 - settings.max_outlier_part))
 
 
 def _compute_robust_scale(median_squared: float, n: int, settings: PoseSettings) -> float:

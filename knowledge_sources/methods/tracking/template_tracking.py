@@ -75,7 +75,8 @@ def follow_landmarks(
 
 
 def correct_pose(
-    robot: RobotModel, seen: list[Track], anchors: tuple[Anchor, ...], pose: Pose2, covariance: Floats
+    robot: RobotModel, seen: list[Track], anchors: tuple[Anchor, ...], pose: Pose2, covariance: Floats,
+    settings: Settings = DEFAULT,
 ) -> PoseCorrection:
     """Solve for the pose from landmarks that were found; no surer than the beliefs at which their templates were cut.
 
@@ -90,6 +91,7 @@ def correct_pose(
         pose,
         covariance,
         sigma_px=np.array([t.sigma_px for t in seen]),
+        settings=settings.pose,
     )
     after = estimate.world_from_robot
     spread = np.asarray(estimate.covariance + _compute_anchor_covariance(after, seen, anchors))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise, product
 from typing import Any
 
@@ -14,6 +15,7 @@ from scipy.optimize import minimize
 
 from knowledge_sources.methods.matching import Match, Peak, Similarity2, match_lines
 from knowledge_sources.methods.matching.fit import compute_best_fits
+from knowledge_sources.settings.matching import PAPER_MATCHING, MatchingSettings
 
 Array = NDArray[np.float64]
 
@@ -21,6 +23,12 @@ seeds = st.integers(0, 2**32 - 1)
 objectives = st.sampled_from(["paper", "likelihood"])
 strategies = st.sampled_from(["first", "steepest"])
 quick = settings(max_examples=12, deadline=None, derandomize=True)
+
+
+def search_with(objective: str, **more: Any) -> MatchingSettings:
+    """Three starts and steepest descent with exchanges, within 3 px, unless ``more`` says otherwise."""
+    steepest = replace(PAPER_MATCHING, strategy="steepest", exchange=True, max_starts=3)
+    return replace(steepest, objective=objective, **more)
 
 
 def model_of(rng: np.random.Generator, count: int) -> Array:
@@ -68,21 +76,22 @@ def apart_px(found: Match, move: Similarity2, model: Array) -> float:
 @settings(max_examples=12, deadline=None, derandomize=True)
 def test_a_moved_model_is_found(seed: int, objective: Any, with_scale: bool) -> None:
     model, data, move, _ = scene(seed)
-    found = match_lines(model, data, objective=objective, with_scale=with_scale)
+    found = match_lines(model, data, search_with(objective, with_scale=with_scale))
     assert apart_px(found, move, model) < 2.0
     assert found.coverage.mean() > 0.8 and abs(found.transform.scale - 1.0) < 0.02
 
 
-@given(seed=seeds, objective=objectives, strategy=strategies, replace=st.booleans())
+@given(seed=seeds, objective=objectives, strategy=strategies, exchange=st.booleans())
 @quick
-def test_the_match_error_falls_at_every_step(seed: int, objective: Any, strategy: Any, replace: bool) -> None:
+def test_the_match_error_falls_at_every_step(seed: int, objective: Any, strategy: Any, exchange: bool) -> None:
     model, data, _, _ = scene(seed, lines=6, clutter=80)
-    found = match_lines(model, data, objective=objective, strategy=strategy, replace=replace, pair_px=8.0, trace=True)
+    chosen = search_with(objective, strategy=strategy, exchange=exchange)
+    found = match_lines(model, data, chosen, pair_px=8.0, trace=True)
     errors = [step.evaluation for step in found.trace]
     assert all(after < before for before, after in pairwise(errors))
     assert len(errors) == found.steps + 1
     assert found.e_match == pytest.approx(errors[-1])
-    most = 3 if replace else 2
+    most = 3 if exchange else 2
     for before, after in pairwise(found.trace):
         assert 1 <= len(set(before.pairs) ^ set(after.pairs)) <= most
 
@@ -91,7 +100,7 @@ def test_the_match_error_falls_at_every_step(seed: int, objective: Any, strategy
 @quick
 def test_each_data_line_goes_to_one_model_line(seed: int, objective: Any) -> None:
     model, data, _, _ = scene(seed, clutter=100)
-    pairs = match_lines(model, data, objective=objective, pair_px=8.0).pairs
+    pairs = match_lines(model, data, search_with(objective), pair_px=8.0).pairs
     assert len(np.unique(pairs[:, 1])) == len(pairs)
     assert [tuple(p) for p in pairs] == sorted(tuple(p) for p in pairs)
 
@@ -101,8 +110,8 @@ def test_each_data_line_goes_to_one_model_line(seed: int, objective: Any) -> Non
 def test_the_order_of_lines_does_not_matter(seed: int, objective: Any) -> None:
     model, data, _, rng = scene(seed)
     rows, columns = rng.permutation(len(model)), rng.permutation(len(data))
-    first = match_lines(model, data, objective=objective)
-    second = match_lines(model[rows], data[columns], objective=objective)
+    first = match_lines(model, data, search_with(objective))
+    second = match_lines(model[rows], data[columns], search_with(objective))
     back = {(int(rows[m]), int(columns[d])) for m, d in second.pairs}
     assert back == {(int(m), int(d)) for m, d in first.pairs}
     assert second.e_match == pytest.approx(first.e_match, abs=1e-6)
@@ -115,8 +124,8 @@ def test_which_end_comes_first_does_not_matter(seed: int, objective: Any) -> Non
     a, b = rng.random(len(model)) < 0.5, rng.random(len(data)) < 0.5
     turned, flipped = model.copy(), data.copy()
     turned[a], flipped[b] = model[a][:, ::-1], data[b][:, ::-1]
-    first = match_lines(model, data, objective=objective)
-    second = match_lines(turned, flipped, objective=objective)
+    first = match_lines(model, data, search_with(objective))
+    second = match_lines(turned, flipped, search_with(objective))
     assert np.array_equal(first.pairs, second.pairs)
     assert second.e_match == pytest.approx(first.e_match, abs=1e-6)
 
@@ -129,8 +138,8 @@ def test_moving_model_and_data_together_changes_nothing(seed: int, objective: An
     still = Peak(0.0, (0.0, 0.0), 1.0)
     data = data_of(model, Similarity2(0.0, (0.0, 0.0), 1.0, move.centre_px), rng, 40)
     common = Similarity2(angle, (37.0, -80.0), 1.0, (256.0, 256.0))
-    first = match_lines(model, data, objective=objective, start=still)
-    second = match_lines(common.apply(model), common.apply(data), objective=objective, start=still)
+    first = match_lines(model, data, search_with(objective), start=still)
+    second = match_lines(common.apply(model), common.apply(data), search_with(objective), start=still)
     assert np.array_equal(first.pairs, second.pairs)
     assert second.e_match == pytest.approx(first.e_match, rel=1e-6)
 
@@ -143,13 +152,13 @@ def test_no_state_of_a_small_problem_is_better_than_brute_force_s_best(seed: int
     model = model_of(rng, 2)
     data = data_of(model, Similarity2(0.0, (1.0, -0.5), 1.0, (256.0, 256.0)), rng, 0)
     data = np.concatenate([data, data[:1] + 2.0, data[-1:] - 2.0])
-    arguments: dict[str, Any] = {"objective": objective, "start": Peak(0.0, (0.0, 0.0), 1.0), "pair_px": 4.0}
+    arguments = {"settings": search_with(objective), "start": Peak(0.0, (0.0, 0.0), 1.0), "pair_px": 4.0}
     found = match_lines(model, data, **arguments)
     errors: dict[frozenset[tuple[int, int]], float] = {}
     nearest = [int(np.argmin([_distance(line, segment) for line in model])) for segment in data]
     for take in product([False, True], repeat=len(data)):
         pairs = frozenset((nearest[k], k) for k in range(len(data)) if take[k])
-        errors[pairs] = _held(model, data, pairs, arguments)
+        errors[pairs] = _evaluate(model, data, pairs, arguments)
     state = frozenset((int(m), int(d)) for m, d in found.pairs)
     assert found.e_match >= min(errors.values()) - 1e-9
     assert found.e_match == pytest.approx(errors[state])
@@ -164,7 +173,7 @@ def _distance(line: Array, segment: Array) -> float:
     return float(np.abs(across).max()) + gap
 
 
-def _held(model: Array, data: Array, pairs: frozenset[tuple[int, int]], arguments: dict[str, Any]) -> float:
+def _evaluate(model: Array, data: Array, pairs: frozenset[tuple[int, int]], arguments: dict[str, Any]) -> float:
     """E_match of one state: the first of a search's trace."""
     return match_lines(model, data, first_pairs=pairs, trace=True, **arguments).trace[0].evaluation
 
@@ -205,12 +214,16 @@ def test_the_closed_fit_is_the_library_s_minimum(seed: int, with_scale: bool) ->
 def test_nothing_matches_nothing(objective: Any) -> None:
     empty, line = np.zeros((0, 2, 2)), np.array([[[10.0, 10.0], [10.0, 90.0]]])
     for model, data in ((line, empty), (empty, line), (empty, empty)):
-        found = match_lines(model, data, objective=objective)
+        found = match_lines(model, data, search_with(objective))
         assert found.pairs.shape == (0, 2) and not found.coverage.any()
 
 
 @pytest.mark.parametrize(
-    "more", [{"objective": "other"}, {"pair_px": 0.0}, {"pair_px": [1.0, 2.0, 3.0]}, {"strategy": "random"}]
+    "more",
+    [
+        {"settings": search_with("other")}, {"pair_px": 0.0}, {"pair_px": [1.0, 2.0, 3.0]},
+        {"settings": search_with("paper", strategy="random")}, {"settings": search_with("paper", max_pair_px=0.0)},
+    ],
 )
 def test_wrong_settings_are_named(more: dict[str, Any]) -> None:
     line = np.array([[[10.0, 10.0], [10.0, 90.0]]])
