@@ -18,9 +18,10 @@ from sim.render.rasterizer import sample_offsets
 from sim.render.sensor import SensorParameters
 from world_models.bounds import Bounds, check_bounds
 from world_models.camera import Camera, CameraMount
+from world_models.files.toml.line_numbers import Key
 from world_models.files.toml.mission import ROOT, TABLES, Limits, Mission, MissionFormat, named_file
 from world_models.files.toml.settings import MAX_NUMBER, read_settings, suggest_keys
-from world_models.files.toml.source import Key, Source, WorldError
+from world_models.files.toml.source import Source, WorldError
 
 SCENARIOS = ROOT / "sim" / "scenarios"
 MAX_DISTORTION = 1e4

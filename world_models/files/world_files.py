@@ -1,4 +1,4 @@
-"""Reading a world: TOML that a person writes (``worlds/research_center.toml`` is annotated), or a compiled file."""
+"""Reading a world: from TOML that people write (``worlds/research_center.toml`` is annotated), or a compiled file."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from world_models.files.compiled.schema import SUFFIXES
 from world_models.files.compiled.sqlite_locales import SqliteLocales
 from world_models.files.compiled.writer import compile_world
 from world_models.files.construction.builder import build_world
-from world_models.files.toml.drafting import Draft
 from world_models.files.toml.includes import WORLDS, compute_digest
 from world_models.files.toml.source import Source, WorldError
+from world_models.files.toml.world_reader import WorldReader
 
 __all__ = ["SUFFIXES", "WORLDS", "WorldError", "compile_file", "fingerprint", "load_world", "read_world"]
 
 
 def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[str]] = ()) -> World:
-    """The world described by a TOML file, or in a compiled one, whose frames are then loaded as they are asked for.
+    """The world of a TOML file, or of a compiled one, which is read one locale at a time.
 
     Args:
         path: the world file.
-        details: further files that add parts, finishes and things (no rooms or doors). A compiled world has them in
-            itself: they must be those that it was compiled with, and only their names matter.
+        details: further files that add parts, finishes and things (no rooms or doors). A compiled world contains its
+            details: here they must be those that it was compiled with, and only their names count.
 
     Raises:
-        WorldError: a file cannot be read or does not describe a world; names file, line, what was expected and came.
+        WorldError: a file cannot be read or does not describe a world; names file, line, what was expected and got.
     """
     path = Path(path)
     if path.suffix in SUFFIXES:
@@ -36,14 +36,14 @@ def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[st
 
 
 def fingerprint(path: str | PathLike[str]) -> str:
-    """SHA-256 of a world file, or of what a compiled one was made of. Raises OSError or WorldError."""
+    """SHA-256 of a world file with its includes, or of a compiled world's contents. Raises OSError or WorldError."""
     path = Path(path)
     return SqliteLocales(path).sha256 if path.suffix in SUFFIXES else compute_digest(path)
 
 
 def compile_file(path: str | PathLike[str], out: str | PathLike[str],
                  details: Sequence[str | PathLike[str]] = ()) -> World:
-    """Compile a TOML world with its details; returns the world as it was compiled. Raises WorldError."""
+    """Compile a TOML world with its details into one file; returns that world. Raises WorldError."""
     base, added = Source.read(Path(path)), [Source.read(Path(detail)) for detail in details]
     layers = [read_world(base, added[:count]) for count in range(len(added) + 1)]
     compile_world(layers, Path(out), [Path(detail).stem for detail in details])
@@ -51,9 +51,9 @@ def compile_file(path: str | PathLike[str], out: str | PathLike[str],
 
 
 def read_world(base: Source, details: Sequence[Source] = ()) -> World:
-    """As :func:`load_world`, from texts already read."""
-    draft = Draft(base)
-    draft.read_base()
+    """The world of files already read; see :func:`load_world`."""
+    reader = WorldReader(base)
+    reader.read_base()
     for source in details:
-        draft.read_details(source)
-    return build_world(draft.blueprint())
+        reader.read_details(source)
+    return build_world(reader.spec())

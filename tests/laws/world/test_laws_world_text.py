@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from world_models.building.checks import check_world
 from world_models.building.world import World
-from world_models.files.toml.source import Source, WorldError, line_numbers
+from world_models.files.toml.line_numbers import find_line_numbers
+from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import WORLDS, read_world
 
 SMALL = """\
@@ -153,7 +154,7 @@ def walk(value: object, key: tuple[str | int, ...] = ()) -> list[tuple[tuple[str
 @settings(deadline=None, max_examples=150)
 @given(documents())
 def test_every_value_is_found_on_its_line(text: str) -> None:
-    data, lines = tomllib.loads(text), line_numbers(text)
+    data, lines = tomllib.loads(text), find_line_numbers(text)
     rows = text.split("\n")
     for key, value in walk(data)[1:]:
         row = rows[lines[key] - 1]
@@ -165,7 +166,7 @@ def test_every_value_is_found_on_its_line(text: str) -> None:
 
 def test_the_shipped_world_has_a_line_for_every_value() -> None:
     text = (WORLDS / "research_center.toml").read_text()
-    data, lines = tomllib.loads(text), line_numbers(text)
+    data, lines = tomllib.loads(text), find_line_numbers(text)
     assert all(key in lines for key, _ in walk(data)[1:])
     rows = text.split("\n")
     assert rows[lines["locales", "allens-office", "size"] - 1].startswith("allens-office = ")

@@ -1,4 +1,4 @@
-"""From a blueprint to a world: frames are composed, doors cut, rooms and furniture given surfaces and model lines."""
+"""Building a world from its spec: poses, openings for doors, then faces and model lines of rooms, doors and things."""
 
 from __future__ import annotations
 
@@ -17,38 +17,38 @@ from world_models.building.memory_locales import MemoryLocales
 from world_models.building.solids import Solid
 from world_models.building.things import ROBOT_TOP_M, Finding, Thing
 from world_models.building.world import World
-from world_models.files.construction.blueprint import Blueprint, DoorSpec, LinkSpec, LocaleSpec, ThingSpec
-from world_models.files.construction.doors import LEAF_DEPTH_M, DoorSide, closed_door, open_door
-from world_models.files.construction.shells import Opening, Shell, Wall, along_wall, walls_of
+from world_models.files.construction.doors import LEAF_DEPTH_M, DoorSide, build_closed_door, build_open_door
+from world_models.files.construction.rooms import Opening, RoomShell, Wall, build_walls, coordinate_along_wall
+from world_models.files.construction.specs import DoorSpec, LinkSpec, LocaleSpec, ThingSpec, WorldSpec
 from world_models.frames import Pose, Pose2, flattened
 
-THICKEST_WALL_M = 0.9
-"""Walls of two rooms that are further apart than this are not the two sides of one wall, not even in an old house."""
+MAX_WALL_M = 0.9
+"""Walls of two rooms further apart than this are not the two sides of one wall, not even in an old house."""
 
-ROOF_M = 0.3
-"""How far a locale without walls of its own reaches beyond the locales in it."""
+CONTAINER_MARGIN_M = 0.3
+"""How far a locale without walls reaches beyond the locales in it."""
 
 
-def build_world(blueprint: Blueprint) -> World:
-    """The world that a blueprint describes; what cannot be built is left out and named in ``World.check()``."""
-    site = _Site(blueprint)
-    site.cut_doors()
-    site.raise_shells()
-    site.hang_doors()
-    site.furnish()
+def build_world(spec: WorldSpec) -> World:
+    """The world that a spec describes; what cannot be built is left out and is in ``World.building_faults``."""
+    builder = _WorldBuilder(spec)
+    builder.cut_openings()
+    builder.build_rooms()
+    builder.build_doors()
+    builder.place_things()
     return World(MemoryLocales(
-        name=blueprint.name,
-        locales=MappingProxyType(_locales(blueprint, site.poses)),
-        every_doorway=tuple(site.doorways),
-        every_face=tuple(site.faces),
-        every_landmark=tuple(mark for mark in site.landmarks if len(mark.edges)),
-        every_thing=tuple(site.things),
-        every_link=tuple(_link(link, site.poses) for link in blueprint.links),
-        building_faults=tuple(site.faults),
+        name=spec.name,
+        locales=MappingProxyType(_build_locales(spec, builder.poses)),
+        every_doorway=tuple(builder.doorways),
+        every_face=tuple(builder.faces),
+        every_landmark=tuple(mark for mark in builder.landmarks if len(mark.edges)),
+        every_thing=tuple(builder.things),
+        every_link=tuple(_build_link(link, builder.poses) for link in spec.links),
+        building_faults=tuple(builder.faults),
     ))
 
 
-def world_poses(locales: Mapping[str, LocaleSpec], root: str) -> dict[str, Pose]:
+def compute_world_poses(locales: Mapping[str, LocaleSpec], root: str) -> dict[str, Pose]:
     """world_from_locale of every locale; the root's frame is the world's."""
     poses = {root: Pose.identity()}
 
@@ -63,13 +63,13 @@ def world_poses(locales: Mapping[str, LocaleSpec], root: str) -> dict[str, Pose]
 
 
 @dataclass
-class _Site:
-    """The building while it is built."""
+class _WorldBuilder:
+    """A world while it is built, in the order of the public methods."""
 
-    blueprint: Blueprint
+    spec: WorldSpec
     poses: dict[str, Pose] = field(init=False)
     walls: dict[str, dict[str, Wall]] = field(init=False)
-    shells: dict[str, Shell] = field(default_factory=dict)
+    shells: dict[str, RoomShell] = field(default_factory=dict)
     cuts: list[tuple[DoorSpec, list[tuple[str, str, Opening]]]] = field(default_factory=list)
     doorways: list[Doorway] = field(default_factory=list)
     faces: list[Face] = field(default_factory=list)
@@ -78,24 +78,24 @@ class _Site:
     faults: list[Finding] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        locales = self.blueprint.locales
-        self.poses = world_poses(locales, self.blueprint.name)
-        self.walls = {name: {w.name: w for w in walls_of(spec, self.poses[name])} for name, spec in locales.items()}
+        locales = self.spec.locales
+        self.poses = compute_world_poses(locales, self.spec.name)
+        self.walls = {name: {w.name: w for w in build_walls(spec, self.poses[name])} for name, spec in locales.items()}
 
-    def cut_doors(self) -> None:
-        """Make the holes of all doors, before any wall is build_barrier."""
-        for door in self.blueprint.doors:
+    def cut_openings(self) -> None:
+        """Cut the openings of all doors, before any wall gets its face."""
+        for door in self.spec.doors:
             try:
-                holes = self._holes(door)
-            except _Unbuildable as problem:
+                openings = self._find_openings(door)
+            except _CannotBuildError as problem:
                 self.faults.append(Finding(door.source, f"door {door.name}: {problem}"))
                 continue
-            for room, wall, opening in holes:
+            for room, wall, opening in openings:
                 self.walls[room][wall] = self.walls[room][wall].with_opening(opening)
-            self.cuts.append((door, holes))
+            self.cuts.append((door, openings))
 
-    def _holes(self, door: DoorSpec) -> list[tuple[str, str, Opening]]:
-        """(room, wall, opening) on one or both sides of the wall that a door is in."""
+    def _find_openings(self, door: DoorSpec) -> list[tuple[str, str, Opening]]:
+        """(room, wall, opening) on one or both sides of a door's wall. Raises _CannotBuildError."""
         near = self.walls[door.between[0]][door.wall]
         wall_from_locale = near.world_from_wall.inverse() @ self.poses[door.between[0]]
         across = _coordinate_along(near.name, wall_from_locale, door.along_m)
@@ -106,64 +106,70 @@ class _Site:
         if len(door.between) == 1:
             return [(near.locale, near.name, opening)]
         ends_world = near.world_from_wall.apply([(across - half, 0, 0), (across + half, 0, 0)])
-        far = self._far_hole(door, near, ends_world)
+        far = self._find_far_opening(door, near, ends_world)
         _check_fit(self.walls[far[0]][far[1]], far[2])
         return [(near.locale, near.name, opening), far]
 
-    def _far_hole(self, door: DoorSpec, near: Wall, ends_world: NDArray[np.float64]) -> tuple[str, str, Opening]:
-        found: tuple[float, Wall, Opening] | None = None
+    def _find_far_opening(
+        self, door: DoorSpec, near: Wall, ends_world: NDArray[np.float64]
+    ) -> tuple[str, str, Opening]:
+        """(room, wall, opening) in the nearest wall of the second room behind the first one's. Raises."""
+        best: tuple[float, Wall, Opening] | None = None
         for wall in self.walls[door.between[1]].values():
             ends = wall.world_from_wall.inverse().apply(ends_world)
             faces_back = float(wall.inward_world @ near.inward_world) < -0.999
-            behind = -THICKEST_WALL_M <= ends[0, 1] <= 1e-6
+            behind = -MAX_WALL_M <= ends[0, 1] <= 1e-6
             if faces_back and behind and ends[1, 0] >= 0 and ends[0, 0] <= wall.length_m:
                 neighbour = door.between[0] if door.is_open else None
                 opening = Opening(door.name, float(ends[1, 0]), float(ends[0, 0]), door.height_m, neighbour)
-                if found is None or -ends[0, 1] < found[0] - 1e-9:
-                    found = -float(ends[0, 1]), wall, opening
-        if found is not None:
-            return found[1].locale, found[1].name, found[2]
-        raise _Unbuildable(f"expected a wall of {door.between[1]} behind the {door.wall} wall of {door.between[0]}, "
-                           "got none there: the doorway leads nowhere")
+                if best is None or -ends[0, 1] < best[0] - 1e-9:
+                    best = -float(ends[0, 1]), wall, opening
+        if best is not None:
+            return best[1].locale, best[1].name, best[2]
+        raise _CannotBuildError(f"expected a wall of {door.between[1]} behind the {door.wall} wall of "
+                                f"{door.between[0]}, got none there: the doorway leads nowhere")
 
-    def raise_shells(self) -> None:
-        for name, spec in self.blueprint.locales.items():
+    def build_rooms(self) -> None:
+        """Floors, ceilings, walls and trim."""
+        for name, spec in self.spec.locales.items():
             if spec.outline is None:
                 continue
-            shell = Shell(spec, tuple(self.walls[name].values()), self.poses[name])
+            shell = RoomShell(spec, tuple(self.walls[name].values()), self.poses[name])
             self.shells[name] = shell
             self.faces += shell.faces()
             self.landmarks += shell.landmarks()
 
-    def hang_doors(self) -> None:
-        for door, holes in self.cuts:
-            sides = [self._door_side(door, room, wall, opening) for room, wall, opening in holes]
+    def build_doors(self) -> None:
+        """Casings, jambs, thresholds and leaves."""
+        for door, openings in self.cuts:
+            sides = [self._build_door_side(door, room, wall, opening) for room, wall, opening in openings]
             if door.is_open:
-                built = [open_door(sides[0], sides[1])]
-                self.doorways.append(_doorway(door, sides))
+                built = [build_open_door(sides[0], sides[1])]
+                self.doorways.append(_build_doorway(door, sides))
             else:
-                built = [closed_door(side) for side in sides]
+                built = [build_closed_door(side) for side in sides]
             for faces, landmark in built:
                 self.faces += faces
                 self.landmarks.append(landmark)
 
-    def _door_side(self, door: DoorSpec, room: str, wall: str, opening: Opening) -> DoorSide:
-        here, floor = self.walls[room][wall], self.blueprint.locales[room].look.floor
+    def _build_door_side(self, door: DoorSpec, room: str, wall: str, opening: Opening) -> DoorSide:
+        here, floor = self.walls[room][wall], self.spec.locales[room].finishes.floor
         depth = LEAF_DEPTH_M
         if len(door.between) == 2:
-            thickness = _thickness(self.walls[door.between[0]][door.wall], here, self.walls, door)
+            thickness = _wall_thickness(self.walls[door.between[0]][door.wall], here, self.walls, door)
             depth = thickness if door.is_open else min(LEAF_DEPTH_M, 0.45 * thickness)
         return DoorSide(door, here, opening, depth, floor)
 
-    def furnish(self) -> None:
-        for spec in self.blueprint.things:
+    def place_things(self) -> None:
+        """Furniture and the like."""
+        for spec in self.spec.things:
             shell = self.shells[spec.locale]
             pose = self._pose_of_thing(spec)
             name = f"{spec.locale}/{spec.name}"
             solid = Solid(name, spec.boxes, pose, shell.surfaces)
             self.faces += solid.faces(spec.locale)
             self.landmarks.append(Landmark(name, spec.locale, spec.kind, solid.edges(), source=spec.source))
-            self.things.append(_thing(spec, name, pose))
+            self.things.append(_build_thing(spec, name, pose))
 
     def _pose_of_thing(self, spec: ThingSpec) -> Pose:
         world_from_locale = self.poses[spec.locale]
@@ -178,52 +184,53 @@ class _Site:
         return wall.world_from_wall @ Pose(np.eye(3), np.array([across, 0.0, spec.up_m]))
 
 
-class _Unbuildable(Exception):
+class _CannotBuildError(Exception):
     """A door that the walls do not allow."""
 
 
 def _check_fit(wall: Wall, opening: Opening) -> None:
+    """Raises _CannotBuildError for an opening outside a wall, or over another opening."""
     if opening.left_m < 0.0 or opening.right_m > wall.length_m or opening.top_m > wall.height_m:
-        raise _Unbuildable(
+        raise _CannotBuildError(
             f"expected an opening within the {wall.name} wall of {wall.locale} ({wall.length_m:.2f} m long, "
             f"{wall.height_m:.2f} m high), "
             f"got {opening.left_m:.2f} .. {opening.right_m:.2f} m, {opening.top_m:.2f} m high"
         )
     for other in wall.openings:
         if opening.left_m < other.right_m and other.left_m < opening.right_m:
-            raise _Unbuildable(f"expected solid wall, got the opening of {other.name} in {wall.face_name}")
+            raise _CannotBuildError(f"expected solid wall, got the opening of {other.name} in {wall.face_name}")
 
 
 def _coordinate_along(wall_name: str, wall_from_locale: Pose, along_m: float) -> float:
-    """The wall's own x of a place given as x or y of the locale (rectangles) or as distance from the wall's start."""
+    """The wall's x of a place given as the locale's x or y (rectangles), or as distance from the wall's start [m]."""
     if wall_name in ("south", "north"):
-        return along_wall(wall_from_locale, (along_m, 0.0))
+        return coordinate_along_wall(wall_from_locale, (along_m, 0.0))
     if wall_name in ("east", "west"):
-        return along_wall(wall_from_locale, (0.0, along_m))
+        return coordinate_along_wall(wall_from_locale, (0.0, along_m))
     return along_m
 
 
-def _thickness(near: Wall, here: Wall, walls: Mapping[str, Mapping[str, Wall]], door: DoorSpec) -> float:
-    """Distance between the two sides of the wall that a door is in."""
+def _wall_thickness(near: Wall, here: Wall, walls: Mapping[str, Mapping[str, Wall]], door: DoorSpec) -> float:
+    """Distance between the two sides of a door's wall [m]."""
     if here is not near:
         return float(abs((here.world_from_wall.translation - near.world_from_wall.translation) @ near.inward_world))
     backs = [w for w in walls[door.between[1]].values() if any(o.name == door.name for o in w.openings)]
-    return _thickness(near, backs[0], walls, door)
+    return _wall_thickness(near, backs[0], walls, door)
 
 
-def _doorway(door: DoorSpec, sides: list[DoorSide]) -> Doorway:
-    """Left jamb first, as seen from inside each room: the wall's x runs to the left as one faces it."""
+def _build_doorway(door: DoorSpec, sides: list[DoorSide]) -> Doorway:
+    """The doorway, left jamb first as seen from inside each room: a wall's x runs to the left."""
     thresholds = [side.wall.world_from_wall.apply([(side.x[1], 0, 0), (side.x[0], 0, 0)])[:, :2] for side in sides]
     return Doorway(door.name, (door.between[0], door.between[1]), np.array(thresholds), door.height_m, door.source)
 
 
-def _link(spec: LinkSpec, poses: Mapping[str, Pose]) -> Link:
+def _build_link(spec: LinkSpec, poses: Mapping[str, Pose]) -> Link:
     stops = [flattened(poses[room]) @ Pose2(*stop) for room, stop in zip(spec.between, spec.stops, strict=True)]
     return Link(spec.name, spec.kind, spec.between, np.array([(s.x_m, s.y_m, s.heading_rad) for s in stops]),
                 spec.source)
 
 
-def _thing(spec: ThingSpec, name: str, world_from_part: Pose) -> Thing:
+def _build_thing(spec: ThingSpec, name: str, world_from_part: Pose) -> Thing:
     ranges = np.array([box.ranges for box in spec.boxes])
     low, high = ranges[..., 0].min(axis=0), ranges[..., 1].max(axis=0)
     reached = ranges[ranges[:, 2, 0] + spec.up_m < ROBOT_TOP_M]
@@ -234,15 +241,15 @@ def _thing(spec: ThingSpec, name: str, world_from_part: Pose) -> Thing:
                  float(high[1]) if spec.wall else None, spec.source)
 
 
-def _locales(blueprint: Blueprint, poses: Mapping[str, Pose]) -> dict[str, Locale]:
-    """Root first, then in the order of the file; locales without walls of their own reach round those in them."""
-    specs = blueprint.locales
-    root = _container(blueprint.name, "building", None, Pose.identity(), blueprint, poses, {}, blueprint.source)
-    out = {blueprint.name: root}
+def _build_locales(spec: WorldSpec, poses: Mapping[str, Pose]) -> dict[str, Locale]:
+    """All locales, root first, then in the order of the file; those without walls enclose the locales in them."""
+    specs = spec.locales
+    root = _build_container(spec.name, "building", None, Pose.identity(), spec, poses, {}, spec.source)
+    out = {spec.name: root}
     for name, s in specs.items():
         if s.outline is None:
             out[name] = replace(
-                _container(name, s.kind, s.parent, s.frame, blueprint, poses, s.properties, s.source),
+                _build_container(name, s.kind, s.parent, s.frame, spec, poses, s.properties, s.source),
                 survey_m=s.survey_m, survey_rad=s.survey_rad)
         else:
             out[name] = Locale(name, s.kind, s.parent, s.frame, s.outline, s.height_m, s.properties, s.source,
@@ -250,15 +257,15 @@ def _locales(blueprint: Blueprint, poses: Mapping[str, Pose]) -> dict[str, Local
     return out
 
 
-def _container(
-    name: str, kind: str, parent: str | None, frame: Pose, blueprint: Blueprint, poses: Mapping[str, Pose],
+def _build_container(
+    name: str, kind: str, parent: str | None, frame: Pose, spec: WorldSpec, poses: Mapping[str, Pose],
     properties: Mapping[str, Any], source: str,
 ) -> Locale:
-    corners = poses[name].inverse().apply(_corners_within(name, blueprint.locales, poses))
+    corners = poses[name].inverse().apply(_corners_within(name, spec.locales, poses))
     (x0, y0, z0), (x1, y1, z1) = corners.min(axis=0), corners.max(axis=0)
-    x0, y0, x1, y1 = x0 - ROOF_M, y0 - ROOF_M, x1 + ROOF_M, y1 + ROOF_M
+    x0, y0, x1, y1 = x0 - CONTAINER_MARGIN_M, y0 - CONTAINER_MARGIN_M, x1 + CONTAINER_MARGIN_M, y1 + CONTAINER_MARGIN_M
     outline = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-    return Locale(name, kind, parent, frame, outline, float(z1) + ROOF_M, properties, source, float(z0))
+    return Locale(name, kind, parent, frame, outline, float(z1) + CONTAINER_MARGIN_M, properties, source, float(z0))
 
 
 def _corners_within(name: str, specs: Mapping[str, LocaleSpec], poses: Mapping[str, Pose]) -> NDArray[np.float64]:

@@ -12,23 +12,23 @@ from world_models.building.faces import Face, build_barrier
 from world_models.building.landmarks import Edges, Landmark
 from world_models.building.regions import Finish, expected_brightness
 from world_models.building.solids import Box, Range, Solid, Surface, surface_from_polygon
-from world_models.files.construction.blueprint import DoorSpec
-from world_models.files.construction.shells import CASING_M, CASING_PROUD_M, Opening, Wall
+from world_models.files.construction.rooms import CASING_DEPTH_M, CASING_WIDTH_M, Opening, Wall
+from world_models.files.construction.specs import DoorSpec
 from world_models.frames import Pose
 
 LEAF_DEPTH_M = 0.05
-"""How far a closed leaf stands back from the wall that it is seen in."""
+"""How far a closed leaf is set back from the wall's surface."""
 
 Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class DoorSide:
-    """A door as seen from one of the rooms that it is in.
+    """A door as seen from one of its rooms; coordinates are in the frame of that room's wall.
 
     Attributes:
         spec: the door.
-        wall: the wall of that room; everything here is in its frame.
+        wall: the wall of that room.
         opening: the hole in it.
         depth_m: how far the jambs reach back: through the wall, or to the leaf.
         floor: finish of the room's floor.
@@ -50,113 +50,116 @@ class DoorSide:
 
     def casing_faces(self) -> list[Face]:
         """The boards round the opening, but for their inner sides: those are one with jambs and soffit."""
-        (a, b), h, y, finish = self.x, self.opening.top_m, (0.0, CASING_PROUD_M), self.spec.frame
+        (a, b), h, y, finish = self.x, self.opening.top_m, (0.0, CASING_DEPTH_M), self.spec.casing
         boxes = (
-            Box((a - CASING_M, a), y, (0.0, h + CASING_M), finish),
-            Box((b, b + CASING_M), y, (0.0, h + CASING_M), finish),
-            Box((a, b), y, (h, h + CASING_M), finish),
+            Box((a - CASING_WIDTH_M, a), y, (0.0, h + CASING_WIDTH_M), finish),
+            Box((b, b + CASING_WIDTH_M), y, (0.0, h + CASING_WIDTH_M), finish),
+            Box((a, b), y, (h, h + CASING_WIDTH_M), finish),
         )
-        solid = Solid(f"{self.name}/casing", boxes, self.wall.world_from_wall, self._ground)
+        solid = Solid(f"{self.name}/casing", boxes, self.wall.world_from_wall, self._surfaces)
         faces = solid.faces(self.wall.locale, parent=self.wall.face_name, neighbour=self.opening.neighbour)
         return [face for face in faces if not face.name.endswith(("/0x+", "/1x-", "/2z-"))]
 
     def doorway_face(self) -> Face:
-        """The opening itself (§3.4, Figure 6): a face of type doorway, an offspring of the wall."""
+        """The opening (§3.4, Figure 6): a face of type doorway, with the wall as its parent."""
         polygon = self.wall.rectangle(self.x, (0.0, self.opening.top_m))
         return Face(f"{self.name}/doorway", self.wall.locale, polygon, "doorway", self.opening.neighbour,
                     self.wall.face_name)
 
     def lining(self, back_m: float) -> list[Face]:
         """Jambs and soffit from the front of the casing to y = -``back_m``."""
-        (a, b), h, front, back = self.x, self.opening.top_m, CASING_PROUD_M, -back_m
+        (a, b), h, front, back = self.x, self.opening.top_m, CASING_DEPTH_M, -back_m
         sides = {
             "right-jamb": [(a, front, 0), (a, back, 0), (a, back, h), (a, front, h)][::-1],
             "left-jamb": [(b, front, 0), (b, back, 0), (b, back, h), (b, front, h)],
             "soffit": [(a, front, h), (b, front, h), (b, back, h), (a, back, h)],
         }
-        return [self._painted(name, corners, self.spec.frame) for name, corners in sides.items()]
+        return [self._build_face(name, corners, self.spec.casing) for name, corners in sides.items()]
 
     def threshold(self, finish: Finish) -> Face:
         """The floor between the jambs."""
         (a, b), back = self.x, -self.depth_m
-        return self._painted("threshold", [(a, back, 0), (b, back, 0), (b, 0, 0), (a, 0, 0)], finish)
+        return self._build_face("threshold", [(a, back, 0), (b, back, 0), (b, 0, 0), (a, 0, 0)], finish)
 
     def leaf(self) -> tuple[list[Face], Edges]:
-        """The closed leaf and what stands on it."""
+        """The closed leaf with its panel."""
         polygon = self.wall.rectangle(self.x, (0.0, self.opening.top_m), -self.depth_m)
         face = build_barrier(f"{self.name}/leaf", self.wall.locale, polygon, self.spec.leaf, parent=self.wall.face_name)
-        middle = self.wall.world_from_wall @ _moved((self.x[0] + self.x[1]) / 2, -self.depth_m)
+        middle = self.wall.world_from_wall @ _translation((self.x[0] + self.x[1]) / 2, -self.depth_m)
         surface = surface_from_polygon(polygon, self.spec.leaf)
-        panel = Solid(f"{self.name}/panel", self.spec.panel, middle, (*self._ground, surface))
-        (a, b), h, y, frame = self.x, self.opening.top_m, -self.depth_m, self.spec.frame
+        panel = Solid(f"{self.name}/panel", self.spec.panel, middle, (*self._surfaces, surface))
+        (a, b), h, y, frame = self.x, self.opening.top_m, -self.depth_m, self.spec.casing
         edges = [
-            self._line((a, y, 0), (a, y, h), "+x", "+y", frame, self.spec.leaf),
-            self._line((b, y, 0), (b, y, h), "-x", "+y", frame, self.spec.leaf),
-            self._line((a, y, h), (b, y, h), "-z", "+y", frame, self.spec.leaf),
-            self._line((a, y, 0), (b, y, 0), "+z", "+y", self.floor, self.spec.leaf),
+            self._edge_row((a, y, 0), (a, y, h), "+x", "+y", frame, self.spec.leaf),
+            self._edge_row((b, y, 0), (b, y, h), "-x", "+y", frame, self.spec.leaf),
+            self._edge_row((a, y, h), (b, y, h), "-z", "+y", frame, self.spec.leaf),
+            self._edge_row((a, y, 0), (b, y, 0), "+z", "+y", self.floor, self.spec.leaf),
         ]
         faces = [face, *panel.faces(self.wall.locale, parent=face.name)]
         return faces, Edges.concatenate([Edges.from_rows(edges), panel.edges()])
 
     def casing_edges(self) -> Edges:
         """Outer edges of the boards, and their inner edges along the jambs."""
-        (a, b), h, p, w = self.x, self.opening.top_m, CASING_PROUD_M, CASING_M
-        frame, wall = self.spec.frame, self.wall.finish
+        (a, b), h, p, w = self.x, self.opening.top_m, CASING_DEPTH_M, CASING_WIDTH_M
+        frame, wall = self.spec.casing, self.wall.finish
         rows = []
         for x, out, into in ((a, -1, "+x"), (b, 1, "-x")):
             side, outer = ("-x" if out < 0 else "+x"), x + out * w
-            rows.append(self._line((outer, p, 0), (outer, p, h + w), "+y", side, frame, frame, wall))
-            rows.append(self._line((outer, 0, 0), (outer, 0, h + w), side, "+y", frame, wall, ground=True))
-            rows.append(self._line((x, p, 0), (x, p, h), "+y", into, frame, frame))
-        rows.append(self._line((a - w, p, h + w), (b + w, p, h + w), "+y", "+z", frame, frame, wall))
-        rows.append(self._line((a - w, 0, h + w), (b + w, 0, h + w), "+z", "+y", frame, wall, ground=True))
-        rows.append(self._line((a, p, h), (b, p, h), "+y", "-z", frame, frame))
+            rows.append(self._edge_row((outer, p, 0), (outer, p, h + w), "+y", side, frame, frame, wall))
+            rows.append(self._edge_row((outer, 0, 0), (outer, 0, h + w), side, "+y", frame, wall, ground=True))
+            rows.append(self._edge_row((x, p, 0), (x, p, h), "+y", into, frame, frame))
+        rows.append(self._edge_row((a - w, p, h + w), (b + w, p, h + w), "+y", "+z", frame, frame, wall))
+        rows.append(self._edge_row((a - w, 0, h + w), (b + w, 0, h + w), "+z", "+y", frame, wall, ground=True))
+        rows.append(self._edge_row((a, p, h), (b, p, h), "+y", "-z", frame, frame))
         return Edges.from_rows(rows)
 
     def lining_edges(self, back_m: float, floor: Finish) -> Edges:
-        """Where the jambs meet soffit and floor."""
-        (a, b), h, front, back, frame = self.x, self.opening.top_m, CASING_PROUD_M, -back_m, self.spec.frame
+        """Edges where the jambs meet soffit and floor."""
+        (a, b), h, front, back, frame = self.x, self.opening.top_m, CASING_DEPTH_M, -back_m, self.spec.casing
         rows = []
         for x, into in ((a, "+x"), (b, "-x")):
-            rows.append(self._line((x, back, h), (x, front, h), into, "-z", frame, frame))
-            rows.append(self._line((x, back, 0), (x, front, 0), into, "+z", frame, floor))
+            rows.append(self._edge_row((x, back, h), (x, front, h), into, "-z", frame, frame))
+            rows.append(self._edge_row((x, back, 0), (x, front, 0), into, "+z", frame, floor))
         return Edges.from_rows(rows)
 
     def threshold_edge(self) -> Edges:
-        """Where the threshold meets the floor of this room."""
+        """Edge where the threshold meets the floor of this room."""
         (a, b) = self.x
-        return Edges.from_rows([self._line((a, 0, 0), (b, 0, 0), "+z", "+z", self.spec.threshold, self.floor)])
+        return Edges.from_rows([self._edge_row((a, 0, 0), (b, 0, 0), "+z", "+z", self.spec.threshold, self.floor)])
 
     @property
-    def _ground(self) -> tuple[Surface, ...]:
+    def _surfaces(self) -> tuple[Surface, ...]:
         up = np.array([0.0, 0.0, 1.0])
         base = float(self.wall.world_from_wall.translation[2])
         floor = Surface(up, base, expected_brightness(self.floor, up))
         return floor, surface_from_polygon(self.wall.polygon_world, self.wall.finish)
 
-    def _painted(self, name: str, corners: Sequence[Sequence[float]], finish: Finish) -> Face:
+    def _build_face(self, name: str, corners: Sequence[Sequence[float]], finish: Finish) -> Face:
         polygon = self.wall.world_from_wall.apply(corners)
         return build_barrier(f"{self.name}/{name}", self.wall.locale, polygon, finish,
                        neighbour=self.opening.neighbour, parent=self.wall.face_name)
 
-    def _line(
+    def _edge_row(
         self, start: Point, end: Point, first: str, second: str, finish: Finish, other: Finish,
         behind: Finish | None = None, *, ground: bool = False,
     ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]], list[float]]:
-        """A row of :class:`Edges`; sides are named ``+x`` .. ``-z``, and a ground shows when the first side does."""
+        """A row of :class:`Edges` between two sides, named ``+x`` .. ``-z``.
+
+        With ``ground`` the second side only carries the first, and the line shows when the first side does.
+        """
         normals = [self._direction(first), self._direction(second)]
-        levels = [expected_brightness(finish, normals[0]), expected_brightness(other, normals[1])]
-        levels.append(float("nan") if behind is None else expected_brightness(behind, self.wall.inward_world))
-        return self.wall.world_from_wall.apply([start, end]), [normals[0], normals[0 if ground else 1]], levels
+        brightness = [expected_brightness(finish, normals[0]), expected_brightness(other, normals[1])]
+        brightness.append(float("nan") if behind is None else expected_brightness(behind, self.wall.inward_world))
+        return self.wall.world_from_wall.apply([start, end]), [normals[0], normals[0 if ground else 1]], brightness
 
     def _direction(self, side: str) -> NDArray[np.float64]:
         sign = 1.0 if side[0] == "+" else -1.0
         return np.asarray(sign * self.wall.world_from_wall.rotation[:, "xyz".index(side[1])])
 
 
-def open_door(near: DoorSide, far: DoorSide) -> tuple[list[Face], Landmark]:
+def build_open_door(near: DoorSide, far: DoorSide) -> tuple[list[Face], Landmark]:
     """Faces and the landmark of a doorway between two rooms."""
-    back = near.depth_m + CASING_PROUD_M
+    back = near.depth_m + CASING_DEPTH_M
     faces = [near.doorway_face(), far.doorway_face(), *near.lining(back), near.threshold(near.spec.threshold)]
     for side in (near, far):
         faces += side.casing_faces()
@@ -166,7 +169,7 @@ def open_door(near: DoorSide, far: DoorSide) -> tuple[list[Face], Landmark]:
     return faces, Landmark(name, first, "doorway", Edges.concatenate(edges), neighbour=second, source=near.spec.source)
 
 
-def closed_door(side: DoorSide) -> tuple[list[Face], Landmark]:
+def build_closed_door(side: DoorSide) -> tuple[list[Face], Landmark]:
     """Faces and the landmark of a closed door, as seen from one room."""
     leaf_faces, leaf_edges = side.leaf()
     faces = [*side.casing_faces(), *side.lining(side.depth_m), side.threshold(side.floor), *leaf_faces]
@@ -174,5 +177,5 @@ def closed_door(side: DoorSide) -> tuple[list[Face], Landmark]:
     return faces, Landmark(side.name, side.wall.locale, "door", edges, source=side.spec.source)
 
 
-def _moved(x: float, y: float) -> Pose:
+def _translation(x: float, y: float) -> Pose:
     return Pose(np.eye(3), np.array([x, y, 0.0]))

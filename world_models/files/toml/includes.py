@@ -1,4 +1,4 @@
-"""Other files that a world file names: shared finishes and parts to include, and whole worlds to take a part from."""
+"""Files that a world file names: shared finishes and parts to include, and worlds to copy a part from."""
 
 from __future__ import annotations
 
@@ -9,23 +9,28 @@ from pathlib import Path
 from world_models.files.toml.source import Node, Source, WorldError
 
 WORLDS = Path(__file__).parents[2] / "worlds"
-"""Where the worlds that come with the project are kept, and in ``parts`` what they share."""
-DEEPEST = 8
+"""Folder of the worlds that come with the project; ``parts`` in it holds what they share."""
+MAX_DEPTH = 8
+"""Longest chain of files that name each other."""
 
 
-def included(root: Node) -> Iterator[Source]:
-    """The files that ``include`` lists."""
+def read_included(root: Node) -> Iterator[Source]:
+    """The files that ``include`` lists. Raises WorldError."""
     if "include" not in root:
         return
     for item in root["include"].items():
-        source = named_file(item, WORLDS / "parts")
-        if source.depth > DEEPEST:
+        source = find_named_file(item, WORLDS / "parts")
+        if source.depth > MAX_DEPTH:
             raise item.fail("a file that does not include itself")
         yield source
 
 
-def named_file(node: Node, shipped: Path = WORLDS) -> Source:
-    """A file that comes with the project, by its bare name, or any .toml file, relative to the one that names it."""
+def find_named_file(node: Node, shipped: Path = WORLDS) -> Source:
+    """A file that comes with the project, by its bare name, or a .toml file relative to the file that names it.
+
+    Raises:
+        WorldError: there is no such file.
+    """
     name = node.text()
     path = node.source.folder / name if name.endswith(".toml") else shipped / f"{name}.toml"
     bare = name.endswith(".toml") or name in [known.stem for known in shipped.glob("*.toml")]
@@ -38,26 +43,26 @@ def named_file(node: Node, shipped: Path = WORLDS) -> Source:
     raise node.fail(f"a .toml file that is there, or one of {names}")
 
 
-def files_of(source: Source) -> Iterator[Source]:
-    """A world file and all that it is made of, each once for each time that it is named."""
+def find_all_files(source: Source) -> Iterator[Source]:
+    """A world file and all that it includes or copies from, once for each time that it is named."""
     yield source
     root = source.root
-    if not isinstance(root.value, dict) or source.depth > DEEPEST:
+    if not isinstance(root.value, dict) or source.depth > MAX_DEPTH:
         return
     if isinstance(root.value.get("include"), list):
-        for other in included(root):
-            yield from files_of(other)
-    locales = root.value.get("locales")
-    for name, value in locales.items() if isinstance(locales, dict) else ():
-        if isinstance(value, dict) and "from" in value:
-            yield from files_of(named_file(root["locales"][name]["from"]))
+        for other in read_included(root):
+            yield from find_all_files(other)
+    if isinstance(root.value.get("locales"), dict):
+        for _, node in root["locales"].entries():
+            if isinstance(node.value, dict) and "from" in node:
+                yield from find_all_files(find_named_file(node["from"]))
 
 
 def compute_digest(path: Path) -> str:
-    """SHA-256 of a world file, and of what it is made of where there is such. Raises OSError or WorldError."""
+    """SHA-256 of a world file with all that it includes or copies from. Raises OSError or WorldError."""
     own = path.read_bytes()
     try:
-        others = list(files_of(Source.read(path)))[1:]
+        others = list(find_all_files(Source.read(path)))[1:]
     except WorldError:
         others = []
     if not others:

@@ -1,19 +1,17 @@
-"""TOML with the line of every value, so that a fault in a world file can be pointed at."""
+"""TOML files whose values know their file and line, so that every error can name them."""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from bisect import bisect_right
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-Key = tuple[str | int, ...]
-"""The way to a value: table names, keys and positions in arrays, from the top of the file."""
+from world_models.files.toml.line_numbers import Key, find_line_numbers
 
-MOST_SHOWN = 10**80
+MAX_SHOWN = 10**80
 
 
 class WorldError(ValueError):
@@ -25,10 +23,12 @@ class Source:
     """One TOML file.
 
     Attributes:
-        name: for messages, the path as it was given; data: its tables; lines: the line on which each value starts.
-        folder: from where files that it names are looked for.
+        name: for messages: the path as it was given.
+        data: its tables.
+        lines: the line, from 1, on which each value starts.
+        folder: file names in it are relative to it.
         text: as it was read.
-        depth: how many files named each other until this one was named.
+        depth: length of the chain of files that name each other, up to this one.
         settings: keys whose values were replaced since it was read (``--set``).
     """
 
@@ -42,9 +42,9 @@ class Source:
 
     @staticmethod
     def read(path: Path, depth: int = 0) -> Source:
-        """Raises WorldError where the file is missing, not text or not TOML."""
+        """Read a file. Raises WorldError where it is missing, not text or not TOML."""
         try:
-            text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")  # some editors begin with a mark
+            text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")  # some editors write a byte order mark
             return replace(Source.parse(text, str(path)), folder=path.parent, depth=depth)
         except OSError as error:
             raise WorldError(f"{path}: expected a readable file, got: {error.strerror}") from None
@@ -54,20 +54,20 @@ class Source:
 
     @staticmethod
     def parse(text: str, name: str = "world") -> Source:
-        """Raises WorldError where the text is not TOML."""
+        """Parse a text. Raises WorldError where it is not TOML."""
         try:
             data = tomllib.loads(text)
         except RecursionError:
             raise WorldError(f"{name}: expected at most a few nested arrays, got too many to read") from None
         except ValueError as error:
-            told = re.search(r"at line (\d+)", str(error))
-            line = told.group(1) if told else text.count("\n") + 1
+            match = re.search(r"at line (\d+)", str(error))
+            line = match.group(1) if match else text.count("\n") + 1
             raise WorldError(f"{name}:{line}: expected TOML, got: {error}") from None
-        return Source(name, data, line_numbers(text), text=text)
+        return Source(name, data, find_line_numbers(text), text=text)
 
     @property
     def file(self) -> Path:
-        """The same for one file, however it was named on the way to it."""
+        """The absolute path: equal for one file, however it is named."""
         return Path(self.name).resolve()
 
     @property
@@ -91,7 +91,7 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A value of the file that knows where it stands; every reader raises WorldError with that place."""
+    """A value of a file with its key; every method that reads it raises WorldError with file and line."""
 
     value: Any
     key: Key
@@ -106,12 +106,12 @@ class Node:
         return self.source.place(self.key)
 
     def fail(self, expected: str, got: str | None = None) -> WorldError:
-        """The error to raise when this value is not what was expected."""
-        came = _shortened(shown(self.value)) if got is None else got
+        """The error to raise where this value is not what was expected."""
+        came = _shorten(_format_value(self.value)) if got is None else got
         return WorldError(f"{self.place}: expected {expected}, got {came}")
 
     def table(self, required: tuple[str, ...] = (), optional: tuple[str, ...] = ()) -> Node:
-        """This node, after checking that it is a table with the required keys and none but these."""
+        """This node, after checking that it is a table with all required keys and no unknown ones."""
         if not isinstance(self.value, dict):
             raise self.fail("a table")
         missing = [key for key in required if key not in self.value]
@@ -130,6 +130,7 @@ class Node:
         return Node(self.value[key], (*self.key, key), self.source)
 
     def get(self, key: str) -> Node | None:
+        """The value of a key of this table; None where it is absent."""
         return self[key] if key in self.value else None
 
     def entries(self) -> Iterator[tuple[str, Node]]:
@@ -138,23 +139,31 @@ class Node:
             raise self.fail("a table")
         return ((key, self[key]) for key in self.value)
 
-    def items(self, least: int = 0) -> list[Node]:
-        """The elements of an array of at least this length."""
-        if not isinstance(self.value, list) or len(self.value) < least:
-            raise self.fail(f"an array of at least {least} elements" if least else "an array")
+    def entries_of(self, key: str) -> Iterator[tuple[str, Node]]:
+        """The (name, node) pairs of the table ``key`` of this table; none where it is absent."""
+        node = self.get(key)
+        return iter(()) if node is None else node.entries()
+
+    def items(self, min_count: int = 0) -> list[Node]:
+        """The elements of an array with at least ``min_count`` of them."""
+        if not isinstance(self.value, list) or len(self.value) < min_count:
+            raise self.fail(f"an array of at least {min_count} elements" if min_count else "an array")
         return [self[index] for index in range(len(self.value))]
 
     def text(self) -> str:
+        """A non-empty text."""
         if not isinstance(self.value, str) or not self.value:
             raise self.fail("a non-empty text")
         return self.value
 
     def choice(self, *choices: str) -> str:
+        """One of these texts."""
         if self.value not in choices:
             raise self.fail(f"one of {', '.join(choices)}")
         return str(self.value)
 
     def flag(self) -> bool:
+        """True or false."""
         if not isinstance(self.value, bool):
             raise self.fail("true or false")
         return self.value
@@ -167,132 +176,24 @@ class Node:
         return float(value)
 
     def numbers(self, counts: tuple[int, ...], low: float, high: float) -> tuple[float, ...]:
-        """An array of as many numbers as one of ``counts``."""
+        """An array of numbers from ``low`` to ``high``; ``counts`` are the allowed lengths."""
         if not isinstance(self.value, list) or len(self.value) not in counts:
             raise self.fail(f"an array of {' or '.join(str(count) for count in counts)} numbers")
         return tuple(item.number(low, high) for item in self.items())
 
 
-def shown(value: Any) -> str:
-    """A value as a TOML file has it, for messages."""
+def _format_value(value: Any) -> str:
+    """A value in TOML notation, for messages."""
     if isinstance(value, bool):
         return str(value).lower()
-    if isinstance(value, int) and abs(value) >= MOST_SHOWN:
-        return "a number of more than 80 digits"  # Python refuses to write out those of some thousands
+    if isinstance(value, int) and abs(value) >= MAX_SHOWN:
+        return "a number of more than 80 digits"  # Python refuses to format thousands of them
     if isinstance(value, list):
-        return f"[{', '.join(shown(item) for item in value)}]"
+        return f"[{', '.join(_format_value(item) for item in value)}]"
     if isinstance(value, dict):
-        return f"{{{', '.join(f'{key} = {shown(item)}' for key, item in value.items())}}}"
+        return f"{{{', '.join(f'{key} = {_format_value(item)}' for key, item in value.items())}}}"
     return value.isoformat() if hasattr(value, "isoformat") else repr(value)  # dates and times
 
 
-def _shortened(text: str) -> str:
+def _shorten(text: str) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
-
-
-def line_numbers(text: str) -> dict[Key, int]:
-    """The line (from 1) on which each value of a valid TOML text starts."""
-    return _Scanner(text).scan()
-
-
-@dataclass
-class _Scanner:
-    """Walks over TOML that ``tomllib`` has accepted, noting where values start."""
-
-    text: str
-    at: int = 0
-    lines: dict[Key, int] = field(default_factory=dict)
-    counts: dict[Key, int] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self._newlines = [match.start() for match in re.finditer("\n", self.text)]
-
-    def scan(self) -> dict[Key, int]:
-        table: Key = ()
-        while self._skip(r"(?:\s|#[^\n]*)*"):
-            if self.text.startswith("[", self.at):
-                table = self._header()
-            else:
-                self._pair(table)
-        return self.lines
-
-    def _skip(self, pattern: str) -> bool:
-        """Move past the pattern; says whether text is left."""
-        match = re.compile(pattern).match(self.text, self.at)
-        self.at = match.end() if match else self.at
-        return self.at < len(self.text)
-
-    def _note(self, key: Key) -> None:
-        """The value of this key starts here, and those that hold it no later."""
-        line = bisect_right(self._newlines, self.at - 1) + 1
-        for length in range(len(key), 0, -1):
-            self.lines.setdefault(key[:length], line)
-
-    def _header(self) -> Key:
-        double = self.text.startswith("[[", self.at)
-        start, self.at = self.at, self.at + (2 if double else 1)
-        path: Key = ()
-        names = self._dotted()
-        for depth, name in enumerate(names):
-            path = (*path, name)
-            if double and depth == len(names) - 1:
-                self.counts[path] = self.counts.get(path, -1) + 1
-            if path in self.counts:
-                path = (*path, self.counts[path])
-        end, self.at = self.at, start
-        self._note(path)
-        self.at = end
-        self._skip(r"\s*\]\]?")
-        return path
-
-    def _dotted(self) -> list[str]:
-        names = []
-        while True:
-            self._skip(r"[ \t]*")
-            start = self.at
-            self._skip(_STRING + r"|[A-Za-z0-9_-]+")
-            raw = self.text[start : self.at]
-            names.append(next(iter(tomllib.loads(raw + "=0"))))
-            self._skip(r"[ \t]*")
-            if not self.text.startswith(".", self.at):
-                return names
-            self.at += 1
-
-    def _pair(self, table: Key) -> None:
-        key: Key = (*table, *self._dotted())
-        self._skip(r"[ \t]*=[ \t]*")
-        self._value(key)
-
-    def _value(self, key: Key) -> None:
-        self._note(key)
-        opening = self.text[self.at]
-        if opening == "[":
-            self._array(key)
-        elif opening == "{":
-            self._inline_table(key)
-        elif opening in "\"'":
-            self._skip(_STRING)
-        else:
-            self._skip(r"[^,\]}\n#]*")
-
-    def _array(self, key: Key) -> None:
-        self.at += 1
-        index = 0
-        while self._skip(r"(?:[\s,]|#[^\n]*)*") and self.text[self.at] != "]":
-            self._value((*key, index))
-            index += 1
-        self.at += 1
-
-    def _inline_table(self, key: Key) -> None:
-        self.at += 1
-        while self._skip(r"(?:[\s,]|#[^\n]*)*") and self.text[self.at] != "}":
-            self._pair(key)
-        self.at += 1
-
-
-_STRING = (
-    r'"""(?:[^\\]|\\[\s\S])*?"{3,5}'
-    r"|'''[\s\S]*?'{3,5}"
-    r'|"(?:[^"\\\n]|\\.)*"'
-    r"|'[^'\n]*'"
-)

@@ -1,4 +1,4 @@
-"""Room shells: floor, ceiling and walls with their openings, baseboards and crown mouldings."""
+"""Room shells: floor, ceiling and walls with their openings, baseboards and mouldings."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ from world_models.building.landmarks import Edges, Landmark
 from world_models.building.outlines import convex_pieces
 from world_models.building.regions import Finish, build_region, expected_brightness
 from world_models.building.solids import MIN_LINE_M, Box, Range, Solid, Surface, surface_from_polygon
-from world_models.files.construction.blueprint import LocaleSpec, RoomLook
+from world_models.files.construction.specs import LocaleSpec, RoomFinishes
 from world_models.frames import Pose
 
-CASING_M = 0.10
-"""Width of the boards round a door."""
-
-CASING_PROUD_M = 0.02
-BASEBOARD_M, BASEBOARD_PROUD_M = 0.10, 0.015
-MOULDING_M, MOULDING_PROUD_M = 0.08, 0.04
+CASING_WIDTH_M, CASING_DEPTH_M = 0.10, 0.02
+"""Of the boards round a door; depth is measured from the wall."""
+BASEBOARD_HEIGHT_M, BASEBOARD_DEPTH_M = 0.10, 0.015
+MOULDING_HEIGHT_M, MOULDING_DEPTH_M = 0.08, 0.04
 
 UP = np.array([0.0, 0.0, 1.0])
 
-SKY = 0.85
-"""The brightness, 0..1, that the model expects of the sky."""
+SKY_BRIGHTNESS = 0.85
+"""Expected brightness of the sky, 0..1."""
+
+MIN_STRETCH_M = 1e-3
+"""Shorter stretches of wall are left out."""
 
 _Row = tuple[NDArray[np.float64], tuple[NDArray[np.float64], NDArray[np.float64]], tuple[float, float, float]]
-"""A line, the normals beside it and the brightnesses, as :class:`Edges` wants them."""
+"""(line, normals, brightness) as :class:`Edges` takes them."""
 
 
 @dataclass(frozen=True)
 class Opening:
-    """A hole in a wall from the floor up: extent along the wall and height [m]."""
+    """A hole in a wall from the floor up: extent along the wall and height [m], and the locale beyond."""
 
     name: str
     left_m: float
@@ -47,10 +48,10 @@ class Opening:
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """One wall of a room, seen from inside.
+    """One wall of a room.
 
-    Its frame: origin at its right end on the floor as one faces it, x along it to the left (so to the right as one
-    stands with the back to it), y into the room, z up.
+    Its coordinate frame: origin on the floor at its right end as seen from inside, x along it to the left, y into the
+    room, z up.
     """
 
     locale: str
@@ -79,19 +80,20 @@ class Wall:
         return self.rectangle((0.0, self.length_m), (0.0, self.height_m))
 
     def rectangle(self, x: Range, z: Range, y: float = 0.0) -> NDArray[np.float64]:
-        """(4, 3) an upright rectangle parallel to the wall, counter-clockwise from inside the room [m, world]."""
+        """(4, 3) an upright rectangle parallel to the wall, counter-clockwise as seen from inside [m, world]."""
         return self.world_from_wall.apply([(x[1], y, z[0]), (x[0], y, z[0]), (x[0], y, z[1]), (x[1], y, z[1])])
 
     def free_of_openings(self, margin_m: float = 0.0) -> list[Range]:
-        """The stretches between its openings, which are taken to be wider by the margin on both sides."""
+        """The stretches between its openings, each enlarged by the margin on both sides."""
         taken = [(o.left_m - margin_m, o.right_m + margin_m) for o in self.openings]
-        return subtract_intervals((0.0, self.length_m), taken, 1e-3)
+        return subtract_intervals((0.0, self.length_m), taken, MIN_STRETCH_M)
 
     def with_opening(self, opening: Opening) -> Wall:
+        """The wall with one more opening."""
         return replace(self, openings=tuple(sorted((*self.openings, opening), key=lambda o: o.left_m)))
 
 
-def walls_of(spec: LocaleSpec, world_from_locale: Pose) -> list[Wall]:
+def build_walls(spec: LocaleSpec, world_from_locale: Pose) -> list[Wall]:
     """The walls of a room, one for each side of its outline, without openings."""
     if spec.outline is None:
         return []
@@ -101,17 +103,17 @@ def walls_of(spec: LocaleSpec, world_from_locale: Pose) -> list[Wall]:
         x = np.array([*(end - start) / length, 0.0])
         frame = Pose(np.stack([x, np.cross(UP, x), UP], axis=1), np.array([*start, 0.0]))
         height = spec.wall_heights_m.get(name, spec.height_m)
-        walls.append(Wall(spec.name, name, world_from_locale @ frame, length, height, spec.look.walls[name]))
+        walls.append(Wall(spec.name, name, world_from_locale @ frame, length, height, spec.finishes.walls[name]))
     return walls
 
 
-def along_wall(wall_from_locale: Pose, locale_xy: Sequence[float]) -> float:
-    """Where along the wall (its x) the point (2,) of the locale's frame lies."""
+def coordinate_along_wall(wall_from_locale: Pose, locale_xy: Sequence[float]) -> float:
+    """The wall's x of a point (2,) in the locale's frame [m]."""
     return float(wall_from_locale.apply([*locale_xy, 0.0])[0])
 
 
 @dataclass(frozen=True, eq=False)
-class Shell:
+class RoomShell:
     """An empty room: ``walls`` with their openings cut, floor and ceiling."""
 
     spec: LocaleSpec
@@ -120,30 +122,33 @@ class Shell:
 
     @cached_property
     def surfaces(self) -> tuple[Surface, ...]:
-        """What things in the room stand on or against."""
-        look, up = self.spec.look, self.world_from_locale.apply([(0.0, 0.0, 0.0), (0.0, 0.0, self.spec.height_m)])[:, 2]
-        above = [Surface(-UP, -float(up[1]), expected_brightness(look.ceiling, -UP))] if look.ceiling else []
+        """The planes that things in the room stand on or against."""
+        finishes = self.spec.finishes
+        low, high = self.world_from_locale.apply([(0.0, 0.0, 0.0), (0.0, 0.0, self.spec.height_m)])[:, 2]
+        above = [Surface(-UP, -float(high), expected_brightness(finishes.ceiling, -UP))] if finishes.ceiling else []
         return (
-            Surface(UP, float(up[0]), expected_brightness(look.floor, UP)), *above,
+            Surface(UP, float(low), expected_brightness(finishes.floor, UP)), *above,
             *(surface_from_polygon(wall.polygon_world, wall.finish) for wall in self.walls),
         )
 
     def faces(self) -> list[Face]:
         """Floor, ceiling, walls and trim."""
-        look = self.spec.look
-        faces = [self._flat("floor", look.floor), *([self._flat("ceiling", look.ceiling)] if look.ceiling else [])]
+        finishes = self.spec.finishes
+        faces = [self._build_flat_face("floor", finishes.floor)]
+        if finishes.ceiling:
+            faces.append(self._build_flat_face("ceiling", finishes.ceiling))
         for index, wall in enumerate(self.walls):
-            faces.append(_wall_face(wall))
-            for solid in self._trim(index):
+            faces.append(_build_wall_face(wall))
+            for solid in self._build_trim(index):
                 faces.extend(solid.faces(wall.locale, parent=wall.face_name))
         return faces
 
     def landmarks(self) -> list[Landmark]:
-        """One for each wall: its trim and the corner at its end."""
-        return [Landmark(wall.face_name, wall.locale, "wall", self._wall_edges(index), source=self.spec.source)
+        """One landmark for each wall: its trim and the corner at its start."""
+        return [Landmark(wall.face_name, wall.locale, "wall", self._build_wall_edges(index), source=self.spec.source)
                 for index, wall in enumerate(self.walls)]
 
-    def _flat(self, name: str, finish: Finish) -> Face:
+    def _build_flat_face(self, name: str, finish: Finish) -> Face:
         up = name == "floor"
         assert self.spec.outline is not None
         z = 0.0 if up else self.spec.height_m
@@ -155,57 +160,57 @@ class Shell:
         outline = self.world_from_locale.apply(flat if up else flat[::-1])
         return Face(name, self.spec.name, outline, front=regions)
 
-    def _trim(self, index: int) -> list[Solid]:
-        """Baseboard and moulding of a wall."""
-        wall, look = self.walls[index], self.spec.look
+    def _build_trim(self, index: int) -> list[Solid]:
+        """Baseboard and moulding of a wall, where it has them."""
+        wall, finishes = self.walls[index], self.spec.finishes
         solids = []
-        if look.baseboard:
-            stretches = wall.free_of_openings(CASING_M)
-            z = (0.0, BASEBOARD_M)
-            solids.append(self._strip(index, "baseboard", look.baseboard, stretches, z, BASEBOARD_PROUD_M))
-        if look.moulding:
-            z = (wall.height_m - MOULDING_M, wall.height_m)
-            solids.append(self._strip(index, "moulding", look.moulding, [(0.0, wall.length_m)], z, MOULDING_PROUD_M))
+        if finishes.baseboard:
+            stretches = wall.free_of_openings(CASING_WIDTH_M)
+            z = (0.0, BASEBOARD_HEIGHT_M)
+            solids.append(self._build_strip(index, "baseboard", finishes.baseboard, stretches, z, BASEBOARD_DEPTH_M))
+        if finishes.moulding:
+            z = (wall.height_m - MOULDING_HEIGHT_M, wall.height_m)
+            whole = [(0.0, wall.length_m)]
+            solids.append(self._build_strip(index, "moulding", finishes.moulding, whole, z, MOULDING_DEPTH_M))
         return solids
 
-    def _strip(
-        self, index: int, name: str, finish: Finish, stretches: Sequence[Range], z: Range, protrusion_m: float
+    def _build_strip(
+        self, index: int, name: str, finish: Finish, stretches: Sequence[Range], z: Range, depth_m: float
     ) -> Solid:
-        """Boards along a wall; in an inner corner they end at the front of the next wall's board."""
+        """Boards along a wall; in a concave corner they end at the front of the next wall's board."""
         wall, ahead = self.walls[index], self.walls[(index + 1) % len(self.walls)]
         along, surfaces = wall.world_from_wall.rotation[:, 0], self.surfaces
         end = wall.length_m
         if float(along @ ahead.inward_world) < -1e-6:
-            end -= protrusion_m
-            front = ahead.rectangle((0.0, 1.0), (0.0, 1.0), protrusion_m)
+            end -= depth_m
+            front = ahead.rectangle((0.0, 1.0), (0.0, 1.0), depth_m)
             surfaces = (*surfaces, surface_from_polygon(front, finish))
-        boxes = [Box((low, min(high, end)), (0.0, protrusion_m), z, finish)
-                 for low, high in stretches if low < end - 1e-3]
+        boxes = [Box((low, min(high, end)), (0.0, depth_m), z, finish)
+                 for low, high in stretches if low < end - MIN_STRETCH_M]
         return Solid(f"{wall.face_name}/{name}", tuple(boxes), wall.world_from_wall, surfaces)
 
-    def _wall_edges(self, index: int) -> Edges:
+    def _build_wall_edges(self, index: int) -> Edges:
         wall, before = self.walls[index], self.walls[index - 1]
-        look, rows = self.spec.look, []
-        low, high = trim_heights(look, min(wall.height_m, before.height_m))
+        finishes, rows = self.spec.finishes, []
+        low, high = bare_wall_range(finishes, min(wall.height_m, before.height_m))
         nan = float("nan")
         rows.append((wall.world_from_wall.apply([(0, 0, low), (0, 0, high)]),
                      (wall.inward_world, before.inward_world), (wall.brightness, before.brightness, nan)))
-        flats = [(0.0, look.floor, UP, look.baseboard)]
-        if look.ceiling is None:
-            rows += self._skyline(wall, before)
+        flats = [(0.0, finishes.floor, UP, finishes.baseboard)]
+        if finishes.ceiling is None:
+            rows += self._build_skyline(wall, before)
         else:
-            flats.append((wall.height_m, look.ceiling, -UP, look.moulding))
+            flats.append((wall.height_m, finishes.ceiling, -UP, finishes.moulding))
         for z, finish, normal, board in flats:
-            for x in wall.free_of_openings(CASING_M) if board is None and z == 0.0 else [(0.0, wall.length_m)]:
+            for x in wall.free_of_openings(CASING_WIDTH_M) if board is None and z == 0.0 else [(0.0, wall.length_m)]:
                 if board is None and x[1] - x[0] >= MIN_LINE_M:
                     line = wall.world_from_wall.apply([(x[0], 0, z), (x[1], 0, z)])
                     brightness = (wall.brightness, expected_brightness(finish, normal), nan)
                     rows.append((line, (wall.inward_world, normal), brightness))
-        return Edges.concatenate([Edges.from_rows(rows), *(solid.edges() for solid in self._trim(index))])
+        return Edges.concatenate([Edges.from_rows(rows), *(solid.edges() for solid in self._build_trim(index))])
 
-
-    def _skyline(self, wall: Wall, before: Wall) -> list[_Row]:
-        """The top of a wall under the sky, and its end where it is higher than the one before, or that one's."""
+    def _build_skyline(self, wall: Wall, before: Wall) -> list[_Row]:
+        """Edges against the sky: the top of a wall, and the vertical end of whichever wall at its start is higher."""
         nan, rows = float("nan"), []
         tops = [(wall, [(0.0, 0.0, wall.height_m), (wall.length_m, 0.0, wall.height_m)])]
         if wall.height_m > before.height_m:
@@ -215,17 +220,18 @@ class Shell:
             tops.append((before, [(end, 0.0, wall.height_m), (end, 0.0, before.height_m)]))
         for seen, line in tops:
             normals = (seen.inward_world, seen.inward_world)
-            rows.append((seen.world_from_wall.apply(line), normals, (seen.brightness, SKY, nan)))
+            rows.append((seen.world_from_wall.apply(line), normals, (seen.brightness, SKY_BRIGHTNESS, nan)))
         return rows
 
 
-def trim_heights(look: RoomLook, height_m: float) -> Range:
-    """Where the bare wall begins and ends above the floor."""
-    return (BASEBOARD_M if look.baseboard else 0.0), height_m - (MOULDING_M if look.moulding else 0.0)
+def bare_wall_range(finishes: RoomFinishes, height_m: float) -> Range:
+    """Where the wall between baseboard and moulding begins and ends above the floor [m]."""
+    low = BASEBOARD_HEIGHT_M if finishes.baseboard else 0.0
+    return low, height_m - (MOULDING_HEIGHT_M if finishes.moulding else 0.0)
 
 
-def _wall_face(wall: Wall) -> Face:
-    """The wall with a convex region for each stretch between openings and each header above one."""
+def _build_wall_face(wall: Wall) -> Face:
+    """The face of a wall, with one region for each stretch between openings and one above each opening."""
     full = (0.0, wall.height_m)
     rectangles = [(x, full) for x in wall.free_of_openings()]
     rectangles += [((o.left_m, o.right_m), (o.top_m, wall.height_m)) for o in wall.openings]

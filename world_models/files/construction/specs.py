@@ -1,4 +1,4 @@
-"""What a world file says, checked and in metres, before the geometer makes surfaces of it."""
+"""A world as its file describes it, checked and in metres, before surfaces are built."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from world_models.frames import Pose
 
 
 @dataclass(frozen=True)
-class RoomLook:
-    """The finishes of a room; ``baseboard`` and ``moulding`` may be absent, the ``ceiling`` under the sky."""
+class RoomFinishes:
+    """The finishes of a room, those of the walls by name; ``None`` for parts that it lacks, as a ceiling outdoors."""
 
     walls: Mapping[str, Finish]
     floor: Finish
@@ -27,10 +27,15 @@ class RoomLook:
 
 @dataclass(frozen=True, eq=False)
 class LocaleSpec:
-    """A locale as described; ``outline`` (k, 2) [m] is ``None`` for one that only contains others.
+    """A locale as described.
 
-    ``wall_names`` has one name for each side of the outline, the side from vertex i to vertex i + 1;
-    ``wall_heights_m`` the heights of those that are lower than the room.
+    Attributes:
+        parent: name of its container.
+        frame: parent_from_locale.
+        outline: (k, 2) counter-clockwise [m, own frame]; ``None`` for a locale that only contains others.
+        wall_names: of each side of the outline; side i runs from vertex i to vertex i + 1.
+        survey_m, survey_rad: standard deviations of the frame's position and direction in its container.
+        wall_heights_m: of walls lower than the room, by name.
     """
 
     name: str
@@ -40,7 +45,7 @@ class LocaleSpec:
     outline: NDArray[np.float64] | None
     wall_names: tuple[str, ...]
     height_m: float
-    look: RoomLook
+    finishes: RoomFinishes
     properties: Mapping[str, Any]
     source: str
     survey_m: float = 0.0
@@ -50,9 +55,14 @@ class LocaleSpec:
 
 @dataclass(frozen=True)
 class DoorSpec:
-    """A door in a wall of ``between[0]``, centred ``along_m`` of that locale's frame; closed unless ``is_open``.
+    """A door as described; closed unless ``is_open``.
 
-    ``between`` has a second name where it leads to another modelled locale. ``panel`` stands on the closed leaf.
+    Attributes:
+        between: the locale in whose wall it is, and the modelled locale beyond, if there is one.
+        wall: name of the wall of ``between[0]``.
+        along_m: position of its centre along that wall, in the frame of ``between[0]``.
+        casing, leaf, threshold: finishes of the boards round it (the door's frame), the leaf and the threshold.
+        panel: boxes on the closed leaf.
     """
 
     name: str
@@ -62,7 +72,7 @@ class DoorSpec:
     width_m: float
     height_m: float
     is_open: bool
-    frame: Finish
+    casing: Finish
     leaf: Finish
     threshold: Finish
     panel: tuple[Box, ...]
@@ -71,9 +81,11 @@ class DoorSpec:
 
 @dataclass(frozen=True, eq=False)
 class ThingSpec:
-    """Furniture and the like: boxes placed in a locale, either freely or against a wall.
+    """A thing as described: boxes in a locale, either free (``locale_from_part``) or against a wall.
 
-    ``wall`` with ``along_m`` (as for doors) and ``up_m``, or ``locale_from_part``.
+    Attributes:
+        kind: the part that it is made from.
+        wall, along_m, up_m: name of the wall, position along it (as for doors) and height above the floor.
     """
 
     name: str
@@ -99,12 +111,12 @@ class LinkSpec:
 
 
 @dataclass(frozen=True, eq=False)
-class Blueprint:
-    """A whole world file."""
+class WorldSpec:
+    """A whole world file; ``name`` is the root locale's."""
 
     name: str
     source: str
     locales: Mapping[str, LocaleSpec]
     doors: tuple[DoorSpec, ...]
-    things: tuple[ThingSpec, ...] = field(default=())
-    links: tuple[LinkSpec, ...] = field(default=())
+    things: tuple[ThingSpec, ...] = ()
+    links: tuple[LinkSpec, ...] = ()
