@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
-
 from sim.faults.base_faults import LinkLost, Nonsense, Stall
 from sim.faults.camera_faults import CameraUnplugged, DroppedFrames, LateFrames
 from sim.faults.displacement import Bump, Kidnap
@@ -12,6 +10,7 @@ from sim.faults.lights_off import LightsOff
 from sim.faults.occlusion import Occlusion
 from world_models.files.toml.settings import read_settings, suggest_keys
 from world_models.files.toml.source import Node, WorldError
+from world_models.plugins import list_plugins, load_plugin
 
 GROUP = "harvey.faults"
 """Entry points of this group name fault classes; an entry point's name is the ``kind`` of its class."""
@@ -23,7 +22,7 @@ BUILT_IN: tuple[type[Fault], ...] = (
 def list_fault_kinds() -> tuple[str, ...]:
     """Every ``kind`` that a scenario can name: the built-in ones first."""
     built_in = [fault_class.kind for fault_class in BUILT_IN]
-    return tuple(dict.fromkeys([*built_in, *sorted(point.name for point in entry_points(group=GROUP))]))
+    return tuple(dict.fromkeys([*built_in, *(point.name for point in list_plugins(GROUP))]))
 
 
 def find_fault_class(kind: str) -> type[Fault]:
@@ -36,13 +35,10 @@ def find_fault_class(kind: str) -> type[Fault]:
     for fault_class in BUILT_IN:
         if fault_class.kind == kind:
             return fault_class
-    point = next(iter(entry_points(group=GROUP, name=kind)), None)
+    point = next((point for point in list_plugins(GROUP) if point.name == kind), None)
     if point is None:
         raise KeyError(kind)
-    try:
-        found = point.load()
-    except (ImportError, AttributeError) as error:
-        raise ImportError(f"expected a fault class at {point.value}, got {error}") from error
+    found = load_plugin(point, "a fault class")
     if not (isinstance(found, type) and issubclass(found, Fault) and getattr(found, "kind", None) == kind):
         raise ImportError(f"expected a subclass of sim.faults.fault.Fault with kind = {kind!r} at {point.value}, "
                           f"got {found!r}")
