@@ -50,7 +50,7 @@ def run(quick: bool, seed: int) -> Report:
             f"Floors made with the seeds {trials[0].floor} to {trials[split - 1].floor}, symmetric ones with"
             f" {trials[split].floor} to {trials[-1].floor}; the robot is anywhere, with any heading.",
             f"right: it says where it is, in the right locale and within {NEAR_M} m; wrong: it says so and is not"
-            " there; undecided: it stays lost, with one place in agent or none. A probe is a look, the first one too.",
+            " there; undecided: it stays lost, with one place left or none. A probe is a look, the first one too.",
             "The paper gives no figures for robots that are lost.",
             *_worst(trials, found, folder),
             f"Pictures: {', '.join(str(p) for p in pictures)}; every kidnap in a line: {folder / RESULTS}",

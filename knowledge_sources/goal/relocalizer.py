@@ -14,13 +14,13 @@ from blackboard.effect import Effect, Post, Retract, Revise, to_say
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.methods.localization.obstructions import update_obstruction
-from knowledge_sources.methods.localization.relocation import (
+from knowledge_sources.methods.localization.global_localization import (
     Candidate,
     LocalizationResult,
     LocalizationStatus,
     localize,
 )
+from knowledge_sources.methods.localization.obstructions import update_obstruction
 from knowledge_sources.methods.localization.views import CameraView, propagate_pose
 from knowledge_sources.questions import active_goal, held, is_over, is_settled, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -80,8 +80,9 @@ class Relocalizer(RobotKnowledgeSource):
     ) -> Iterable[Effect]:
         before = _panorama_since(view, lost)
         glimpses = self._glimpses(view, segments, before)
-        looks, hidden = [_glance(view, g) for g in glimpses], view.latest(Obstruction)
-        obstruction = update_obstruction(looks, self._robot.camera, None if hidden is None else hidden.value)
+        looks, hidden = [_to_view(view, g) for g in glimpses], view.latest(Obstruction)
+        known, tuning = None if hidden is None else hidden.value, self._settings.localization
+        obstruction = update_obstruction(looks, self._robot.camera, known, settings=tuning)
         if obstruction is not None:
             looks = [replace(g, segments_px=obstruction.without_its_own(g.segments_px)) for g in looks]
         because: tuple[object, ...] = (segments, lost)
@@ -90,7 +91,7 @@ class Relocalizer(RobotKnowledgeSource):
         if obstruction is not None:
             because = (segments, lost, hidden if change is None else change)
         robot = self._robot.with_obstruction(obstruction).on_floor_of(belief.value.locale)
-        result = localize(robot, looks, self._rooms(belief.value))
+        result = localize(robot, looks, self._rooms(belief.value), self._settings)
         is_last = len(glimpses) >= self._settings.goal.max_probes
         if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
             result = self._within_reach(result, belief.value.locale)
@@ -170,7 +171,7 @@ class Relocalizer(RobotKnowledgeSource):
     def _hypothesis(self, candidate: Candidate, belief: Hypothesis, status: str, weight: float) -> Hypothesis:
         return Hypothesis.of_world(
             self._robot.world, candidate.room, candidate.world_from_robot, candidate.covariance, "relocalization",
-            status=status, weight=weight, motion=belief.motion, evidence=str(candidate.evidence),
+            status=status, weight=weight, motion=belief.motion, evidence=str(candidate.likelihood),
         )
 
 
@@ -193,7 +194,7 @@ def _in_words(result: LocalizationResult) -> str:
     return f"perhaps {places}; {probe} tells most" if places else f"no place bears it out; {probe} shows something new"
 
 
-def _glance(view: View, glimpse: Glimpse) -> CameraView:
+def _to_view(view: View, glimpse: Glimpse) -> CameraView:
     return CameraView(view[glimpse.segments].value.segments_px, glimpse.now_from_then, np.array(glimpse.covariance))
 
 

@@ -122,7 +122,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         covariance = fix.covariance if belief is None else belief.value.covariance_world(robot.world)
         lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
         agreed = check_lines(robot, lines, segments.segments_px, pose, s.verification)
-        faces = check_colors(robot, pose, decode_small_color(frame.jpeg), milestone.looks, s.verification)
+        faces = check_colors(robot, pose, decode_small_color(frame.jpeg), milestone.looks, s)
         weight = compute_evidence(
             robot, lines, segments.segments_px, pose, fix.covariance, before, covariance, agreed, faces,
             s.verification)
@@ -187,7 +187,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         if weighed.p_false <= s.max_p_false_unmistakable or not weighed.is_weak:
             return ""
         alias = find_strongest_alias(weighed.robot, weighed.segments.segments_px, weighed.room, weighed.pose,
-                                     search=weighed.p_false > s.max_p_false_clear)
+                                     search=weighed.p_false > s.max_p_false_clear, settings=self._settings)
         if alias is not None and alias.margin < s.min_alias_margin:
             return f"it may be another door of {weighed.room}, or its other side"
         return ""

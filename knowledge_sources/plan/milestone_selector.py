@@ -146,7 +146,7 @@ class MilestoneSelector(RobotKnowledgeSource):
         hidden, (robot, pose) = view.latest(Obstruction), self._standing(view, belief.value)
         expected = expectation(robot, pose, milestone, car, self._settings)
         if not has_followed(view, self._settings.action) or open_discrepancy(view, Level.PLAN) is not None:
-            precompute_views(robot, belief.value.locale, pose)  # the judge will ask whether it is another door
+            precompute_views(robot, belief.value.locale, pose, self._settings)  # the judge asks: another door?
         because = (task, belief) if hidden is None else (task, belief, hidden)
         wish = Post(expected, because) if old is None else Revise(old, expected, because)
         yield wish

@@ -16,7 +16,7 @@ from knowledge_sources.methods.localization.obstructions import update_obstructi
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.questions import active_goal, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.settings.plan import PlanSettings
+from knowledge_sources.settings import Settings
 from world_models.camera import Camera
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import Segments
@@ -48,21 +48,21 @@ class ObstructionFinder(RobotKnowledgeSource):
     def _news(self, view: View) -> Effect | None:
         """What the last looks say that the board does not."""
         looks, known = _looks(view, self._settings.plan.max_obstruction_looks), view.latest(Obstruction)
-        glances = [CameraView(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
-                   for s, heading_rad in looks]
-        if len(glances) < self._settings.plan.min_obstruction_looks:
+        views = [CameraView(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
+                 for s, heading_rad in looks]
+        if len(views) < self._settings.plan.min_obstruction_looks:
             return None
-        now = _seen_by_the_last(glances, self._robot.camera, None if known is None else known.value,
-                                self._settings.plan)
+        now = _seen_by_the_last(views, self._robot.camera, None if known is None else known.value, self._settings)
         return to_say(known, now, (*(s for s, _ in looks), *(() if known is None else (known,))))
 
 
 def _seen_by_the_last(
-    glances: Sequence[CameraView], camera: Camera, known: Obstruction | None, settings: PlanSettings
+    views: Sequence[CameraView], camera: Camera, known: Obstruction | None, settings: Settings
 ) -> Obstruction | None:
     """What all looks show, the last first; else what fewer of them do, as it was not there in the earlier ones."""
-    for number in range(len(glances), settings.min_obstruction_looks - 1, -1):
-        found = update_obstruction(glances[:number], camera, known, settings.min_obstruction_part)
+    for number in range(len(views), settings.plan.min_obstruction_looks - 1, -1):
+        found = update_obstruction(
+            views[:number], camera, known, settings.plan.min_obstruction_part, settings.localization)
         if found is not None:
             return found
     return None

@@ -1,10 +1,205 @@
-"""Settings of finding the robot when no pose is known."""
+"""Settings of finding the robot when its pose is unknown or in doubt."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+from knowledge_sources.settings.setting import setting
+
+_JUDGED = "engineering judgement"
+_KIDNAP = "engineering judgement, checked with harvey experiment kidnap"
+_MILESTONES = "engineering judgement, checked with harvey experiment milestones"
+_CORRIDOR = "engineering judgement, checked with harvey experiment corridor"
 
 
 @dataclass(frozen=True, slots=True)
 class LocalizationSettings:
-    """The numbers of finding the robot when no pose is known."""
+    """The numbers of finding the robot when its pose is unknown or in doubt."""
+
+    # Views, and the turns between them
+    level_heading_sigma_rad: float = setting(
+        math.radians(0.3), "rad", "Standard deviation of a turn measured by level lines.", _KIDNAP)
+    max_heading_correction_rad: float = setting(
+        math.radians(20.0), "rad", "Largest correction of a turn by level lines; odometry decides between the four.",
+        _JUDGED)
+
+    # Visibility map of a room
+    position_step_m: float = setting(0.25, "m", "Spacing of the positions that are tried in a room.", _KIDNAP)
+    position_clearance_m: float = setting(
+        0.2, "m", "Distance of positions from walls and things: less than the robot's radius, as a bump may move it.",
+        _JUDGED)
+    visibility_cell_m: float = setting(
+        0.75, "m", "Side of the cells of which each shares one set of visible points.", _KIDNAP)
+    point_spacing_m: float = setting(0.25, "m", "Spacing of points along model lines.", _JUDGED)
+    max_line_points: int = setting(60, "count", "Most points along one model line.", _JUDGED)
+    max_point_distance_m: float = setting(14.0, "m", "Largest distance of a visible point.", _JUDGED)
+    min_point_contrast: float = setting(0.05, "1", "Smallest contrast of a line with visible points, 0..1.", _JUDGED)
+    occlusion_tolerance_m: float = setting(
+        0.01, "m", "Distance behind a surface from which a point is hidden by it.", _JUDGED)
+    max_level_slope: float = setting(0.05, "1", "Largest slope of a model line that counts as level.", _JUDGED)
+
+    # Chamfer matching
+    chamfer_directions: int = setting(12, "count", "Directions of lines that have a distance map each.", _KIDNAP)
+    chamfer_reach_px: float = setting(24.0, "px", "Distance from which a segment no longer counts.", _KIDNAP)
+    chamfer_shrink: int = setting(4, "count", "Pixels of the picture along each side of a pixel of the map.", _JUDGED)
+    min_point_depth_m: float = setting(0.3, "m", "Smallest depth of a projected point.", _JUDGED)
+
+    # Pose candidates
+    prior_points: float = setting(
+        50.0, "count", "Points that agree by chance, added to each score: few points are little evidence.", _KIDNAP)
+    grid_stride: int = setting(2, "count", "One of so many points is projected when the grid is scored.", _JUDGED)
+    min_candidate_distance_m: float = setting(0.45, "m", "Distance from which two candidates are distinct.", _KIDNAP)
+    min_candidate_angle_rad: float = setting(
+        math.radians(10.0), "rad", "Angle from which two candidates are distinct.", _KIDNAP)
+    max_climbed: int = setting(60, "count", "Best poses of the grid that are improved by hill climbing.", _KIDNAP)
+    coarse_climb_m: float = setting(0.1, "m", "Step of the first round of hill climbing.", _JUDGED)
+    coarse_climb_rad: float = setting(math.radians(0.8), "rad", "Step of the first round of hill climbing.", _JUDGED)
+    fine_climb_m: float = setting(0.05, "m", "Step of the second round of hill climbing.", _JUDGED)
+    fine_climb_rad: float = setting(math.radians(0.5), "rad", "Step of the second round of hill climbing.", _JUDGED)
+    min_relative_score: float = setting(0.6, "1", "Smallest score of a candidate, as a part of the best.", _KIDNAP)
+    max_candidates: int = setting(14, "count", "Most candidates of a floor that are refined.", _KIDNAP)
+
+    # Refinement
+    candidate_sigma_m: float = setting(0.15, "m", "Standard deviation of a candidate's position.", _KIDNAP)
+    candidate_sigma_rad: float = setting(
+        math.radians(1.5), "rad", "Standard deviation of a candidate's heading.", _KIDNAP)
+    coarse_gate_px: float = setting(16.0, "px", "Distance of a segment from its line in the first round.", _KIDNAP)
+    fine_gate_px: float = setting(4.0, "px", "Distance of a segment from its line in the second round.", _KIDNAP)
+    gate_rad: float = setting(0.12, "rad", "Angle between a segment and its line.", _KIDNAP)
+    min_pair_overlap: float = setting(0.5, "1", "Part of a segment that must lie beside its line.", _JUDGED)
+    min_pairs: int = setting(3, "count", "Fewest pairs of segment and line that are solved for a pose.", _JUDGED)
+    known_turn_rad: float = setting(
+        math.radians(0.5), "rad", "Standard deviation of a turn up to which it is not searched.", _KIDNAP)
+    turn_step_rad: float = setting(math.radians(1.5), "rad", "Step of the search for an uncertain turn.", _KIDNAP)
+    turn_search_sigmas: float = setting(
+        2.5, "1", "Reach of the search for an uncertain turn, in standard deviations.", _JUDGED)
+
+    # Log likelihood of a pose
+    detection_rate: float = setting(
+        0.85, "1", "Probability that a predicted line is found at the right pose: others are hidden or too faint.",
+        _KIDNAP)
+    min_chance: float = setting(0.04, "1", "Lower bound of the probability of a match at a wrong pose.", _JUDGED)
+    max_chance: float = setting(0.6, "1", "Upper bound of the probability of a match at a wrong pose.", _JUDGED)
+    line_independence: float = setting(
+        0.5, "1", "Weight of a line: lines of one thing are seen or missed together (tempered likelihood).", _KIDNAP)
+    min_view_lines: int = setting(8, "count", "Fewest predicted lines by which a single view counts.", _JUDGED)
+    min_explained_length_px: float = setting(
+        25.0, "px", "Shortest segment that should be explained by the model.", _JUDGED)
+    explained_tolerance_px: float = setting(
+        3.0, "px", "Distance of a segment from the model line that explains it.", _JUDGED)
+    min_explaining_length_px: float = setting(
+        4.0, "px", "Shortest model line that explains a segment.", _JUDGED)
+    min_explaining_contrast: float = setting(
+        0.01, "1", "Smallest contrast of a model line that explains a segment, 0..1.", _JUDGED)
+    displacement_m: float = setting(
+        0.35, "m", "Shift of the nearer wrong poses at which chance is counted; the farther are at twice as much.",
+        _JUDGED)
+    displacement_rad: float = setting(0.1, "rad", "Turn of the wrong poses at which chance is counted.", _JUDGED)
+
+    # Acceptance of a pose
+    min_views: int = setting(
+        2, "count", "Fewest views by which a pose is accepted: one may fit a place that the model lacks.", _KIDNAP)
+    min_matched_lines: int = setting(12, "count", "Fewest matched lines of an accepted pose.", _KIDNAP)
+    min_matched_fraction: float = setting(
+        0.6, "1", "Smallest part of the predicted lines that an accepted pose matches.", _KIDNAP)
+    min_view_fraction: float = setting(
+        0.35, "1", "Smallest part of the predicted lines that an accepted pose matches in any view.", _KIDNAP)
+    min_explained_fraction: float = setting(
+        0.35, "1", "Smallest part of the segments that an accepted pose explains.", _KIDNAP)
+    min_fraction_sum: float = setting(
+        1.15, "1", "Smallest sum of matched and explained parts: a pose nearby has a little of both.",
+        "rough-day, seed 91")
+    sure_log_likelihood: float = setting(
+        40.0, "1", "Log likelihood from which segments need no explanation: the model lacks what is on full shelves.",
+        _KIDNAP)
+    sure_matched_fraction: float = setting(
+        0.75, "1", "Part of the predicted lines from which segments need no explanation.", _KIDNAP)
+    min_log_likelihood: float = setting(2.0, "1", "Smallest log likelihood of a hypothesis that is kept.", _KIDNAP)
+    refuting_log_ratio: float = setting(
+        8.0, "1", "Log likelihood ratio (Bayes factor) by which a better hypothesis refutes a distinct one.", _KIDNAP)
+    max_hypotheses: int = setting(6, "count", "Most hypotheses that are kept.", _JUDGED)
+
+    # Telling hypotheses apart, and the next view
+    same_line_px: float = setting(
+        8.0, "px", "Distance up to which lines of two predicted views are the same, as precise as poses are.", _KIDNAP)
+    same_line_rad: float = setting(0.12, "rad", "Angle up to which lines of two predicted views are the same.", _KIDNAP)
+    min_compared_length_px: float = setting(
+        20.0, "px", "Shortest line by which predicted views are compared.", _JUDGED)
+    min_different_lines: float = setting(
+        3.0, "count", "Lines in which two predicted views must differ to be told apart.", _KIDNAP)
+    min_different_fraction: float = setting(
+        0.15, "1", "Part of their lines in which two predicted views must differ to be told apart.", _KIDNAP)
+    max_different_lines: int = setting(
+        20, "count", "Lines from which a larger difference separates hypotheses no better.", _JUDGED)
+    unknown_weight: float = setting(0.1, "1", "Weight of poses that no hypothesis covers.", _JUDGED)
+    turns_rad: tuple[float, ...] = setting(
+        tuple(math.radians(a) for a in (180.0, 90.0, -90.0, 135.0, -135.0, 45.0, -45.0)), "rad",
+        "Turns on the spot that are tried; of equals the first is taken.", _JUDGED)
+    turns_before_move_rad: tuple[float, ...] = setting(
+        tuple(math.radians(a) for a in (0.0, 90.0, -90.0, 180.0)), "rad", "Turns that are tried before a move.",
+        _JUDGED)
+    move_m: float = setting(0.6, "m", "Length of a move to another view.", _JUDGED)
+    move_clearance_m: float = setting(
+        0.1, "m", "Clearance of a move beyond the robot's radius, from every hypothesis.", _JUDGED)
+    min_new_view_rad: float = setting(
+        math.radians(30.0), "rad", "Angle from earlier views from which a view at the same position is new.", _JUDGED)
+
+    # Aliases of a pose: where the room repeats itself, and where the picture fits as well
+    max_size_difference_m: float = setting(0.1, "m", "Difference in the sides of rooms that may be alike.", _JUDGED)
+    alias_line_length_px: float = setting(30.0, "px", "Length that counts as one line of a margin.", _JUDGED)
+    max_fitting_poses: int = setting(14, "count", "Most poses of a room that are tried because the picture fits.",
+                                     _MILESTONES)
+    view_grid_m: float = setting(0.1, "m", "Grid of positions on which visible lines are computed and kept.", _JUDGED)
+    view_grid_rad: float = setting(
+        math.radians(2.0), "rad", "Grid of headings on which visible lines are computed and kept.", _JUDGED)
+    cached_views: int = setting(64, "count", "Predicted views on the grid that are kept.", _JUDGED)
+
+    # Obstructions before the camera
+    min_turn_between_views_rad: float = setting(
+        math.radians(10.0), "rad", "Turn from which nothing of the building stays where it is in the picture.", _JUDGED)
+    stationary_px: float = setting(1.5, "px", "Distance of two segments that are one stationary line.", _JUDGED)
+    stationary_rad: float = setting(0.03, "rad", "Angle of two segments that are one stationary line.", _JUDGED)
+    min_stationary_overlap: float = setting(
+        0.5, "1", "Part of the shorter of two segments that must lie beside the other.", _JUDGED)
+    min_stationary_views: int = setting(
+        2, "count", "Other views in which a stationary segment has a counterpart: in one it may be by chance.", _JUDGED)
+    min_stationary_fraction: float = setting(
+        0.6, "1", "Part of the other views in which a stationary segment has a counterpart.", _JUDGED)
+    min_obstruction_area: float = setting(0.01, "1", "Smallest obstruction, as a part of the picture.", _JUDGED)
+    max_obstruction_area: float = setting(
+        0.5, "1", "Largest obstruction, as a part of the picture: where more is stationary, the robot did not turn.",
+        _JUDGED)
+    side_end_percentile: float = setting(
+        80.0, "percent", "Percentile of segment ends that is the end of a side: longer ones go on in something else.",
+        _JUDGED)
+    min_sides: int = setting(3, "count", "Fewest sides of an outline.", _JUDGED)
+    max_dropped_sides: int = setting(4, "count", "Most sides that are left out as chance.", _JUDGED)
+    inside_margin_px: float = setting(
+        8.0, "px", "Distance within the outline from which a segment lies inside.", _JUDGED)
+    max_inside_fraction: float = setting(
+        0.1, "1", "Largest length of segments inside an opaque outline, as a part of the outline's own.", _JUDGED)
+
+    # Locating a camera near a prior, with six unknowns
+    camera_min_line_length_px: float = setting(8.0, "px", "Shortest projected model line that is matched.", _CORRIDOR)
+    camera_band_px: float = setting(
+        6.0, "px", "Half-width of the bands that are searched for edges around the first pose.", _CORRIDOR)
+    camera_second_prior: float = setting(
+        0.15, "1", "Standard deviation of the first pose, as a part of the prior's.", _CORRIDOR)
+    camera_coarse_pair_px: float = setting(5.0, "px", "Restricted space of the first match.", "§6.1.4")
+    camera_coarse_sigma_px: float = setting(1.5, "px", "Deviation of an end of a pair of the first match.", _CORRIDOR)
+    camera_fine_pair_px: float = setting(3.0, "px", "Restricted space of the second match.", "§6.1.4")
+    camera_fine_sigma_px: float = setting(1.0, "px", "Deviation of an end of a pair of the second match.", _CORRIDOR)
+    camera_probability: float = setting(
+        0.999, "1", "Probability that one of the drawn subsets is free of outliers.", "§6.2.4")
+    camera_min_pairs: int = setting(6, "count", "Fewest matched pairs that are solved for a pose.", _CORRIDOR)
+    camera_min_matched_lines: int = setting(6, "count", "Fewest matched lines of a pose not refuted.", _CORRIDOR)
+    camera_max_p_false: float = setting(1e-4, "1", "Largest chance of a pose that is not refuted.", _CORRIDOR)
+    camera_min_coverage: float = setting(
+        2.0 / 3.0, "1", "Smallest covered part of the model of a verified pose.", _CORRIDOR)
+    camera_displacement_sigmas: float = setting(
+        2.0, "1", "Displacement of the poses at which chance is counted, in the prior's deviations.", _CORRIDOR)
+    camera_tolerance_sigmas: float = setting(
+        3.0, "1", "Standard deviations of a verified pose that fit into the tolerance.", _CORRIDOR)
+    camera_max_restarts: int = setting(
+        3, "count", "Most times that a pose is replaced by a better one found from it.", _CORRIDOR)

@@ -1,11 +1,10 @@
-"""Could it be the next door? A place, against others of its room: those at which the plan repeats itself, and those at
-which the picture fits as well.
+"""Aliases of a known pose: is the robot perhaps at the next door?
 
-Lines that a view shares with the view at the next door speak for both. What tells them apart is what only one of them
-shows: the picture has it, or has it not.
+A pose is compared with others of its room: those at which the plan repeats itself, and those at which the picture fits
+as well. Lines that both views show support both; what tells them apart are the lines that only one of them shows.
 
-Which lines can be seen is worked out on a grid of poses and remembered, and only their projection is of the very pose:
-so it can be thought of beforehand, while the robot has yet to look.
+Visible lines are computed on a grid of poses and kept; only their projection is of the exact pose. So they can be
+computed beforehand, while the robot has yet to look.
 """
 
 from __future__ import annotations
@@ -15,120 +14,117 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization.hypotheses import ALIKE_PX, ALIKE_RAD
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.localization.pose_candidates import are_distinct, find_pose_candidates
 from knowledge_sources.methods.localization.refinement import refine_pose
 from knowledge_sources.methods.localization.repetition import find_repetitions
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.verification.agreement import compute_coverage
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
+from knowledge_sources.settings import DEFAULT, Settings
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 
-Floats = NDArray[np.float64]
-
-LINE_PX, LONG_PX = 30.0, 100.0
-"""So much length counts as one line; what is longer than LONG_PX tells no more."""
-TOLERANCE_PX, TOLERANCE_RAD = 2.5, 0.06
-GRID_M, GRID_RAD = 0.1, math.radians(2.0)
-"""From poses so near to each other the same lines are seen, but for a few."""
-KEPT_VIEWS = 64
-MOST_FITTING = 14
-"""So many of the places at which the picture fits best are looked at."""
-
 
 class Alias(NamedTuple):
-    """The place that is hardest to tell from the one that is believed: ``margin`` lines speak against it."""
+    """The pose that is hardest to tell from the believed one, and the lines by which the picture tells them apart."""
 
     world_from_robot: Pose2
     margin: float
 
 
 def find_strongest_alias(
-    robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, *, search: bool = False
+    robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, *, search: bool = False,
+    settings: Settings = DEFAULT,
 ) -> Alias | None:
-    """Of other places of a room, the one that segments (k, 2, 2) speak least against; None: there is none.
+    """Find the other pose of a room that segments (k, 2, 2) speak least against; None if there is no other.
 
-    They are those at which the room repeats itself and, with ``search``, wherever else in it the segments fit: what
-    repeats itself may be notices and doors for show, which no plan tells of. A search takes half a second.
+    Tried are the poses at which the room repeats itself and, with ``search``, wherever else in it the segments fit:
+    notices and painted doors that no plan shows may repeat themselves. A search takes half a second.
     """
-    others = [*places(robot, room, pose), *(fitting(robot, segments_px, room, pose) if search else ())]
+    others = [*find_repeated_poses(robot, room, pose, settings),
+              *(find_fitting_poses(robot, segments_px, room, pose, settings) if search else ())]
     if not others:
         return None
-    own, *there = (score_view(lines_px, segments_px) for lines_px in predict_views_on_grid(robot, (pose, *others)))
-    margins = [margin(own, other) for other in there]
-    least = int(np.argmin(margins))
-    return Alias(others[least], margins[least])
+    views = predict_views_on_grid(robot, (pose, *others), settings)
+    own, *there = (score_view(lines_px, segments_px, settings) for lines_px in views)
+    margins = [compute_margin(own, other, settings) for other in there]
+    smallest = int(np.argmin(margins))
+    return Alias(others[smallest], margins[smallest])
 
 
-def places(robot: RobotModel, room: str, pose: Pose2) -> list[Pose2]:
-    """The other places within a room at which it repeats itself."""
+def find_repeated_poses(robot: RobotModel, room: str, pose: Pose2, settings: Settings = DEFAULT) -> list[Pose2]:
+    """Find the other poses within a room at which its plan repeats itself."""
     outline = robot.world.outline(room)
     low, high = outline.min(axis=0), outline.max(axis=0)
-    return [other for _, other in find_repetitions(robot.world, room, pose, (room,))
+    return [other for _, other in find_repetitions(robot.world, room, pose, (room,), settings.localization)
             if np.all((low <= other.position) & (other.position <= high))]
 
 
-def fitting(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> list[Pose2]:
-    """The places of a room, apart from a pose, at which segments (k, 2, 2) fit best."""
-    look = (CameraView(segments_px, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))),)
-    candidates = find_pose_candidates(robot, look, (room,), MOST_FITTING)
-    found = (refine_pose(robot, look, c.world_from_robot)[0] for c in candidates)
-    return [place for place in found if are_distinct(place, pose)]
+def find_fitting_poses(
+    robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, settings: Settings = DEFAULT
+) -> list[Pose2]:
+    """Find the poses of a room, distinct from a pose, at which segments (k, 2, 2) fit best."""
+    views, tuning = (CameraView(segments_px, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))),), settings.localization
+    candidates = find_pose_candidates(robot, views, (room,), tuning.max_fitting_poses, settings)
+    refined = (refine_pose(robot, views, candidate.world_from_robot, settings)[0] for candidate in candidates)
+    return [other for other in refined if are_distinct(other, pose, tuning)]
 
 
-def precompute_views(robot: RobotModel, room: str, pose: Pose2) -> None:
-    """Think of what would be seen there, and at the places that may look alike: the answers are at hand then."""
-    predict_views_on_grid(robot, (pose, *places(robot, room, pose)))
+def precompute_views(robot: RobotModel, room: str, pose: Pose2, settings: Settings = DEFAULT) -> None:
+    """Compute what should be visible from a pose and from where the room repeats itself, so that it is at hand."""
+    predict_views_on_grid(robot, (pose, *find_repeated_poses(robot, room, pose, settings)), settings)
 
 
-def predict_views_on_grid(robot: RobotModel, poses: Sequence[Pose2]) -> list[Floats]:
-    """(n, 2, 2) for each pose: where the lines lie that should be seen from it, as they can be from the next of a grid.
-    """
-    lines = [robot.camera_from_world(pose).apply(_seen_near(robot, pose)) for pose in poses]
+def predict_views_on_grid(robot: RobotModel, poses: Sequence[Pose2], settings: Settings = DEFAULT) -> list[Floats]:
+    """Predict the view (n, 2, 2) [px] from each pose: the lines visible from the nearest pose of the grid."""
+    lines = [robot.camera_from_world(pose).apply(_find_visible_on_grid(robot, pose, settings)) for pose in poses]
     seen, inside = robot.camera.project_segments(np.concatenate(lines).reshape(-1, 2, 3), Pose.identity())
     ends = np.cumsum([len(some) for some in lines])[:-1]
     return [some[here] for some, here in zip(np.split(seen, ends), np.split(inside, ends), strict=True)]
 
 
-def _seen_near(robot: RobotModel, pose: Pose2) -> Floats:
-    """(n, 2, 3) the lines [m, world] that can be seen from the pose of a grid that is next to one."""
-    turned = round(pose.heading_rad / GRID_RAD) % round(math.tau / GRID_RAD)
-    nearest = (round(pose.x_m / GRID_M), round(pose.y_m / GRID_M), turned)
-    of_grid = Pose2(nearest[0] * GRID_M, nearest[1] * GRID_M, nearest[2] * GRID_RAD)
-    return robot.world.cached("views of a grid", KEPT_VIEWS, (robot.camera, robot.mount.height_m, nearest),
-                                  lambda: predict_lines(robot, of_grid).lines_world)
-
-
 class ScoredView(NamedTuple):
-    """Lines (n, 2, 2) that a place shows, and what each of them says (n,) if no other place shows it."""
+    """Lines (n, 2, 2) of a view, and by how much (n,) each speaks for the view, or if negative against it [lines]."""
 
     lines_px: Floats
-    says: Floats
+    scores: Floats
 
 
-def score_view(lines_px: Floats, segments_px: Floats) -> ScoredView:
-    """A view (n, 2, 2) held against segments (k, 2, 2): of each line, what is accounted for beyond a half speaks for
-    its view, what is missing beyond a half against it.
-    """
-    lines = np.minimum(np.linalg.norm(lines_px[:, 1] - lines_px[:, 0], axis=1), LONG_PX) / LINE_PX
-    return ScoredView(lines_px, lines * (_covered(lines_px, segments_px, TOLERANCE_PX, TOLERANCE_RAD) - 0.5))
+def score_view(lines_px: Floats, segments_px: Floats, settings: Settings = DEFAULT) -> ScoredView:
+    """Score the lines of a view (n, 2, 2) by how much of each segments (k, 2, 2) cover, more or less than half."""
+    tuning, length = settings.verification, np.linalg.norm(lines_px[:, 1] - lines_px[:, 0], axis=1)
+    lines = np.minimum(length, tuning.max_line_weight_px) / settings.localization.alias_line_length_px
+    covered = _cover(lines_px, segments_px, tuning.line_tolerance_px, tuning.line_tolerance_rad, settings)
+    return ScoredView(lines_px, lines * (covered - tuning.min_covered_fraction))
 
 
-def margin(one: ScoredView, other: ScoredView) -> float:
-    """By how many lines the same segments speak rather for one view than for another: only lines count that the other
-    view lacks.
-    """
-    return _told(one, other) - _told(other, one)
+def compute_margin(one: ScoredView, other: ScoredView, settings: Settings = DEFAULT) -> float:
+    """Compute by how many lines the segments support one view more than another, by the lines not in both."""
+    return _sum_own(one, other, settings) - _sum_own(other, one, settings)
 
 
-def _told(view: ScoredView, other: ScoredView) -> float:
-    return float(np.sum(view.says * (1.0 - _covered(view.lines_px, other.lines_px, ALIKE_PX, ALIKE_RAD))))
+def _find_visible_on_grid(robot: RobotModel, pose: Pose2, settings: Settings) -> Floats:
+    """(n, 2, 3) the lines [m, world] that are visible from the pose of the grid nearest to a pose. Kept."""
+    grid_m, grid_rad = settings.localization.view_grid_m, settings.localization.view_grid_rad
+    turned = round(pose.heading_rad / grid_rad) % round(math.tau / grid_rad)
+    nearest = (round(pose.x_m / grid_m), round(pose.y_m / grid_m), turned)
+    of_grid = Pose2(nearest[0] * grid_m, nearest[1] * grid_m, nearest[2] * grid_rad)
+    key = robot.camera, robot.mount.height_m, nearest, grid_m, grid_rad, settings.verification
+    return robot.world.cached("views on a grid", settings.localization.cached_views, key,
+                              lambda: predict_lines(robot, of_grid, settings.verification).lines_world)
 
 
-def _covered(lines_px: Floats, by_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
+def _sum_own(view: ScoredView, other: ScoredView, settings: Settings) -> float:
+    """The sum of the scores of the lines that another view lacks."""
+    tuning = settings.localization
+    common = _cover(view.lines_px, other.lines_px, tuning.same_line_px, tuning.same_line_rad, settings)
+    return float(np.sum(view.scores * (1.0 - common)))
+
+
+def _cover(lines_px: Floats, by_px: Floats, tolerance_px: float, tolerance_rad: float, settings: Settings) -> Floats:
+    """(n,) covered part of each line, 0 where it is not in view."""
     if not len(lines_px) or not len(by_px):
         return np.zeros(len(lines_px))
-    return np.nan_to_num(compute_coverage(lines_px, by_px, tolerance_px, tolerance_rad))
+    return np.nan_to_num(compute_coverage(lines_px, by_px, tolerance_px, tolerance_rad, settings.verification))

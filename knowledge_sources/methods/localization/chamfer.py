@@ -1,8 +1,8 @@
-"""Which of many poses fits the segments best? Oriented chamfer matching of model lines, many poses at once.
+"""Oriented chamfer matching: score many poses at once by the distance of projected model points to segments.
 
-For each direction of line there is a map of how near the next segment of about that direction is; a pose is scored by
-reading the maps where points of the model lines fall. Source: G. Borgefors, Hierarchical chamfer matching, PAMI 1988,
-with directions kept apart as in M.-Y. Liu et al., Fast directional chamfer matching, CVPR 2010.
+Each direction of line has a map of the distance to the next segment of about that direction. A pose is scored by
+reading the maps where points of the model lines are projected. Source: G. Borgefors, Hierarchical chamfer matching,
+PAMI 1988, with directions apart as in M.-Y. Liu et al., Fast directional chamfer matching, CVPR 2010.
 """
 
 from __future__ import annotations
@@ -14,46 +14,40 @@ from typing import Any
 import cv2
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from knowledge_sources.methods.arrays import Floats, Floats32, Ints
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.localization import LocalizationSettings
 from world_models.camera import Camera
 from world_models.frames import Pose
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
-DIRECTIONS = 12
-REACH_PX = 24.0
-"""Segments further away than this say nothing."""
-SHRUNK = 4
-"""A map has one pixel for so many of the picture along each side: what is looked for is rough."""
-NEAREST_M = 0.3
-"""Points nearer to the camera than this are left out."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChamferMaps:
-    """How near segments are, at each direction and place of a picture.
+    """Nearness of segments by direction and place in a picture.
 
     Attributes:
-        near: (DIRECTIONS, h, w) 1 on a segment of about that direction, 0 at REACH_PX from the next and beyond.
-        chance: (DIRECTIONS,) its mean: what a line that is not there finds by chance.
+        near: (d, h, w) 1 on a segment of about that direction, falling to 0 at the reach; in reduced pixels.
+        chance: (d,) its mean: the score of a point of a line that is not there.
     """
 
-    near: NDArray[np.float32]
-    chance: NDArray[np.float32]
+    near: Floats32
+    chance: Floats32
 
 
-def compute_chamfer_maps(segments_px: Any, camera: Camera) -> ChamferMaps:
-    """Maps of segments (n, 2, 2); each is drawn under its own direction and the two next to it."""
-    size = -(-camera.height // SHRUNK), -(-camera.width // SHRUNK)
-    empty = np.full((DIRECTIONS, *size), 255, np.uint8)
+def compute_chamfer_maps(
+    segments_px: Any, camera: Camera, settings: LocalizationSettings = DEFAULT.localization
+) -> ChamferMaps:
+    """Compute maps of segments (n, 2, 2); each is drawn under its own direction and the two next to it."""
+    shrink, directions = settings.chamfer_shrink, settings.chamfer_directions
+    size = -(-camera.height // shrink), -(-camera.width // shrink)
+    empty = np.full((directions, *size), 255, np.uint8)
     for (u0, v0), (u1, v1) in np.asarray(segments_px, float).reshape(-1, 2, 2):
-        own = round(math.atan2(v1 - v0, u1 - u0) / math.pi * DIRECTIONS)
-        ends = tuple((round(float(u) / SHRUNK), round(float(v) / SHRUNK)) for u, v in ((u0, v0), (u1, v1)))
+        own = round(math.atan2(v1 - v0, u1 - u0) / math.pi * directions)
+        ends = tuple((round(float(u) / shrink), round(float(v) / shrink)) for u, v in ((u0, v0), (u1, v1)))
         for k in (own - 1, own, own + 1):
-            cv2.line(empty[k % DIRECTIONS], ends[0], ends[1], 0, 1)
-    reach = REACH_PX / SHRUNK
+            cv2.line(empty[k % directions], ends[0], ends[1], 0, 1)
+    reach = settings.chamfer_reach_px / shrink
     away = [np.minimum(cv2.distanceTransform(layer, cv2.DIST_L2, 3), reach) / reach for layer in empty]
     near = np.ascontiguousarray(1.0 - np.asarray(away), np.float32)
     return ChamferMaps(near, near.mean(axis=(1, 2)))
@@ -61,23 +55,31 @@ def compute_chamfer_maps(segments_px: Any, camera: Camera) -> ChamferMaps:
 
 def compute_chamfer_scores(
     maps: ChamferMaps, camera: Camera, camera_from_robot: Pose, poses: Floats, points_world: Floats,
-    directions_world: Floats, first: Ints, seen: Ints, view: Ints, stride: int = 1,
+    directions_world: Floats, first: Ints, visible: Ints, cell: Ints, stride: int = 1,
+    settings: LocalizationSettings = DEFAULT.localization,
 ) -> Floats:
-    """(n, 3) for each pose (n, 3) of the robot (x, y, heading): how near segments are, summed over the points in view;
-    what that sum would be by chance; and how many points are in view.
+    """Score poses of the robot by the points of model lines that they show.
 
-    Pose i is asked about the points ``seen[first[view[i]] : first[view[i] + 1]]``, each or only one of ``stride``.
+    Args:
+        poses: (n, 3) x, y, heading [m, rad, world].
+        points_world, directions_world: (p, 3) points of lines and unit directions of their lines.
+        first, visible, cell: pose i shows the points ``visible[first[cell[i]] : first[cell[i] + 1]]``.
+        stride: one of so many of these points is projected.
+
+    Returns:
+        (n, 3) for each pose: nearness summed over the points in view, the sum expected by chance, number of points.
     """
     lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height], float)
-    return np.asarray(_scores(
+    return np.asarray(_score(
         maps.near, maps.chance, lens, np.array(camera_from_robot.rotation), np.array(camera_from_robot.translation),
-        np.array(poses, float), points_world, directions_world, first, seen, np.array(view, np.int64), stride))
+        np.array(poses, float), points_world, directions_world, first, visible, np.array(cell, np.int64), stride,
+        settings.chamfer_shrink, settings.min_point_depth_m))
 
 
 @njit(cache=True, error_model="numpy")
-def _scores(
+def _score(
     near: Any, chance: Any, lens: Any, mount: Any, shift: Any, poses: Any, points: Any, directions: Any, first: Any,
-    seen: Any, view: Any, stride: int,
+    visible: Any, cell: Any, stride: int, shrink: int, min_depth_m: float,
 ) -> Any:
     out = np.zeros((len(poses), 3))
     bins, height, width = near.shape
@@ -88,11 +90,11 @@ def _scores(
         r10, r11 = mount[1, 0] * c - mount[1, 1] * s, mount[1, 0] * s + mount[1, 1] * c
         r20, r21 = mount[2, 0] * c - mount[2, 1] * s, mount[2, 0] * s + mount[2, 1] * c
         total, by_chance, count = 0.0, 0.0, 0
-        for j in range(first[view[i]], first[view[i] + 1], stride):
-            k = seen[j]
+        for j in range(first[cell[i]], first[cell[i] + 1], stride):
+            k = visible[j]
             x, y, up = points[k, 0] - x0, points[k, 1] - y0, points[k, 2]
             z = r20 * x + r21 * y + mount[2, 2] * up + shift[2]
-            if z < NEAREST_M:
+            if z < min_depth_m:
                 continue
             across = r00 * x + r01 * y + mount[0, 2] * up + shift[0]
             u = lens[0] * across / z + lens[2]
@@ -107,7 +109,7 @@ def _scores(
             dz = r20 * a + r21 * b + mount[2, 2] * w
             turn = math.atan2(lens[1] * (db * z - dz * down), lens[0] * (da * z - dz * across)) / math.pi * bins
             d = math.floor(turn + 0.5) % bins
-            total += near[d, min(height - 1, int(v / SHRUNK + 0.5)), min(width - 1, int(u / SHRUNK + 0.5))]
+            total += near[d, min(height - 1, int(v / shrink + 0.5)), min(width - 1, int(u / shrink + 0.5))]
             by_chance += chance[d]
             count += 1
         out[i, 0], out[i, 1], out[i, 2] = total, by_chance, count

@@ -1,4 +1,4 @@
-"""What was seen while nobody knew where: several looks from one spot and near it, composed by the motions between."""
+"""Views that were taken while the pose was unknown, related by the motions between them."""
 
 from __future__ import annotations
 
@@ -7,89 +7,90 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from knowledge_sources.methods.features.manhattan import find_level_direction
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
+from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
-
-Floats = NDArray[np.float64]
-RIGHT = 0.5 * math.pi
-SEEN_RAD = math.radians(0.3)
-"""How well level lines tell a turn."""
-MOST_OFF_RAD = math.radians(20.0)
-"""Motions say better than this which of four directions is meant."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraView:
-    """One look.
+    """The line segments of one picture, and where the robot was when it was taken.
 
     Attributes:
-        segments_px: (n, 2, 2) what was seen.
-        now_from_then: where the robot was, from where it is now.
-        spread: (3, 3) covariance of that over (x, y, heading).
+        segments_px: (n, 2, 2) found in the picture.
+        now_from_then: the robot's pose then, in its frame now.
+        covariance: (3, 3) of ``now_from_then`` over (x, y, heading).
     """
 
     segments_px: Floats
     now_from_then: Pose2
     covariance: Floats
 
-    def then(self, world_from_now: Pose2) -> Pose2:
-        """Where the robot was, if it is there now."""
+    def pose_then(self, world_from_now: Pose2) -> Pose2:
+        """The robot's pose when the picture was taken, if it is at ``world_from_now`` now."""
         return world_from_now @ self.now_from_then
 
 
-def align_headings(glances: Sequence[CameraView], camera: Camera, camera_from_robot: Pose) -> tuple[CameraView, ...]:
-    """The glances, in the order they were taken, with the turns between them corrected by the level lines they show.
-
-    Wheels err by a fortieth of a turn; but lines at right angles are seen to a tenth of a degree, and it is known from
-    the wheels which of the four directions is which. The last glance is where the robot is now. If it shows no level
-    lines, the others are set straight by the last one that does, and are known from now no better than that one is.
-    """
-    told = _told(glances, camera, camera_from_robot)
-    if len(told) < 2:
-        return tuple(glances)
-    surest = max(told)
-    axis, spread = told[surest], float(glances[surest].covariance[2, 2]) + SEEN_RAD**2
-    out, off_later = [glances[-1]], 0.0
-    for k in range(len(glances) - 2, -1, -1):
-        glance, off = glances[k], math.remainder(axis - told[k], RIGHT) if k in told else math.inf
-        if abs(off) < MOST_OFF_RAD and k != surest:
-            glance = replace(glance, covariance=_known_turn(glance.covariance, spread))
-        else:
-            off = off_later
-        pose = _before(glance, glances[k + 1], out[-1].now_from_then, off_later - off)
-        out.append(replace(glance, now_from_then=pose))
-        off_later = off
-    return tuple(reversed(out))
-
-
-def _told(glances: Sequence[CameraView], camera: Camera, camera_from_robot: Pose) -> dict[int, float]:
-    """By the number of each glance that shows level lines: their direction from now, modulo a right angle [rad]."""
-    seen = [find_level_direction(g.segments_px, camera, camera_from_robot) for g in glances]
-    return {k: d + g.now_from_then.heading_rad for k, (g, d) in enumerate(zip(glances, seen, strict=True))
-            if d is not None}
-
-
-def _before(glance: CameraView, later: CameraView, now_from_later: Pose2, more_rad: float) -> Pose2:
-    """Where a glance was taken if the robot turned by so much more before it went on to the later one."""
-    step = Pose2(0.0, 0.0, more_rad) @ glance.now_from_then.inverse() @ later.now_from_then
-    return now_from_later @ step.inverse()
-
-
-def _known_turn(spread: Floats, seen: float) -> Floats:
-    """The covariance (3, 3) once the turn is known from what is seen with the variance ``seen``."""
-    out = np.zeros((3, 3))
-    out[:2, :2], out[2, 2] = spread[:2, :2], min(float(spread[2, 2]), seen)
-    return out
-
-
-def propagate_pose(now_from_then: Pose2, covariance: Floats, step: Pose2, spread: Floats) -> tuple[Pose2, Floats]:
-    """Where the robot was, and its covariance (3, 3), from where it is after one more step with its spread (3, 3)."""
+def propagate_pose(now_from_then: Pose2, covariance: Floats, step: Pose2, step_covariance: Floats
+                   ) -> tuple[Pose2, Floats]:
+    """Express an earlier pose in the robot's frame after one more step, with its covariance (3, 3)."""
     after = step.inverse() @ now_from_then
     c, s = math.cos(step.heading_rad), math.sin(step.heading_rad)
     turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     lever = np.eye(3)
-    lever[0, 2], lever[1, 2] = after.y_m, -after.x_m  # what a heading of the step does to a place before it
-    return after, np.asarray(turn @ covariance @ turn.T + lever @ turn @ spread @ turn.T @ lever.T)
+    lever[0, 2], lever[1, 2] = after.y_m, -after.x_m  # an error in the step's heading moves the earlier position
+    return after, np.asarray(turn @ covariance @ turn.T + lever @ turn @ step_covariance @ turn.T @ lever.T)
+
+
+def align_headings(
+    views: Sequence[CameraView], camera: Camera, camera_from_robot: Pose, settings: Settings = DEFAULT
+) -> tuple[CameraView, ...]:
+    """Correct the turns between views, in the order in which they were taken, by the level lines they show.
+
+    Odometry errs by a fortieth of a turn. Level lines run in two directions at right angles (Manhattan world), which
+    are seen to a tenth of a degree; odometry tells which of the four directions is which. The last view is from where
+    the robot is now. If it shows no level lines, the reference is the last view that does, and all turns are known no
+    better than that view's.
+    """
+    axes = _find_axes(views, camera, camera_from_robot, settings)
+    if len(axes) < 2:
+        return tuple(views)
+    tuning, reference = settings.localization, max(axes)
+    axis = axes[reference]
+    variance = float(views[reference].covariance[2, 2]) + tuning.level_heading_sigma_rad**2
+    out, off_later = [views[-1]], 0.0
+    for k in range(len(views) - 2, -1, -1):
+        view, off = views[k], math.remainder(axis - axes[k], RIGHT_ANGLE_RAD) if k in axes else math.inf
+        if abs(off) < tuning.max_heading_correction_rad and k != reference:
+            view = replace(view, covariance=_limit_turn_variance(view.covariance, variance))
+        else:
+            off = off_later
+        pose = _correct_turn(view, views[k + 1], out[-1].now_from_then, off_later - off)
+        out.append(replace(view, now_from_then=pose))
+        off_later = off
+    return tuple(reversed(out))
+
+
+def _find_axes(
+    views: Sequence[CameraView], camera: Camera, camera_from_robot: Pose, settings: Settings
+) -> dict[int, float]:
+    """By index of the views that show level lines: their direction in the frame of now, modulo a right angle [rad]."""
+    found = [find_level_direction(v.segments_px, camera, camera_from_robot, settings.features) for v in views]
+    return {k: direction + view.now_from_then.heading_rad
+            for k, (view, direction) in enumerate(zip(views, found, strict=True)) if direction is not None}
+
+
+def _correct_turn(view: CameraView, later: CameraView, now_from_later: Pose2, more_rad: float) -> Pose2:
+    """The pose of a view if the robot turned by so much more before it moved on to the later one."""
+    step = Pose2(0.0, 0.0, more_rad) @ view.now_from_then.inverse() @ later.now_from_then
+    return now_from_later @ step.inverse()
+
+
+def _limit_turn_variance(covariance: Floats, variance: float) -> Floats:
+    """The covariance (3, 3) after the turn was measured with a variance, without correlations of turn and position."""
+    out = np.zeros((3, 3))
+    out[:2, :2], out[2, 2] = covariance[:2, :2], min(float(covariance[2, 2]), variance)
+    return out

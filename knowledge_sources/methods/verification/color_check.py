@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from knowledge_sources.methods.arrays import Floats, Image, Ints
 from knowledge_sources.methods.features.regions import segment_regions
 from knowledge_sources.methods.verification.predicted_colors import FaceColor
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.verification import VerificationSettings
 from world_models.camera import NEAR_PLANE_M
 from world_models.frames import Pose2
@@ -59,8 +59,7 @@ def decode_small_color(jpeg: bytes) -> Image:
 
 
 def check_colors(
-    robot: RobotModel, pose: Pose2, image: Image, face_colors: Sequence[FaceColor],
-    settings: VerificationSettings = DEFAULT.verification,
+    robot: RobotModel, pose: Pose2, image: Image, face_colors: Sequence[FaceColor], settings: Settings = DEFAULT
 ) -> ColorCheck:
     """Compare a picture with the face colors predicted from a pose.
 
@@ -74,16 +73,18 @@ def check_colors(
     points = robot.camera_from_world(pose).apply(np.array([p for _, points in face_colors for p in points]))
     ahead = points[:, 2] > NEAR_PLANE_M
     pixels = robot.lens.project(np.where(ahead[:, None], points, (0.0, 0.0, 1.0)))
-    inside = ahead & robot.lens.inside(pixels, settings.border_margin_px)
+    tuning = settings.verification
+    inside = ahead & robot.lens.inside(pixels, tuning.border_margin_px)
     if not inside.any():
         return NOT_TESTED
     parts = (pixels[inside] + 0.5) / (robot.lens.width, robot.lens.height)
-    side = settings.region_image_px
+    side = tuning.region_image_px
     tiny = cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA).mean(axis=2)
-    labels = segment_regions(tiny, sector_px=side, min_area_px=settings.min_region_area_px).labels
+    labels = segment_regions(
+        tiny, sector_px=side, min_area_px=tuning.min_region_area_px, settings=settings.features).labels
     smooth = np.asarray(cv2.blur(image, (3, 3)), np.float64)
     colors = np.array([color for color, _ in face_colors])
-    return _measure(_sample(smooth, parts), _sample(labels, parts), face[inside], colors, settings)
+    return _measure(_sample(smooth, parts), _sample(labels, parts), face[inside], colors, tuning)
 
 
 def predict_color_check(

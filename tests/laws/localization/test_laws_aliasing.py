@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.localization import aliasing
 from knowledge_sources.methods.localization.aliasing import (
-    GRID_M,
-    GRID_RAD,
     find_strongest_alias,
     precompute_views,
     predict_views_on_grid,
@@ -21,6 +19,7 @@ from knowledge_sources.methods.localization.aliasing import (
 )
 from knowledge_sources.methods.verification.agreement import compute_coverage
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
+from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
@@ -31,13 +30,14 @@ Floats = NDArray[np.float64]
 
 WORLD = load_world(WORLDS / "research_center.toml", details=[])
 ROBOT = RobotModel(WORLD, Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1), ActuatorModel())
+TUNING = DEFAULT.localization
 NONE = np.zeros((0, 2, 2))
 few = settings(max_examples=40, deadline=None)
 
 
 def margin(one: Floats, other: Floats, seen: Floats) -> float:
     """Of two views, by what was seen."""
-    return aliasing.margin(score_view(one, seen), score_view(other, seen))
+    return aliasing.compute_margin(score_view(one, seen), score_view(other, seen))
 
 
 @st.composite
@@ -100,8 +100,9 @@ def test_lines_visible_from_the_grid_are_projected_to_where_they_are_seen_from_t
     for _ in range(200):
         x, y = WORLD.world_from_locale("hallway").apply([rng.uniform(3.0, 18.0), 1.2, 0.0])[:2]
         pose = Pose2(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
+        steps = TUNING.view_grid_m, TUNING.view_grid_m, TUNING.view_grid_rad
         of_grid = Pose2(*(round(v / by) * by for v, by in zip(
-            (pose.x_m, pose.y_m, pose.heading_rad), (GRID_M, GRID_M, GRID_RAD), strict=True)))
+            (pose.x_m, pose.y_m, pose.heading_rad), steps, strict=True)))
         on_grid, between = predict_views_on_grid(ROBOT, [of_grid, pose])
         assert on_grid == pytest.approx(predict_lines(ROBOT, of_grid).segments_px, abs=1e-6)
         exact = predict_lines(ROBOT, pose).segments_px

@@ -1,4 +1,4 @@
-"""Laws of a robot that is lost: what it keeps in agent, which probe it chooses, and that it never guesses."""
+"""Laws of a robot that is lost: what it keeps in mind, which view it chooses, and that it never guesses."""
 
 from __future__ import annotations
 
@@ -12,19 +12,21 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
+from knowledge_sources.methods.localization.global_localization import LocalizationStatus, find_aliases, localize
 from knowledge_sources.methods.localization.hypotheses import (
     PoseHypothesis,
-    SensingAction,
-    choose_sensing_action,
-    compute_separation,
     compute_view_difference,
-    find_widest_gap,
-    make_safety_check,
     normalize_log_likelihoods,
 )
 from knowledge_sources.methods.localization.log_likelihood import PoseLikelihood
+from knowledge_sources.methods.localization.next_view import (
+    SensingAction,
+    choose_sensing_action,
+    compute_separation,
+    find_widest_gap,
+    make_safety_check,
+)
 from knowledge_sources.methods.localization.refinement import refine_pose, refine_view_motions
-from knowledge_sources.methods.localization.relocation import Candidate, LocalizationStatus, find_aliases, localize
 from knowledge_sources.methods.localization.views import CameraView, align_headings, propagate_pose
 from knowledge_sources.methods.localization.visibility_map import get_visibility_map
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
@@ -259,26 +261,26 @@ def test_a_turn_that_is_unsure_is_corrected_and_not_the_pose(error: float, turn:
 
 @pytest.mark.parametrize("room", ["robot-laboratory", "hallway"])
 def test_what_is_in_sight_is_what_the_exact_computation_sees(room: str) -> None:
-    vantage = get_visibility_map(CENTRE.world, room, 1.0)
+    room_map = get_visibility_map(CENTRE.world, room, 1.0)
     agree = []
-    for square in range(0, len(vantage.first) - 1, 12):
-        eye = vantage.eyes[square]
-        in_sight = np.zeros(len(vantage.points), bool)
-        in_sight[vantage.visible[vantage.first[square]: vantage.first[square + 1]]] = True
+    for square in range(0, len(room_map.first) - 1, 12):
+        eye = room_map.eyes[square]
+        in_sight = np.zeros(len(room_map.points), bool)
+        in_sight[room_map.visible[room_map.first[square]: room_map.first[square + 1]]] = True
         for heading in (0.0, 2.0, 4.0):
             camera_from_world = CENTRE.camera_from_world(Pose2(*eye, heading) @ Pose2(-0.1, 0.0, 0.0))
-            ahead = camera_from_world.apply(vantage.points)
+            ahead = camera_from_world.apply(room_map.points)
             shown = np.flatnonzero(in_sight & (ahead[:, 2] > 0.3))
             px = CAMERA.project(ahead[shown])
             shown = shown[CAMERA.inside(px)]
-            agree.append(~find_hidden(CENTRE.world, CAMERA, camera_from_world, vantage.points[shown]))
+            agree.append(~find_hidden(CENTRE.world, CAMERA, camera_from_world, room_map.points[shown]))
     assert np.mean(np.concatenate(agree)) > 0.99
 
 
 # -- never a guess ---------------------------------------------------------------------------------------------------
 
 
-def glances_from(robot: RobotModel, pose: Pose2, turns: tuple[float, ...], seed: int) -> list[CameraView]:
+def views_from(robot: RobotModel, pose: Pose2, turns: tuple[float, ...], seed: int) -> list[CameraView]:
     rng = np.random.default_rng(seed)
     now = pose @ Pose2(0.0, 0.0, turns[-1])
     return [CameraView(seen_from(robot, there, rng), now.inverse() @ there, np.diag([1e-5, 1e-5, 1e-4]))
@@ -295,7 +297,7 @@ def test_in_a_corridor_that_looks_the_same_from_both_ends_it_never_says_where_it
     pose = Pose2(low[0] + part * (high[0] - low[0]), 0.5 * (low[1] + high[1]) + 0.3, heading)
     rooms = list(SYMMETRIC.world.rooms)
     for turns in ((0.0, math.pi), (0.0, 1.5, 3.0, 4.5)):
-        found = localize(TWIN, glances_from(TWIN, pose, turns, seed), rooms)
+        found = localize(TWIN, views_from(TWIN, pose, turns, seed), rooms)
         assert found.status is not LocalizationStatus.FOUND
     assert len(found.candidates) >= 2
     turned = Pose2(*(low + high - pose.position), wrap_angle(pose.heading_rad + turns[-1] + math.pi))
@@ -324,14 +326,13 @@ def test_in_a_building_that_differs_everywhere_it_says_where_it_is(seed: int, he
     spots = get_visibility_map(CENTRE.world, "robot-laboratory", 1.0).positions
     x, y = spots[int(rng.integers(len(spots)))]
     pose, turns = Pose2(x, y, heading), (0.0, math.pi, 0.5 * math.pi, -0.5 * math.pi)
-    found = localize(CENTRE, glances_from(CENTRE, pose, turns, seed), list(CENTRE.world.rooms))
+    found = localize(CENTRE, views_from(CENTRE, pose, turns, seed), list(CENTRE.world.rooms))
     assert found.status is LocalizationStatus.FOUND and found.candidates[0].room == "robot-laboratory"
     assert found.candidates[0].world_from_robot.distance_to(pose) < 0.05
 
 
-def candidate(seen: int, accounted: int, likelihood: float, explained: float, weakest: float) -> Candidate:
-    evidence = PoseLikelihood(seen, accounted, likelihood, explained, weakest)
-    return Candidate("hallway", Pose2(0.0, 0.0, 0.0), np.eye(3), evidence)
+def is_sufficient(visible: int, matched: int, log_likelihood: float, explained: float, weakest: float) -> bool:
+    return PoseLikelihood(visible, matched, log_likelihood, explained, weakest).is_sufficient()
 
 
 parts = st.floats(0.0, 1.0)
@@ -344,14 +345,14 @@ def test_a_place_that_stands_stands_with_more_evidence_too(
     seen: int, accounted: float, likelihood: float, explained: float, weakest: float, more: float
 ) -> None:
     count = int(accounted * seen)
-    if candidate(seen, count, likelihood, explained, weakest).is_accepted:
-        assert candidate(seen, int(count + more * (seen - count)), likelihood, explained, weakest).is_accepted
-        assert candidate(seen, count, likelihood + 10.0 * more, explained, weakest).is_accepted
-        assert candidate(seen, count, likelihood, explained + more * (1.0 - explained), weakest).is_accepted
-        assert candidate(seen, count, likelihood, explained, weakest + more * (1.0 - weakest)).is_accepted
+    if is_sufficient(seen, count, likelihood, explained, weakest):
+        assert is_sufficient(seen, int(count + more * (seen - count)), likelihood, explained, weakest)
+        assert is_sufficient(seen, count, likelihood + 10.0 * more, explained, weakest)
+        assert is_sufficient(seen, count, likelihood, explained + more * (1.0 - explained), weakest)
+        assert is_sufficient(seen, count, likelihood, explained, weakest + more * (1.0 - weakest))
 
 
 def test_a_little_of_both_is_not_enough() -> None:
     """As at a place 0.12 m beside the right one (rough-day, seed 91), where 99 of 158 lines were accounted for."""
-    assert not candidate(158, 99, 30.0, 0.38, 0.5).is_accepted
-    assert candidate(324, 204, 30.0, 0.75, 0.5).is_accepted
+    assert not is_sufficient(158, 99, 30.0, 0.38, 0.5)
+    assert is_sufficient(324, 204, 30.0, 0.75, 0.5)

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.localization.obstructions import (
-    MOST_AREA,
     find_obstruction,
     has_counterpart,
     is_opaque,
@@ -19,6 +18,7 @@ from knowledge_sources.methods.localization.obstructions import (
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
+from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries.obstruction import MOST_HIDDEN, Obstruction
@@ -181,7 +181,7 @@ def test_a_robot_that_did_not_turn_though_its_wheels_say_so_has_nothing_before_i
     segments = seen(ROBOT, somewhere(rng), None, rng)
     stuck = [CameraView(segments, Pose2(0.0, 0.0, 0.5 * k), np.zeros((3, 3))) for k in range(LOOKS)]
     found = find_obstruction(stuck, CAMERA)
-    assert found is None or _part(found) <= MOST_AREA
+    assert found is None or _part(found) <= DEFAULT.localization.max_obstruction_area
 
 
 def _part(found: Obstruction) -> float:

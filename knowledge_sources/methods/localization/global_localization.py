@@ -1,0 +1,219 @@
+"""Global localization: where is the robot, if it may be anywhere in these rooms?
+
+Candidates are refined, weighed against each other, and compared with the places that look alike (aliases).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import lru_cache
+from typing import NamedTuple
+
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.localization.hypotheses import (
+    PoseHypothesis,
+    are_distinguishable,
+    make_view_predictor,
+    normalize_log_likelihoods,
+)
+from knowledge_sources.methods.localization.log_likelihood import PoseLikelihood, compute_pose_likelihood
+from knowledge_sources.methods.localization.next_view import (
+    SensingAction,
+    can_distinguish,
+    choose_sensing_action,
+    find_widest_gap,
+    make_safety_check,
+)
+from knowledge_sources.methods.localization.pose_candidates import are_distinct, find_pose_candidates
+from knowledge_sources.methods.localization.refinement import refine_pose, refine_view_motions
+from knowledge_sources.methods.localization.repetition import find_repetitions
+from knowledge_sources.methods.localization.views import CameraView, align_headings
+from knowledge_sources.methods.verification.predicted_lines import predict_lines
+from knowledge_sources.settings import DEFAULT, Settings
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+
+LookAlike = Callable[[Pose2, Pose2], bool]
+"""Whether two poses would look the same in all views."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A place where the robot may be now.
+
+    Attributes:
+        room, world_from_robot, covariance: where; (3, 3) over (x, y, heading), world.
+        likelihood: how well the views support it.
+        is_accepted: whether this is enough to accept it where it stands alone.
+        weight: its share among all that are kept.
+    """
+
+    room: str
+    world_from_robot: Pose2
+    covariance: Floats
+    likelihood: PoseLikelihood
+    is_accepted: bool
+    weight: float = 1.0
+
+    @property
+    def hypothesis(self) -> PoseHypothesis:
+        """Room, pose and weight."""
+        return PoseHypothesis(self.room, self.world_from_robot, self.weight)
+
+
+class LocalizationStatus(Enum):
+    """What the views say of where the robot is."""
+
+    FOUND = "found"
+    PROBE = "probe"
+    AMBIGUOUS = "ambiguous"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalizationResult:
+    """The outcome of one localization.
+
+    Attributes:
+        status: found (one accepted candidate is left), probe (another look is needed), or ambiguous (no look within
+            reach would tell the best two candidates apart).
+        candidates: those that are kept, the likeliest first.
+        next_action: what to look at next; None where nothing new can be seen.
+    """
+
+    status: LocalizationStatus
+    candidates: tuple[Candidate, ...]
+    next_action: SensingAction | None = None
+
+
+class RefinedPose(NamedTuple):
+    """A refined candidate: the room in which it was found, the pose, and its covariance (3, 3)."""
+
+    room: str
+    world_from_robot: Pose2
+    covariance: Floats
+
+
+def localize(
+    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT
+) -> LocalizationResult:
+    """Find the robot in these rooms by its views, the last of which was taken from where it is now."""
+    aligned = align_headings(views, robot.camera, robot.mount.camera_from_robot, settings)
+    candidates = find_candidates(robot, aligned, rooms, settings)
+    return decide(robot, candidates, [view.now_from_then for view in aligned], settings)
+
+
+def find_candidates(
+    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT
+) -> tuple[Candidate, ...]:
+    """Find the places in these rooms that explain all views (with aligned headings), the likeliest first.
+
+    If one accepted place is left, its aliases on the whole floor are weighed too.
+    """
+    look_alike = make_alias_test(robot, [view.now_from_then for view in views], settings)
+    found = [_build_candidate(robot, views, pose, settings) for pose in _find_refined(robot, views, rooms, settings)]
+    kept = rank_candidates(found, look_alike, settings)
+    if len(kept) != 1 or not kept[0].is_accepted:
+        return kept
+    aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, settings)
+    beside = [_build_candidate(robot, views, pose, settings) for pose in aliases]
+    return rank_candidates([*kept, *beside], look_alike, settings)
+
+
+def find_aliases(
+    robot: RobotModel, views: Sequence[CameraView], pose: Pose2, rooms: Sequence[str], settings: Settings = DEFAULT
+) -> tuple[RefinedPose, ...]:
+    """Find the other places of these rooms that would look the same in all views, by the model alone.
+
+    The pictures are not used: missed, hidden or additional lines may make one of two aliases much less likely than the
+    other. The search is for what should be visible from ``pose``. Where few lines are, the grid may be too coarse to
+    find an alias, so the places at which the plan repeats itself are tried too.
+    """
+    lines = [predict_lines(robot, view.pose_then(pose), settings.verification) for view in views]
+    predicted = [replace(view, segments_px=seen.segments_px) for view, seen in zip(views, lines, strict=True)]
+    look_alike = make_alias_test(robot, [view.now_from_then for view in views], settings)
+    tuning = settings.localization
+    found = [other for other in _find_refined(robot, predicted, rooms, settings)
+             if are_distinct(other.world_from_robot, pose, tuning) and look_alike(pose, other.world_from_robot)]
+    room_of_pose = _find_room(robot, rooms[0], pose)
+    for room, other in find_repetitions(robot.world, room_of_pose, pose, rooms, tuning):
+        known = (pose, *(alias.world_from_robot for alias in found))
+        if all(are_distinct(other, one, tuning) for one in known) and look_alike(pose, other):
+            found.append(RefinedPose(room, *refine_pose(robot, predicted, other, settings)))
+    return tuple(found)
+
+
+def make_alias_test(robot: RobotModel, looked: Sequence[Pose2], settings: Settings = DEFAULT) -> LookAlike:
+    """Return a test whether two poses would look the same in all views, by the model."""
+    predict = lru_cache(maxsize=64)(make_view_predictor(robot, settings))
+
+    def look_alike(one: Pose2, other: Pose2) -> bool:
+        views, others = ([predict(pose @ look) for look in looked] for pose in (one, other))
+        return not are_distinguishable(views, others, settings)
+
+    return look_alike
+
+
+def rank_candidates(
+    found: Sequence[Candidate], look_alike: LookAlike, settings: Settings = DEFAULT
+) -> tuple[Candidate, ...]:
+    """Keep the likely candidates that the likeliest does not refute, with their weights, the likeliest first.
+
+    The likeliest refutes a candidate by the log likelihood ratio (Bayes factor), but never one that would look the
+    same: chance may have made it much less likely.
+    """
+    tuning = settings.localization
+    order = sorted((c for c in found if c.likelihood.log_likelihood >= tuning.min_log_likelihood),
+                   key=lambda c: -c.likelihood.log_likelihood)
+    kept = [c for c in order
+            if c.likelihood.log_likelihood >= order[0].likelihood.log_likelihood - tuning.refuting_log_ratio
+            or look_alike(order[0].world_from_robot, c.world_from_robot)][: tuning.max_hypotheses]
+    weights = normalize_log_likelihoods([c.likelihood.log_likelihood for c in kept])
+    return tuple(replace(c, weight=weight) for c, weight in zip(kept, weights, strict=True))
+
+
+def decide(
+    robot: RobotModel, candidates: Sequence[Candidate], looked: Sequence[Pose2], settings: Settings = DEFAULT
+) -> LocalizationResult:
+    """Decide whether the robot is found, cannot be found, or needs another look, and which."""
+    kept, enough = tuple(candidates), len(looked) >= settings.localization.min_views
+    if len(kept) == 1 and kept[0].is_accepted and enough:
+        return LocalizationResult(LocalizationStatus.FOUND, kept)
+    if not kept:
+        return LocalizationResult(LocalizationStatus.PROBE, (), SensingAction(find_widest_gap(looked), 0.0, 0.0))
+    predict, is_safe = make_view_predictor(robot, settings), make_safety_check(robot, settings.localization)
+    hypotheses = [c.hypothesis for c in kept]
+    tied = len(kept) > 1 and all(c.is_accepted for c in kept[:2]) and enough
+    if tied and not can_distinguish(hypotheses[0], hypotheses[1], looked, predict, is_safe, settings):
+        return LocalizationResult(LocalizationStatus.AMBIGUOUS, kept)
+    action = choose_sensing_action(hypotheses, looked, predict, is_safe, settings)
+    return LocalizationResult(LocalizationStatus.PROBE, kept, action)
+
+
+def _find_refined(
+    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings
+) -> list[RefinedPose]:
+    """The best candidates, refined, each once."""
+    tuning, found = settings.localization, list[RefinedPose]()
+    for candidate in find_pose_candidates(robot, views, rooms, tuning.max_candidates, settings):
+        pose, covariance = refine_pose(robot, views, candidate.world_from_robot, settings)
+        if all(are_distinct(pose, other.world_from_robot, tuning) for other in found):
+            found.append(RefinedPose(candidate.room, pose, covariance))
+    return found
+
+
+def _build_candidate(
+    robot: RobotModel, views: Sequence[CameraView], found: RefinedPose, settings: Settings
+) -> Candidate:
+    room, pose, covariance = found
+    refined = refine_view_motions(robot, views, pose, covariance, settings)
+    likelihood = compute_pose_likelihood(robot, refined, pose, settings)
+    is_accepted = likelihood.is_sufficient(settings.localization)
+    return Candidate(_find_room(robot, room, pose), pose, covariance, likelihood, is_accepted)
+
+
+def _find_room(robot: RobotModel, room: str, pose: Pose2) -> str:
+    """The room in which a pose lies; in a doorway the one from which it was found."""
+    there = robot.world.locale_at([*pose.position, robot.world.floor_m(room)])
+    return there if there is not None and robot.world.is_room(there) else room
