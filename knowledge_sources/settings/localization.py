@@ -170,9 +170,8 @@ class LocalizationSettings:
     max_obstruction_area: float = setting(
         0.5, "1", "Largest obstruction, as a part of the picture: where more is stationary, the robot did not turn.",
         _JUDGED)
-    side_end_percentile: float = setting(
-        80.0, "percent", "Percentile of segment ends that is the end of a side: longer ones go on in something else.",
-        _JUDGED)
+    side_end_quantile: float = setting(
+        0.8, "1", "Quantile of segment ends that is the end of a side: longer ones go on in something else.", _JUDGED)
     min_sides: int = setting(3, "count", "Fewest sides of an outline.", _JUDGED)
     max_dropped_sides: int = setting(4, "count", "Most sides that are left out as chance.", _JUDGED)
     inside_margin_px: float = setting(

@@ -110,17 +110,18 @@ def _build_sides(stationary: Sequence[Floats], settings: LocalizationSettings) -
         return []
     count, which = connected_components(_lie_on(segments, segments, settings), directed=False)
     groups = [segments[which == k] for k in range(count)]
-    return [_Side(_find_ends(group, settings.side_end_percentile), group) for group in groups]
+    return [_Side(_find_ends(group, settings.side_end_quantile), group) for group in groups]
 
 
-def _find_ends(segments_px: Floats, percentile: float) -> Floats:
+def _find_ends(segments_px: Floats, quantile: float) -> Floats:
     """(2, 2) the ends of segments (n, 2, 2) on one line, without those that continue in something else."""
     longest = segments_px[np.argmax(_measure(segments_px))]
     along = (longest[1] - longest[0]) / _measure(longest[None])[0]
     normal = np.array([-along[1], along[0]])
     at = np.sort((segments_px - longest[0]) @ along, axis=1)
     across = (segments_px - longest[0]) @ normal
-    low, high = np.percentile(at[:, 0], 100.0 - percentile), np.percentile(at[:, 1], percentile)
+    percent = 100.0 * quantile
+    low, high = np.percentile(at[:, 0], 100.0 - percent), np.percentile(at[:, 1], percent)
     return np.asarray(longest[0] + np.outer([low, high], along) + float(np.median(across)) * normal)
 
 
