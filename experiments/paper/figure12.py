@@ -1,4 +1,4 @@
-"""Figure 12: a simple 2D matching problem, and the trace of the local search that solves it (§6.1.1, §6.1.3)."""
+"""Figure 12: the trace of the local search on a simple 2D matching problem (§6.1.1, §6.1.3)."""
 
 from __future__ import annotations
 
@@ -49,21 +49,21 @@ PAPER: tuple[tuple[str, float], ...] = (
     ("A1 A2 B3 C4 D5 D6", 1.61),
 )
 """The figure's own rows: the pairs checked, and the evaluation."""
-FALSE_START = ((2, 7), (3, 6))
+WRONG_START = ((2, 7), (3, 6))
 """C-8 and D-7."""
-PAIR_PX = 10.0
+MAX_PAIR_PX = 10.0
 
 
 def run(quick: bool, seed: int) -> Report:
-    """The paper's search from the paper's false start; nothing is drawn, so ``seed`` changes nothing."""
-    match = _search("paper")
-    shorter = _search("steepest")
+    """Run the paper's search from the paper's wrong start; nothing is random, so ``seed`` changes nothing."""
+    match = _search(paper=True)
+    shorter = _search(paper=False)
     states = list(zip_longest(PAPER, match.trace))
     rows: list[tuple[Cell, ...]] = []
     for i, (theirs, ours) in enumerate(states):
         paper = theirs or (None, None)
         name = "initial" if i == 0 else str(i)
-        rows.append((name, *paper, None, *((_named(ours), ours.evaluation) if ours else (None, None))))
+        rows.append((name, *paper, None, *((_format_pairs(ours), ours.evaluation) if ours else (None, None))))
     errors = [step.evaluation for step in match.trace]
     pairs = [set(step.pairs) for step in match.trace]
     return Report(
@@ -71,13 +71,13 @@ def run(quick: bool, seed: int) -> Report:
         ("state", "paper: pairs", "paper: E", "peer", "ours: pairs", "ours: E"),
         tuple(rows),
         notes=(
-            "Scene ours: the figure's drawing is not legible to the digit. Four model lines A-D, a square of 120 px,"
+            "Our scene, as the figure's drawing cannot be read to the digit. Four model lines A-D, a square of 120 px,"
             " and 15 data lines, each beside the model line under which the figure lists it."
             " No peer prints such a trace.",
-            f"First improvement, k = 1, no exchanges, alpha .5, beta 4, pairs within {PAIR_PX:.0f} px and .3 rad, from"
-            " C-8 and D-7 at the model's own place. Omission weighs by relative model length (§6.1.3 allows it;"
+            f"First improvement, k = 1, no exchanges, alpha .5, beta 4, pairs within {MAX_PAIR_PX:.0f} px and .3 rad,"
+            " from C-8 and D-7 at the model's own place. Omission weighs by relative model length (§6.1.3 allows it;"
             " unweighted, four lines fully seen cost 2.0 and 1.61 cannot be reached).",
-            f"Steepest descent with exchanges from the same start ends at {_named(shorter.trace[-1])},"
+            f"Steepest descent with exchanges from the same start ends at {_format_pairs(shorter.trace[-1])},"
             f" E = {shorter.e_match:.2f}, in {shorter.steps} moves.",
             "The trace as printed by the matcher; model 0-3 are A-D, data count from 0:",
             *format_trace(match).splitlines(),
@@ -85,20 +85,21 @@ def run(quick: bool, seed: int) -> Report:
         claims=(
             ("the evaluation falls at each step", all(b < a for a, b in pairwise(errors))),
             ("each step adds or deletes one pair", all(len(a ^ b) == 1 for a, b in pairwise(pairs))),
-            ("both false pairs of the start are gone in the end", not set(FALSE_START) & pairs[-1]),
-            ("the final state is the figure's", _named(match.trace[-1]) == PAPER[-1][0]),
+            ("both wrong pairs of the start are gone in the end", not set(WRONG_START) & pairs[-1]),
+            ("the final state is the figure's", _format_pairs(match.trace[-1]) == PAPER[-1][0]),
         ),
     )
 
 
-def _search(way: str) -> Match:
-    settings = PAPER_MATCHING if way == "paper" else replace(PAPER_MATCHING, strategy="steepest", exchange=True)
+def _search(*, paper: bool) -> Match:
+    """Search as the paper does, or by steepest descent with exchanges."""
+    settings = PAPER_MATCHING if paper else replace(PAPER_MATCHING, strategy="steepest", exchange=True)
     return match_lines(
-        np.array(MODEL), np.array(DATA), settings, pair_px=PAIR_PX, start=Peak(0.0, (0.0, 0.0), 0.0),
-        first_pairs=FALSE_START, trace=True,
+        np.array(MODEL), np.array(DATA), settings, pair_px=MAX_PAIR_PX, start=Peak(0.0, (0.0, 0.0), 0.0),
+        first_pairs=WRONG_START, trace=True,
     )
 
 
-def _named(step: TraceStep) -> str:
-    """Pairs as in the figure: A1 is model line A with data line 1."""
+def _format_pairs(step: TraceStep) -> str:
+    """Format pairs as in the figure: A1 is model line A with data line 1."""
     return " ".join(f"{NAMES[model]}{data + 1}" for model, data in sorted(step.pairs))

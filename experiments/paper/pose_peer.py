@@ -1,4 +1,4 @@
-"""PoseLib, today's tool for poses from lines, where it is installed: the peer of the pose tables."""
+"""PoseLib, the peer of the pose tables, if it is installed."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ NOT_INSTALLED = "not installed"
 
 
 class Peer:
-    """The two ways in which a user would call PoseLib from a prior."""
+    """PoseLib's two estimators for poses from lines with a prior."""
 
     def __init__(self, library: Any) -> None:
         self._library = library
 
     @staticmethod
-    def found() -> Peer | None:
-        """``None`` if PoseLib is not installed."""
+    def find() -> Peer | None:
+        """Import PoseLib; None if it is not installed."""
         try:
             return Peer(importlib.import_module("poselib"))
         except ImportError:
             return None
 
-    def refined(
+    def refine(
         self, lines: Array, segments: Array, camera: Camera, prior: Pose, *, loss: str, scale_px: float = 1.0
     ) -> Pose:
         """``refine_absolute_pose_pnpl`` with the loss "TRIVIAL" or "CAUCHY"."""
@@ -38,16 +38,16 @@ class Peer:
         pose, _ = self._library.refine_absolute_pose_pnpl(
             *_arrays(lines, segments), self._pose(prior), _camera(camera), options, options
         )
-        return _from_library(pose)
+        return _to_pose(pose)
 
-    def ransac(self, lines: Array, segments: Array, camera: Camera, prior: Pose, *, limit_px: float) -> Pose:
-        """``estimate_absolute_pose_pnpl``: LO-RANSAC, told the prior, Cauchy loss in the end."""
-        options = {"max_reproj_error": limit_px, "max_epipolar_error": limit_px, "seed": 0}
-        losses = {"loss_type": "CAUCHY", "loss_scale": 0.5 * limit_px}
+    def ransac(self, lines: Array, segments: Array, camera: Camera, prior: Pose, *, max_residual_px: float) -> Pose:
+        """``estimate_absolute_pose_pnpl``: LO-RANSAC with the prior, and a final refinement with Cauchy loss."""
+        options = {"max_reproj_error": max_residual_px, "max_epipolar_error": max_residual_px, "seed": 0}
+        losses = {"loss_type": "CAUCHY", "loss_scale": 0.5 * max_residual_px}
         pose, _ = self._library.estimate_absolute_pose_pnpl(
             *_arrays(lines, segments), _camera(camera), options, losses, self._pose(prior)
         )
-        return _from_library(pose)
+        return _to_pose(pose)
 
     def _pose(self, pose: Pose) -> Any:
         out = self._library.CameraPose()
@@ -69,5 +69,5 @@ def _camera(camera: Camera) -> dict[str, Any]:
     }
 
 
-def _from_library(pose: Any) -> Pose:
+def _to_pose(pose: Any) -> Pose:
     return Pose(np.asarray(pose.R), np.asarray(pose.t))

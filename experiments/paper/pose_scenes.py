@@ -1,4 +1,4 @@
-"""Made-up scenes for the pose tables: where the paper left the geometry open, this is the one that we state."""
+"""Synthetic scenes of the pose tables, whose geometry the paper does not give."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EYE_M = 1.2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseScene:
-    """Lines that a camera sees, all of each or a part.
+    """Lines in a camera's view, whole or in parts.
 
     Attributes:
         lines_world: (n, 2, 3) [m]. segments_px: (n, 2, 2) without noise. landmark_ids: (n,).
@@ -41,7 +41,7 @@ class PoseScene:
         return len(self.lines_world)
 
     def take(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> PoseScene:
-        """Some of the lines."""
+        """Select some of the lines."""
         return PoseScene(
             self.lines_world[chosen],
             self.segments_px[chosen],
@@ -63,7 +63,7 @@ def campus(ahead_m: float = 0.0) -> PoseScene:
         _building(8.0, 75.0, 20.0, 14.0, 16.0),
         _building(-10.0, 91.0, 14.0, 10.0, 20.0),
     ]
-    return _seen(parts, ahead_m)
+    return _project(parts, ahead_m)
 
 
 def corridor(doors: int = 6) -> PoseScene:
@@ -79,11 +79,11 @@ def corridor(doors: int = 6) -> PoseScene:
         side, start = (-half if i % 2 else half), 4.0 + 2.3 * i
         frame = [[start, 0.0, start, 2.1], [start + 0.9, 0.0, start + 0.9, 2.1], [start, 2.1, start + 0.9, 2.1]]
         parts.append(np.array([[[side, a, b], [side, c, d]] for a, b, c, d in frame]))
-    return _seen(parts)
+    return _project(parts)
 
 
-def fragmented(scene: PoseScene, rng: np.random.Generator) -> PoseScene:
-    """Only a part, 30 to 100 % long, of each segment is seen."""
+def fragment(scene: PoseScene, rng: np.random.Generator) -> PoseScene:
+    """Keep only a part, 30 to 100 % long, of each segment."""
     share = rng.uniform(0.3, 1.0, len(scene))
     start = rng.uniform(0.0, 1.0 - share)
     a, d = scene.segments_px[:, 0], scene.segments_px[:, 1] - scene.segments_px[:, 0]
@@ -91,8 +91,8 @@ def fragmented(scene: PoseScene, rng: np.random.Generator) -> PoseScene:
     return PoseScene(scene.lines_world, cut, scene.landmark_ids, scene.camera, scene.camera_from_world)
 
 
-def end_noise(segments_px: Array, sigma_px: float, rng: np.random.Generator) -> Array:
-    """Gaussian noise of the ends across the segments (n, 2, 2)."""
+def add_end_noise(segments_px: Array, sigma_px: float, rng: np.random.Generator) -> Array:
+    """Add Gaussian noise to the ends (n, 2, 2), across the segments."""
     span = segments_px[:, 1] - segments_px[:, 0]
     unit = span / np.linalg.norm(span, axis=1, keepdims=True)
     across = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
@@ -100,10 +100,10 @@ def end_noise(segments_px: Array, sigma_px: float, rng: np.random.Generator) -> 
     return np.asarray(segments_px + offsets[..., None] * across[:, None, :])
 
 
-def rho_theta_noise(
+def add_rho_theta_noise(
     segments_px: Array, rho_px: float, theta_rad: float, about_px: Array, rng: np.random.Generator
 ) -> Array:
-    """Uniform noise, +-rho and +-theta, of the lines' (rho, theta) about ``about_px`` (2,) or (n, 2)."""
+    """Add uniform noise, +-rho and +-theta, to the lines' (rho, theta) about ``about_px`` (2,) or (n, 2)."""
     count = len(segments_px)
     turn = rng.uniform(-theta_rad, theta_rad, count)
     shift = rng.uniform(-rho_px, rho_px, count)
@@ -118,10 +118,10 @@ def rho_theta_noise(
     return np.asarray(moved + shift[:, None, None] * np.einsum("nab,nb->na", turns, across)[:, None])
 
 
-def wrong_landmarks(
+def mismatch_landmarks(
     scene: PoseScene, segments_px: Array, count: int, rng: np.random.Generator
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Whole landmarks matched to the wrong place, each shifted as one, until ``count`` lines are wrong; which are."""
+    """Shift whole landmarks until ``count`` lines are wrong matches; returned with which lines are."""
     out, wrong = segments_px.copy(), np.zeros(len(scene), bool)
     for name in rng.permutation(np.unique(scene.landmark_ids)):
         rows = np.flatnonzero(scene.landmark_ids == name)[: count - int(wrong.sum())]
@@ -133,27 +133,27 @@ def wrong_landmarks(
     return out, wrong
 
 
-def position_error_ft(found: Pose, truth: Pose) -> Array:
-    """(3,) error of the camera's position in the paper's axes: x up, y to the left, z ahead [ft]."""
+def compute_position_error_ft(found: Pose, truth: Pose) -> Array:
+    """Compute the (3,) error of the camera's position in the paper's axes: x up, y left, z ahead [ft]."""
     apart = (found.inverse().translation - truth.inverse().translation) @ truth.rotation.T
     return np.asarray(np.array([-apart[1], -apart[0], apart[2]]) * FEET_PER_M)
 
 
-def information(scene: PoseScene, sigma_px: float) -> Array:
-    """(6, 6) Fisher information of the lines on the pose's left perturbation, at the truth."""
+def compute_information(scene: PoseScene, sigma_px: float) -> Array:
+    """Compute the (6, 6) Fisher information of the lines on the pose's left perturbation, at the truth."""
     lines, truth = build_line_set(scene.lines_world, scene.segments_px, scene.camera, sigma_px), scene.camera_from_world
     slopes = compute_image_jacobian(lines, truth.rotation, truth.translation)[1].reshape(-1, 6) / sigma_px
     return np.asarray(slopes.T @ slopes)
 
 
-def position_limit_ft(scene: PoseScene, sigma_px: float) -> Array:
-    """(3,) deviation of the camera's position in the paper's axes that no unbiased estimate stays below [ft]."""
-    variance = np.diag(invert_information(information(scene, sigma_px)))[3:]
+def compute_position_bound_ft(scene: PoseScene, sigma_px: float) -> Array:
+    """Compute the Cramér-Rao bound (3,) of the camera's position in the paper's axes [ft]."""
+    variance = np.diag(invert_information(compute_information(scene, sigma_px)))[3:]
     return np.asarray(np.sqrt(variance[[1, 0, 2]]) * FEET_PER_M)
 
 
-def drawn_prior(truth: Pose, shift_m: float, turn_rad: float, rng: np.random.Generator) -> Pose:
-    """The truth moved by uniform errors of up to ``shift_m`` and ``turn_rad`` along and about each camera axis."""
+def draw_prior(truth: Pose, shift_m: float, turn_rad: float, rng: np.random.Generator) -> Pose:
+    """Perturb the truth by uniform errors of up to ``shift_m`` and ``turn_rad`` along and about each camera axis."""
     return truth.perturbed(rng.uniform(-turn_rad, turn_rad, 3), rng.uniform(-shift_m, shift_m, 3))
 
 
@@ -162,7 +162,7 @@ def _post(x: float, y: float, height: float, arm: float) -> Array:
 
 
 def _building(x: float, y: float, wide: float, deep: float, high: float) -> Array:
-    """The front's two corners and roof line, the side's roof line and corner, and the front's foot."""
+    """The front's two corners and roof line, the side's roof line and corner, and the front's base."""
     side = x + wide if x < 0.0 else x
     return np.array(
         [
@@ -176,8 +176,8 @@ def _building(x: float, y: float, wide: float, deep: float, high: float) -> Arra
     )
 
 
-def _seen(parts: list[Array], ahead_m: float = 0.0) -> PoseScene:
-    """What the camera sees of all lines, as if nothing hid anything."""
+def _project(parts: list[Array], ahead_m: float = 0.0) -> PoseScene:
+    """Project all lines, without occlusion."""
     lines = np.concatenate(parts)
     names = np.repeat(np.arange(len(parts)), [len(p) for p in parts])
     ahead = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])

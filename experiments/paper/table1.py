@@ -1,4 +1,4 @@
-"""Table 1 and Figure 11: forty feet down the hallway by increments of two feet, servoed and unservoed (§5)."""
+"""Table 1 and Figure 11: forty feet of hallway in increments of two feet, servoed and unservoed (§5)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.chart import OURS, PAPER, PEER, chart
-from experiments.paper.table1_drives import INCREMENTS, Drive, Driven, driven, driven_and_kept, unservoed
+from experiments.paper.table1_drives import INCREMENTS, Drive, DriveResult, run_drive, run_open_loop
 from experiments.report import Cell, Report
 from experiments.trials import RESULTS, campaign_folder, run_trials
 from harvey.run_files.run_directory import vacant
@@ -22,24 +22,24 @@ PAPER_X = (0.0, -0.3, -0.4, -0.6, -0.7, -1.1, -1.3, -1.8, -2.0, -2.1)
 """The unservoed columns [in]."""
 PAPER_SERVOED_Z = (22.8, 45.7, 68.5, 91.3, 114.3, 136.9, 159.5, 182.2, 205.0, 227.7)
 PAPER_SERVOED_X = (0.13, 0.13, 0.13, 0.13, 0.06, 0.0, -0.13, -0.13, -0.38, -0.25)
-MOST_IN, RMS_IN = 0.38, 0.1
-"""Servoed: the worst of the table, and what is asked of the root mean square."""
+MAX_IN, MAX_RMS_IN = 0.38, 0.1
+"""Servoed: the largest of the table, and the bound on the root mean square."""
 DRIVES, ON_THE_MOVE = 1000, 40
 QUICK_DRIVES, QUICK_ON_THE_MOVE, QUICK_FEET = 2, 1, 6
-WORST = 5
-MOST_SEEDS = 10
+WORST_SHOWN = 5
+MAX_SEEDS_PER_DRIVE = 10
 MOVING = "#2e8b57"
-"""The colour of what is corrected on the move."""
+"""Colour of drives on the move."""
 
 
 def run(quick: bool, seed: int) -> Report:
-    """Drives by the wheels of seeds from ``seed`` on that drift, unservoed, at least as far as the paper's."""
-    drives = [Drive(s) for s in _bad_seeds(seed, QUICK_DRIVES if quick else DRIVES)]
+    """Drive with wheels that, unservoed, drift at least as far as the paper's; seeds from ``seed`` on."""
+    drives = [Drive(s) for s in _find_drifting_seeds(seed, QUICK_DRIVES if quick else DRIVES)]
     moving = [Drive(d.seed, QUICK_FEET if quick else 40, True)
               for d in drives[: QUICK_ON_THE_MOVE if quick else ON_THE_MOVE]]
     folder = campaign_folder("table1", seed, quick=quick)
-    found = run_trials(driven, [*drives, *moving], Driven, folder, "drive")
-    stopping, rolling = found[: len(drives)], found[len(drives):]
+    results = run_trials(run_drive, [*drives, *moving], DriveResult, folder, "drive")
+    stopping, rolling = results[: len(drives)], results[len(drives):]
     pictures = [folder / "figure11.png", folder / "errors.png"]
     _draw(stopping, rolling, pictures)
     report = Report(
@@ -48,15 +48,15 @@ def run(quick: bool, seed: int) -> Report:
          "servoed z", "servoed rms x", "servoed max |x|", "on the move rms x", "on the move max |x|"),
         _rows(stopping, rolling),
         notes=(
-            f"{len(drives)} drives, seeds {drives[0].seed} to {drives[-1].seed}, of which no unservoed one is less than"
-            f" {abs(PAPER_X[-1])} in off after {len(PAPER_X)} increments; each starts as well aligned as the scenario"
-            " says (0.1 in, 0.1 degrees). z: mean; unservoed |x|: mean.",
-            "The action level is alone: a milestone at either end and none between. All perception is on rendered"
-            " pictures. After increment 10 the paper gives one row, at 480 in: z 456.0, x 0.0.",
-            f"On the move: {len(moving)} of the same drives, {moving[0].feet} feet, thirty pictures a second; x is read"
+            f"{len(drives)} drives, seeds {drives[0].seed} to {drives[-1].seed}, chosen so that every unservoed one is"
+            f" at least {abs(PAPER_X[-1])} in off after {len(PAPER_X)} increments; each starts as well aligned as the"
+            " scenario says (0.1 in, 0.1 degrees). z: mean; unservoed |x|: mean.",
+            "Only the action level corrects: there is a milestone at either end and none between. All perception is on"
+            " rendered pictures. After increment 10 the paper gives one row, at 480 in: z 456.0, x 0.0.",
+            f"On the move: {len(moving)} of the same drives, {moving[0].feet} feet, thirty frames per second; x is read"
             " where the increments would end.",
             *_worst(stopping, folder),
-            f"Pictures: {', '.join(map(str, pictures))}; every drive in a line: {folder / RESULTS}",
+            f"Pictures: {', '.join(map(str, pictures))}; one line per drive: {folder / RESULTS}",
         ),
         claims=(*_claims("servoed", stopping), *_claims("on the move", rolling), _drift_claim(stopping)),
     )
@@ -64,25 +64,25 @@ def run(quick: bool, seed: int) -> Report:
     return report
 
 
-def _bad_seeds(first: int, count: int) -> list[int]:
-    """Seeds whose wheels drift unservoed at least as far as the paper's."""
+def _find_drifting_seeds(first: int, count: int) -> list[int]:
+    """Find seeds whose wheels, unservoed, drift at least as far as the paper's."""
     seeds: list[int] = []
-    for seed in range(first, first + MOST_SEEDS * count):
-        if len(seeds) < count and _is_bad(unservoed(seed)[1]):
+    for seed in range(first, first + MAX_SEEDS_PER_DRIVE * count):
+        if len(seeds) < count and _drifts(run_open_loop(seed)[1]):
             seeds.append(seed)
     return seeds
 
 
-def _is_bad(x_in: Sequence[float]) -> bool:
-    """Off as far as the paper's at the end of its unservoed column, or in a wall before."""
+def _drifts(x_in: Sequence[float]) -> bool:
+    """Whether it is as far off as the paper's at the end of its unservoed column, or hit a wall before."""
     return len(x_in) < len(PAPER_X) or abs(x_in[len(PAPER_X) - 1]) >= abs(PAPER_X[-1])
 
 
-def _rows(stopping: Sequence[Driven], rolling: Sequence[Driven]) -> tuple[tuple[Cell, ...], ...]:
+def _rows(stopping: Sequence[DriveResult], rolling: Sequence[DriveResult]) -> tuple[tuple[Cell, ...], ...]:
     return tuple(_row(k, stopping, rolling) for k in range(INCREMENTS))
 
 
-def _row(k: int, stopping: Sequence[Driven], rolling: Sequence[Driven]) -> tuple[Cell, ...]:
+def _row(k: int, stopping: Sequence[DriveResult], rolling: Sequence[DriveResult]) -> tuple[Cell, ...]:
     def paper(column: Sequence[float]) -> Cell:
         return column[k] if k < len(column) else None
 
@@ -90,8 +90,8 @@ def _row(k: int, stopping: Sequence[Driven], rolling: Sequence[Driven]) -> tuple
                          _at(k, [d.x_in for d in rolling]))
     return (
         k + 1, 24.0 * (k + 1), paper(PAPER_Z), paper(PAPER_X), _mean(_at(k, [d.open_z_in for d in stopping])),
-        _mean(np.abs(open_x)), paper(PAPER_SERVOED_X), _mean(_at(k, [d.z_in for d in stopping])), _rms(x), _most(x),
-        _rms(moving), _most(moving),
+        _mean(np.abs(open_x)), paper(PAPER_SERVOED_X), _mean(_at(k, [d.z_in for d in stopping])), _rms(x), _max_abs(x),
+        _rms(moving), _max_abs(moving),
     )
 
 
@@ -107,67 +107,68 @@ def _rms(values: Floats) -> Cell:
     return round(math.sqrt(float(np.mean(values**2))), 3) if len(values) else None
 
 
-def _most(values: Floats) -> Cell:
+def _max_abs(values: Floats) -> Cell:
     return round(float(np.max(np.abs(values))), 3) if len(values) else None
 
 
-def _all(drives: Sequence[Driven]) -> Floats:
+def _all(drives: Sequence[DriveResult]) -> Floats:
     return np.concatenate([np.array(d.x_in) for d in drives])
 
 
-def _claims(name: str, drives: Sequence[Driven]) -> tuple[tuple[str, bool], ...]:
+def _claims(name: str, drives: Sequence[DriveResult]) -> tuple[tuple[str, bool], ...]:
     x = _all(drives)
-    most, rms = float(np.max(np.abs(x))), math.sqrt(float(np.mean(x**2)))
+    largest, rms = float(np.max(np.abs(x))), math.sqrt(float(np.mean(x**2)))
     there = sum(d.outcome == "reached" and d.collisions == 0 for d in drives)
     return (
-        (f"{name}: |x| is never beyond {MOST_IN} in at the end of an increment: {most:.3f} in", most <= MOST_IN),
-        (f"{name}: its root mean square is below {RMS_IN} in: {rms:.3f} in", rms < RMS_IN),
+        (f"{name}: |x| is never beyond {MAX_IN} in at the end of an increment: {largest:.3f} in", largest <= MAX_IN),
+        (f"{name}: its root mean square is below {MAX_RMS_IN} in: {rms:.3f} in", rms < MAX_RMS_IN),
         (f"{name}: every drive arrives and touches nothing: {there} of {len(drives)}", there == len(drives)),
     )
 
 
-def _drift_claim(drives: Sequence[Driven]) -> tuple[str, bool]:
+def _drift_claim(drives: Sequence[DriveResult]) -> tuple[str, bool]:
     off = [abs(d.open_x_in[len(PAPER_X) - 1]) for d in drives if len(d.open_x_in) >= len(PAPER_X)]
-    told = f"{min(off):.1f} to {max(off):.1f} in" if off else "in a wall before"
-    return (f"unservoed, every drive is at least {abs(PAPER_X[-1])} in off after {len(PAPER_X)} increments: {told}",
-            all(_is_bad(d.open_x_in) for d in drives))
+    extent = f"{min(off):.1f} to {max(off):.1f} in" if off else "in a wall before"
+    return (f"unservoed, every drive is at least {abs(PAPER_X[-1])} in off after {len(PAPER_X)} increments: {extent}",
+            all(_drifts(d.open_x_in) for d in drives))
 
 
-def _worst(drives: Sequence[Driven], folder: Path) -> list[str]:
-    """The worst drives, made once more and kept as runs, so that they can be looked at and asked."""
-    order = sorted(drives, key=lambda d: -max(abs(x) for x in d.x_in))[: min(WORST, len(drives) // 10)]
-    told = []
+def _worst(drives: Sequence[DriveResult], folder: Path) -> list[str]:
+    """Repeat the worst drives and keep them as runs, to be viewed and explained."""
+    order = sorted(drives, key=lambda d: -max(abs(x) for x in d.x_in))[: min(WORST_SHOWN, len(drives) // 10)]
+    lines = []
     for one in order:
         out = folder / f"seed-{one.seed}"
         if not (out / "run.json").exists():
-            driven_and_kept(Drive(one.seed), vacant(out))
-        told.append(f"among the worst: seed {one.seed}, {max(abs(x) for x in one.x_in):.3f} in, wheels of"
+            run_drive(Drive(one.seed), vacant(out))
+        lines.append(f"among the worst: seed {one.seed}, {max(abs(x) for x in one.x_in):.3f} in, wheels of"
                     f" {one.curvature_per_m:+.4f} per metre. See it: harvey view {out}")
-    return told
+    return lines
 
 
-def _draw(stopping: Sequence[Driven], rolling: Sequence[Driven], pictures: Sequence[Path]) -> None:
+def _draw(stopping: Sequence[DriveResult], rolling: Sequence[DriveResult], pictures: Sequence[Path]) -> None:
     with chart(pictures[0], "Figure 11: servoed and unservoed", "z, along the line [in]", "x, to its right [in]",
                (9.0, 5.0)) as axes:
         for number, d in enumerate(stopping[:60]):
             axes.plot([0.0, *d.open_z_in], [0.0, *d.open_x_in], color=PEER, alpha=0.35, linewidth=0.8,
-                      label=_once(number, "unservoed"))
-            axes.plot(d.way_z_in, d.way_x_in, color=OURS, alpha=0.35, linewidth=0.8, label=_once(number, "servoed"))
+                      label=_label_first(number, "unservoed"))
+            axes.plot(d.path_z_in, d.path_x_in, color=OURS, alpha=0.35, linewidth=0.8,
+                      label=_label_first(number, "servoed"))
         for number, d in enumerate(rolling[:20]):
-            axes.plot(d.way_z_in, d.way_x_in, color=MOVING, alpha=0.5, linewidth=0.8,
-                      label=_once(number, "servoed on the move"))
+            axes.plot(d.path_z_in, d.path_x_in, color=MOVING, alpha=0.5, linewidth=0.8,
+                      label=_label_first(number, "servoed on the move"))
         axes.plot((0.0, *PAPER_Z), (0.0, *PAPER_X), "o--", color=PAPER, markersize=3, label="paper, unservoed")
         axes.plot((0.0, *PAPER_SERVOED_Z, 456.0), (0.0, *PAPER_SERVOED_X, 0.0), "s-", color="black", markersize=3,
                   label="paper, servoed")
         axes.set_ylim(-12.0, 12.0)
-    with chart(pictures[1], "How far from the line, servoed", "|x| at the end of an increment [in]", "part below it"
+    with chart(pictures[1], "Distance from the line, servoed", "|x| at the end of an increment [in]", "share below it"
                ) as axes:
         for drives, colour, label in ((stopping, OURS, "stopping"), (rolling, MOVING, "on the move")):
             x = np.sort(np.abs(_all(drives)))
             axes.step(x, np.arange(1, len(x) + 1) / len(x), where="post", color=colour, label=label)
-        axes.axvline(MOST_IN, color=PAPER, linestyle="--", label="the paper's worst")
+        axes.axvline(MAX_IN, color=PAPER, linestyle="--", label="the paper's largest")
 
 
-def _once(number: int, label: str) -> str:
-    """A label for the first of many lines only; what begins with a _ is not shown."""
+def _label_first(number: int, label: str) -> str:
+    """Label the first of many curves only; matplotlib hides labels that begin with _."""
     return label if number == 0 else "_"

@@ -1,4 +1,4 @@
-"""One drive of Table 1: forty feet of hallway, with and without action-level servoing, by the same wheels."""
+"""One drive of Table 1: forty feet of hallway, with and without action-level servoing, on the same wheels."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ SCENARIO = "forty-foot-hallway"
 INCREMENT_M = 2.0 * FOOT_M
 INCREMENTS = 20
 ONE_LEG = (("plan.max_leg_m", "15"),)
-"""The whole way is one leg, so that no milestone corrects anything between its ends: the action level is alone."""
+"""The whole path is one leg, so that no milestone corrects anything between its ends."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A drive to be made: of so many feet, by the wheels of a seed, stopping at each increment or not."""
+    """A drive: length in feet, seed of the wheels, and whether it stops after each increment."""
 
     seed: int
     feet: int = 40
@@ -40,15 +40,14 @@ class Drive:
 
 
 @dataclass(frozen=True, slots=True)
-class Driven:
-    """What came of it; z along the line and x to its right, in inches, as in the paper.
+class DriveResult:
+    """Result of a drive; z along the line and x to its right, in inches, as in the paper.
 
     Attributes:
-        z_in, x_in: the servoed robot after each increment of two feet; on the move: when it passes where increments
-            would end.
-        most_in: the furthest that it was from the line anywhere on the way.
+        z_in, x_in: the servoed robot after each increment of two feet; on the move: where increments would end.
+        max_in: its largest distance from the line on the whole path.
         open_z_in, open_x_in: the unservoed robot after each increment, until it touches a wall.
-        way_z_in, way_x_in: the servoed robot about every foot, for the picture.
+        path_z_in, path_x_in: the servoed robot about every half foot, for the picture.
     """
 
     seed: int
@@ -58,46 +57,41 @@ class Driven:
     curvature_per_m: float
     z_in: list[float]
     x_in: list[float]
-    most_in: float
+    max_in: float
     open_z_in: list[float]
     open_x_in: list[float]
-    way_z_in: list[float]
-    way_x_in: list[float]
+    path_z_in: list[float]
+    path_x_in: list[float]
     cpu_s: float
 
 
-def driven(drive: Drive) -> Driven:
-    """Make a drive."""
-    return driven_and_kept(drive, None)
-
-
-def driven_and_kept(drive: Drive, out: Path | None) -> Driven:
-    """Make a drive, and keep it as a run, if ``out`` says where."""
+def run_drive(drive: Drive, out: Path | None = None) -> DriveResult:
+    """Drive, and keep the run in ``out``, if given."""
     began_s, stage = time.process_time(), _stage(drive.feet, drive.continuous)
     head = replace(head_of(stage, drive.seed), constants=ONE_LEG)
     ends: list[Truth] = []
     agent = agent_of(head)
     files = None if out is None else RunDirectory(out)
     recorder = RunRecorder(files, head, agent.robot)
-    with SimulatedRun(stage, head, agent, recorder, (_ends_of_moves(ends, lambda: run),)) as run:
+    with SimulatedRun(stage, head, agent, recorder, (_log_ends_of_moves(ends, lambda: run),)) as run:
         result = run.drive(files)
     body = run.simulated_body
-    way = np.array([_beside(stage, truth) for truth in body.track])
+    way = np.array([_to_line_in(stage, truth) for truth in body.track])
     if drive.continuous:
-        z_in, x_in = _passing(way, _reach(stage))
+        z_in, x_in = _interpolate_ends(way, _mean_move_in(stage))
     else:
-        z_in, x_in = (list(column) for column in zip(*(_beside(stage, t) for t in ends[:INCREMENTS]), strict=True))
-    open_z, open_x = unservoed(drive.seed, drive.feet)
+        z_in, x_in = (list(column) for column in zip(*(_to_line_in(stage, t) for t in ends[:INCREMENTS]), strict=True))
+    open_z, open_x = run_open_loop(drive.seed, drive.feet)
     some = way[:: max(1, len(way) // 80)]
-    return Driven(
+    return DriveResult(
         drive.seed, result.outcome, result.collisions or 0, result.frames, body.curvature_per_m, z_in, x_in,
         float(np.max(np.abs(way[:, 1]))), open_z, open_x, some[:, 0].tolist(), some[:, 1].tolist(),
         time.process_time() - began_s,
     )
 
 
-def unservoed(seed: int, feet: int = 40) -> tuple[list[float], list[float]]:
-    """(z, x) of the same wheels after each increment when nobody corrects anything, until a wall is touched [in]."""
+def run_open_loop(seed: int, feet: int = 40) -> tuple[list[float], list[float]]:
+    """Drive the same wheels without corrections; (z, x) [in] after each increment, until a wall is touched."""
     stage = _stage(feet, False)
     body = stage.body(seed)
     places = []
@@ -105,7 +99,7 @@ def unservoed(seed: int, feet: int = 40) -> tuple[list[float], list[float]]:
         body.execute(MotorCommand(0.0, INCREMENT_M))
         if body.truth.collisions:
             break
-        places.append(_beside(stage, body.truth))
+        places.append(_to_line_in(stage, body.truth))
     return [z for z, _ in places], [x for _, x in places]
 
 
@@ -115,19 +109,19 @@ def _stage(feet: int, continuous: bool) -> Stage:
     return Task(SCENARIO, (("goal", goal), ("motion.continuous", "on" if continuous else "off")), 0).stage()
 
 
-def _ends_of_moves(ends: list[Truth], run: Callable[[], SimulatedRun]) -> Callable[[Decision], None]:
-    """A sink that notes where the robot truly is after each MOVE."""
+def _log_ends_of_moves(ends: list[Truth], run: Callable[[], SimulatedRun]) -> Callable[[Decision], None]:
+    """Make a sink that appends the truth after each MOVE."""
 
-    def heard(decision: Decision) -> None:
+    def sink(decision: Decision) -> None:
         for change in decision.observed:
             if isinstance(change.entry.value, MotionReport) and change.entry.value.move_m > 0.0:
                 ends.append(run().simulated_body.truth)
 
-    return heard
+    return sink
 
 
-def _beside(stage: Stage, truth: Truth) -> tuple[float, float]:
-    """(z, x) [in] of the robot against the intended line."""
+def _to_line_in(stage: Stage, truth: Truth) -> tuple[float, float]:
+    """Convert the true pose to (z, x) [in] of the intended line."""
     start, goal, here = stage.start_world, stage.goal_world, truth.world_from_robot
     along = math.atan2(goal.y_m - start.y_m, goal.x_m - start.x_m)
     dx, dy = here.x_m - start.x_m, here.y_m - start.y_m
@@ -135,14 +129,14 @@ def _beside(stage: Stage, truth: Truth) -> tuple[float, float]:
     return z / INCH_M, -left / INCH_M
 
 
-def _reach(stage: Stage) -> float:
-    """What a MOVE of two feet is on the average [in]."""
+def _mean_move_in(stage: Stage) -> float:
+    """Mean length of a commanded MOVE of two feet [in]."""
     a = stage.scenario.actuator
     return (1.0 - 0.5 * (a.shortfall_low + a.shortfall_high)) * INCREMENT_M / INCH_M
 
 
-def _passing(way: NDArray[np.float64], reach_in: float) -> tuple[list[float], list[float]]:
-    """Where it passes the ends of increments on the move."""
+def _interpolate_ends(way: NDArray[np.float64], reach_in: float) -> tuple[list[float], list[float]]:
+    """Interpolate the path at the ends of increments."""
     z = np.maximum.accumulate(way[:, 0])
     places = np.array([reach_in * k for k in range(1, INCREMENTS + 1) if reach_in * k <= z[-1]])
     return places.tolist(), np.interp(places, z, way[:, 1]).tolist()

@@ -1,4 +1,4 @@
-"""Table 2: R then T against R and T on noisy lines, and how far both are from the physical limit (§6.2.3)."""
+"""Table 2: R then T against R and T on noisy lines, and both against the Cramér-Rao bound (§6.2.3)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from tqdm import tqdm
 from experiments.paper.pose_peer import NOT_INSTALLED, Peer
 from experiments.paper.pose_scenes import (
     PoseScene,
+    add_end_noise,
+    add_rho_theta_noise,
     campus,
-    drawn_prior,
-    end_noise,
-    fragmented,
-    information,
-    position_error_ft,
-    rho_theta_noise,
+    compute_information,
+    compute_position_error_ft,
+    draw_prior,
+    fragment,
 )
 from experiments.report import Cell, Report
 from knowledge_sources.methods.pose import PoseEstimate, r_and_t, r_and_t_ml, r_then_t
@@ -46,26 +46,26 @@ CHOSEN: Mapping[int, tuple[int, ...]] = {
     10: (0, 2, 4, 8, 12, 14, 16, 19, 20, 24),
     30: tuple(range(30)),
 }
-"""Which of the campus's lines, by hand: posts near, corners and roofs far."""
+"""Lines of the campus, chosen by hand: near posts, far corners and roofs."""
 PRIOR_M, PRIOR_RAD = 1.0, 0.05
 SIGMA_PX = 0.5
-FEW, MANY = 100, 1000
-MOST_RATIO = 1.03
+QUICK_SAMPLES, SAMPLES = 100, 1000
+MAX_RATIO = 1.03
 NOTES = (
-    "Geometry ours: 45 degree camera, 512 px, 30 lines of 9 landmarks 55 to 300 ft ahead; the paper's is not printed.",
-    "Noise uniform +-a in rho and theta (not of full width a), about the image's centre (not each segment's middle).",
+    "Our geometry: 45 degree camera, 512 px, 30 lines of 9 landmarks 55 to 300 ft ahead; the paper does not give it.",
+    "Noise uniform +-a in rho and theta (not of full width a), about the image's centre (not each segment's midpoint).",
     "Paper's axes: x up, y lateral, z ahead. Mean absolute errors in feet. Which axis is the weakest follows from the"
     " geometry: in the paper it is the lateral one, here the height.",
     f"Prior off by up to {PRIOR_M} m and {math.degrees(PRIOR_RAD):.0f} degrees on each camera axis. Unit weights.",
-    f"Limit: ends with Gaussian noise of {SIGMA_PX} px across the segment; RMS error over the Cramér-Rao bound, all "
-    "six directions alike, and how often the 95 % ellipsoid holds the truth.",
+    f"Bound: ends with Gaussian noise of {SIGMA_PX} px across the segment; RMS error over the Cramér-Rao bound, in "
+    "all six directions, and how often the 95 % ellipsoid contains the truth.",
 )
 
 
 def run(quick: bool, seed: int, samples: int | None = None) -> Report:
-    """The table at 100 samples, as in the paper, and (unless quick) at 1,000; then the limit."""
-    count = samples or (FEW if quick else MANY)
-    rng, peer = np.random.default_rng(seed), Peer.found()
+    """Compute the table at 100 samples, as in the paper, and (unless quick) at 1,000; then the bound."""
+    count = samples or (QUICK_SAMPLES if quick else SAMPLES)
+    rng, peer = np.random.default_rng(seed), Peer.find()
     scene = campus()
     rows: list[tuple[Cell, ...]] = []
     totals: Totals = {}
@@ -78,14 +78,14 @@ def run(quick: bool, seed: int, samples: int | None = None) -> Report:
     claims = _claims(totals)
     for n in (5, 10, 30):
         for whole in (True, False):
-            ratio, held = _limit(scene.take(np.array(CHOSEN[n])), whole, count, rng)
+            ratio, held = _compare_to_bound(scene.take(np.array(CHOSEN[n])), whole, count, rng)
             label = f"{n} {'whole' if whole else 'fragmented'} lines"
-            rows.append((f"{label}: RMS over the bound, 95 % ellipsoid holds", None, None, None,
+            rows.append((f"{label}: RMS over the bound, 95 % ellipsoid contains truth", None, None, None,
                          f"{ratio:.3f}  {held:.1%}"))
-            if n >= 10 and count >= MANY:
-                claims.append((f"{label}: R and T, likelihood within {MOST_RATIO} of the bound", ratio <= MOST_RATIO))
-                claims.append((f"{label}: the 95 % ellipsoid holds 93 to 97 %", 0.93 <= held <= 0.97))
-    columns = ("what", "paper x y z [ft]", "peer (PoseLib, TRIVIAL)", f"ours, first {min(count, FEW)}",
+            if n >= 10 and count >= SAMPLES:
+                claims.append((f"{label}: R and T, likelihood within {MAX_RATIO} of the bound", ratio <= MAX_RATIO))
+                claims.append((f"{label}: the 95 % ellipsoid contains the truth in 93 to 97 %", 0.93 <= held <= 0.97))
+    columns = ("what", "paper x y z [ft]", "peer (PoseLib, TRIVIAL)", f"ours, first {min(count, QUICK_SAMPLES)}",
                f"ours, all {count}")
     notes = (*NOTES, f"{count} samples, seed {seed}. The peer's figures are of all {count}.")
     return Report("Table 2: translation errors on noisy lines", columns, tuple(rows), notes, tuple(claims))
@@ -94,11 +94,11 @@ def run(quick: bool, seed: int, samples: int | None = None) -> Report:
 def _rows(label: str, paper: Triples, errors: Mapping[str, Array], peer: Peer | None) -> list[tuple[Cell, ...]]:
     """Mean absolute errors by method; ``errors`` (samples, 3) each."""
     theirs = _mean(errors["peer"]) if peer else NOT_INSTALLED
-    named = (("R then T", "r_then_t", _triple(paper[0]), None), ("R and T", "r_and_t", _triple(paper[1]), None),
+    methods = (("R then T", "r_then_t", _triple(paper[0]), None), ("R and T", "r_and_t", _triple(paper[1]), None),
              ("R and T, likelihood", "r_and_t_ml", None, theirs))
     return [
-        (f"{label}: {name}", told, peers, _mean(errors[key][:FEW]), _mean(errors[key]))
-        for name, key, told, peers in named
+        (f"{label}: {name}", paper_cell, peer_cell, _mean(errors[key][:QUICK_SAMPLES]), _mean(errors[key]))
+        for name, key, paper_cell, peer_cell in methods
     ]
 
 
@@ -124,30 +124,30 @@ def _errors(
     centre = np.array([scene.camera.cx, scene.camera.cy])
     found: dict[str, list[Array]] = {"r_then_t": [], "r_and_t": [], "r_and_t_ml": [], "peer": []}
     for _ in range(count):
-        segments = rho_theta_noise(scene.segments_px, noise, math.radians(noise), centre, rng)
-        prior = drawn_prior(scene.camera_from_world, PRIOR_M, PRIOR_RAD, rng)
+        segments = add_rho_theta_noise(scene.segments_px, noise, math.radians(noise), centre, rng)
+        prior = draw_prior(scene.camera_from_world, PRIOR_M, PRIOR_RAD, rng)
         for solver in (r_then_t, r_and_t, r_and_t_ml):
             pose = solver(scene.lines_world, segments, scene.camera, prior).camera_from_world
             found[solver.__name__].append(_error(pose, scene))
         if peer:
-            theirs = peer.refined(scene.lines_world, segments, scene.camera, prior, loss="TRIVIAL")
+            theirs = peer.refine(scene.lines_world, segments, scene.camera, prior, loss="TRIVIAL")
             found["peer"].append(_error(theirs, scene))
     return {name: np.array(errors).reshape(-1, 3) for name, errors in found.items()}
 
 
 def _error(pose: Pose, scene: PoseScene) -> Array:
-    return np.abs(position_error_ft(pose, scene.camera_from_world))
+    return np.abs(compute_position_error_ft(pose, scene.camera_from_world))
 
 
-def _limit(scene: PoseScene, whole: bool, count: int, rng: np.random.Generator) -> tuple[float, float]:
-    """RMS error of the likelihood's pose over the bound, and the share of 95 % ellipsoids that hold the truth."""
+def _compare_to_bound(scene: PoseScene, whole: bool, count: int, rng: np.random.Generator) -> tuple[float, float]:
+    """Compute the RMS error over the bound, and the share of 95 % ellipsoids that contain the truth."""
     truth = scene.camera_from_world
     sizes, held = [], []
-    fixed = scene if whole else fragmented(scene, rng)
-    bound = information(fixed, SIGMA_PX)
+    fixed = scene if whole else fragment(scene, rng)
+    bound = compute_information(fixed, SIGMA_PX)
     for _ in range(count):
-        segments = end_noise(fixed.segments_px, SIGMA_PX, rng)
-        prior = drawn_prior(truth, PRIOR_M, PRIOR_RAD, rng)
+        segments = add_end_noise(fixed.segments_px, SIGMA_PX, rng)
+        prior = draw_prior(truth, PRIOR_M, PRIOR_RAD, rng)
         found = r_and_t_ml(fixed.lines_world, segments, fixed.camera, prior, sigma_px=SIGMA_PX)
         apart = found.camera_from_world @ truth.inverse()
         error = np.concatenate([apart.rotation_vector, apart.translation])

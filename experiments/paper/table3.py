@@ -1,4 +1,4 @@
-"""Table 3: wrong matches. R and T against Med R and T (§6.2.4), and what holds beyond half of the lines wrong."""
+"""Table 3: R and T against Med R and T with wrong matches (§6.2.4), and beyond half of the lines wrong."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from experiments.paper.table3_trials import (
     Frame,
     TrialErrors,
     Trials,
-    errors_of,
-    scene_of,
+    compute_errors,
+    get_scene,
 )
 from experiments.report import Cell, Report
 from experiments.trials import campaign_folder, run_trials
@@ -31,11 +31,11 @@ Claims = list[tuple[str, bool]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """Of one frame: errors (trials, 3) by method, and the limit of each trial (trials,) [ft]."""
+class FrameResult:
+    """Errors (trials, 3) by method, and the bound of each trial (trials,) [ft], for one frame."""
 
     errors: Errors
-    limits_ft: Array
+    bounds_ft: Array
 
 
 PAPER: Mapping[Frame, tuple[tuple[float, ...], tuple[float, ...]]] = {
@@ -47,37 +47,35 @@ PAPER: Mapping[Frame, tuple[tuple[float, ...], tuple[float, ...]]] = {
 """Errors of Med R and T and of R and T [ft], x y z."""
 DRAWN = (Frame("any 17 of the campus", "campus", 5, drawn=17), Frame("any 17 of the campus", "campus", 3, drawn=17))
 FRACTIONS: Mapping[float, float] = {0.45: 0.99, 0.6: 0.93, 0.7: 0.70}
-"""Share of the 46 fragments that is wrong, and the least share of successes."""
-LIMIT_FT, LEAST_MED = 1.1, 0.99
+"""Share of the 46 fragments that is wrong, and the smallest share of successes."""
+MAX_ERROR_FT, MIN_MED_SHARE = 1.1, 0.99
 FULL, QUICK = 1000, 20
 BATCH = 10
 NOTES = (
-    "Scenes ours (the paper's frames are not at hand), a fixed set of lines a row as in the paper. Outdoor 1: of Table"
-    " 2's campus, lamp posts and telephone poles with their arms and the nearest building but for its foot; Outdoor 3:"
+    "Our scenes (the paper's frames are not at hand), a fixed set of lines per row as in the paper. Outdoor 1: of Table"
+    " 2's campus, lamp posts and telephone poles with their arms and the nearest building without its base; Outdoor 3:"
     f" the same from {AHEAD_M:g} m nearer. Indoor 1: a corridor's four long edges and five doors; Indoor 7: with both"
     " edges of the far wall and fourteen doors, but for two lines.",
-    "Of seven outdoor sets that were looked at, it is the one in which, whichever 5 lines are wrong, the others tell"
-    " most of the pose: see 'limit', the greatest deviation along an axis that an unbiased estimate from them can have"
-    " (Cramér-Rao). 'Any 17' are drawn anew for each trial; some draws leave the height to a line or two, and"
-    " these rows have no claim.",
-    "Wrong matches: whole landmarks, drawn anew for each trial and each moved by 15 to 60 px in any direction, as one"
-    " that is matched to its neighbour (the matcher looks within 30 px); of the last one only as many lines as the row"
-    " says.",
+    "Of seven outdoor sets it is the one in which, whichever 5 lines are wrong, the others determine the pose best: see"
+    " 'bound', the largest standard deviation along an axis of the best unbiased estimate (Cramér-Rao). 'Any 17' are"
+    " drawn for each trial; in some draws the height rests on one or two lines, so these rows have no claim.",
+    "Wrong matches: whole landmarks, drawn for each trial and moved by 15 to 60 px in any direction, as when matched to"
+    " a neighbour (the matcher searches within 30 px); of the last one only as many lines as the row says.",
     f"Ends with Gaussian noise of {SIGMA_PX} px across; prior off by up to {PRIOR_M} m and "
     f"{math.degrees(PRIOR_RAD):.1f} degrees on each camera axis.",
-    f"Success: under {LIMIT_FT} ft in every axis. Paper's figures are of one frame each; ours and the peer's the median"
-    " magnitude. Peer: PoseLib's LO-RANSAC told the prior, and its refinement from the prior with Cauchy's loss.",
-    "Landmark version, every subset tried.",
+    f"Success: under {MAX_ERROR_FT} ft in every axis. The paper's figures are of one frame each; ours and the peer's"
+    " are medians. Peer: PoseLib's LO-RANSAC with the prior, and its refinement from the prior with Cauchy loss.",
+    "Landmark version, all subsets.",
 )
 
 
 def run(quick: bool, seed: int, samples: int | None = None) -> Report:
-    """The four rows, then the share of successes at 45, 60 and 70 % wrong lines, fragmented segments."""
+    """Compute the four rows, then the share of successes at 45, 60 and 70 % wrong lines with fragments."""
     count = samples or (QUICK if quick else FULL)
     shares = {Frame(f"{f:.0%} of 46 fragments wrong", "hall", round(46 * f), parts=True): f for f in FRACTIONS}
     frames = [*PAPER, *DRAWN, *shares]
     folder = campaign_folder("table3", seed, quick=quick)
-    found = dict(zip(frames, _all_found(frames, seed, count, folder), strict=True))
+    found = dict(zip(frames, _run_frames(frames, seed, count, folder), strict=True))
     rows: list[tuple[Cell, ...]] = []
     claims: Claims = []
     for frame in (*PAPER, *DRAWN):
@@ -92,47 +90,48 @@ def run(quick: bool, seed: int, samples: int | None = None) -> Report:
     return Report("Table 3: translation errors with wrong matches", columns, tuple(rows), notes, tuple(claims))
 
 
-def _all_found(frames: Sequence[Frame], seed: int, count: int, folder: Path) -> list[Found]:
-    """Of each frame, from ``count`` trials."""
+def _run_frames(frames: Sequence[Frame], seed: int, count: int, folder: Path) -> list[FrameResult]:
+    """Run ``count`` trials of each frame."""
     seeds = [[(seed, number, k) for k in range(count)] for number in range(len(frames))]
     jobs = [
         Trials(frame, tuple(seeds[number][k : k + BATCH]))
         for number, frame in enumerate(frames) for k in range(0, count, BATCH)
     ]
-    done = run_trials(errors_of, jobs, TrialErrors, folder, f"x {BATCH} trials")
+    done = run_trials(compute_errors, jobs, TrialErrors, folder, f"x {BATCH} trials")
     each = len(jobs) // len(frames)
-    return [_joined(done[i * each : (i + 1) * each]) for i in range(len(frames))]
+    return [_join(done[i * each : (i + 1) * each]) for i in range(len(frames))]
 
 
-def _joined(parts: Sequence[TrialErrors]) -> Found:
+def _join(parts: Sequence[TrialErrors]) -> FrameResult:
     names = parts[0].by_method
     errors = {name: np.concatenate([np.array(part.by_method[name]) for part in parts]) for name in names}
-    return Found(errors, np.concatenate([part.limits_ft for part in parts]))
+    return FrameResult(errors, np.concatenate([part.bounds_ft for part in parts]))
 
 
-def _rows(frame: Frame, found: Found) -> list[tuple[Cell, ...]]:
+def _rows(frame: Frame, found: FrameResult) -> list[tuple[Cell, ...]]:
     errors = found.errors
     med, plain = (_triple(paper) for paper in PAPER[frame]) if frame in PAPER else (None, None)
     label = _label(frame)
-    limits = f"{np.median(found.limits_ft):.2f}  {found.limits_ft.max():.2f}"
+    bounds = f"{np.median(found.bounds_ft):.2f}  {found.bounds_ft.max():.2f}"
     rates = f"{_rate(errors, 'ransac')} / {_rate(errors, 'cauchy')}" if "ransac" in errors else NOT_INSTALLED
     return [
         (f"{label}: R and T", plain, None, _median(errors, "r_and_t")),
         (f"{label}: Med R and T", med, _median(errors, "ransac"), _median(errors, "med_r_and_t")),
         (f"{label}: Med R and T, successes", None, rates, _rate(errors, "med_r_and_t")),
         (f"{label}: Trunc R and T, successes", None, None, _rate(errors, "trunc_r_and_t")),
-        (f"{label}: limit, median and worst", None, None, limits),
+        (f"{label}: bound, median and worst", None, None, bounds),
     ]
 
 
 def _claims(frame: Frame, errors: Errors) -> Claims:
-    """Med R and T holds; and R and T is off by feet where the paper's is."""
+    """Claim that Med R and T holds, and that R and T is off by feet where the paper's is."""
     share, label = _share(errors, "med_r_and_t"), _label(frame)
-    claims = [(f"{label}: Med R and T under {LIMIT_FT} ft in every axis in at least {LEAST_MED:.0%}",
-               _reaches(share, LEAST_MED, len(errors["med_r_and_t"])))]
-    if max(PAPER[frame][1]) > LIMIT_FT:
+    claims = [(f"{label}: Med R and T under {MAX_ERROR_FT} ft in every axis in at least {MIN_MED_SHARE:.0%}",
+               _reaches(share, MIN_MED_SHARE, len(errors["med_r_and_t"])))]
+    if max(PAPER[frame][1]) > MAX_ERROR_FT:
         worst = float(np.median(errors["r_and_t"].max(axis=1)))
-        claims.append((f"{label}: R and T is off by feet (median of the worst axis {worst:.1f} ft)", worst > LIMIT_FT))
+        claims.append((f"{label}: R and T is off by feet (median of the worst axis {worst:.1f} ft)",
+                       worst > MAX_ERROR_FT))
     return claims
 
 
@@ -155,15 +154,15 @@ def _claims_beyond(frame: Frame, errors: Errors, least: float) -> Claims:
 
 
 def _label(frame: Frame) -> str:
-    return f"{frame.name}: {frame.drawn or len(scene_of(frame.place))} lines, {frame.wrong} wrong"
+    return f"{frame.name}: {frame.drawn or len(get_scene(frame.place))} lines, {frame.wrong} wrong"
 
 
 def _share(errors: Errors, name: str) -> float:
-    return float(np.mean(errors[name].max(axis=1) < LIMIT_FT))
+    return float(np.mean(errors[name].max(axis=1) < MAX_ERROR_FT))
 
 
 def _reaches(share: float, least: float, count: int) -> bool:
-    """Whether a share of ``count`` trials is the wanted one, or the next lower one that so few can have."""
+    """Whether a share of ``count`` trials is at least ``least``, rounded down to what so few trials can have."""
     return share * count >= math.floor(least * count + 1e-9) - 1e-9
 
 

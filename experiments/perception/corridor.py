@@ -110,7 +110,7 @@ def _covered(model: Array, segments: Array) -> float:
 
 def _rows(test: Perturbation, trials: Sequence[Trial]) -> list[tuple[Cell, ...]]:
     recovered = [t for t in trials if t.recovered]
-    theirs = f"{_share([t.peer_recovered for t in trials]):.1%}" if Peer.found() else NOT_INSTALLED
+    theirs = f"{_share([t.peer_recovered for t in trials]):.1%}" if Peer.find() else NOT_INSTALLED
     papers = f"{_share([t.paper_recovered for t in trials]):.1%}"
     median = tuple(float(np.median([getattr(t, name) for t in trials])) for name in ("shift_steps", "turn_rad"))
     missed = len(trials) - len(recovered)

@@ -82,7 +82,7 @@ def run_attempt(attempt: Attempt) -> Trial:
     frame, segments = data.frames[attempt.frame], find_segments(attempt.frame)
     ours = locate_from(attempt.frame, prior, rng)
     shift, turn = _errors(prior if ours is None else ours.camera_from_world, frame, data.step)
-    peer = Peer.found()
+    peer = Peer.find()
     return Trial(
         recovered=shift <= MAX_ERROR_STEPS and turn <= MAX_ERROR_RAD,
         verdict=(PoseVerdict.NOT_TESTABLE if ours is None else ours.verdict).value,
@@ -156,7 +156,8 @@ def _solve_as_paper(
 def _solve_as_peer(peer: Peer, data: Corridor, frame: CorridorFrame, ours: CameraFix, prior: Pose) -> Pose:
     """PoseLib's LO-RANSAC on our pairs."""
     i, k = ours.pairs.T
-    return peer.ransac(data.model_lines[i], ours.segments_px[k], frame.camera, prior, limit_px=PEER_MAX_RESIDUAL_PX)
+    lines, segments = data.model_lines[i], ours.segments_px[k]
+    return peer.ransac(lines, segments, frame.camera, prior, max_residual_px=PEER_MAX_RESIDUAL_PX)
 
 
 def _errors(pose: Pose, frame: CorridorFrame, step: float) -> tuple[float, float]:
