@@ -91,8 +91,8 @@ def fragment(scene: PoseScene, rng: np.random.Generator) -> PoseScene:
     return PoseScene(scene.lines_world, cut, scene.landmark_ids, scene.camera, scene.camera_from_world)
 
 
-def add_end_noise(segments_px: Array, sigma_px: float, rng: np.random.Generator) -> Array:
-    """Add Gaussian noise to the ends (n, 2, 2), across the segments."""
+def end_noise(segments_px: Array, sigma_px: float, rng: np.random.Generator) -> Array:
+    """Segments (n, 2, 2) with Gaussian noise of their ends, across the segments."""
     span = segments_px[:, 1] - segments_px[:, 0]
     unit = span / np.linalg.norm(span, axis=1, keepdims=True)
     across = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
@@ -100,10 +100,10 @@ def add_end_noise(segments_px: Array, sigma_px: float, rng: np.random.Generator)
     return np.asarray(segments_px + offsets[..., None] * across[:, None, :])
 
 
-def add_rho_theta_noise(
+def rho_theta_noise(
     segments_px: Array, rho_px: float, theta_rad: float, about_px: Array, rng: np.random.Generator
 ) -> Array:
-    """Add uniform noise, +-rho and +-theta, to the lines' (rho, theta) about ``about_px`` (2,) or (n, 2)."""
+    """Segments with uniform noise, +-rho and +-theta, of the lines' (rho, theta) about ``about_px`` (2,) or (n, 2)."""
     count = len(segments_px)
     turn = rng.uniform(-theta_rad, theta_rad, count)
     shift = rng.uniform(-rho_px, rho_px, count)
@@ -118,10 +118,10 @@ def add_rho_theta_noise(
     return np.asarray(moved + shift[:, None, None] * np.einsum("nab,nb->na", turns, across)[:, None])
 
 
-def mismatch_landmarks(
+def wrong_landmarks(
     scene: PoseScene, segments_px: Array, count: int, rng: np.random.Generator
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Shift whole landmarks until ``count`` lines are wrong matches; returned with which lines are."""
+    """Segments in which whole landmarks are shifted until ``count`` lines are wrong, and which lines are."""
     out, wrong = segments_px.copy(), np.zeros(len(scene), bool)
     for name in rng.permutation(np.unique(scene.landmark_ids)):
         rows = np.flatnonzero(scene.landmark_ids == name)[: count - int(wrong.sum())]
@@ -152,8 +152,8 @@ def compute_position_bound_ft(scene: PoseScene, sigma_px: float) -> Array:
     return np.asarray(np.sqrt(variance[[1, 0, 2]]) * FEET_PER_M)
 
 
-def draw_prior(truth: Pose, shift_m: float, turn_rad: float, rng: np.random.Generator) -> Pose:
-    """Perturb the truth by uniform errors of up to ``shift_m`` and ``turn_rad`` along and about each camera axis."""
+def drawn_prior(truth: Pose, shift_m: float, turn_rad: float, rng: np.random.Generator) -> Pose:
+    """The truth with uniform errors of up to ``shift_m`` and ``turn_rad`` along and about each camera axis."""
     return truth.perturbed(rng.uniform(-turn_rad, turn_rad, 3), rng.uniform(-shift_m, shift_m, 3))
 
 

@@ -15,13 +15,13 @@ from tqdm import tqdm
 from experiments.paper.pose_peer import NOT_INSTALLED, Peer
 from experiments.paper.pose_scenes import (
     PoseScene,
-    add_end_noise,
-    add_rho_theta_noise,
     campus,
     compute_information,
     compute_position_error_ft,
-    draw_prior,
+    drawn_prior,
+    end_noise,
     fragment,
+    rho_theta_noise,
 )
 from experiments.report import Cell, Report
 from knowledge_sources.methods.pose import PoseEstimate, r_and_t, r_and_t_ml, r_then_t
@@ -124,8 +124,8 @@ def _errors(
     centre = np.array([scene.camera.cx, scene.camera.cy])
     found: dict[str, list[Array]] = {"r_then_t": [], "r_and_t": [], "r_and_t_ml": [], "peer": []}
     for _ in range(count):
-        segments = add_rho_theta_noise(scene.segments_px, noise, math.radians(noise), centre, rng)
-        prior = draw_prior(scene.camera_from_world, PRIOR_M, PRIOR_RAD, rng)
+        segments = rho_theta_noise(scene.segments_px, noise, math.radians(noise), centre, rng)
+        prior = drawn_prior(scene.camera_from_world, PRIOR_M, PRIOR_RAD, rng)
         for solver in (r_then_t, r_and_t, r_and_t_ml):
             pose = solver(scene.lines_world, segments, scene.camera, prior).camera_from_world
             found[solver.__name__].append(_error(pose, scene))
@@ -146,8 +146,8 @@ def _compare_to_bound(scene: PoseScene, whole: bool, count: int, rng: np.random.
     fixed = scene if whole else fragment(scene, rng)
     bound = compute_information(fixed, SIGMA_PX)
     for _ in range(count):
-        segments = add_end_noise(fixed.segments_px, SIGMA_PX, rng)
-        prior = draw_prior(truth, PRIOR_M, PRIOR_RAD, rng)
+        segments = end_noise(fixed.segments_px, SIGMA_PX, rng)
+        prior = drawn_prior(truth, PRIOR_M, PRIOR_RAD, rng)
         found = r_and_t_ml(fixed.lines_world, segments, fixed.camera, prior, sigma_px=SIGMA_PX)
         apart = found.camera_from_world @ truth.inverse()
         error = np.concatenate([apart.rotation_vector, apart.translation])

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from experiments.paper.pose_peer import Peer
 from experiments.paper.pose_scenes import (
     PoseScene,
-    add_end_noise,
     campus,
     compute_position_bound_ft,
     compute_position_error_ft,
     corridor,
-    draw_prior,
+    drawn_prior,
+    end_noise,
     fragment,
-    mismatch_landmarks,
+    wrong_landmarks,
 )
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, trunc_r_and_t
 from world_models.frames import Pose
@@ -101,8 +101,8 @@ def _run_trial(frame: Frame, rng: np.random.Generator) -> tuple[Errors, float]:
         scene = scene.take(np.sort(rng.permutation(len(scene))[: frame.drawn]))
     if frame.parts:
         scene = fragment(scene, rng)
-    segments, wrong = mismatch_landmarks(scene, add_end_noise(scene.segments_px, SIGMA_PX, rng), frame.wrong, rng)
-    prior = draw_prior(scene.camera_from_world, PRIOR_M, PRIOR_RAD, rng)
+    segments, wrong = wrong_landmarks(scene, end_noise(scene.segments_px, SIGMA_PX, rng), frame.wrong, rng)
+    prior = drawn_prior(scene.camera_from_world, PRIOR_M, PRIOR_RAD, rng)
     methods = _methods(scene, segments, prior, Peer.find())
     errors = {name: np.abs(compute_position_error_ft(solve(), scene.camera_from_world))
               for name, solve in methods.items()}

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.paper.pose_scenes import PoseScene, add_end_noise, campus, corridor, draw_prior, mismatch_landmarks
+from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose.estimate import BEHIND, DISTANCE, NO_LENGTH, NO_OVERLAP
 from knowledge_sources.methods.pose.line_set import build_line_set
@@ -33,7 +33,7 @@ def named(solvers: list[Any]) -> Any:
 
 
 def solve(solver: Solver, scene: PoseScene, segments: Any, rng: np.random.Generator) -> PoseEstimate:
-    prior = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
     return solver(
         scene.lines_world, segments, scene.camera, prior, landmark_ids=scene.landmark_ids, sigma_px=SIGMA_PX
     )
@@ -44,7 +44,7 @@ def solve(solver: Solver, scene: PoseScene, segments: Any, rng: np.random.Genera
 @quick
 def test_residuals_are_those_of_the_pose(solver: Solver, scene: PoseScene, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    segments, _ = mismatch_landmarks(scene, add_end_noise(scene.segments_px, SIGMA_PX, rng), 6, rng)
+    segments, _ = wrong_landmarks(scene, end_noise(scene.segments_px, SIGMA_PX, rng), 6, rng)
     found = solve(solver, scene, segments, rng)
     lines, pose = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX), found.camera_from_world
     expected = compute_image_distances(lines, pose.rotation, pose.translation)
@@ -56,7 +56,7 @@ def test_residuals_are_those_of_the_pose(solver: Solver, scene: PoseScene, seed:
 @quick
 def test_each_rejected_line_has_a_reason_that_is_true(solver: Solver, scene: PoseScene, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    segments, _ = mismatch_landmarks(scene, add_end_noise(scene.segments_px, SIGMA_PX, rng), 6, rng)
+    segments, _ = wrong_landmarks(scene, end_noise(scene.segments_px, SIGMA_PX, rng), 6, rng)
     segments[0, 1] = segments[0, 0]
     along = segments[1, 1] - segments[1, 0]
     segments[1] += 3.0 * along
@@ -85,7 +85,7 @@ def test_each_rejected_line_has_a_reason_that_is_true(solver: Solver, scene: Pos
 def test_the_covariance_says_how_far_off_the_pose_is(solver: Solver, scene: PoseScene, seed: int) -> None:
     """40 is beyond chi-squared's 99.9999 % with six degrees of freedom."""
     rng = np.random.default_rng(seed)
-    found = solve(solver, scene, add_end_noise(scene.segments_px, SIGMA_PX, rng), rng)
+    found = solve(solver, scene, end_noise(scene.segments_px, SIGMA_PX, rng), rng)
     np.testing.assert_allclose(found.covariance, found.covariance.T)
     assert np.linalg.eigvalsh(found.covariance)[0] > 0.0
     apart = found.camera_from_world @ scene.camera_from_world.inverse()
@@ -99,7 +99,7 @@ def test_the_covariance_says_how_far_off_the_pose_is(solver: Solver, scene: Pose
 def test_doubt_in_the_lines_is_doubt_in_the_pose(solver: Solver, scene: PoseScene, seed: int, factor: float) -> None:
     """With exact lines and ``factor`` times the deviation, the covariance is ``factor`` squared times as large."""
     rng = np.random.default_rng(seed)
-    prior = draw_prior(scene.camera_from_world, 0.1, 0.01, rng)
+    prior = drawn_prior(scene.camera_from_world, 0.1, 0.01, rng)
     first, second = (
         solver(scene.lines_world, scene.segments_px, scene.camera, prior, landmark_ids=scene.landmark_ids, sigma_px=s)
         for s in (SIGMA_PX, factor * SIGMA_PX)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from experiments.paper.pose_scenes import PoseScene, add_end_noise, campus, corridor, draw_prior, fragment
+from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, fragment
 from knowledge_sources.methods.pose import PoseEstimate, r_and_t, r_and_t_ml, r_then_t
 from knowledge_sources.methods.pose.line_set import build_line_set
 from knowledge_sources.methods.pose.numerics.image_error import compute_image_distances, compute_image_jacobian
@@ -40,8 +40,8 @@ def trials(solver: Callable[..., PoseEstimate], scene: PoseScene) -> tuple[Array
     rng = np.random.default_rng(11)
     errors, sizes = [], []
     for _ in range(TRIALS):
-        segments = add_end_noise(scene.segments_px, SIGMA_PX, rng)
-        prior = draw_prior(scene.camera_from_world, 0.5, 0.03, rng)
+        segments = end_noise(scene.segments_px, SIGMA_PX, rng)
+        prior = drawn_prior(scene.camera_from_world, 0.5, 0.03, rng)
         found = solver(scene.lines_world, segments, scene.camera, prior, sigma_px=SIGMA_PX)
         apart = found.camera_from_world @ scene.camera_from_world.inverse()
         error = np.concatenate([apart.rotation_vector, apart.translation])
@@ -89,8 +89,8 @@ def test_e2_lies_between_e1_and_the_likelihood() -> None:
 def test_the_likelihood_agrees_with_the_library_s_least_squares() -> None:
     scene = scene_of("corridor", True)
     rng = np.random.default_rng(5)
-    segments = add_end_noise(scene.segments_px, SIGMA_PX, rng)
-    prior = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    segments = end_noise(scene.segments_px, SIGMA_PX, rng)
+    prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
     found = r_and_t_ml(scene.lines_world, segments, scene.camera, prior, sigma_px=SIGMA_PX)
     lines = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
 

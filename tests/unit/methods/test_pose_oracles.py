@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from experiments.paper.pose_scenes import PoseScene, add_end_noise, campus, corridor, draw_prior, mismatch_landmarks
+from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import med_r_and_t, planar_from_points, r_and_t, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose.line_set import LineSet, build_line_set
 from knowledge_sources.methods.pose.numerics.plane_error import compute_camera_ends, compute_plane_distances
@@ -26,9 +26,9 @@ Residuals = Callable[[Pose], Array]
 
 def problem(scene: PoseScene, seed: int) -> tuple[Array, Pose, LineSet]:
     rng = np.random.default_rng(seed)
-    segments = add_end_noise(scene.segments_px, SIGMA_PX, rng)
+    segments = end_noise(scene.segments_px, SIGMA_PX, rng)
     lines = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
-    return segments, draw_prior(scene.camera_from_world, 0.3, 0.03, rng), lines
+    return segments, drawn_prior(scene.camera_from_world, 0.3, 0.03, rng), lines
 
 
 def least(residuals: Residuals, start: Pose) -> Pose:
@@ -91,7 +91,7 @@ def test_no_triple_of_landmarks_has_a_much_smaller_median() -> None:
     """Brute force: E1 by the library for every triple; Med's pose is as good, by the median, as noise can tell."""
     scene = corridor(doors=5)
     segments, prior, _ = problem(scene, 3)
-    segments, _ = mismatch_landmarks(scene, segments, 7, np.random.default_rng(3))
+    segments, _ = wrong_landmarks(scene, segments, 7, np.random.default_rng(3))
     lines = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
 
     def median(pose: Pose) -> float:
@@ -124,8 +124,8 @@ def test_the_truncated_loss_holds_beyond_half() -> None:
     scene, rng = corridor(doors=14), np.random.default_rng(4)
     off = []
     for _ in range(10):
-        segments, _ = mismatch_landmarks(scene, add_end_noise(scene.segments_px, SIGMA_PX, rng), 31, rng)
-        prior = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
+        segments, _ = wrong_landmarks(scene, end_noise(scene.segments_px, SIGMA_PX, rng), 31, rng)
+        prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
         found = trunc_r_and_t(
             scene.lines_world, segments, scene.camera, prior, landmark_ids=scene.landmark_ids, sigma_px=SIGMA_PX
         )
