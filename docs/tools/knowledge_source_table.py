@@ -1,4 +1,7 @@
-"""The table of experts in ARCHITECTURE.md, made from the classes: ``python -m docs.tools.knowledge_source_table``."""
+"""The table of knowledge sources in ARCHITECTURE.md, made from the classes.
+
+``python -m docs.tools.knowledge_source_table`` prints it.
+"""
 
 from __future__ import annotations
 
@@ -9,19 +12,19 @@ from harvey.wiring import KNOWLEDGE_SOURCES
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 
 
-def rows(experts: Iterable[type[RobotKnowledgeSource]]) -> list[str]:
+def rows(sources: Iterable[type[RobotKnowledgeSource]]) -> list[str]:
     """The table in markdown, a line an element."""
-    head = ["| expert | level | closes | wakes on | writes | what it does |", "|---|---|---|---|---|---|"]
-    return head + [_row(expert) for expert in experts]
+    head = ["| knowledge source | level | closes | wakes on | writes | what it does |", "|---|---|---|---|---|---|"]
+    return head + [_row(source) for source in sources]
 
 
-def _row(expert: type[RobotKnowledgeSource]) -> str:
-    told = (expert.__doc__ or "").strip().split("\n\n")[0]
-    wakes = ", ".join(dict.fromkeys(_watch(watch) for watch in expert.watches))
-    writes = ", ".join(kind.__name__ for kind in expert.writes)
-    closes = "" if expert.closes is None else str(expert.closes)
-    name = expert.__module__.rpartition(".")[2]
-    return f"| `{name}` | {expert.level} | {closes} | {wakes} | {writes} | {' '.join(told.split())} |"
+def _row(source: type[RobotKnowledgeSource]) -> str:
+    what = (source.__doc__ or "").strip().split("\n\n")[0]
+    wakes = ", ".join(dict.fromkeys(_watch(watch) for watch in source.watches))
+    writes = ", ".join(kind.__name__ for kind in source.writes)
+    closes = "" if source.closes is None else str(source.closes)
+    name = source.__module__.rpartition(".")[2]
+    return f"| `{name}` | {source.level} | {closes} | {wakes} | {writes} | {' '.join(what.split())} |"
 
 
 def _watch(watch: Watch) -> str:

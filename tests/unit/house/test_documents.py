@@ -1,4 +1,4 @@
-"""README and ARCHITECTURE say what is: the experts' table is current, links lead somewhere, commands parse."""
+"""README and ARCHITECTURE say what is: table and picture are current, links lead somewhere, commands parse."""
 
 from __future__ import annotations
 
@@ -8,18 +8,27 @@ from pathlib import Path
 
 import pytest
 
+from docs.tools.architecture_picture import PICTURE, draw_architecture, name_of
 from docs.tools.knowledge_source_table import rows
 from harvey.cli import parser
-from harvey.wiring import KNOWLEDGE_SOURCES
+from harvey.wiring import KNOWLEDGE_SOURCES, known_kinds
 
 ROOT = Path(__file__).parents[3]
 DOCUMENTS = ("README.md", "ARCHITECTURE.md")
 
 
-def test_the_experts_table_is_the_one_that_the_classes_give() -> None:
+def test_the_table_of_knowledge_sources_is_the_one_that_the_classes_give() -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
-    held = text.split("<!-- experts -->\n")[1].split("\n<!-- /experts -->")[0]
-    assert held.splitlines() == rows(KNOWLEDGE_SOURCES)
+    table = text.split("<!-- knowledge sources -->\n")[1].split("\n<!-- /knowledge sources -->")[0]
+    assert table.splitlines() == rows(KNOWLEDGE_SOURCES)
+
+
+def test_the_picture_is_the_one_that_the_classes_give() -> None:
+    """It names every knowledge source and every kind of entry; ``python -m docs.tools.architecture_picture``."""
+    picture = PICTURE.read_text(encoding="utf-8")
+    assert picture == draw_architecture(KNOWLEDGE_SOURCES, known_kinds())
+    words = {name for text in re.findall(r"<text[^>]*>([^<]*)</text>", picture) for name in text.split(" · ")}
+    assert words >= {name_of(source) for source in KNOWLEDGE_SOURCES} | set(known_kinds())
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
