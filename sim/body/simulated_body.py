@@ -115,7 +115,7 @@ class SimulatedBody:
 
     def wait(self, duration_s: float) -> float:
         """Stand still for a while; returns the time after it [s]."""
-        self._pass(duration_s)
+        self._advance_time(duration_s)
         return self._truth.time_s
 
     def execute(self, command: MotorCommand) -> MotionReport:
@@ -124,7 +124,7 @@ class SimulatedBody:
         A contact ends the motion, and so does a device fault that stops it; the report is of the part that was done.
         """
         began_s = self._truth.time_s
-        self._pass(self._wheels.parameters.command_s)
+        self._advance_time(self._wheels.parameters.command_s)
         self._turn(command.turn_rad)
         done = self._move(command.move_m)
         turn, move = self._wheels.quantize(command.turn_rad, command.move_m * done)
@@ -162,7 +162,7 @@ class SimulatedBody:
         """
         if turn_rad == move_m == 0.0:
             self._slip, self._touching = None, False
-            self._pass(duration_s)
+            self._advance_time(duration_s)
             return 0.0, 0.0
         slip = self._slip = self._slip or self._wheels.sample_slip(self._wheel_rng)
         before = self._truth.world_from_robot
@@ -172,9 +172,9 @@ class SimulatedBody:
             if not self._touching:
                 self._count_collision()
             self._touching = True
-            self._pass(duration_s)
+            self._advance_time(duration_s)
             return 0.0, 0.0
-        self._go(there, duration_s)
+        self._drive_to(there, duration_s)
         self._add_odometry(turn_rad, move_m)
         return turn_rad, move_m
 
@@ -220,9 +220,9 @@ class SimulatedBody:
             before = self._truth.world_from_robot
             if self._building.obstacles.blocks(before, before @ step):
                 self._count_collision()
-                self._pass(duration_s / steps)
+                self._advance_time(duration_s / steps)
                 return True
-            self._go(before @ step, duration_s / steps)
+            self._drive_to(before @ step, duration_s / steps)
         return False
 
     def ride(self, ride: Ride) -> RideReport | BodyFault:
@@ -234,11 +234,11 @@ class SimulatedBody:
         if isinstance(outcome, str):
             return BodyFault("elevator", "no ride", outcome, "", began_s)
         self._helped[outcome.helper] = self._helped.get(outcome.helper, 0) + 1
-        self._pass(outcome.comes_s)
+        self._advance_time(outcome.comes_s)
         if self._building.on_floor is not None:
             self._building = self._building.on_floor(outcome.floor_m)
         self._truth = replace(self._truth, world_from_robot=outcome.world_from_robot, locale=outcome.locale)
-        self._pass(outcome.takes_s)
+        self._advance_time(outcome.takes_s)
         now_s = self._truth.time_s
         return RideReport(ride.passage, ride.destination, now_s - began_s, now_s)
 
@@ -248,7 +248,7 @@ class SimulatedBody:
 
     def look(self, purpose: str = "") -> Frame:
         """Take a picture, for the purpose of the request."""
-        self._pass(FRAME_S)
+        self._advance_time(FRAME_S)
         return self._take_frame(purpose)
 
     def picture(self) -> bytes:
@@ -263,7 +263,7 @@ class SimulatedBody:
         before = self._truth.world_from_robot
         aside = before @ Pose2(done.x_m, done.y_m, done.heading_rad)
         blocked = self._building.obstacles.blocks(before, aside)
-        self._go(before @ Pose2(0.0, 0.0, done.heading_rad) if blocked else aside, self._wheels.turn_s(turn_rad))
+        self._drive_to(before @ Pose2(0.0, 0.0, done.heading_rad) if blocked else aside, self._wheels.turn_s(turn_rad))
 
     def _move(self, move_m: float) -> float:
         """Move until it is done, in contact or broken off; returns the part that was done, 0..1."""
@@ -277,7 +277,7 @@ class SimulatedBody:
                 self._count_collision()
                 self._track.append(self._truth)
                 return index / len(steps)
-            self._go(before @ step, each_s)
+            self._drive_to(before @ step, each_s)
         return 1.0
 
     def _is_broken_off(self) -> bool:
@@ -295,16 +295,16 @@ class SimulatedBody:
     def _add_odometry(self, turn_rad: float, move_m: float) -> None:
         self._odometry = self._odometry @ Pose2(0.0, 0.0, turn_rad) @ Pose2(move_m, 0.0, 0.0)
 
-    def _go(self, there: Pose2, duration_s: float) -> None:
+    def _drive_to(self, there: Pose2, duration_s: float) -> None:
         """Drive to a near pose: time and path count."""
         way_m = there.distance_to(self._truth.world_from_robot)
         self._truth = replace(
             self._truth, world_from_robot=there, path_m=self._truth.path_m + way_m,
             locale=self._building.locale_at(there),
         )
-        self._pass(duration_s, way_m)
+        self._advance_time(duration_s, way_m)
 
-    def _pass(self, duration_s: float, way_m: float = 0.0) -> None:
+    def _advance_time(self, duration_s: float, way_m: float = 0.0) -> None:
         """Let time pass, and apply the faults that are due."""
         self._schedule = self._schedule.advance(duration_s, way_m, self._truth.locale)
         due, self._schedule = self._schedule.take_due(self._truth.locale)

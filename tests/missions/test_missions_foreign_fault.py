@@ -41,10 +41,23 @@ class Earthquake(Fault):
         body.report_missed("earthquake: no plaster came down")
 
 
+@dataclass(frozen=True)
+class Landslide(Earthquake):
+    """Its default is out of bounds."""
+
+    kind: ClassVar[str] = "landslide"
+    swing_rad: float = 2.0
+
+
 class NoFault:
     """Not a fault."""
 '''
-ENTRY_POINTS = "[harvey.faults]\nearthquake = tremors:Earthquake\nflood = tremors:NoFault\ndrought = tremors:Drought\n"
+ENTRY_POINTS = """[harvey.faults]
+earthquake = tremors:Earthquake
+landslide = tremors:Landslide
+flood = tremors:NoFault
+drought = tremors:Drought
+"""
 QUAKE = fault("earthquake", "allens-office", 1.5, swing_deg=3.0)
 
 
@@ -95,6 +108,7 @@ def test_a_saved_run_reads_it_from_its_tables() -> None:
      r"faults\.0\.swing_deg: expected a number from 0 to 57\.\d+, got 90"),
     (fault("earthquake", "", 1.0, duration_s=9.0), r"faults\.0\.duration_s: expected one of .*, got the key"),
     (fault("earthquak", "", 1.0), r"faults\.0\.kind: expected one of earthquake, got 'earthquak'"),
+    (fault("landslide", "", 1.0), r"faults\.0: expected swing_rad from 0 to 1, got 2"),
     (fault("flood", "", 1.0), r"faults\.0\.kind: expected a subclass of .* with kind = 'flood' at tremors:NoFault"),
     (fault("drought", "", 1.0), r"faults\.0\.kind: expected a fault class at tremors:Drought, got .*attribute"),
 ])
@@ -105,4 +119,4 @@ def test_what_is_wrong_with_it_is_pointed_at(text: str, message: str) -> None:
 
 def test_the_built_in_kinds_come_first() -> None:
     kinds = list_fault_kinds()
-    assert kinds[0] == "bump" and kinds[-3:] == ("drought", "earthquake", "flood")
+    assert kinds[0] == "bump" and kinds[-4:] == ("drought", "earthquake", "flood", "landslide")

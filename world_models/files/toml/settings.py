@@ -58,6 +58,8 @@ def read_settings(node: Node, kind: type[T]) -> T:
     except WorldError:
         raise
     except OutOfBoundsError as error:
+        if error.key not in written:
+            raise WorldError(f"{node.place}: {error}") from None
         key = written[error.key]
         number = "a whole number" if hints[error.key] is int else "a number"
         raise node[key].fail(f"{number} {error.bounds.describe(known[key][1])}") from None
