@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,10 +15,13 @@ from rerun.error_utils import RerunWarning
 from logs.errors import RecordingError
 from logs.recording.loggers.decisions import RECORD
 from logs.recording.loggers.frames import NUMBER
-from logs.recording.paths import IMAGE, RECORDS
+from logs.recording.paths import IMAGE, RECORDS, TRUE_ROBOT
 
 ROW_ID = "rerun.controls.RowId"
 JPEG = "EncodedImage:blob"
+TRANSLATION, QUATERNION = "Transform3D:translation", "Transform3D:quaternion"
+CYCLE = "cycle"
+"""The timeline of a recording."""
 
 
 def read_decisions(path: Path) -> list[dict[str, Any]]:
@@ -36,6 +40,19 @@ def read_frames(path: Path) -> dict[int, bytes]:
         RecordingError: the file is no recording, or is damaged.
     """
     return {row[NUMBER].as_py(): row[JPEG].values.to_numpy().tobytes() for row in _rows(path, IMAGE, (NUMBER, JPEG))}
+
+
+def read_true_track(path: Path) -> list[tuple[int, float, float, float]]:
+    """Where the robot truly was: (cycle, x [m], y [m], heading [rad]) wherever it had moved, in the world frame.
+
+    Raises:
+        RecordingError: the file is no recording, or is damaged.
+    """
+    track = []
+    for row in _rows(path, TRUE_ROBOT, (TRANSLATION, QUATERNION), CYCLE):
+        (x_m, y_m, _), (_, _, sine, cosine) = row[TRANSLATION].as_py(), row[QUATERNION].as_py()
+        track.append((row[CYCLE], x_m, y_m, 2.0 * math.atan2(sine, cosine)))
+    return track
 
 
 def damage_of(path: Path) -> str | None:
@@ -61,12 +78,15 @@ def _decision(path: Path, line: str) -> dict[str, Any]:
     return record
 
 
-def _rows(path: Path, entity: str, components: tuple[str, ...]) -> list[dict[str, Any]]:
-    """The rows of an entity that have all these components, in the order in which they were logged."""
+def _rows(path: Path, entity: str, components: tuple[str, ...], timeline: str = "") -> list[dict[str, Any]]:
+    """The rows of an entity that have all these components, in the order in which they were logged.
+
+    Each has its time on a timeline too, where one is named.
+    """
     if not path.is_file():
         raise RecordingError(f"{path}: expected a recording, got no such file")
     try:
-        rows = [row for batch in _batches(path, entity) for row in _complete(batch, components)]
+        rows = [row for batch in _batches(path, entity) for row in _complete(batch, components, timeline)]
     except Exception as error:  # as above
         raise RecordingError(f"{path}: expected a whole Rerun recording, got: {error} (harvey repair {path.parent} "
                              "draws it anew)") from None
@@ -81,11 +101,12 @@ def _batches(path: Path, entity: str) -> Iterator[Any]:
         yield chunk.to_record_batch()
 
 
-def _complete(batch: Any, components: tuple[str, ...]) -> Iterator[tuple[bytes, dict[str, Any]]]:
+def _complete(batch: Any, components: tuple[str, ...], timeline: str) -> Iterator[tuple[bytes, dict[str, Any]]]:
     """(row id, components) of the rows of a batch that have all of the components."""
     if not set(components) <= set(batch.schema.names):
         return
     for number, row_id in enumerate(batch.column(ROW_ID)):
         cells = [batch.column(name)[number].values for name in components]
         if all(cell is not None and len(cell) for cell in cells):
-            yield row_id.as_py(), {name: cell[0] for name, cell in zip(components, cells, strict=True)}
+            row = {name: cell[0] for name, cell in zip(components, cells, strict=True)}
+            yield row_id.as_py(), row | ({timeline: batch.column(timeline)[number].as_py()} if timeline else {})

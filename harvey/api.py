@@ -1,0 +1,239 @@
+"""The Python interface, for programs and notebooks: everything here is exported from ``harvey`` itself.
+
+    import harvey
+
+    result = harvey.run("lab-to-allens-office", seed=0, out="runs/first")
+    print(result.outcome, result.final_error_m)
+    run = harvey.open_run("runs/first")
+    for decision in run.decisions():
+        ...
+    print(run.why("MotorCommand-12"))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blackboard.entry import Entry
+from blackboard.journal import Decision
+from harvey.errors import BadInput
+from harvey.run_files import run_directory
+from harvey.run_files.observations import entry_of
+from harvey.run_files.records import DecisionRecord, EntryRecord, read_records
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import RunHead
+from harvey.runner.replay import pictures_of, replay
+from harvey.runner.result import MissionResult
+from harvey.why.journal import JournalHistory
+from harvey.why.sentences import kinds_for
+from harvey.why.story import Story, lines_of, story
+from harvey.why.walk import principal
+from logs.reader import read_true_track
+from sim.scenario import Scenario, ScenarioError, load_scenario, with_settings
+from sim.stage import build_stage
+from world_models.building.world import World
+from world_models.entries.body import Frame
+from world_models.entries.location import Hypothesis
+from world_models.files.toml.source import Source, WorldError
+from world_models.files.world_files import load_world, read_world
+from world_models.frames import Pose2
+
+T = TypeVar("T")
+
+
+def run(
+    scenario: str | Path | Scenario,
+    *,
+    seed: int = 0,
+    settings: Mapping[str, Any] | None = None,
+    out: str | Path | None = None,
+    on_decision: Callable[[Decision], None] | None = None,
+    live: bool = False,
+) -> MissionResult:
+    """Run a mission in the simulator to its outcome, as ``harvey run`` does.
+
+    Args:
+        scenario: a name from ``harvey list``, a TOML file, or a scenario that was loaded already.
+        seed: of all chance; the same scenario and seed give the same decisions.
+        settings: as after ``--set``, for example ``{"servo.action": False, "start.heading_deg": 80}``.
+        out: the run directory; an older run of the same scenario and seed there is replaced, another one moved aside.
+            None keeps nothing.
+        on_decision: called with every decision, as it is made.
+        live: also send the recording to an open rerun viewer.
+
+    Raises:
+        BadInput: the scenario, a setting or ``out`` cannot be used; says what was expected and what came.
+    """
+    from harvey.simulation.run import run_mission
+
+    try:
+        mission = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+        stage = build_stage(with_settings(mission, settings or {}))
+    except (ScenarioError, WorldError) as error:
+        raise BadInput(str(error)) from None
+    folder = None if out is None else run_directory.new_run(Path(out), mission.name, seed)[0]
+    return run_mission(stage, seed, out=folder, sinks=() if on_decision is None else (on_decision,), live=live)
+
+
+def open_run(path: str | Path) -> RecordedRun:
+    """A run that was recorded: its directory, or its name under ``runs/``.
+
+    Raises:
+        BadInput: there is none.
+    """
+    return RecordedRun(run_directory.open_run(str(path)))
+
+
+def build_world(text: str, name: str = "world") -> World:
+    """A building model from the text of a world file.
+
+    Raises:
+        BadInput: the text is no world; names the line, what was expected and what came.
+    """
+    try:
+        return read_world(Source.parse(text, name))
+    except WorldError as error:
+        raise BadInput(str(error)) from None
+
+
+@dataclass(frozen=True, slots=True)
+class TrackPoint:
+    """Where the robot was in one cycle, or believed to be: ``pose`` in the world frame [m, rad]."""
+
+    cycle: int
+    pose: Pose2
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A camera picture of a run.
+
+    Attributes:
+        entry: its name on the board, as ``Frame-49``.
+        cycle: in which the board saw it; time_s: when it was taken, by the body's clock.
+        jpeg: as the camera delivered it.
+    """
+
+    entry: str
+    cycle: int
+    time_s: float
+    jpeg: bytes
+
+    def pixels(self) -> NDArray[np.uint8]:
+        """(height, width, 3) red, green, blue."""
+        from knowledge_sources.methods.features.images import decode_colour
+
+        return np.asarray(decode_colour(self.jpeg))
+
+
+class RecordedRun:
+    """A recorded run, read from its directory. Nothing of it is changed.
+
+    Attributes:
+        path: its directory.
+    """
+
+    def __init__(self, files: RunDirectory) -> None:
+        self._files = files
+        self.path = files.path
+
+    @cached_property
+    def head(self) -> RunHead:
+        """How it began: scenario, seed, world, settings. Raises BadInput."""
+        return RunHead.read(self.path)
+
+    @property
+    def result(self) -> Mapping[str, Any]:
+        """``result.json``; empty where the run was cut off. Raises BadInput."""
+        return self._files.read_result()
+
+    def decisions(self) -> Iterator[DecisionRecord]:
+        """Every decision, in order: what was seen, who could act, who was chosen, what changed. Raises BadInput."""
+        return read_records(self._files.journal)
+
+    def records(self) -> Iterator[EntryRecord]:
+        """Every change of every entry, in order, observed ones too. Raises BadInput."""
+        for decision in self.decisions():
+            yield from (*decision.observed, *decision.made)
+
+    @overload
+    def entries(self, kind: type[T]) -> Iterator[Entry[T]]: ...
+    @overload
+    def entries(self, kind: None = None) -> Iterator[Entry[Any]]: ...
+
+    def entries(self, kind: type[Any] | None = None) -> Iterator[Entry[Any]]:
+        """Every revision of every entry with its typed value, or those of one kind.
+
+        Raises:
+            BadInput: a value is of a kind, or of a version of it, that is not known here.
+        """
+        for record in self.records():
+            if record.change != "Retracted" and (kind is None or record.type == kind.__name__):
+                yield entry_of(record, kinds_for(record))
+
+    def pictures(self) -> Iterator[Picture]:
+        """The camera's pictures, in order. Raises BadInput where they are missing."""
+        jpegs = pictures_of(self._files)
+        for record in self.records():
+            if record.type == Frame.__name__ and record.change == "Posted":
+                value = record.value
+                yield Picture(record.id, record.cycle, float(value["sim_time_s"]), jpegs[value["number"]])
+
+    def believed_track(self) -> Sequence[TrackPoint]:
+        """Where the robot believed it was: one point for each revision of the held pose hypothesis."""
+        world = self.head.model().world
+        held = (entry for entry in self.entries(Hypothesis) if entry.value.is_held)
+        return [TrackPoint(entry.cycle, entry.value.world_from_robot(world)) for entry in held]
+
+    def true_track(self) -> Sequence[TrackPoint]:
+        """Where it truly was, from the recording: a point wherever it had moved; none on hardware.
+
+        Raises:
+            RecordingError: the recording cannot be read.
+        """
+        return [TrackPoint(cycle, Pose2(x_m, y_m, heading_rad))
+                for cycle, x_m, y_m, heading_rad in read_true_track(self._files.recording)]
+
+    def why(self, what: str | int | None = None) -> str:
+        """Why something came about, in sentences, as ``harvey why`` says it.
+
+        Args:
+            what: an entry, as ``"MotorCommand-12"``; the number of a cycle; None for the outcome.
+
+        Raises:
+            BadInput: the run has none of that name; near ones are listed.
+        """
+        return "\n\n".join("\n".join(lines_of(one)) for one in self.stories(what))
+
+    def stories(self, what: str | int | None = None) -> Sequence[Story]:
+        """The same as data: headline, decision and reasons with the entries that say so."""
+        history = JournalHistory(self._files.journal)
+        if isinstance(what, int):
+            refs = principal(history.decision(what))
+        else:
+            refs = [history.named(what) if what else history.outcome()]
+        return [story(history, record) for ref in refs if (record := history.entry(ref)) is not None]
+
+    def replay(self) -> int | None:
+        """Decide it again from what it observed: the first cycle that is decided otherwise, or None where none is.
+
+        Raises:
+            BadInput: an observation cannot be read.
+        """
+        from harvey.agent import agent_of
+
+        with agent_of(self.head) as agent:
+            decided = replay(self._files, pictures_of(self._files), agent.scheduler())
+            return next((one.recorded.cycle for one in decided if not one.same), None)
+
+
+__all__ = [
+    "Picture", "RecordedRun", "TrackPoint", "build_world", "load_scenario", "load_world", "open_run", "run",
+]
