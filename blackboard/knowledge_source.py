@@ -38,6 +38,11 @@ class KnowledgeSource(ABC):
         cls._called = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
         cls.has_own_word = cls.still_valid is not KnowledgeSource.still_valid
 
+    @classmethod
+    def called(cls) -> str:
+        """Its name, as far as the class tells."""
+        return cls._called
+
     @property
     def name(self) -> str:
         """Its class name in snake case, as in the folder listing."""

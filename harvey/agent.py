@@ -24,7 +24,7 @@ from blackboard.servoing import Servoing
 from harvey.agent_settings import build_settings
 from harvey.errors import BadInput
 from harvey.run_files.run_head import RunHead
-from harvey.wiring import knowledge_sources, servoing
+from harvey.wiring import build, foreign_sources, knowledge_sources, servoing
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import Settings
 from world_models.building.landmarks import Edges
@@ -78,10 +78,13 @@ def agent_of(head: RunHead, sources: Sources = knowledge_sources) -> Agent:
     segments = segments_named(head.without)
     settings = settings_of(head)
     model = head.model()
-    known = [source.name for source in sources(model, settings)]
+    given = sources(model, settings)
+    foreign = _foreign(head, {source.name for source in given})
+    known = [*(source.name for source in given), *(source.called() for source in foreign)]
     robot = replace(model, world=_lacking(model.world, [name for name in names if name not in known], known))
     levels = {key.removeprefix(SERVO): value for key, value in head.constants if key.startswith(SERVO)}
-    chosen = tuple(s for s in sources(robot, settings) if s.name not in names)
+    everyone = (*sources(robot, settings), *(build(source, robot, settings) for source in foreign))
+    chosen = tuple(source for source in everyone if source.name not in names)
     if segments:
         chosen = tuple(
             _SegmentHider(robot, settings, segments) if isinstance(s, LineFinder) else s for s in chosen)
@@ -91,6 +94,20 @@ def agent_of(head: RunHead, sources: Sources = knowledge_sources) -> Agent:
 def settings_of(head: RunHead) -> Settings:
     """The settings of a run. Raises BadInput."""
     return build_settings([pair for pair in head.constants if not pair[0].startswith(SERVO)], SERVO_KEYS)
+
+
+def _foreign(head: RunHead, given: Set[str]) -> list[type[KnowledgeSource]]:
+    """The knowledge sources of other packages that decided the run, but for those that are given already.
+
+    Raises BadInput where one is not installed here.
+    """
+    needed = {name: package for name, package in head.plugins.items() if name not in given}
+    installed = foreign_sources() if needed else {}
+    for name, package in needed.items():
+        if name not in installed:
+            raise BadInput(f"run.json: plugins: expected the knowledge source {name!r} of {package}, which decided "
+                           "this run, to be installed here, got none")
+    return [installed[name] for name in needed]
 
 
 def segments_named(names: Iterable[str]) -> tuple[tuple[int, int], ...]:

@@ -13,7 +13,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar, overload
@@ -23,18 +23,25 @@ from numpy.typing import NDArray
 
 from blackboard.entry import Entry
 from blackboard.journal import Decision
+from blackboard.kinds import Registry
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.scheduler import registry_of
+from harvey import wiring
+from harvey.agent import Sources, agent_of
 from harvey.errors import BadInput
 from harvey.run_files import run_directory
 from harvey.run_files.observations import entry_of
 from harvey.run_files.records import DecisionRecord, EntryRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
-from harvey.runner.replay import pictures_of, replay
+from harvey.runner.replay import pictures_of
+from harvey.runner.replay import replay as replay_run
 from harvey.runner.result import MissionResult
+from harvey.simulation.run import head_of, run_mission
 from harvey.why.journal import JournalHistory
-from harvey.why.sentences import kinds_for
 from harvey.why.story import Story, lines_of, story
 from harvey.why.walk import principal
+from knowledge_sources.settings import Settings
 from logs.reader import read_true_track
 from sim.scenario import Scenario, ScenarioError, load_scenario, with_settings
 from sim.stage import build_stage
@@ -44,8 +51,12 @@ from world_models.entries.location import Hypothesis
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import load_world, read_world
 from world_models.frames import Pose2
+from world_models.robot import RobotModel
 
 T = TypeVar("T")
+
+GIVEN = "the calling program"
+"""Where a knowledge source comes from that no installed package brings."""
 
 
 def run(
@@ -54,6 +65,7 @@ def run(
     seed: int = 0,
     settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
+    knowledge_sources: Sequence[type[KnowledgeSource]] = (),
     on_decision: Callable[[Decision], None] | None = None,
     live: bool = False,
 ) -> MissionResult:
@@ -65,30 +77,44 @@ def run(
         settings: as after ``--set``, for example ``{"servo.action": False, "start.heading_deg": 80}``.
         out: the run directory; an older run of the same scenario and seed there is replaced, another one moved aside.
             None keeps nothing.
+        knowledge_sources: classes that sit round the board beside the project's; what they decide can be replayed by
+            ``open_run(out, knowledge_sources=...)`` with the same classes.
         on_decision: called with every decision, as it is made.
         live: also send the recording to an open rerun viewer.
 
     Raises:
         BadInput: the scenario, a setting or ``out`` cannot be used; says what was expected and what came.
     """
-    from harvey.simulation.run import run_mission
-
     try:
         mission = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
         stage = build_stage(with_settings(mission, settings or {}))
     except (ScenarioError, WorldError) as error:
         raise BadInput(str(error)) from None
     folder = None if out is None else run_directory.new_run(Path(out), mission.name, seed)[0]
-    return run_mission(stage, seed, out=folder, sinks=() if on_decision is None else (on_decision,), live=live)
+    head = head_of(stage, seed)
+    given = {source.called(): GIVEN for source in knowledge_sources}
+    return run_mission(stage, seed, out=folder, sinks=() if on_decision is None else (on_decision,), live=live,
+                       head=replace(head, plugins={**head.plugins, **given}), sources=with_sources(knowledge_sources))
 
 
-def open_run(path: str | Path) -> RecordedRun:
+def open_run(path: str | Path, *, knowledge_sources: Sequence[type[KnowledgeSource]] = ()) -> RecordedRun:
     """A run that was recorded: its directory, or its name under ``runs/``.
+
+    Args:
+        knowledge_sources: those that were given to :func:`run` beside the project's.
 
     Raises:
         BadInput: there is none.
     """
-    return RecordedRun(run_directory.open_run(str(path)))
+    return RecordedRun(run_directory.open_run(str(path)), knowledge_sources)
+
+
+def with_sources(more: Sequence[type[KnowledgeSource]]) -> Sources:
+    """The project's knowledge sources and some more."""
+    def build_all(robot: RobotModel, settings: Settings) -> tuple[KnowledgeSource, ...]:
+        return (*wiring.knowledge_sources(robot, settings), *(wiring.build(one, robot, settings) for one in more))
+
+    return build_all
 
 
 def build_world(text: str, name: str = "world") -> World:
@@ -140,14 +166,18 @@ class RecordedRun:
         path: its directory.
     """
 
-    def __init__(self, files: RunDirectory) -> None:
-        self._files = files
+    def __init__(self, files: RunDirectory, sources: Sequence[type[KnowledgeSource]] = ()) -> None:
+        self._files, self._sources = files, tuple(sources)
         self.path = files.path
 
     @cached_property
     def head(self) -> RunHead:
         """How it began: scenario, seed, world, settings. Raises BadInput."""
         return RunHead.read(self.path)
+
+    @cached_property
+    def _kinds(self) -> Registry:
+        return registry_of(self._sources, wiring.known_kinds().values())
 
     @property
     def result(self) -> Mapping[str, Any]:
@@ -176,7 +206,7 @@ class RecordedRun:
         """
         for record in self.records():
             if record.change != "Retracted" and (kind is None or record.type == kind.__name__):
-                yield entry_of(record, kinds_for(record))
+                yield entry_of(record, self._kinds)
 
     def pictures(self) -> Iterator[Picture]:
         """The camera's pictures, in order. Raises BadInput where they are missing."""
@@ -227,11 +257,9 @@ class RecordedRun:
         Raises:
             BadInput: an observation cannot be read.
         """
-        from harvey.agent import agent_of
-
-        with agent_of(self.head) as agent:
-            decided = replay(self._files, pictures_of(self._files), agent.scheduler())
-            return next((one.recorded.cycle for one in decided if not one.same), None)
+        agent = agent_of(self.head, with_sources(self._sources))
+        decided = replay_run(self._files, pictures_of(self._files), agent.scheduler())
+        return next((one.recorded.cycle for one in decided if not one.same), None)
 
 
 __all__ = [

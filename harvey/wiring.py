@@ -1,10 +1,12 @@
-"""The knowledge sources, servo levels and models of a run, put together from its scenario.
+"""The knowledge sources round the board: those of the project, and those of other installed packages.
 
-A new knowledge source takes one file in its level's folder and one line here.
+A new knowledge source of the project takes one file in its level's folder and one line here. One of another package
+takes an entry point of the group ``harvey.knowledge_sources`` there, and no edit here.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 
 from blackboard.kinds import Registry
@@ -12,6 +14,7 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import registry_of
 from blackboard.servoing import Servoing
+from harvey.run_files.run_head import SOURCES
 from knowledge_sources.action.correlator_tracker import CorrelatorTracker
 from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.action.elevator_rider import ElevatorRider
@@ -34,6 +37,7 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.entries import KINDS
 from world_models.files.toml.mission import Servo
+from world_models.plugins import PluginError, load_plugin_classes
 from world_models.robot import RobotModel
 
 KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
@@ -60,14 +64,33 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
 
 
 def knowledge_sources(robot: RobotModel, settings: Settings = DEFAULT) -> tuple[KnowledgeSource, ...]:
-    """The knowledge sources for a robot, each built with the robot's model and the settings, and nothing else."""
-    return tuple(source(robot, settings) for source in KNOWLEDGE_SOURCES)
+    """The project's knowledge sources for a robot."""
+    return tuple(build(source, robot, settings) for source in KNOWLEDGE_SOURCES)
+
+
+def build(source: type[KnowledgeSource], robot: RobotModel, settings: Settings) -> KnowledgeSource:
+    """A knowledge source with the robot's model and the settings; one that needs neither is built without."""
+    return source(robot, settings) if issubclass(source, RobotKnowledgeSource) else source()
+
+
+@cache
+def foreign_sources() -> Mapping[str, type[KnowledgeSource]]:
+    """The knowledge sources of other installed packages, by name.
+
+    Raises:
+        PluginError: one cannot be loaded, or is called otherwise than its entry point.
+    """
+    found = load_plugin_classes(SOURCES, KnowledgeSource)
+    for name, source in found.items():
+        if source.called() != name:
+            raise PluginError(f"entry point {SOURCES}, {name}: expected the name of its class, {source.called()}")
+    return found
 
 
 @cache
 def known_kinds() -> Registry:
-    """The kinds of entries that may be on a board: those of the project and of every knowledge source."""
-    return registry_of(KNOWLEDGE_SOURCES, KINDS)
+    """The kinds of entries that may be on a board: those of the project and of every knowledge source there is."""
+    return registry_of((*KNOWLEDGE_SOURCES, *foreign_sources().values()), KINDS)
 
 
 def servoing(servo: Servo) -> Servoing:

@@ -1,29 +1,56 @@
-"""What other installed packages add: found by the entry points of a group, loaded by name."""
+"""Plugins: what other installed packages add, found by their entry points.
+
+============================  ==========================================================================
+``harvey.knowledge_sources``  a class under ``blackboard.knowledge_source.KnowledgeSource``
+``harvey.bases``              a ``harvey.hardware.drivers.bases.base.BaseKind``
+``harvey.faults``             a class under ``sim.faults.fault.Fault``
+``harvey.loggers``            a class under ``logs.recording.loggers.Logger``
+============================  ==========================================================================
+
+The name of an entry point is the name under which Harvey knows what it points to.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 
-def list_plugins(group: str) -> tuple[EntryPoint, ...]:
-    """The entry points of a group by their names; of several with one name the first."""
-    found: dict[str, EntryPoint] = {}
-    for point in entry_points(group=group):
-        found.setdefault(point.name, point)
-    return tuple(found[name] for name in sorted(found))
+class PluginError(ImportError):
+    """What an installed package adds cannot be used: names the package, what was expected and what came."""
 
 
-def load_plugin(point: EntryPoint, what: str) -> Any:
-    """What an entry point names.
+def list_plugins(group: str) -> Mapping[str, str]:
+    """The names of a group, sorted, each with its package and version, as ``harvey-timekeeper 1.0``. Loads nothing."""
+    return {point.name: _package(point) for point in _points(group)}
 
-    Args:
-        what: is expected there, as "a fault class"; for the message.
 
-    Raises:
-        ImportError: it cannot be imported.
-    """
+def load_plugins(group: str, kind: type[Any]) -> Mapping[str, Any]:
+    """The instances of ``kind`` that a group points to, by name in order. Raises PluginError."""
+    return {point.name: _load(point, kind, lambda found: isinstance(found, kind)) for point in _points(group)}
+
+
+def load_plugin_classes(group: str, kind: type[Any], *names: str) -> Mapping[str, type[Any]]:
+    """The classes under ``kind`` that a group points to, by name in order; those of some names. Raises PluginError."""
+    return {point.name: _load(point, kind, lambda found: isinstance(found, type) and issubclass(found, kind))
+            for point in _points(group) if not names or point.name in names}
+
+
+def _points(group: str) -> list[EntryPoint]:
+    return sorted(entry_points(group=group), key=lambda point: point.name)
+
+
+def _load(point: EntryPoint, kind: type[Any], fits: Callable[[Any], bool]) -> Any:
+    where = f"{_package(point)}: entry point {point.group}, {point.name} = {point.value}"
     try:
-        return point.load()
-    except (ImportError, AttributeError) as error:
-        raise ImportError(f"expected {what} at {point.value}, got {error}") from error
+        found = point.load()
+    except Exception as error:  # whatever a foreign module raises while it is imported
+        raise PluginError(f"{where}: expected to be importable, got {type(error).__name__}: {error}") from error
+    if not fits(found):
+        raise PluginError(f"{where}: expected a {kind.__module__}.{kind.__qualname__}, got {found!r}")
+    return found
+
+
+def _package(point: EntryPoint) -> str:
+    return "a package" if point.dist is None else f"{point.dist.name} {point.dist.version}"

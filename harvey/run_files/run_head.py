@@ -22,9 +22,12 @@ from world_models.camera import Camera, CameraMount
 from world_models.entries.task import Command
 from world_models.files.toml.mission import ROOT, Servo
 from world_models.files.world_files import fingerprint, load_world
+from world_models.plugins import list_plugins
 from world_models.robot import RobotModel
 
 SIMULATOR, HARDWARE = "simulator", "hardware"
+SOURCES = "harvey.knowledge_sources"
+"""The entry points of other packages' knowledge sources; the name of each is that of its knowledge source."""
 PARTS: Mapping[str, type[Any]] = {"camera": Camera, "mount": CameraMount, "actuator": ActuatorModel}
 """What a robot knows of itself that has parts of its own."""
 
@@ -50,6 +53,7 @@ class RunHead:
         body: simulator: how the body is reached, as :func:`harvey.simulation.serial_body.open_body` knows it.
         harvey: version; code: what :func:`~harvey.run_files.deciding_code.deciding_code` says of the deciding program,
             "" in a run that is older than that.
+        plugins: the knowledge sources of other packages that decide too: name -> package and version.
         arithmetic: how the libraries calculated, as :func:`harvey.arithmetic.arithmetic` tells; "" in an older run.
     """
 
@@ -69,6 +73,7 @@ class RunHead:
     harvey: str = field(default_factory=lambda: version("harvey"))
     code: str = field(default_factory=deciding_code)
     arithmetic: str = field(default_factory=arithmetic)
+    plugins: Mapping[str, str] = field(default_factory=lambda: dict(list_plugins(SOURCES)))
 
     @staticmethod
     def of(
@@ -98,7 +103,8 @@ class RunHead:
         except (ValueError, RecursionError) as error:
             raise BadInput(f"{path}: expected JSON, got: {error}") from None
         try:
-            head: RunHead = decoded({"code": "", "arithmetic": "", **data} if isinstance(data, dict) else data, RunHead)
+            older = {"code": "", "arithmetic": "", "plugins": {}}
+            head: RunHead = decoded({**older, **data} if isinstance(data, dict) else data, RunHead)
         except (ValueError, TypeError) as error:
             raise BadInput(f"{path}: {error}") from None
         return head
@@ -119,6 +125,10 @@ class RunHead:
             return f"was decided by version {self.harvey} of harvey, and this is {here.harvey}"
         if self.code and self.code != here.code:
             return f"was decided by other code than this ({self.code} by its run.json, and here {here.code})"
+        installed = list_plugins(SOURCES)
+        for name, package in self.plugins.items():
+            if name in installed and installed[name] != package:
+                return f"was decided with {name} of {package}, and here it is of {installed[name]}"
         if self.arithmetic and self.arithmetic != here.arithmetic:
             return f"was calculated on another processor ({self.arithmetic}, and this is {here.arithmetic})"
         return ""

@@ -10,7 +10,7 @@ from sim.faults.lights_off import LightsOff
 from sim.faults.occlusion import Occlusion
 from world_models.files.toml.settings import read_settings, suggest_keys
 from world_models.files.toml.source import Node, WorldError
-from world_models.plugins import list_plugins, load_plugin
+from world_models.plugins import PluginError, list_plugins, load_plugin_classes
 
 GROUP = "harvey.faults"
 """Entry points of this group name fault classes; an entry point's name is the ``kind`` of its class."""
@@ -22,7 +22,7 @@ BUILT_IN: tuple[type[Fault], ...] = (
 def list_fault_kinds() -> tuple[str, ...]:
     """Every ``kind`` that a scenario can name: the built-in ones first."""
     built_in = [fault_class.kind for fault_class in BUILT_IN]
-    return tuple(dict.fromkeys([*built_in, *(point.name for point in list_plugins(GROUP))]))
+    return tuple(dict.fromkeys([*built_in, *list_plugins(GROUP)]))
 
 
 def find_fault_class(kind: str) -> type[Fault]:
@@ -30,18 +30,14 @@ def find_fault_class(kind: str) -> type[Fault]:
 
     Raises:
         KeyError: there is none.
-        ImportError: an installed package names one that cannot be imported, or that is no class of this kind.
+        PluginError: an installed package names one that cannot be imported, or that is no class of this kind.
     """
     for fault_class in BUILT_IN:
         if fault_class.kind == kind:
             return fault_class
-    point = next((point for point in list_plugins(GROUP) if point.name == kind), None)
-    if point is None:
-        raise KeyError(kind)
-    found = load_plugin(point, "a fault class")
-    if not (isinstance(found, type) and issubclass(found, Fault) and getattr(found, "kind", None) == kind):
-        raise ImportError(f"expected a subclass of sim.faults.fault.Fault with kind = {kind!r} at {point.value}, "
-                          f"got {found!r}")
+    found = load_plugin_classes(GROUP, Fault, kind)[kind]
+    if found.kind != kind:
+        raise PluginError(f"entry point {GROUP}, {kind}: expected a class with kind = {kind!r}, got {found.kind!r}")
     return found
 
 
