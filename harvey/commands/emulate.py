@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from sim.emulators.emulator import Emulator
     from sim.emulators.ground import Ground
 
-KINDS = ("denning", "p2os", "create2")
 MAX_PORT = 65535
 TELL_S = 1.0
 """How often its place is told, with --trace [s of the base]."""
 
 
 def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("kind", choices=KINDS, help="which protocol it speaks")
+    parser.add_argument("kind", metavar="KIND", help="which protocol it speaks: denning, p2os, create2, or one that"
+                        " another installed package brings")
     parser.add_argument("--scenario", metavar="NAME",
                         help="put it where a scenario begins, with the scenario's walls, wheels and faults; else on an"
                              " endless floor")
@@ -95,18 +95,14 @@ def _base(args: Namespace) -> tuple[Emulator, Callable[[], tuple[float, str]], S
 
     With a scenario the line fails when the scenario's faults say so.
     """
-    from sim.emulators.create2 import Create2Emulator
-    from sim.emulators.denning import DenningEmulator
-    from sim.emulators.denning_motion import ConstantSpeedMotion
     from sim.emulators.faulty_line import FaultyLine
-    from sim.emulators.p2os import P2osEmulator
+    from sim.emulators.registry import emulator_kinds
 
+    kinds = emulator_kinds()
+    if args.kind not in kinds:
+        raise BadInput(f"expected a kind of base, one of {', '.join(kinds)}, got {args.kind!r}")
     ground, where, body = _ground(args)
-    emulator: Emulator
-    if args.kind == "denning":
-        emulator = DenningEmulator(ConstantSpeedMotion(ground))
-    else:
-        emulator = P2osEmulator(ground) if args.kind == "p2os" else Create2Emulator(ground)
+    emulator = kinds[args.kind].on_ground(ground)
     return emulator if body is None else FaultyLine(emulator, body), where, body
 
 

@@ -4,42 +4,16 @@ from __future__ import annotations
 
 import errno
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 from harvey.errors import BadInput
 from harvey.hardware.drivers.bases import create2, denning, p2os
-from harvey.hardware.drivers.bases.base import Base
-from harvey.hardware.drivers.bases.create2 import Create2Base
-from harvey.hardware.drivers.bases.denning import DenningBase
-from harvey.hardware.drivers.bases.link import Link, SerialLink
-from harvey.hardware.drivers.bases.p2os import P2osBase
+from harvey.hardware.drivers.bases.base import Base, BaseKind
+from harvey.hardware.drivers.bases.link import SerialLink
+from world_models.plugins import load_plugins
 
-
-@dataclass(frozen=True, slots=True)
-class Kind:
-    """A kind of base.
-
-    Attributes:
-        baud: of its line.
-        over: its driver over a line.
-        watchdog: what stops it when nobody talks to it any more.
-        alone: whether it stops by itself when the line is cut.
-    """
-
-    baud: int
-    over: Callable[[Link], Base]
-    watchdog: str
-    alone: bool
-
-
-KINDS: Mapping[str, Kind] = {
-    "denning": Kind(denning.BAUD, DenningBase, "its own, 0.5 s", True),
-    "p2os": Kind(p2os.BAUD, P2osBase, "its own, 2 s", True),
-    "create2": Kind(create2.BAUD, lambda link: Create2Base(link, guarded=True),
-                    "ours, 0.5 s; it has none of its own: a cable that comes off does not stop it", False),
-}
 WHY: Mapping[int, str] = {
     errno.ENOENT: "there is no such port",
     errno.EACCES: "you may not use it: sudo usermod -aG dialout $USER, then log in anew",
@@ -51,20 +25,34 @@ WHY: Mapping[int, str] = {
 }
 
 
-def kind_of(port: str) -> tuple[Kind, str]:
+BUILT_IN = (denning.KIND, p2os.KIND, create2.KIND)
+
+
+@cache
+def base_kinds() -> Mapping[str, BaseKind]:
+    """Every kind of base by its name: the project's, then those of other installed packages.
+
+    Raises:
+        PluginError: one of another package cannot be loaded.
+    """
+    return {kind.name: kind for kind in BUILT_IN} | dict(load_plugins("harvey.bases", BaseKind))
+
+
+def kind_of(port: str) -> tuple[BaseKind, str]:
     """The kind of base, and where it is. Raises BadInput."""
     name, colon, url = port.partition(":")
-    if name not in KINDS or not colon or not url:
-        forms = " or ".join(f"{kind}:PORT" for kind in KINDS)
-        raise BadInput(f"base: expected {forms}, as {next(iter(KINDS))}:/dev/ttyUSB0, got {port!r}")
-    return KINDS[name], url
+    kinds = base_kinds()
+    if name not in kinds or not colon or not url:
+        forms = " or ".join(f"{kind}:PORT" for kind in kinds)
+        raise BadInput(f"base: expected {forms}, as {next(iter(kinds))}:/dev/ttyUSB0, got {port!r}")
+    return kinds[name], url
 
 
 def open_base(port: str) -> Base:
     """The base, its port open; whether anything answers is not known yet. Raises BadInput."""
     kind, url = kind_of(port)
     try:
-        return kind.over(SerialLink(url, kind.baud))
+        return kind.connect(SerialLink(url, kind.baud))
     except OSError as error:
         why = WHY.get(_number(error), str(error))
         raise BadInput(f"base: {url}: expected a serial port, but {why}{_others(url)}") from None

@@ -12,7 +12,7 @@ import pytest
 from blackboard.journal import Decision, decision_line
 from harvey.runner.result import MissionResult
 from harvey.simulation.run import run_mission
-from harvey.simulation.serial_body import KINDS
+from harvey.simulation.serial_body import body_kinds
 from sim.body.simulated_body import SimulatedBody
 from sim.faults.registry import find_fault_class
 from sim.stage import Stage
@@ -49,7 +49,7 @@ def test_bases_that_count_in_whole_steps_reach_within_an_inch(short_stage: Stage
     assert result.final_error_m < INCH_M
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", body_kinds())
 @pytest.mark.parametrize("fault_kind", ["link_lost", "nonsense"])
 def test_a_line_that_fails_in_mid_move_is_told_and_waited_for_and_the_goal_is_reached(
     short_stage: Stage, kind: str, fault_kind: str, monkeypatch: pytest.MonkeyPatch

@@ -5,8 +5,11 @@ The simulator's body is one implementation, by its shape alone; the drivers of t
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Literal, Protocol, get_args
 
+from harvey.hardware.drivers.bases.link import Link
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
 
 FaultKind = Literal["silent", "nonsense", "disconnected", "stalled", "watchdog", "refused", "stopped"]
@@ -54,6 +57,30 @@ class Base(Protocol):
     def close(self) -> None:
         """Stop, and let the line go. Never raises; a second call does nothing."""
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class BaseKind:
+    """A kind of base, as ``harvey drive`` names it before the colon: ``denning:/dev/ttyUSB0``.
+
+    Attributes:
+        name: of the kind.
+        baud: of its line.
+        connect: its driver over a line.
+        watchdog: what stops it when it hears nothing any more, in words.
+        connect_emulated: its driver over a line to an emulated base, where that must be otherwise: no real time passes
+            there, and two runs must send the same bytes.
+    """
+
+    name: str
+    baud: int
+    connect: Callable[[Link], Base]
+    watchdog: str
+    connect_emulated: Callable[[Link], Base] | None = None
+
+    def emulated(self, link: Link) -> Base:
+        """The driver over a line to an emulated base."""
+        return (self.connect_emulated or self.connect)(link)
 
 
 class BaseFault(Exception):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from harvey.hardware.drivers.bases.base import FaultKind
+from harvey.hardware.drivers.bases.base import BaseKind, FaultKind
 from harvey.hardware.drivers.bases.counters import step
 from harvey.hardware.drivers.bases.create2_wire import SAFE_MODE, Decoder, Report, drive, safe, stream, wake
 from harvey.hardware.drivers.bases.driver import LOOK_S, Driver
@@ -284,3 +284,9 @@ class _Way:
         right, left = self._base._right_m - self._part[0], self._base._left_m - self._part[1]
         apart, together = (right - left) / 2.0, (right + left) / 2.0
         return (self._sign * apart, together) if self._turning else (self._sign * together, apart)
+
+
+KIND = BaseKind(
+    "create2", BAUD, lambda link: Create2Base(link, guarded=True),
+    "ours, 0.5 s; it has none of its own: a cable that comes off does not stop it", Create2Base)
+"""An emulated one needs no guard: no real time passes."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
+from harvey.hardware.drivers.bases.base import BaseKind
 from harvey.hardware.drivers.bases.counters import step
 from harvey.hardware.drivers.bases.driver import LOOK_S, Driver
 from harvey.hardware.drivers.bases.link import Link
@@ -327,3 +328,6 @@ class _Way:
 def _parts(whole: float, most: float) -> list[float]:
     count = math.ceil(abs(whole) / most)
     return [whole / count] * count if count else []
+
+
+KIND = BaseKind("p2os", BAUD, P2osBase, "its own, 2 s")

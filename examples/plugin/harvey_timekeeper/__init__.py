@@ -1,0 +1,1 @@
+"""What another package can add to Harvey without an edit there: each file is one thing, each entry point names one."""

@@ -1,0 +1,47 @@
+"""Timekeeper: warns once when the battery runs short (a knowledge source with a kind of entry of its own)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Post
+from blackboard.kinds import inference
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from world_models.entries.body import MotionReport
+
+BATTERY_S = 60.0
+"""What the battery lasts; the warning comes when half of it is left."""
+
+
+@inference()
+@dataclass(frozen=True, slots=True)
+class RunningShort:
+    """The battery runs short.
+
+    Attributes:
+        left_s: what is left [s].
+    """
+
+    left_s: float
+
+    def sentence(self) -> str:
+        return f"the battery runs short: {self.left_s:.0f} s are left"
+
+
+class Timekeeper(KnowledgeSource):
+    """Warns once when half of the battery is used up, by the time that the wheels report (§3.2)."""
+
+    level = Level.GOAL
+    watches = (Watch(MotionReport, (Posted,)),)
+    writes = (RunningShort,)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        is_due = trigger.entry.value.sim_time_s > BATTERY_S / 2.0
+        return 0.1 if is_due and view.latest(RunningShort) is None else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        yield Post(RunningShort(BATTERY_S - trigger.entry.value.sim_time_s), (trigger.entry,))
