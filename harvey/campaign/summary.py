@@ -21,7 +21,9 @@ COLUMNS = ("seed", "outcome", "error mm", "inches", "milestones", "refuted", "wr
 
 
 def format_error(error_m: float) -> str:
-    """An error in millimetres and inches; beyond a metre in metres and feet."""
+    """An error in millimetres and inches; beyond a metre in metres and feet; NaN is not known."""
+    if math.isnan(error_m):
+        return "not known"
     if abs(error_m) > 1.0:
         return f"{error_m:.2f} m ({error_m / FOOT_M:.1f} feet)"
     return f"{error_m * 1000.0:.1f} mm ({error_m / INCH_M:.2f} inches)"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
@@ -14,6 +14,11 @@ from world_models.words import count
 
 if TYPE_CHECKING:
     from world_models.building.world import World
+
+SILENT_S = 3.0
+"""What takes longer than this shows a bar."""
+LARGE_BYTES = 500_000
+"""A world file of this size takes some seconds to read."""
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -41,7 +46,10 @@ def _run(args: Namespace) -> int:
 def _load(file: str, details: list[str]) -> World:
     from world_models.files.world_files import load_world
 
-    return load_world(_path(file), details=details)
+    path = _path(file)
+    if path.suffix == ".toml" and path.is_file() and path.stat().st_size > LARGE_BYTES:
+        print(f"{file}: reading", file=sys.stderr, flush=True)
+    return load_world(path, details=details)
 
 
 def _path(file: str) -> Path:
@@ -91,7 +99,7 @@ def _import(file: str, out: str | None) -> int:
 def _check(world: World, file: str) -> int:
     from world_models.building.checks import check_world
 
-    faults = check_world(world)
+    faults = check_world(world, _with_bar)
     for fault in faults:
         print(fault)
     if faults:
@@ -99,6 +107,13 @@ def _check(world: World, file: str) -> int:
         return 2
     print(f"{file}: no faults in {_inventory(world)}")
     return 0
+
+
+def _with_bar(items: Sequence[Any], what: str) -> Iterable[Any]:
+    """A bar on standard error, where it takes longer than some seconds."""
+    from tqdm import tqdm
+
+    yield from tqdm(items, desc=f"checked: {what}", file=sys.stderr, leave=False, delay=SILENT_S, mininterval=1.0)
 
 
 def _inventory(world: World) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from world_models.building.locales import Locale
 from world_models.building.outlines import distance_to_border, inside_polygon
-from world_models.building.things import STEP_M, Finding
+from world_models.building.things import STEP_M, Finding, Thing
 from world_models.building.world import World
 
 TOLERANCE_M = 0.01
@@ -23,15 +24,27 @@ OUTDOOR_EYE_M = 0.3
 """Outdoors rays start this low: walls under the sky may be low."""
 
 
-def check_world(world: World) -> list[Finding]:
-    """All findings, each kind in the order of the file; empty for a sound world."""
-    return [*world.building_faults, *_unclosed(world), *_overlapping(world), *_stepped(world), *_obstructed(world),
-            *_unreachable(world), *_misplaced(world)]
+Watched = Callable[[Sequence[Any], str], Iterable[Any]]
+"""Passes items on, one by one, and may show how far it is; the text says what they are."""
 
 
-def _unclosed(world: World) -> Iterator[Finding]:
+def pass_on(items: Sequence[Any], _what: str) -> Iterable[Any]:
+    """Show nothing."""
+    return items
+
+
+def check_world(world: World, watched: Watched = pass_on) -> list[Finding]:
+    """All findings, each kind in the order of the file; empty for a sound world.
+
+    ``watched`` may show the progress: a large world takes minutes.
+    """
+    return [*world.building_faults, *_unclosed(world, watched), *_overlapping(world, watched), *_stepped(world),
+            *_obstructed(world), *_unreachable(world), *_misplaced(world, watched), *_coinciding(world)]
+
+
+def _unclosed(world: World, watched: Watched) -> Iterator[Finding]:
     """Rooms with a gap: from a point inside, some ray meets neither a surface nor a doorway of the room."""
-    for name in world.rooms:
+    for name in watched(world.rooms, "rooms closed"):
         locale = world.locales[name]
         faces = world.faces_of(name)
         polygons = [r.polygon_world for f in faces for r in f.front]
@@ -81,8 +94,8 @@ def _clearance_m(point: NDArray[np.float64], outline: NDArray[np.float64]) -> fl
     return distance if inside_polygon(point, outline) else -distance
 
 
-def _overlapping(world: World) -> Iterator[Finding]:
-    outlines = [world.outline(name) for name in world.rooms]
+def _overlapping(world: World, watched: Watched) -> Iterator[Finding]:
+    outlines = [world.outline(name) for name in watched(world.rooms, "rooms apart")]
     for i, j in _near_pairs(outlines):
         a, b = world.rooms[i], world.rooms[j]
         if _share_height(world, a, b) and _overlap(outlines[i], outlines[j]):
@@ -160,8 +173,8 @@ def _unreachable(world: World) -> Iterator[Finding]:
             yield Finding(locale.source, f"{name}: expected open doorways from {world.rooms[0]}, got none")
 
 
-def _misplaced(world: World) -> Iterator[Finding]:
-    for thing in world.things:
+def _misplaced(world: World, watched: Watched) -> Iterator[Finding]:
+    for thing in watched(world.things, "things in their rooms"):
         outline, locale = world.outline(thing.locale), world.locales[thing.locale]
         if not all(inside_polygon(corner, outline, TOLERANCE_M) for corner in thing.footprint_world):
             yield Finding(thing.source, f"{thing.name}: expected it inside {thing.locale}, got a corner outside")
@@ -169,3 +182,16 @@ def _misplaced(world: World) -> Iterator[Finding]:
             what = (f"{thing.name}: expected it between floor and ceiling (0 .. {locale.height_m:.2f} m), "
                     f"got {thing.low_m:.2f} .. {thing.high_m:.2f} m")
             yield Finding(thing.source, what)
+
+
+def _coinciding(world: World) -> Iterator[Finding]:
+    """Things in exactly the same place: one of them was pasted twice, or is not where it should be."""
+    places: dict[tuple[Any, ...], list[Thing]] = {}
+    for thing in world.things:
+        key = (thing.locale, thing.low_m, thing.high_m, thing.footprint_world.tobytes())
+        places.setdefault(key, []).append(thing)
+    for first, *others in places.values():
+        if others:
+            more = f", and {len(others) - 1} more are there" if len(others) > 1 else ""
+            what = f"{others[0].name}: expected a place of its own, got that of {first.name}{more}"
+            yield Finding(others[0].source, what)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import socket
 from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -73,6 +76,11 @@ def said(capsys: pytest.CaptureFixture[str], argv: list[str]) -> tuple[int, str]
     (["run", "bump", "--set", "limits.max_cycles=-3"], "above 0"),
     (["run", "bump", "--seed", "0..1", "--trace"], "one seed"),
     (["run", "bump", "--nonsense"], "--nonsense"),
+    (["run", "bump", "--check", "--live"], "--check: expected it without --live"),
+    (["run", "bump", "--check", "--go-on"], "--check: expected it without --go-on"),
+    (["run", "."], "scenario: expected a name or a TOML file, got the directory ."),
+    (["emulate", "p2os", "--scenario", "bump", "--camera-port", "99999"], "expected a port from 0 to 65535"),
+    (["calibrate", "--camera", "999999999999"], "expected a device's number from 0 to 255, got 999999999999"),
     (["view", "nowhere"], "does not exist"),
     (["why", "nowhere"], "does not exist"),
     (["replay", "nowhere"], "does not exist"),
@@ -92,6 +100,36 @@ def test_bad_input_is_named(argv: list[str], told: str, tmp_path: Path, capsys: 
     code, err = said(capsys, argv)
     assert code == 2
     assert told in err
+
+
+def test_a_scenario_that_is_not_there_is_named_before_anything_begins(capsys: pytest.CaptureFixture[str]) -> None:
+    assert said(capsys, ["run", "nosuch"])[1].startswith("harvey: scenario: expected one of")
+
+
+def test_a_picture_of_one_pixel_shows_no_board(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cv2.imwrite(str(tmp_path / "dot.png"), np.zeros((1, 1), np.uint8))
+    code, err = said(capsys, ["calibrate", str(tmp_path / "dot.png"), "--out", str(tmp_path / "camera.toml")])
+    assert code == 2 and "the picture is only 1 x 1 px" in err and "Traceback" not in err
+
+
+def test_a_port_in_use_is_named_before_a_base_is_there(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        assert main(["emulate", "p2os", "--scenario", "bump", "--camera-port", port]) == 2
+    out, err = capsys.readouterr()
+    told = f"harvey: --camera-port {port}: expected a free port, got: Address already in use\n"
+    assert out == "" and err.endswith(told)
+
+
+@pytest.mark.parametrize("argv", [["why"], ["why", "--check"], ["why", "--at", "1"]])
+@pytest.mark.parametrize("journal", [b"\0" * 3000, b'{"cycle":' + b"1" * 6000 + b',"focus":"plan"}\n',
+                                     b'{"cycle":1,"pending":' + b"1" * 6000 + b"}\n"])
+def test_a_journal_that_is_none_is_refused(
+    argv: list[str], journal: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "journal.jsonl").write_bytes(journal)
+    code, err = said(capsys, [argv[0], str(tmp_path), *argv[1:]])
+    assert code == 2 and err.count("\n") == 1
 
 
 @pytest.mark.parametrize("argv", [

@@ -11,6 +11,7 @@ import sys
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -186,7 +187,7 @@ def test_a_run_that_is_still_driven_is_not_called_cut_off(
     assert capsys.readouterr().out.startswith("The run was cut off in cycle 20")
 
 
-def headed(run: Path, to: Path, **head: str) -> Path:
+def headed(run: Path, to: Path, **head: Any) -> Path:
     """The run with something else at its head."""
     again = copied(run, to, journal=(run / "journal.jsonl").read_text())
     (again / "run.json").write_text(json.dumps(json.loads((run / "run.json").read_text()) | head))
@@ -224,6 +225,20 @@ def test_a_run_of_another_program_is_called_that(
     err = capsys.readouterr().err
     assert f"note: the run {words}" in err
     assert "is not decided again as it was" in err
+
+
+def test_diff_names_each_setting_that_differs_once_and_nothing_else(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    head = json.loads((run / "run.json").read_text())
+    scenario = {**head["scenario"], "servo": {"goal": False}}
+    other = headed(run, tmp_path / "other", scenario=scenario, servo={**head["servo"], "goal": False})
+    text = (other / "journal.jsonl").read_text()
+    (other / "journal.jsonl").write_text(text.replace('"rating":0.8', '"rating":0.7', 1))
+    assert main(["diff", str(run), str(other)]) == 1
+    out = capsys.readouterr().out
+    assert "set differently: servo.goal: True against False; scenario.servo.goal: nothing against False\n" in out
+    assert out.count("scenario.servo.goal") == 1 and "description" not in out
 
 
 def test_a_run_that_is_older_than_the_names_of_its_code_and_arithmetic_is_read(

@@ -16,7 +16,7 @@ from blackboard.servoing import Discrepancy
 from experiments.paper.levels import _row
 from experiments.report import Report
 from experiments.scale.render_speed import measure_edge_offsets_px
-from harvey.campaign.summary import foreseen, one, several
+from harvey.campaign.summary import foreseen, format_error, one, several
 from harvey.dry_run import MilestonePreview
 from harvey.errors import BadInput
 from harvey.run_files.records import EntryRecord
@@ -31,6 +31,12 @@ from world_models.frames import Pose2
 from world_models.words import degrees, metres, turn
 
 FOUND = Track("door-frame", (1.0, 2.0, 3.0), "Frame-3", (10.0, 20.0), 2.5, (100.0, 80.0), (95.8, 81.5), 0.97, 0.1)
+
+
+@pytest.mark.parametrize(("error_m", "text"), [
+    (0.0033, "3.3 mm (0.13 inches)"), (13.1812, "13.18 m (43.2 feet)"), (math.nan, "not known")])
+def test_an_error_is_told_in_units_of_its_size(error_m: float, text: str) -> None:
+    assert format_error(error_m) == text
 
 
 def say(value: Any) -> str:

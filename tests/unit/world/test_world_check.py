@@ -1,6 +1,8 @@
 """What ``World.check`` finds wrong with worlds that can be read."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -54,6 +56,8 @@ def test_a_sound_house_has_no_faults() -> None:
         ("along = 2 }", "along = 3.8 }", "house.toml:10: kitchen/chest-2: expected it inside kitchen"),
         ("along = 2 }", "along = 4.8 }", "house.toml:10: chest-2: expected a place on the south wall of kitchen"),
         ("along = 2 }", "along = 2, up = 2.5 }", "house.toml:10: kitchen/chest-2: expected it between floor and"),
+        ('{ part = "chest", wall = "south", along = 2 }', ", ".join(['{ part = "chest", at = [2, 1] }'] * 3),
+         "house.toml:10: kitchen/chest-2: expected a place of its own, got that of kitchen/chest-1, and 2 more are"),
         ('"], wall = "west"', '"], wall = "east"',
          "house.toml:17: door back: expected solid wall, got the opening of middle"),
     ],
@@ -61,6 +65,19 @@ def test_a_sound_house_has_no_faults() -> None:
 def test_faults_are_told_with_their_line(old: str, new: str, expected: str) -> None:
     found = faults(old, new)
     assert any(expected in fault for fault in found), found
+
+
+def test_who_waits_for_a_large_world_sees_how_far_it_is() -> None:
+    seen: list[tuple[str, int]] = []
+
+    def watched(items: Sequence[Any], what: str) -> Iterable[Any]:
+        for number, item in enumerate(items, 1):
+            seen.append((what, number))
+            yield item
+
+    assert check_world(read_world(Source.parse(HOUSE, "house.toml")), watched) == []
+    assert seen == [(what, number) for what in ("rooms closed", "rooms apart", "things in their rooms")
+                    for number in (1, 2)]
 
 
 def test_a_room_with_a_hole_is_not_closed() -> None:
