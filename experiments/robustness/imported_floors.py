@@ -1,4 +1,4 @@
-"""Plan between any two rooms of different floors of a university, imported from IndoorGML.
+"""BuildingPlan between any two rooms of different floors of a university, imported from IndoorGML.
 
 Three searches: on the graph that came with the file; on the imported world's doorways, stairs and elevators; and
 Harvey's route for wheels, level by level (Figure 9), refined until nothing is left to refine.
@@ -19,7 +19,7 @@ from experiments.shared_data import UNIVERSITY, data_path, describe_absence
 from world_models.building.checks import check_world
 from world_models.building.passages import drivable_passages
 from world_models.building.world import World
-from world_models.files.importers import Network, import_building
+from world_models.files.importers import NavigationGraph, import_building
 from world_models.files.world_files import load_world
 
 MAX_REFINEMENTS = 20
@@ -46,7 +46,7 @@ class Pair:
 
 
 def run(quick: bool, seed: int) -> Report:
-    """Plan between all pairs; nothing is random, so ``quick`` and ``seed`` change nothing."""
+    """BuildingPlan between all pairs; nothing is random, so ``quick`` and ``seed`` change nothing."""
     path = data_path(UNIVERSITY)
     if not path.is_file():
         return Report(TITLE, COLUMNS, (), (f"Nothing was tried: {describe_absence(UNIVERSITY)}.",),
@@ -82,8 +82,8 @@ def run(quick: bool, seed: int) -> Report:
     )
 
 
-def plan_pairs(world: World, network: Network | None) -> list[Pair]:
-    """Plan between any two rooms of different floors."""
+def plan_pairs(world: World, network: NavigationGraph | None) -> list[Pair]:
+    """BuildingPlan between any two rooms of different floors."""
     pairs = []
     for rooms in combinations(world.rooms, 2):
         a, b = (world.path_of(room)[1] for room in rooms)
@@ -93,8 +93,8 @@ def plan_pairs(world: World, network: Network | None) -> list[Pair]:
     return pairs
 
 
-def _length_m(network: Network | None, origin: str, destination: str) -> float | None:
-    way = network.way(origin, destination) if network is not None else None
+def _length_m(network: NavigationGraph | None, origin: str, destination: str) -> float | None:
+    way = network.find_route(origin, destination) if network is not None else None
     if network is None or way is None:
         return None
     return float(np.sum([network.graph.edges[a, b]["length_m"] for a, b in pairwise(way)]))

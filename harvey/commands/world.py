@@ -92,7 +92,7 @@ def _import(file: str, out: str | None) -> int:
     except BuildingError as error:
         raise BadInput(str(error)) from None
     target.write_text(made.text, encoding="utf-8")
-    print(f"{made.account}\n")
+    print(f"{made.report}\n")
     return _check(load_world(target), str(target))
 
 

@@ -15,10 +15,10 @@ from ifc_house import House, box, flat
 from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.files.importers import BuildingError, import_building
-from world_models.files.importers.curves import straight_at
-from world_models.files.importers.ifc.things import climbed
-from world_models.files.importers.outlines import Floats, apart, outline_of
-from world_models.files.importers.plan import Space
+from world_models.files.importers.building_plan import Space
+from world_models.files.importers.curved_walls import straighten_wall
+from world_models.files.importers.ifc.boxes import find_climbed_spaces
+from world_models.files.importers.polygons import Floats, extract_outline, separate_outlines
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 
@@ -30,7 +30,7 @@ def imported(house: House, folder: Path) -> tuple[World, str]:
     made = import_building(house.write(folder / "house.ifc"))
     world = read_world(Source.parse(made.text))
     assert check_world(world) == []
-    return world, str(made.account)
+    return world, str(made.report)
 
 
 def areas(world: World) -> dict[str, float]:
@@ -43,7 +43,7 @@ def doors(world: World) -> set[tuple[str, ...]]:
 
 def row(house: House, gap_m: float, *, wall_m: float | None = None) -> House:
     """Rooms a, b and c of 3 by 3 m so far from each other, with walls between them, and no space boundaries."""
-    house.storey("Ground", 0.0)
+    house.storey("PlanOrigin", 0.0)
     for i, name in enumerate("abc"):
         house.space(name, box((3.0 + gap_m) * i, 0.0, (3.0 + gap_m) * i + 3.0, 3.0))
     thick = gap_m if wall_m is None else wall_m
@@ -127,7 +127,7 @@ def test_a_wall_on_the_border_of_spaces_that_touch_is_a_wall(tmp_path: Path) -> 
 
 def test_where_a_wall_ends_the_rest_is_open_and_no_railing_is(tmp_path: Path) -> None:
     house = House()
-    house.storey("Ground", 0.0)
+    house.storey("PlanOrigin", 0.0)
     for name, x in (("a", 0.0), ("b", 3.0), ("c", 6.0)):
         house.space(name, box(x, 0.0, x + 3.0, 6.0))
     house.wall(2.95, 0.0, 3.05, 3.5)
@@ -141,7 +141,7 @@ def test_where_a_wall_ends_the_rest_is_open_and_no_railing_is(tmp_path: Path) ->
 
 def test_openings_without_doors_and_virtual_boundaries_are_ways_through(tmp_path: Path) -> None:
     house = House()
-    house.storey("Ground", 0.0)
+    house.storey("PlanOrigin", 0.0)
     a, b, c = (house.space(name, box(x, 0.0, x + 3.0, 3.0)) for name, x in (("a", 0.0), ("b", 3.0), ("c", 6.2)))
     for space in (a, b):
         house.bound(space, house.rooted("IfcVirtualElement", None), "VIRTUAL")
@@ -170,7 +170,7 @@ def test_a_step_between_rooms_is_told(tmp_path: Path) -> None:
 
 def test_a_door_in_a_curved_wall(tmp_path: Path) -> None:
     house = House()
-    house.storey("Ground", 0.0)
+    house.storey("PlanOrigin", 0.0)
     house.space("round", (), shape=house.shape(house.extruded(house.circle(3.0, 3.0, 3.0), 0.0, 2.5)))
     bends = [math.pi * i / 24 - math.pi / 2 for i in range(25)]
     inner, outer = ([(3 + r * math.cos(t), 3 + r * math.sin(t)) for t in bends] for r in (3.2, 5.0))
@@ -184,7 +184,7 @@ def test_a_door_in_a_curved_wall(tmp_path: Path) -> None:
 
 def test_a_corridor_round_a_core_and_a_column(tmp_path: Path) -> None:
     house = House()
-    house.storey("Ground", 0.0)
+    house.storey("PlanOrigin", 0.0)
     hall = house.profile(box(0, 0, 12, 10), box(3, 3, 9, 7), box(10.0, 5.0, 10.4, 5.4))
     house.space("hall", (), shape=house.shape(house.extruded(hall, 0.0, 2.5)))
     house.space("core", box(3.2, 3.2, 8.8, 6.8))
@@ -197,7 +197,7 @@ def test_a_corridor_round_a_core_and_a_column(tmp_path: Path) -> None:
 
 def test_areas_over_rooms_and_rooms_told_twice_are_no_rooms(tmp_path: Path) -> None:
     house = House()
-    house.storey("Ground", 0.0)
+    house.storey("PlanOrigin", 0.0)
     house.space("gross", box(-0.3, -0.3, 6.5, 3.3), PredefinedType="GFA")
     house.space("1", box(0.0, 0.0, 3.0, 3.0))
     house.space("2", box(3.2, 0.0, 6.2, 3.0))
@@ -282,13 +282,13 @@ def test_a_lift_joins_the_shafts_over_each_other(tmp_path: Path) -> None:
 
 
 def test_stairs_over_three_storeys_pass_the_one_between() -> None:
-    square = outline_of(shapely.box(0.0, 0.0, 4.0, 4.0))
+    square = extract_outline(shapely.box(0.0, 0.0, 4.0, 4.0))
     assert square is not None
     spaces = [Space(f"s{i}", "hall", "", f"f{i}", square, 3.0 * i, 2.5) for i in range(3)]
     points = shapely.get_coordinates(shapely.box(1, 1, 2, 3))
     tower: Floats = shapely.get_coordinates(shapely.force_3d(shapely.MultiPoint(points)), include_z=True)
     tower[:, 2] = [0.0, 6.9, 3.0, 0.0, 6.0]
-    assert [(a.name, b.name) for a, b in climbed(tower, spaces)] == [("s0", "s1"), ("s1", "s2")]
+    assert [(a.name, b.name) for a, b in find_climbed_spaces(tower, spaces)] == [("s0", "s1"), ("s1", "s2")]
 
 
 def test_furniture_of_a_storey_stands_in_the_room_round_it_but_in_no_doorway(tmp_path: Path) -> None:
@@ -334,15 +334,15 @@ def test_what_cannot_be_a_world_is_told_in_a_paragraph(tmp_path: Path, capsys: p
 
 
 def test_a_straight_wall_stays_as_it_is() -> None:
-    square = outline_of(shapely.box(0.0, 0.0, 4.0, 4.0))
+    square = extract_outline(shapely.box(0.0, 0.0, 4.0, 4.0))
     assert square is not None
-    assert straight_at(square, np.array([2.0, 0.0]), np.array([1.0, 0.0]), 0.9) is None
+    assert straighten_wall(square, np.array([2.0, 0.0]), np.array([1.0, 0.0]), 0.9) is None
 
 
 def test_a_room_within_a_room_leaves_it_what_is_round_it() -> None:
     bounds = {"hall": (0.0, 0.0, 9.0, 9.0), "core": (3.0, 3.0, 6.0, 6.0)}
-    outlines = {name: outline_of(shapely.box(*bound)) for name, bound in bounds.items()}
-    rooms, _ = apart({name: outline for name, outline in outlines.items() if outline is not None})
+    outlines = {name: extract_outline(shapely.box(*bound)) for name, bound in bounds.items()}
+    rooms, _ = separate_outlines({name: outline for name, outline in outlines.items() if outline is not None})
     shapes = {name: shapely.Polygon(outline) for name, outline in rooms.items()}
     assert shapes["hall"].intersection(shapes["core"]).area == 0.0
     assert shapes["hall"].area == pytest.approx(72.0, abs=0.8)

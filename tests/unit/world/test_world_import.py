@@ -14,10 +14,15 @@ from harvey.cli import main
 from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.files.importers import BuildingError, ImportedBuilding, import_building
-from world_models.files.importers.cuts import door_between, wide_opening
-from world_models.files.importers.outlines import apart, cleaned, facing, squared
-from world_models.files.importers.plan import Furnishing, Gap, Names, Space, slug
-from world_models.files.importers.things import bounding_steps, put_inside
+from world_models.files.importers.building_plan import Furnishing, Names, Space, WallOpening, slug
+from world_models.files.importers.furnishings import build_bounding_boxes, fit_into_room
+from world_models.files.importers.openings import place_door, place_wide_opening
+from world_models.files.importers.polygons import (
+    clean_outline,
+    find_facing_stretches,
+    separate_outlines,
+    square_outline,
+)
 from world_models.files.world_files import load_world
 
 DATA = Path(__file__).parents[4] / "shared" / "data" / "buildings"
@@ -55,7 +60,7 @@ def test_the_duplex_apartment_is_a_world_without_faults(duplex: Building) -> Non
     assert len(world.rooms) == 21
     between_rooms = {d.between for d in world.doorways if d.name.startswith("door")}
     assert len(between_rooms) == 10
-    assert "14 of 14 doors" in str(made.account) and "24 of 24 windows" in str(made.account)
+    assert "14 of 14 doors" in str(made.report) and "24 of 24 windows" in str(made.report)
 
 
 @no_ifc
@@ -105,7 +110,7 @@ def test_the_university_plans_between_any_two_rooms_of_different_floors(universi
     pairs = [(a, b) for a, b in combinations(world.rooms, 2) if world.locale(a).parent != world.locale(b).parent]
     assert len(pairs) == 166
     for a, b in pairs:
-        way = network.way(a, b)
+        way = network.find_route(a, b)
         assert way is not None, (a, b)
         assert network.graph.nodes[way[0]]["floor"] == world.locale(a).parent
         assert network.graph.nodes[way[-1]]["floor"] == world.locale(b).parent
@@ -141,50 +146,50 @@ def test_trips_in_the_duplex_are_between_rooms_that_wheels_can_reach(duplex: Bui
 
 
 def test_touching_rooms_are_put_apart_and_opened() -> None:
-    rooms, changed = apart({"a": ROOM, "b": np.add(ROOM, [4.0, 0.0]), "c": np.add(ROOM, [20.0, 0.0])})
+    rooms, changed = separate_outlines({"a": ROOM, "b": np.add(ROOM, [4.0, 0.0]), "c": np.add(ROOM, [20.0, 0.0])})
     assert changed == ["a", "b"] and np.array_equal(rooms["c"], np.add(ROOM, [20.0, 0.0]))
-    cut = wide_opening("a-to-b", "a", "b", rooms, 2.0, [], 0.1)
+    cut = place_wide_opening("a-to-b", "a", "b", rooms, 2.0, [], 0.1)
     assert cut is not None and cut.between == ("a", "b") and 2.5 < cut.width_m < 3.0
-    assert wide_opening("a-to-c", "a", "c", rooms, 2.0, [], 0.1) is None
+    assert place_wide_opening("a-to-c", "a", "c", rooms, 2.0, [], 0.1) is None
 
 
 def test_a_door_goes_where_it_is_and_not_where_no_wall_is() -> None:
     rooms = {"a": ROOM, "b": np.add(ROOM, [4.2, 0.0])}
-    found = door_between(Gap("d", "floor", np.array([4.1, 1.0]), 0.8, 2.0), rooms, [("a", "b")])
+    found = place_door(WallOpening("d", "floor", np.array([4.1, 1.0]), 0.8, 2.0), rooms, [("a", "b")])
     assert found is not None
     assert (found[0].side, found[0].along_m, found[0].width_m) == (1, pytest.approx(1.0), pytest.approx(0.8))
-    assert door_between(Gap("d", "floor", np.array([1.0, 1.5]), 0.8, 2.0), rooms, [("a", "b")]) is None
+    assert place_door(WallOpening("d", "floor", np.array([1.0, 1.5]), 0.8, 2.0), rooms, [("a", "b")]) is None
 
 
 def test_facing_needs_a_wall_between() -> None:
-    assert facing("a", ROOM, "b", np.add(ROOM, [4.2, 0.0]))[0].gap_m == pytest.approx(0.2)
-    assert facing("a", ROOM, "b", np.add(ROOM, [5.0, 0.0])) == []
-    assert facing("a", ROOM, "b", np.add(ROOM, [4.2, 2.9])) == []
+    assert find_facing_stretches("a", ROOM, "b", np.add(ROOM, [4.2, 0.0]))[0].gap_m == pytest.approx(0.2)
+    assert find_facing_stretches("a", ROOM, "b", np.add(ROOM, [5.0, 0.0])) == []
+    assert find_facing_stretches("a", ROOM, "b", np.add(ROOM, [4.2, 2.9])) == []
 
 
 def test_crooked_walls_are_squared_and_spoilt_outlines_refused() -> None:
     crooked = np.add(ROOM, [(0.0, 0.0), (0.0, 0.1), (0.1, 0.0), (0.0, 0.1)])
-    square = squared(crooked)
+    square = square_outline(crooked)
     ahead = np.roll(square, -1, axis=0) - square
     assert np.abs(ahead).min(axis=1).max() < 1e-9
-    assert cleaned(np.array([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)])) is None
-    assert cleaned(np.array([(0.0, 0.0), (1.0, np.nan), (2.0, 1.0)])) is None
+    assert clean_outline(np.array([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)])) is None
+    assert clean_outline(np.array([(0.0, 0.0), (1.0, np.nan), (2.0, 1.0)])) is None
 
 
 def test_furniture_in_a_wall_is_moved_out_of_it_or_left_out() -> None:
     space = Space("a", "room", "A", "floor", ROOM, 3.0, 2.5)
     box = ((-0.5, 0.5, -0.3, 0.3, 3.0, 3.9),)
-    placed = put_inside(Furnishing("t", "t", "a", np.array([0.4, 1.0]), 0.0, box), ROOM, space)
+    placed = fit_into_room(Furnishing("t", "t", "a", np.array([0.4, 1.0]), 0.0, box), ROOM, space)
     assert placed is not None and placed.at[0] == pytest.approx(0.5, abs=0.01) and placed.boxes[0][4:] == (
         0.0, pytest.approx(0.9))
-    assert put_inside(Furnishing("t", "t", "a", np.array([9.0, 1.0]), 0.0, box), ROOM, space) is None
+    assert fit_into_room(Furnishing("t", "t", "a", np.array([9.0, 1.0]), 0.0, box), ROOM, space) is None
     high = ((-0.5, 0.5, -0.3, 0.3, 9.0, 9.9),)
-    assert put_inside(Furnishing("t", "t", "a", np.array([2.0, 1.0]), 0.0, high), ROOM, space) is None
+    assert fit_into_room(Furnishing("t", "t", "a", np.array([2.0, 1.0]), 0.0, high), ROOM, space) is None
 
 
 def test_a_flight_of_stairs_rises_box_by_box() -> None:
     treads = np.array([(x, y, 0.2 * x) for x in range(11) for y in (0.0, 1.0)] + [(0.0, 0.0, 0.0)])
-    tops = [box[5] for box in bounding_steps(treads, 5)]
+    tops = [box[5] for box in build_bounding_boxes(treads, 5)]
     assert len(tops) == 5 and tops == sorted(tops) and tops[-1] == pytest.approx(2.0)
 
 

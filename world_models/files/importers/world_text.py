@@ -1,4 +1,4 @@
-"""A laid-out building as a world file that people can read and change."""
+"""The text of a world file from a layout, for people to read and change."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from world_models.files.importers.cuts import Cut, Pane
+from world_models.files.importers.building_plan import Furnishing, Space, Storey, Window
 from world_models.files.importers.layout import Layout
-from world_models.files.importers.outlines import Floats, middle
-from world_models.files.importers.plan import Furnishing, Space, Storey, Window
+from world_models.files.importers.openings import PlacedOpening, PlacedWindow
+from world_models.files.importers.polygons import Floats, find_center
 
 HEAD = """\
 [finishes]   # none of these is in the building file
@@ -47,14 +47,14 @@ def world_text(layout: Layout) -> str:
     for name in layout.rooms:
         lines += _room(layout, plan.space(name))
     lines += ["[doors]", *(_door(layout, cut) for cut in layout.cuts), ""]
-    if plan.ways:
+    if plan.links:
         lines += ["[links]   # between rooms that share no wall; x, y, heading in degrees of the stops in both"]
-        lines += [_link(layout, way.name, way.kind, way.between) for way in plan.ways]
+        lines += [_link(layout, way.name, way.kind, way.between) for way in plan.links]
     return "\n".join(lines).rstrip() + "\n"
 
 
 def corner(outline: Floats) -> Floats:
-    """(2,) where a room's own frame begins on the plan of its storey."""
+    """(2,) origin of a room's own coordinate frame on the plan of its storey [m]."""
     return np.asarray(outline.min(axis=0))
 
 
@@ -82,20 +82,22 @@ def _things(layout: Layout, space: Space, outline: Floats) -> Iterator[str]:
     taken: set[str] = set()
     for pane, window in layout.panes:
         if pane.room == space.name:
-            yield _pane(pane, window, space, _new(window.name, taken))
+            yield _pane(pane, window, space, _make_unique(window.name, taken))
     for thing in layout.furnishings.get(space.name, ()):
-        yield _thing(thing, corner(outline), _new(thing.name, taken))
+        yield _thing(thing, corner(outline), _make_unique(thing.name, taken))
 
 
-def _new(name: str, taken: set[str]) -> str:
-    number = 1
-    while (told := name if number == 1 else f"{name}-{number}") in taken:
+def _make_unique(name: str, taken: set[str]) -> str:
+    """The name, with the first free number from 2 on where it is taken."""
+    unique, number = name, 1
+    while unique in taken:
         number += 1
-    taken.add(told)
-    return told
+        unique = f"{name}-{number}"
+    taken.add(unique)
+    return unique
 
 
-def _pane(pane: Pane, window: Window, space: Space, name: str) -> str:
+def _pane(pane: PlacedWindow, window: Window, space: Space, name: str) -> str:
     sill = max(0.0, window.sill_m - space.floor_m)
     top = min(window.sill_m + window.height_m - space.floor_m, space.height_m - 0.1)
     box = _box((-pane.width_m / 2, pane.width_m / 2, 0.0, 0.05, 0.0, max(top - sill, 0.02)))
@@ -115,7 +117,7 @@ def _box(box: tuple[float, ...]) -> str:
     return ", ".join(f"{axis} = [{_row(box[2 * i : 2 * i + 2])}]" for i, axis in enumerate("xyz"))
 
 
-def _door(layout: Layout, cut: Cut) -> str:
+def _door(layout: Layout, cut: PlacedOpening) -> str:
     names = ", ".join(_text(name) for name in cut.between)
     shown = ", open = true" if cut.is_open else ""
     return (f'{_text(cut.name)} = {{ between = [{names}], wall = "side-{cut.side}", along = {_n(cut.along_m)}, '
@@ -126,7 +128,7 @@ def _link(layout: Layout, name: str, kind: str, between: tuple[str, str]) -> str
     stops = []
     for room in between:
         outline = layout.rooms[room]
-        stops.append(f"[{_row(middle(outline, []) - corner(outline))}, 0]")
+        stops.append(f"[{_row(find_center(outline, []) - corner(outline))}, 0]")
     names = ", ".join(_text(room) for room in between)
     return f"{_text(name)} = {{ kind = {_text(kind)}, between = [{names}], stops = [{', '.join(stops)}] }}"
 

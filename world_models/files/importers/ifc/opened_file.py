@@ -1,4 +1,4 @@
-"""An opened IFC file, and the plan that is made of it."""
+"""An opened IFC file, and the building plan that is read from it."""
 
 from __future__ import annotations
 
@@ -8,44 +8,45 @@ from typing import Any, NamedTuple
 
 import shapely
 
+from world_models.files.importers.building_plan import BuildingPlan, Names, slug
 from world_models.files.importers.ifc.relations import name_of
-from world_models.files.importers.ifc.shapes import Body, Ground
-from world_models.files.importers.outlines import Floats
-from world_models.files.importers.plan import Names, Plan, slug
+from world_models.files.importers.ifc.shapes import Body, PlanOrigin
+from world_models.files.importers.polygons import Floats
 
 READ_ERRORS = (RuntimeError, ValueError, TypeError, AttributeError, IndexError, KeyError, OverflowError)
-"""What ifcopenshell and the geometry of a spoilt file raise."""
+"""What ifcopenshell and the geometry of a broken file raise."""
 ELEMENT_S = 20.0
-"""An element that takes longer to be read is given up, and the file with it."""
-MANY = 3
-"""Elements that are left out for one reason are told together if they are more."""
+"""Time limit to read one element; beyond it the file is given up."""
+MAX_LISTED = 3
+"""More elements that are left out for the same reason are reported together."""
 
 
-class Next(NamedTuple):
-    """What the reading process does next, and how long that may take."""
+class Progress(NamedTuple):
+    """What the reading process does next, and its time limit."""
 
     doing: str
     limit_s: float
 
 
 def first_line(error: Exception) -> str:
-    """What an error says, in short."""
+    """The first line of an error's text, shortened."""
     return (str(error).strip() or type(error).__name__).splitlines()[0][:200]
 
 
 @dataclass
 class IfcFile:
-    """What is read from, and what is known by then.
+    """The file, and what is known of it while it is read.
 
     Attributes:
-        stem, source: name of the file, without and with its ending.
+        stem, source: name of the file without and with its suffix.
         model: the file as ifcopenshell has it.
-        shape: the shape of an element; told to be rough, also from its bounding box or its lines on the plan.
-        height: how high an element is placed, in the file's unit.
-        tell: hears what is done next.
+        shape: reads the shape of an element; with True also roughly, from its bounding box or its lines on the plan.
+        height: reads the height of an element's placement, in the file's unit.
+        send: takes progress messages.
         unit_m: the file's unit of length [m].
-        ground: where the plan's zero is in the file, and how it is turned; known once the spaces are.
-        by_id: the plan's name of each space of the file. floors: by that name, where one can stand in it.
+        origin: origin and direction of the plan in the file; known once the spaces are.
+        by_id: the plan's name of each space, by the file's id.
+        floors: the floor polygon of each space, by name.
     """
 
     stem: str
@@ -53,20 +54,20 @@ class IfcFile:
     model: Any
     shape: Callable[[Any, bool], Body]
     height: Callable[[Any], float | None]
-    tell: Callable[[Next], None]
+    send: Callable[[Progress], None]
     unit_m: float = 1.0
-    plan: Plan = field(init=False)
+    plan: BuildingPlan = field(init=False)
     names: Names = field(init=False)
-    ground: Ground = field(init=False)
+    origin: PlanOrigin = field(init=False)
     by_id: dict[int, str] = field(default_factory=dict)
     floors: dict[str, shapely.Polygon] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         title = slug(self.stem) or "building"
-        self.plan, self.names = Plan(title, self.source), Names(title)
+        self.plan, self.names = BuildingPlan(title, self.source), Names(title)
 
     def all(self, *kinds: str) -> list[Any]:
-        """The elements of some kinds; none where the schema does not know one."""
+        """All elements of these kinds; kinds that the schema does not know have none."""
         found: list[Any] = []
         for kind in kinds:
             try:
@@ -76,35 +77,36 @@ class IfcFile:
         return found
 
     def each(self, kind: str, read: Callable[[Any], None]) -> None:
-        """Read every element of a kind; those that cannot be read are left out and named."""
+        """Read every element of a kind; those that cannot be read are left out and reported."""
         failed: dict[str, list[str]] = {}
         for element in self.all(kind):
-            self.next(element)
+            self.report_progress(element)
             try:
                 read(element)
             except READ_ERRORS as error:
                 failed.setdefault(first_line(error), []).append(f"#{element.id()} {name_of(element)}".rstrip())
         for why, which in failed.items():
-            if len(which) > MANY:
-                self.plan.account.left_out.append(f"{len(which)} of {kind}: {why} ({', '.join(which[:MANY])}, ...)")
+            if len(which) > MAX_LISTED:
+                listed = ", ".join(which[:MAX_LISTED])
+                self.plan.report.left_out.append(f"{len(which)} of {kind}: {why} ({listed}, ...)")
             else:
-                self.plan.account.left_out += [f"{kind} {label}: {why}" for label in which]
+                self.plan.report.left_out += [f"{kind} {label}: {why}" for label in which]
 
-    def next(self, element: Any) -> None:
-        """Tell that an element is read now."""
-        self.tell(Next(f"reading {element.is_a()} #{element.id()}", ELEMENT_S))
+    def report_progress(self, element: Any) -> None:
+        """Report that an element is read now, which starts its time limit."""
+        self.send(Progress(f"reading {element.is_a()} #{element.id()}", ELEMENT_S))
 
     def body(self, element: Any) -> Body:
-        """Its shape on the plan's ground. Raises ValueError, or what ifcopenshell raises, where it has none."""
-        return self.ground.under(self.shape(element, False))
+        """Shape of an element on the plan. Raises ValueError, or what ifcopenshell raises, where it has none."""
+        return self.origin.place_on_plan(self.shape(element, False))
 
     def body_of(self, element: Any) -> Body | None:
-        """Its shape where it has one."""
+        """Shape of an element on the plan; None where it has none."""
         try:
             return self.body(element)
         except READ_ERRORS:
             return None
 
-    def away(self, space: str, point: Floats) -> float:
-        """How far a point is from where one can stand in a space, on the plan [m]."""
+    def distance_m(self, space: str, point: Floats) -> float:
+        """Distance on the plan of a point (2,) from the floor of a space [m]."""
         return float(self.floors[space].distance(shapely.Point(point)))

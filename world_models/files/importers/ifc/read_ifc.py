@@ -1,4 +1,4 @@
-"""IFC (ISO 16739) building files: spaces, doors, windows, stairs and furniture, read with ifcopenshell (an extra)."""
+"""Reading IFC (ISO 16739) building files with ifcopenshell (an extra), in a process of its own."""
 
 from __future__ import annotations
 
@@ -12,94 +12,96 @@ from typing import Any
 
 import numpy as np
 
-from world_models.files.importers.ifc.opened_file import READ_ERRORS, IfcFile, Next, first_line
-from world_models.files.importers.ifc.reader import plan_of
+from world_models.files.importers.building_plan import BuildingError, BuildingPlan
+from world_models.files.importers.ifc.opened_file import READ_ERRORS, IfcFile, Progress, first_line
+from world_models.files.importers.ifc.plan_reader import read_plan
 from world_models.files.importers.ifc.shapes import Body
-from world_models.files.importers.plan import BuildingError, Plan
 
-TAIL = 65536
+TAIL_BYTES = 65536
+"""How much of a file's start and end is searched for its first and last line."""
 START_S, OPEN_S, OPEN_S_PER_MB = 60.0, 10.0, 5.0
-"""A file that takes longer to open is given up."""
+"""Time limits to start the process and to open a file; beyond these the file is given up."""
 
 
-def read_ifc(path: Path) -> Plan:
-    """What is in an IFC file. Raises BuildingError where it cannot be read, or ifcopenshell is not installed.
+def read_ifc(path: Path) -> BuildingPlan:
+    """The building plan of an IFC file, read in a process of its own: a broken file may crash or hang native code.
 
-    The file is read in a process of its own: a spoilt one may end or hang the library's native code.
+    Raises:
+        BuildingError: the file cannot be read, or ifcopenshell is not installed.
     """
     if find_spec("ifcopenshell") is None:
         raise BuildingError(f"{path.name}: reading IFC takes ifcopenshell, which is not installed: "
                             ".venv/bin/pip install '.[ifc]'")
     context = multiprocessing.get_context("spawn")
     answers, sender = context.Pipe(duplex=False)
-    child = context.Process(target=_answer, args=(path, sender), daemon=True)
+    child = context.Process(target=_serve, args=(path, sender), daemon=True)
     child.start()
     sender.close()
     try:
-        answer = heard(path, answers)
+        answer = await_answer(path, answers)
     except EOFError:
         answer = f"{path.name}: expected an IFC file, got one that ends ifcopenshell"
     finally:
         child.kill()
         child.join()
         answers.close()
-    if isinstance(answer, Plan):
+    if isinstance(answer, BuildingPlan):
         return answer
     raise BuildingError(answer)
 
 
-def heard(path: Path, answers: Connection) -> Plan | str:
-    """What the reading process says in the end; on the way it tells what it is about to do."""
+def await_answer(path: Path, answers: Connection) -> BuildingPlan | str:
+    """The plan or the error text that the reading process sends, each step within the time limit that it announced."""
     limit_s, doing = START_S, "starting to read"
     while answers.poll(limit_s):
-        said: Next | Plan | str = answers.recv()
-        if not isinstance(said, Next):
-            return said
-        limit_s, doing = said.limit_s, said.doing
+        message: Progress | BuildingPlan | str = answers.recv()
+        if not isinstance(message, Progress):
+            return message
+        limit_s, doing = message.limit_s, message.doing
     return (f"{path.name}: expected an IFC file, got one that ifcopenshell does not get done with: {doing} was given up"
             f" after {limit_s:.0f} s")
 
 
-def _answer(path: Path, sender: Connection) -> None:
-    """What the reading process does: sends what it is about, and in the end a plan, or what is wrong with the file."""
+def _serve(path: Path, sender: Connection) -> None:
+    """The reading process: sends its progress, and in the end a plan or an error text."""
     try:
         sender.send(_read(path, sender.send))
     except BuildingError as error:
         sender.send(str(error))
 
 
-def _read(path: Path, tell: Callable[[Next], None]) -> Plan:
+def _read(path: Path, send: Callable[[Progress], None]) -> BuildingPlan:
     import ifcopenshell
     import ifcopenshell.geom
 
     try:
-        tell(Next("opening it", OPEN_S + OPEN_S_PER_MB * path.stat().st_size / 1e6))
-        if _cut_off(path):
+        send(Progress("opening it", OPEN_S + OPEN_S_PER_MB * path.stat().st_size / 1e6))
+        if _is_truncated(path):
             raise ValueError("one that is cut off: END-ISO-10303-21; is missing")
         plain = path.read_bytes().isascii()
-        model = ifcopenshell.open(str(path)) if plain else ifcopenshell.file.from_string(_plain(path))
+        model = ifcopenshell.open(str(path)) if plain else ifcopenshell.file.from_string(_to_ascii(path))
     except (*READ_ERRORS, OSError, ifcopenshell.Error) as error:
         raise BuildingError(f"{path.name}: expected an IFC file, got: {first_line(error)}") from None
-    file = IfcFile(path.stem, path.name, model, _shapes(), _height, tell)
+    file = IfcFile(path.stem, path.name, model, _build_shape_reader(), _read_height, send)
     try:
         if not _has_unit(model):
-            _take_metres(model)
-            file.plan.account.guessed.append("the file says nothing of its unit of length: taken for metres")
-        file.unit_m = _unit_m(model)
-        return plan_of(file)
+            _assume_metres(model)
+            file.plan.report.guessed.append("the file says nothing of its unit of length: taken for metres")
+        file.unit_m = _read_unit_m(model)
+        return read_plan(file)
     except READ_ERRORS as error:
         if isinstance(error, BuildingError):
             raise
         raise BuildingError(f"{path.name}: expected an IFC file with spaces, got: {first_line(error)}") from None
 
 
-def _cut_off(path: Path) -> bool:
+def _is_truncated(path: Path) -> bool:
     data = path.read_bytes()
-    return b"ISO-10303-21;" in data[:TAIL] and b"END-ISO-10303-21" not in data[-TAIL:]
+    return b"ISO-10303-21;" in data[:TAIL_BYTES] and b"END-ISO-10303-21" not in data[-TAIL_BYTES:]
 
 
-def _plain(path: Path) -> str:
-    """The text of a file that has letters with accents as they are, as some programs write them: spelled out."""
+def _to_ascii(path: Path) -> str:
+    """The text of a file with every non-ASCII letter escaped as STEP wants it; some programs do not escape them."""
     data = path.read_bytes()
     try:
         text = data.decode("utf-8")
@@ -108,8 +110,8 @@ def _plain(path: Path) -> str:
     return re.sub(r"[^\x00-\x7f]+", lambda found: f"\\X4\\{found[0].encode('utf-32-be').hex().upper()}\\X0\\", text)
 
 
-def _shapes() -> Callable[[Any, bool], Body]:
-    """How an element's shape is had from ifcopenshell; roughly: also from its bounding box, or lines on the plan."""
+def _build_shape_reader() -> Callable[[Any, bool], Body]:
+    """A function for the shape of an element; with ``roughly`` also from its bounding box or its lines on the plan."""
     import ifcopenshell.geom
 
     geometry: Any = ifcopenshell.geom
@@ -121,8 +123,8 @@ def _shapes() -> Callable[[Any, bool], Body]:
         try:
             made = geometry.create_shape(rough if roughly else settings, element)
         except RuntimeError:
-            told = "a shape that cannot be read" if getattr(element, "Representation", None) else "no shape"
-            raise ValueError(f"the file gives it {told}") from None
+            given = "a shape that cannot be read" if getattr(element, "Representation", None) else "no shape"
+            raise ValueError(f"the file gives it {given}") from None
         points = np.array(made.geometry.verts, float).reshape(-1, 3)
         frame = np.array(made.transformation.matrix, float).reshape(4, 4).T[:3]
         if not len(points) or not np.isfinite(points).all() or not np.isfinite(frame).all():
@@ -133,8 +135,8 @@ def _shapes() -> Callable[[Any, bool], Body]:
     return shape
 
 
-def _height(element: Any) -> float | None:
-    """Where an element is placed above the file's zero, in the file's unit; None where that is not said."""
+def _read_height(element: Any) -> float | None:
+    """Height of an element's placement above the file's zero, in the file's unit; None where it has none."""
     import ifcopenshell.util.placement
 
     if getattr(element, "ObjectPlacement", None) is None:
@@ -147,14 +149,14 @@ def _has_unit(model: Any) -> bool:
                for unit in getattr(project.UnitsInContext, "Units", None) or ())
 
 
-def _take_metres(model: Any) -> None:
+def _assume_metres(model: Any) -> None:
     for project in model.by_type("IfcProject"):
         units = tuple(getattr(project.UnitsInContext, "Units", None) or ())
         metre = model.create_entity("IfcSIUnit", UnitType="LENGTHUNIT", Name="METRE")
         project.UnitsInContext = model.create_entity("IfcUnitAssignment", Units=[*units, metre])
 
 
-def _unit_m(model: Any) -> float:
+def _read_unit_m(model: Any) -> float:
     """The file's unit of length [m]."""
     import ifcopenshell.util.unit
 

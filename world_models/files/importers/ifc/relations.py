@@ -1,4 +1,4 @@
-"""What an element of an IFC file is called, is part of, stands in and is filled with."""
+"""Names, containers, hosts and fillings of the elements of an IFC file."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Any
 
 
 def name_of(element: Any) -> str:
-    """Its name, or nothing."""
+    """Its name, or an empty text."""
     return str(getattr(element, "Name", None) or "").strip()
 
 
 def containers(element: Any) -> Iterator[Any]:
-    """What an element is part of or contained in, from the nearest up."""
+    """The elements that this one is part of or contained in, from the nearest up."""
     seen: set[int] = set()
     while element is not None and element.id() not in seen:
         seen.add(element.id())
@@ -30,5 +30,5 @@ def host(opening: Any) -> Any:
 
 
 def filling(opening: Any) -> list[Any]:
-    """The doors and windows in an opening: some programs bound a space by the opening alone."""
+    """The doors and windows in an opening; some programs bound a space by the opening alone."""
     return [relation.RelatedBuildingElement for relation in getattr(opening, "HasFillings", ())]

@@ -1,1 +1,8 @@
-"""IndoorGML (OGC 14-005) building files."""
+"""What does an IndoorGML file (OGC 14-005) say of a building?
+
+In reading order:
+
+* :mod:`.xml_reader`: XML from anywhere, without entities, with limits.
+* :mod:`.navigation_graph`: the layers of the file, and the graph to plan on.
+* :mod:`.read_indoor_gml`: rooms, doors and links, into a building plan.
+"""

@@ -1,4 +1,4 @@
-"""Outlines as building files have them: cleaned, kept apart by walls, squared, and where two face each other."""
+"""Outlines of building files: cleaned, separated by walls, squared, and the stretches where two face each other."""
 
 from __future__ import annotations
 
@@ -15,20 +15,24 @@ from world_models.building.outlines import is_simple
 Floats = NDArray[np.float64]
 
 THIN_WALL_M = 0.05
-"""Of the wall that is put between two spaces which have none."""
-THICKEST_M = 0.55
-SHORTEST_SIDE_M = 0.03
-CORNERS, COARSE_M = 24, 0.03
-"""An outline of more corners than this is curved: it is drawn with sides that are off it by up to so much."""
-SMALLEST_HOLE_M2 = 0.05
-COVERED = 0.6
-"""A space of which others, no larger, cover more than this part is no room: an area to pay for, or twice told."""
-STRAIGHT = math.radians(8.0)
+"""Thickness of the wall that is put between two spaces without one."""
+MAX_WALL_M = 0.55
+MIN_SIDE_M = 0.03
+MAX_CORNERS, FINE_TOLERANCE_M, COARSE_TOLERANCE_M = 24, 0.002, 0.03
+"""Outlines are simplified (Douglas-Peucker) to the fine tolerance; one that keeps more corners is curved, and is
+simplified to the coarse one."""
+MIN_HOLE_M2 = 0.05
+MIN_AREA_M2 = 0.05
+MAX_COORDINATE_M = 5000.0
+MAX_COVERED = 0.6
+"""A space of which others, no larger, cover more than this part is no room: a zone, or described twice."""
+MAX_SKEW_RAD = math.radians(8.0)
+"""Sides within this angle of an axis are made parallel to it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Where a side of room ``a`` has a side of room ``b`` behind it: from ``low_m`` to ``high_m`` along the side."""
+    """The part, ``low_m`` to ``high_m``, of a side of room ``a`` with a side of room ``b`` ``gap_m`` behind it."""
 
     a: str
     side: int
@@ -38,35 +42,35 @@ class Stretch:
     gap_m: float
 
 
-def cleaned(points: Floats) -> Floats | None:
-    """(k, 2) a simple outline, counter-clockwise, without needless corners, in millimetres' tenths; None: no area."""
-    if len(points) < 3 or not np.isfinite(points).all() or np.abs(points).max() > 5000.0:
+def clean_outline(points: Floats) -> Floats | None:
+    """A simple counter-clockwise outline (k, 2) from points (n, 2), simplified, rounded to 0.1 mm; None: no area."""
+    if len(points) < 3 or not np.isfinite(points).all() or np.abs(points).max() > MAX_COORDINATE_M:
         return None
     polygon = shapely.Polygon(points)
-    return outline_of(polygon if polygon.is_valid else shapely.make_valid(polygon))
+    return extract_outline(polygon if polygon.is_valid else shapely.make_valid(polygon))
 
 
-def outline_of(shape: shapely.Geometry) -> Floats | None:
-    """(k, 2) the outline of the largest polygon of a shape, as :func:`cleaned` makes it."""
-    polygons = [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon" and p.area > 0.05]
+def extract_outline(shape: shapely.Geometry) -> Floats | None:
+    """The outline (k, 2) of the largest polygon of a shape, simplified; None where it has none."""
+    polygons = [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon" and p.area > MIN_AREA_M2]
     if not polygons:
         return None
-    best = without_holes(max(polygons, key=lambda p: p.area))
-    for tolerance_m in (0.002, COARSE_M):
+    best = cut_holes_open(max(polygons, key=lambda p: p.area))
+    for tolerance_m in (FINE_TOLERANCE_M, COARSE_TOLERANCE_M):
         ring = shapely.Polygon(best.exterior).simplify(tolerance_m)
         outline = np.round(shapely.get_coordinates(shapely.orient_polygons(ring).exterior)[:-1], 4)
-        outline = _without_short_sides(outline)
-        if len(outline) <= CORNERS:
+        outline = _remove_short_sides(outline)
+        if len(outline) <= MAX_CORNERS:
             break
     return outline if len(outline) >= 3 and is_simple(outline) else None
 
 
-def without_holes(polygon: shapely.Polygon) -> shapely.Polygon:
-    """The polygon with a thin wall from each of its holes to its border: a room round a core is drawn as one that ends.
+def cut_holes_open(polygon: shapely.Polygon) -> shapely.Polygon:
+    """The polygon with a slit from each hole to its border, as outlines have no holes.
 
-    An outline has no holes, and to fill them would put the room over those that lie in them.
+    To fill the holes would put the room over the rooms that lie in them.
     """
-    while holes := [ring for ring in polygon.interiors if shapely.Polygon(ring).area > SMALLEST_HOLE_M2]:
+    while holes := [ring for ring in polygon.interiors if shapely.Polygon(ring).area > MIN_HOLE_M2]:
         across = shapely.shortest_line(holes[0], polygon.exterior)
         slit = across.buffer(THIN_WALL_M / 2, cap_style="square") if across.length else across.buffer(THIN_WALL_M)
         parts = [p for p in shapely.get_parts(polygon.difference(slit)) if p.geom_type == "Polygon"]
@@ -77,12 +81,12 @@ def without_holes(polygon: shapely.Polygon) -> shapely.Polygon:
     return polygon
 
 
-def _without_short_sides(outline: Floats) -> Floats:
+def _remove_short_sides(outline: Floats) -> Floats:
     while len(outline) > 3:
         lengths = np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1)
         at = int(np.argmin(lengths))
-        straight = _bends(outline) < 1e-3
-        if lengths[at] < SHORTEST_SIDE_M:
+        straight = _corner_heights(outline) < 1e-3
+        if lengths[at] < MIN_SIDE_M:
             outline = np.delete(outline, (at + 1) % len(outline), axis=0)
         elif straight.any():
             outline = np.delete(outline, int(np.argmax(straight)), axis=0)
@@ -91,20 +95,20 @@ def _without_short_sides(outline: Floats) -> Floats:
     return outline
 
 
-def _bends(outline: Floats) -> Floats:
-    """(k,) how far each corner lies off the line between its neighbours [m]."""
+def _corner_heights(outline: Floats) -> Floats:
+    """(k,) distance of each corner from the line between its neighbours [m]."""
     before, after = np.roll(outline, 1, axis=0), np.roll(outline, -1, axis=0)
     base, arm = after - before, outline - before
     area = np.abs(base[:, 0] * arm[:, 1] - base[:, 1] * arm[:, 0])
     return np.asarray(area / np.maximum(np.linalg.norm(base, axis=1), 1e-9))
 
 
-def apart(outlines: Mapping[str, Floats]) -> tuple[dict[str, Floats], list[str]]:
-    """The outlines of a storey with a thin wall between all that touch or overlap; and the names of those changed.
+def separate_outlines(outlines: Mapping[str, Floats]) -> tuple[dict[str, Floats], list[str]]:
+    """The outlines of a storey with a thin wall between those that touch or overlap, and the names of those changed.
 
-    What others cover is not among them.
+    Outlines that others cover are left out.
     """
-    shapes = _uncovered({name: shapely.Polygon(outline) for name, outline in outlines.items()})
+    shapes = _drop_covered({name: shapely.Polygon(outline) for name, outline in outlines.items()})
     kept: dict[str, Floats] = {}
     changed = []
     for name, shape in shapes.items():
@@ -113,11 +117,11 @@ def apart(outlines: Mapping[str, Floats]) -> tuple[dict[str, Floats], list[str]]
         for other in near:
             shared = shape.intersection(other).area
             if other.area > shape.area and shared > 0.5 * shape.area:
-                continue  # it lies in the other, which makes room for it
+                continue  # it lies in the other, which is cut instead
             smaller = other.area < shape.area or shared < 0.05
             rest = rest.difference(other.buffer(THIN_WALL_M / 2, join_style="mitre")) if smaller else rest.difference(
                 other.buffer(-0.3, join_style="mitre"))
-        outline = outline_of(rest) if near else outlines[name]
+        outline = extract_outline(rest) if near else outlines[name]
         if near:
             changed.append(name)
         if outline is not None:
@@ -125,30 +129,30 @@ def apart(outlines: Mapping[str, Floats]) -> tuple[dict[str, Floats], list[str]]
     return kept, changed
 
 
-def _uncovered(shapes: Mapping[str, shapely.Polygon]) -> dict[str, shapely.Polygon]:
-    """Those of which no others that are smaller, or as large and told before, cover most."""
+def _drop_covered(shapes: Mapping[str, shapely.Polygon]) -> dict[str, shapely.Polygon]:
+    """The shapes that smaller ones, and equal ones listed before, do not cover mostly."""
     kept: dict[str, shapely.Polygon] = {}
     for name, shape in sorted(shapes.items(), key=lambda pair: round(pair[1].area, 1)):
         over = [other.intersection(shape) for other in kept.values() if other.intersects(shape)]
-        if not over or shapely.union_all(over).area < COVERED * shape.area:
+        if not over or shapely.union_all(over).area < MAX_COVERED * shape.area:
             kept[name] = shape
     return {name: shape for name, shape in shapes.items() if name in kept}
 
 
-def squared(outline: Floats) -> Floats:
-    """The outline with sides that are nearly along x or y exactly so; as it is where that spoils it."""
+def square_outline(outline: Floats) -> Floats:
+    """The outline with sides nearly parallel to x or y made exactly so; unchanged where that breaks it."""
     moved = outline.copy()
     ahead = np.roll(outline, -1, axis=0) - outline
     for axis in (0, 1):
-        level = np.abs(ahead[:, axis]) < np.abs(ahead[:, 1 - axis]) * math.tan(STRAIGHT)
-        for run in _runs(level):
+        level = np.abs(ahead[:, axis]) < np.abs(ahead[:, 1 - axis]) * math.tan(MAX_SKEW_RAD)
+        for run in _find_runs(level):
             moved[run, axis] = outline[run, axis].mean()
-    done = cleaned(moved)
+    done = clean_outline(moved)
     return outline if done is None else done
 
 
-def _runs(level: NDArray[np.bool_]) -> list[list[int]]:
-    """The corners that sides in a row join, going round."""
+def _find_runs(level: NDArray[np.bool_]) -> list[list[int]]:
+    """Chains of corner indices joined by consecutive marked sides."""
     count = len(level)
     if level.all():
         return []
@@ -162,12 +166,12 @@ def _runs(level: NDArray[np.bool_]) -> list[list[int]]:
     return runs
 
 
-def facing(a: str, outline_a: Floats, b: str, outline_b: Floats, least_m: float = 1e-3,
-           most_m: float = THICKEST_M) -> list[Stretch]:
-    """The stretches of the sides of one room that have the other behind them, through one wall of so much."""
+def find_facing_stretches(a: str, outline_a: Floats, b: str, outline_b: Floats, min_gap_m: float = 1e-3,
+           max_gap_m: float = MAX_WALL_M) -> list[Stretch]:
+    """The stretches of room a's sides that have room b behind a wall of ``min_gap_m`` to ``max_gap_m``."""
     found: list[Stretch] = []
-    if (outline_a.min(axis=0) > outline_b.max(axis=0) + most_m).any() or (
-            outline_b.min(axis=0) > outline_a.max(axis=0) + most_m).any():
+    if (outline_a.min(axis=0) > outline_b.max(axis=0) + max_gap_m).any() or (
+            outline_b.min(axis=0) > outline_a.max(axis=0) + max_gap_m).any():
         return found
     starts, ends = outline_b, np.roll(outline_b, -1, axis=0)
     for side, (p, q) in enumerate(zip(outline_a, np.roll(outline_a, -1, axis=0), strict=True)):
@@ -177,7 +181,7 @@ def facing(a: str, outline_a: Floats, b: str, outline_b: Floats, least_m: float 
         for start, end in zip(starts, ends, strict=True):
             there = (end - start) / np.linalg.norm(end - start)
             behind = [-float((x - p) @ inward) for x in (start, end)]
-            if float(there @ along) > -0.9993 or min(behind) < least_m or max(behind) > most_m:
+            if float(there @ along) > -0.9993 or min(behind) < min_gap_m or max(behind) > max_gap_m:
                 continue
             s = sorted(float((x - p) @ along) for x in (start, end))
             low, high = max(0.0, s[0]), min(length, s[1])
@@ -187,14 +191,14 @@ def facing(a: str, outline_a: Floats, b: str, outline_b: Floats, least_m: float 
 
 
 def side_of(outline: Floats, side: int) -> tuple[Floats, Floats, float]:
-    """(2,) start and (2,) direction of a side, and its length [m]."""
+    """(2,) start and (2,) unit direction of a side, and its length [m]."""
     start, end = outline[side], outline[(side + 1) % len(outline)]
     length = float(np.linalg.norm(end - start))
     return start, (end - start) / length, length
 
 
-def middle(outline: Floats, solid: list[Floats]) -> Floats:
-    """(2,) the point of a room with the most room round it."""
+def find_center(outline: Floats, solid: list[Floats]) -> Floats:
+    """(2,) the point with the largest clearance: centre of the maximum inscribed circle outside ``solid``."""
     free = shapely.Polygon(outline)
     if solid:
         free = free.difference(shapely.union_all([shapely.Polygon(s).buffer(1e-3) for s in solid]))

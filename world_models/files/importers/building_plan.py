@@ -1,4 +1,4 @@
-"""What an importer found in a building file, before it becomes a world: spaces, openings, things, and what was said."""
+"""What an importer reads from a building file: spaces, openings, furnishings, and a report of what was used."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ Steps = tuple[tuple[float, float, float, float, float, float], ...]
 
 
 class BuildingError(ValueError):
-    """A building file that cannot be read: names the file, what was expected and what came."""
+    """A building file that cannot be read: names the file, what was expected and what was got."""
 
 
 @dataclass(frozen=True, slots=True)
 class Storey:
-    """A floor of the building and its height above the file's zero [m]."""
+    """A storey of the building and its height above the file's zero [m]."""
 
     name: str
     elevation_m: float
@@ -28,9 +28,12 @@ class Storey:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Space:
-    """A room: ``outline`` (k, 2) on the plan of the building [m], counter-clockwise; ``floor_m`` above the file's zero.
+    """A room.
 
-    ``label`` is the file's own name for it.
+    Attributes:
+        label: the file's own name for it.
+        outline: (k, 2) on the plan of the building, counter-clockwise [m].
+        floor_m: height of its floor above the file's zero; height_m: of its ceiling above its floor.
     """
 
     name: str
@@ -43,16 +46,15 @@ class Space:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Gap:
-    """A door or another way through a wall of a storey.
+class WallOpening:
+    """A door or an opening without one in a wall of a storey.
 
     Attributes:
-        name, storey: of the door.
+        name: of the door.
         centre: (2,) on the plan [m].
-        width_m, height_m: of the opening.
-        rooms: the spaces that the file says it joins; empty where it says nothing.
+        rooms: the spaces that it joins according to the file; empty where the file does not say.
         along: (2,) direction along its wall on the plan, where that is known.
-        has_leaf: whether it is a door; else it is a passage, and nothing where it does not lead from space to space.
+        has_leaf: whether it is a door; an opening without one is left out where it does not join two spaces.
     """
 
     name: str
@@ -67,7 +69,7 @@ class Gap:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Window:
-    """A window: (2,) centre and (2,) direction along its wall on the plan, sill above the file's zero [m]."""
+    """A window: (2,) centre and (2,) direction along its wall on the plan; sill above the file's zero [m]."""
 
     name: str
     storey: str
@@ -80,7 +82,7 @@ class Window:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Furnishing:
-    """Something that stands in a space: boxes round (2,) ``at`` on the plan, turned; z above the file's zero."""
+    """A thing in a space: boxes about the point ``at`` (2,) on the plan, turned; z above the file's zero [m]."""
 
     name: str
     kind: str
@@ -91,8 +93,8 @@ class Furnishing:
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
-    """A passage between two spaces that share no wall: kind is stairs or elevator."""
+class RoomLink:
+    """A link between two spaces that share no wall: kind is stairs or elevator."""
 
     name: str
     kind: str
@@ -100,8 +102,8 @@ class Way:
 
 
 @dataclass
-class Account:
-    """What was used of a file, what was guessed, and what was left out; each a sentence."""
+class ImportReport:
+    """What was used of a file, what was guessed and what was left out; one sentence each."""
 
     used: list[str] = field(default_factory=list)
     guessed: list[str] = field(default_factory=list)
@@ -114,39 +116,45 @@ class Account:
 
 
 @dataclass
-class Plan:
-    """Everything that was found; storeys from the lowest up.
+class BuildingPlan:
+    """The contents of a building file.
 
-    ``barriers`` are the shadows of walls and railings by storey: no wide opening is cut where one stands.
+    Attributes:
+        source: name of the file.
+        storeys: from the lowest up.
+        without_wall: pairs of spaces that touch without a wall between them.
+        barriers: footprints of walls and railings by storey: no wide opening is placed across one.
     """
 
     name: str
     source: str
     storeys: list[Storey] = field(default_factory=list)
     spaces: list[Space] = field(default_factory=list)
-    gaps: list[Gap] = field(default_factory=list)
+    openings: list[WallOpening] = field(default_factory=list)
     without_wall: set[frozenset[str]] = field(default_factory=set)
     barriers: dict[str, list[shapely.Geometry]] = field(default_factory=dict)
     windows: list[Window] = field(default_factory=list)
     furnishings: list[Furnishing] = field(default_factory=list)
-    ways: list[Way] = field(default_factory=list)
-    account: Account = field(default_factory=Account)
+    links: list[RoomLink] = field(default_factory=list)
+    report: ImportReport = field(default_factory=ImportReport)
 
     def on(self, storey: str) -> list[Space]:
         """The spaces of a storey."""
         return [space for space in self.spaces if space.storey == storey]
 
     def space(self, name: str) -> Space:
+        """A space by name."""
         return next(space for space in self.spaces if space.name == name)
 
 
 class Names:
-    """Names for locales and doors: words joined by hyphens, each given once."""
+    """Unique names for locales and doors: words joined by hyphens."""
 
     def __init__(self, *taken: str) -> None:
         self._taken = set(taken)
 
     def new(self, text: str, otherwise: str) -> str:
+        """A name made from a text, or from ``otherwise`` where the text has no words; numbered where taken."""
         base = slug(text) or otherwise
         name, number = base, 1
         while name in self._taken:
