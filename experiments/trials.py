@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from tqdm import tqdm
 
 from harvey.arithmetic import arithmetic
-from harvey.campaign.worker_pool import by_workers
+from harvey.campaign.worker_pool import map_over_workers
 from harvey.run_files.deciding_code import digest_of, files_in
 from harvey.run_files.run_directory import RUNS
 
@@ -59,7 +59,7 @@ def run_trials(work: Callable[[T], R], trials: Sequence[T], kind: type[R], folde
              leave=False) as bar,
     ):
         todo = [number for number in range(len(trials)) if number not in known]
-        for place, result in by_workers(work, [trials[number] for number in todo]):
+        for place, result in map_over_workers(work, [trials[number] for number in todo]):
             known[todo[place]] = result
             out.write(_result_line(todo[place], result))
             out.flush()

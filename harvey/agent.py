@@ -68,14 +68,14 @@ class Agent:
         return Scheduler(self.sources, servoing=self.servoing, kinds=KINDS, **more)
 
 
-def agent_of(head: RunHead, sources: Sources = knowledge_sources) -> Agent:
+def build_agent(head: RunHead, sources: Sources = knowledge_sources) -> Agent:
     """The agent of a run.
 
     Raises:
         BadInput: something to be taken or set is not there; near names are listed.
     """
     names = [name for name in head.without if SEGMENT.fullmatch(name) is None]
-    segments = segments_named(head.without)
+    segments = parse_segments(head.without)
     settings = settings_of(head)
     model = head.model()
     given = sources(model, settings)
@@ -110,7 +110,7 @@ def _foreign(head: RunHead, given: Set[str]) -> list[type[KnowledgeSource]]:
     return [installed[name] for name in needed]
 
 
-def segments_named(names: Iterable[str]) -> tuple[tuple[int, int], ...]:
+def parse_segments(names: Iterable[str]) -> tuple[tuple[int, int], ...]:
     """(frame, segment) of the names that are of that kind."""
     return tuple((int(m[1]), int(m[2])) for name in names if (m := SEGMENT.fullmatch(name)))
 

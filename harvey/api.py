@@ -27,17 +27,17 @@ from blackboard.kinds import Registry
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import registry_of
 from harvey import wiring
-from harvey.agent import Sources, agent_of
+from harvey.agent import Sources, build_agent
 from harvey.errors import BadInput
 from harvey.run_files import run_directory
 from harvey.run_files.observations import entry_of
 from harvey.run_files.records import DecisionRecord, EntryRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
-from harvey.runner.replay import pictures_of
+from harvey.runner.replay import open_pictures
 from harvey.runner.replay import replay as replay_run
 from harvey.runner.result import MissionResult
-from harvey.simulation.run import head_of, run_mission
+from harvey.simulation.run import build_head, run_mission
 from harvey.why.journal import JournalHistory
 from harvey.why.story import Story, lines_of, story
 from harvey.why.walk import principal
@@ -90,8 +90,8 @@ def run(
         stage = build_stage(with_settings(mission, settings or {}))
     except (ScenarioError, WorldError) as error:
         raise BadInput(str(error)) from None
-    folder = None if out is None else run_directory.new_run(Path(out), mission.name, seed)[0]
-    head = head_of(stage, seed)
+    folder = None if out is None else run_directory.prepare_directory(Path(out), mission.name, seed)[0]
+    head = build_head(stage, seed)
     given = {source.called(): GIVEN for source in knowledge_sources}
     return run_mission(stage, seed, out=folder, sinks=() if on_decision is None else (on_decision,), live=live,
                        head=replace(head, plugins={**head.plugins, **given}), sources=with_sources(knowledge_sources))
@@ -210,7 +210,7 @@ class RecordedRun:
 
     def pictures(self) -> Iterator[Picture]:
         """The camera's pictures, in order. Raises BadInput where they are missing."""
-        jpegs = pictures_of(self._files)
+        jpegs = open_pictures(self._files)
         for record in self.records():
             if record.type == Frame.__name__ and record.change == "Posted":
                 value = record.value
@@ -257,8 +257,8 @@ class RecordedRun:
         Raises:
             BadInput: an observation cannot be read.
         """
-        agent = agent_of(self.head, with_sources(self._sources))
-        decided = replay_run(self._files, pictures_of(self._files), agent.scheduler())
+        agent = build_agent(self.head, with_sources(self._sources))
+        decided = replay_run(self._files, open_pictures(self._files), agent.scheduler())
         return next((one.recorded.cycle for one in decided if not one.same), None)
 
 

@@ -101,20 +101,20 @@ def dry_run(
     sources = [source for source in knowledge_sources(robot, settings) if source.name in TAKING_PART]
     scheduler = Scheduler([*sources, AcceptEveryMilestone()], ports=(IdealBodyPort(),))
     scheduler.tell([Post(replace(task, start_covariance=diagonal(SEEN_M, SEEN_RAD)))], "user")
-    prospects: list[MilestonePreview] = []
+    previews: list[MilestonePreview] = []
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < MOST_CYCLES:
         decision = scheduler.step()
         if decision is None:
             scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
         elif decision.refused.startswith(RAISED):
-            return tuple(prospects), Outcome("failed", decision.refused.strip().splitlines()[-1])
+            return tuple(previews), Outcome("failed", decision.refused.strip().splitlines()[-1])
         else:
-            prospects += _prospects(robot, scheduler.view, decision.made, settings)
+            previews += _previews(robot, scheduler.view, decision.made, settings)
     outcome = scheduler.view.latest(Outcome)
-    return tuple(prospects), outcome.value if outcome else Outcome("failed", f"not there after {MOST_CYCLES} cycles")
+    return tuple(previews), outcome.value if outcome else Outcome("failed", f"not there after {MOST_CYCLES} cycles")
 
 
-def _prospects(
+def _previews(
     robot: RobotModel, view: View, made: Sequence[Change], settings: Settings
 ) -> list[MilestonePreview]:
     """Those of the milestones that were just taken for verified."""
@@ -123,10 +123,10 @@ def _prospects(
         return []
     values = (change.entry.value for change in made)
     milestones = (v for v in values if isinstance(v, Milestone) and v.status == "verified")
-    return [_prospect(robot, view, belief.value, milestone, settings) for milestone in milestones]
+    return [_preview(robot, view, belief.value, milestone, settings) for milestone in milestones]
 
 
-def _prospect(
+def _preview(
     robot: RobotModel, view: View, belief: Hypothesis, milestone: Milestone, settings: Settings
 ) -> MilestonePreview:
     lines = np.array(milestone.expected, float).reshape(-1, 2, 3)

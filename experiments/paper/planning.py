@@ -19,7 +19,7 @@ from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from experiments.report import Report
 from harvey.dry_run import AcceptEveryMilestone, IdealBodyPort
-from harvey.simulation.run import robot_model
+from harvey.simulation.run import build_robot_model
 from harvey.wiring import knowledge_sources
 from sim.scenario import Scenario, load_scenario
 from world_models.building.world import World
@@ -64,7 +64,7 @@ class Clock:
 def run(quick: bool, seed: int) -> Report:
     """Plan the mission many times, each with a new agent and a world without cached views."""
     scenario = load_scenario("lab-to-allens-office")
-    robot = robot_model(scenario)
+    robot = build_robot_model(scenario)
     _plan_afresh(robot, scenario)
     turns = range(QUICK_REPETITIONS if quick else REPETITIONS)
     shown = tqdm(turns, file=sys.stderr, disable=not sys.stderr.isatty(), leave=False)

@@ -13,7 +13,7 @@ from experiments.chart import OURS, PAPER, PEER, chart
 from experiments.paper.table1_drives import INCREMENTS, Drive, DriveResult, run_drive, run_open_loop
 from experiments.report import Cell, Report
 from experiments.trials import RESULTS, campaign_folder, run_trials
-from harvey.run_files.run_directory import vacant
+from harvey.run_files.run_directory import check_vacant
 
 Floats = NDArray[np.float64]
 
@@ -140,7 +140,7 @@ def _worst(drives: Sequence[DriveResult], folder: Path) -> list[str]:
     for one in order:
         out = folder / f"seed-{one.seed}"
         if not (out / "run.json").exists():
-            run_drive(Drive(one.seed), vacant(out))
+            run_drive(Drive(one.seed), check_vacant(out))
         lines.append(f"among the worst: seed {one.seed}, {max(abs(x) for x in one.x_in):.3f} in, wheels of"
                     f" {one.curvature_per_m:+.4f} per metre. See it: harvey view {out}")
     return lines

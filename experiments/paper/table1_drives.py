@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blackboard.journal import Decision
-from harvey.agent import agent_of
+from harvey.agent import build_agent
 from harvey.campaign.campaign import Task
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_recorder import RunRecorder
-from harvey.simulation.run import SimulatedRun, head_of
+from harvey.simulation.run import SimulatedRun, build_head
 from sim.stage import Stage
 from sim.truth import Truth
 from world_models.entries.body import MotionReport, MotorCommand
@@ -68,9 +68,9 @@ class DriveResult:
 def run_drive(drive: Drive, out: Path | None = None) -> DriveResult:
     """Drive, and keep the run in ``out``, if given."""
     began_s, stage = time.process_time(), _stage(drive.feet, drive.continuous)
-    head = replace(head_of(stage, drive.seed), constants=ONE_LEG)
+    head = replace(build_head(stage, drive.seed), constants=ONE_LEG)
     ends: list[Truth] = []
-    agent = agent_of(head)
+    agent = build_agent(head)
     files = None if out is None else RunDirectory(out)
     recorder = RunRecorder(files, head, agent.robot)
     with SimulatedRun(stage, head, agent, recorder, (_log_ends_of_moves(ends, lambda: run),)) as run:

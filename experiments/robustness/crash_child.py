@@ -12,13 +12,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from experiments.wrapped_body import WrappedBody
-from harvey.agent import agent_of
+from harvey.agent import build_agent
 from harvey.campaign.campaign import Task
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
 from harvey.runner.ports import Body
-from harvey.runner.replay import pictures_of, replay
-from harvey.runner.resume import remains_of
+from harvey.runner.replay import open_pictures, replay
+from harvey.runner.resume import find_remains
 from harvey.simulation.run import Around, resume_mission, run_mission
 from world_models.entries.body import BodyFault, MotionReport, MotorCommand
 
@@ -56,9 +56,9 @@ def main(argv: list[str]) -> int:
         run_mission(Task(scenario, (), int(seed)).stage(), int(seed), out=Path(out), around=logging_to(Path(log)))
         return 0
     run = RunDirectory(Path(argv[1]))
-    result = resume_mission(run, remains_of(run), around=logging_to(Path(argv[2])))
-    agent = agent_of(RunHead.read(run.path))
-    same = all(step.same for step in replay(run, pictures_of(run), agent.scheduler()))
+    result = resume_mission(run, find_remains(run), around=logging_to(Path(argv[2])))
+    agent = build_agent(RunHead.read(run.path))
+    same = all(step.same for step in replay(run, open_pictures(run), agent.scheduler()))
     print(json.dumps({"outcome": result.outcome, "reason": result.reason, "same": same,
                       "error_m": result.error_m, "decisions": result.decisions}))
     return 0

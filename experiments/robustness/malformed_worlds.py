@@ -29,7 +29,7 @@ from tqdm import tqdm
 from experiments.report import Report
 from experiments.robustness.malformed_buildings_text import GML, IFC
 from experiments.robustness.malformed_worlds_text import SMALL
-from harvey.campaign.worker_pool import by_workers
+from harvey.campaign.worker_pool import map_over_workers
 from world_models.building.checks import check_world
 from world_models.files.importers import BuildingError, import_building
 from world_models.files.toml.source import Source, WorldError
@@ -88,7 +88,7 @@ def _found(files: int, chunk: int, seed: int) -> Iterator[Found]:
     parts = [range(first, min(first + chunk, files)) for first in range(0, files, chunk)]
     known: dict[int, list[Found]] = {}
     with tqdm(total=files, unit="file", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
-        for place, found in by_workers(partial(judged_all, seed=seed), parts):
+        for place, found in map_over_workers(partial(judged_all, seed=seed), parts):
             known[place] = found
             bar.update(len(found))
     for place in range(len(parts)):

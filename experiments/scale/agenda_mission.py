@@ -13,7 +13,7 @@ from blackboard.effect import Effect, Post
 from blackboard.journal import Decision, decision_line
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Scheduler
-from harvey.simulation.run import robot_model, run_mission
+from harvey.simulation.run import build_robot_model, run_mission
 from harvey.wiring import knowledge_sources, servoing
 from sim.scenario import Scenario, load_scenario
 from sim.stage import build_stage
@@ -85,7 +85,7 @@ def mission_cost(cycles: int | None, seed: int) -> Cost:
 
 
 def _replay_timed(scenario: Scenario, recorded: list[Decision]) -> Cost:
-    timed = [_Timed(source) for source in knowledge_sources(robot_model(scenario))]
+    timed = [_Timed(source) for source in knowledge_sources(build_robot_model(scenario))]
     scheduler = Scheduler(timed, servoing=servoing(scenario.servo), kinds=KINDS)
     lines_s, steps_s = 0.0, 0.0
     for decision in recorded:

@@ -94,12 +94,12 @@ def explain_mission(task: Task) -> Explanation:
 
 def _count_same(run: RunDirectory) -> int:
     """Count the decisions that a replay decides the same."""
-    from harvey.agent import agent_of
+    from harvey.agent import build_agent
     from harvey.run_files.run_head import RunHead
-    from harvey.runner.replay import pictures_of, replay
+    from harvey.runner.replay import open_pictures, replay
 
-    agent = agent_of(RunHead.read(run.path))
-    return sum(1 for step in replay(run, pictures_of(run), agent.scheduler()) if step.same)
+    agent = build_agent(RunHead.read(run.path))
+    return sum(1 for step in replay(run, open_pictures(run), agent.scheduler()) if step.same)
 
 
 def _time_why(run: Path, *more: str) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from blackboard.journal import Decision, decision_line
 from experiments.report import Cell, Report
-from harvey.simulation.run import robot_model, run_mission
+from harvey.simulation.run import build_robot_model, run_mission
 from logs.recording.loggers.frames import Frames
 from logs.recording.stream import FLUSH_CYCLES
 from logs.recording.writer import RecordingWriter, all_loggers
@@ -147,7 +147,7 @@ class _Bench:
 
     def __init__(self, stage: Stage, folder: Path) -> None:
         folder.mkdir()
-        robot, self._line = robot_model(stage.scenario), ""
+        robot, self._line = build_robot_model(stage.scenario), ""
         self._recorders = []
         for name in (REST, FRAMES, ALL):
             loggers = all_loggers(robot.world, robot.camera, robot.mount, lambda _decision: self._line)

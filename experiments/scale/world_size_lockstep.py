@@ -18,7 +18,7 @@ from blackboard.scheduler import Scheduler
 from experiments.paper.planning import DryMission
 from experiments.scale.world_size_probe import build_probe_stage
 from harvey.runner.ports import BodyPort
-from harvey.simulation.run import robot_model
+from harvey.simulation.run import build_robot_model
 from harvey.wiring import knowledge_sources, servoing
 from sim.body.faulty_body import FaultyBody
 from sim.stage import Stage
@@ -35,14 +35,14 @@ def main(goal: str, seed: str, starts: str, plans: str, *paths: str) -> None:
         agents = [_start(stage, int(seed)) for stage in stages]
         print(json.dumps({"start": decide_in_turn(agents, turn)}), flush=True)
     for turn in range(int(plans)):
-        missions = [DryMission(robot_model(stage.scenario), stage.scenario) for stage in stages]
+        missions = [DryMission(build_robot_model(stage.scenario), stage.scenario) for stage in stages]
         decide_in_turn([mission.step for mission in missions], turn)
         print(json.dumps({"plan": [mission.clock.steps_ms for mission in missions]}), flush=True)
 
 
 def _start(stage: Stage, seed: int) -> Step:
     """Build a new agent with its body; it is done at its first motor command."""
-    robot = robot_model(stage.scenario)
+    robot = build_robot_model(stage.scenario)
     scheduler = Scheduler(knowledge_sources(robot), ports=(BodyPort(FaultyBody(stage.body(seed))),),
                           servoing=servoing(stage.scenario.servo))
     scheduler.tell([Post(stage.scenario.command)], "user")

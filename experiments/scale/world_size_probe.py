@@ -18,7 +18,7 @@ from blackboard.journal import Decision, decision_line
 from blackboard.scheduler import Scheduler
 from harvey.runner.ports import BodyPort
 from harvey.runner.run import run_to_outcome
-from harvey.simulation.run import robot_model
+from harvey.simulation.run import build_robot_model
 from harvey.wiring import knowledge_sources, servoing
 from sim.body.faulty_body import FaultyBody
 from sim.scenario import parse_scenario
@@ -81,7 +81,7 @@ def peak_mb() -> float:
 
 def _open(stage: Stage) -> dict[str, Any]:
     began = time.process_time()
-    world = robot_model(stage.scenario).world
+    world = build_robot_model(stage.scenario).world
     open_ms = 1000.0 * (time.process_time() - began)
     return {"open_ms": open_ms, "far_ms": _time_far_route_ms(world)}
 
@@ -100,7 +100,7 @@ def _time_far_route_ms(world: World) -> float:
 
 
 def _drive(stage: Stage, seed: int) -> dict[str, Any]:
-    watcher, robot = _Watcher(), robot_model(stage.scenario)
+    watcher, robot = _Watcher(), build_robot_model(stage.scenario)
     scheduler = Scheduler(knowledge_sources(robot), ports=(BodyPort(FaultyBody(stage.body(seed))),),
                           servoing=servoing(stage.scenario.servo), sinks=(watcher,))
     scheduler.tell([Post(stage.scenario.command)], "user")

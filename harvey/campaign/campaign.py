@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from blackboard.journal import Sink
-from harvey.campaign.worker_pool import by_workers
+from harvey.campaign.worker_pool import map_over_workers
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RunDirectory, new_run
+from harvey.run_files.run_directory import RunDirectory, prepare_directory
 
 if TYPE_CHECKING:
     from harvey.agent_settings import Pairs
@@ -113,7 +113,7 @@ def _stage(staged: _Staged) -> Stage:
     return build_stage(staged.scenario)
 
 
-def seeds_of(text: str) -> tuple[int, ...]:
+def parse_seeds(text: str) -> tuple[int, ...]:
     """``3``, ``0..19`` (both included) or ``1,4,9``. Raises BadInput."""
     seeds: list[int] = []
     for part in text.split(","):
@@ -126,7 +126,7 @@ def seeds_of(text: str) -> tuple[int, ...]:
     return tuple(dict.fromkeys(seeds))
 
 
-def settings_of(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
+def parse_pairs(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
     """``key=value`` pairs. Raises BadInput."""
     for text in texts:
         if not text.partition("=")[0] or "=" not in text:
@@ -141,20 +141,20 @@ def run_task(
     """Run one mission; ``follow`` makes a sink that shows what is counted. Raises BadInput for what the user gave."""
     stage = task.stage()
     from harvey.campaign.tally import Tally
-    from harvey.simulation.run import head_of, run_mission
+    from harvey.simulation.run import build_head, run_mission
 
     tally = Tally(stage)
     shown = (tally, follow(tally)) if follow else ()
     if task.go_on and task.out is not None and (task.out / "run.json").exists():
         return _kept_or_resumed(RunDirectory(task.out), task, stage, (*shown, *sinks), live)
-    out = None if task.out is None else room_for(task.out, stage.scenario.name, task.seed)
-    head = head_of(stage, task.seed, task.body, task.agent_settings)
+    out = None if task.out is None else make_room(task.out, stage.scenario.name, task.seed)
+    head = build_head(stage, task.seed, task.body, task.agent_settings)
     return run_mission(stage, task.seed, out=out, sinks=(*shown, *sinks), live=live, head=head)
 
 
-def room_for(out: Path, name: str, seed: int) -> Path:
+def make_room(out: Path, name: str, seed: int) -> Path:
     """An empty directory for a run; says so where a run of something else had to be moved aside. Raises BadInput."""
-    path, aside = new_run(out, name, seed)
+    path, aside = prepare_directory(out, name, seed)
     if aside is not None:
         print(f"--out {out}: the run that was there is of another scenario or seed; it is kept in {aside}",
               file=sys.stderr)
@@ -165,12 +165,12 @@ def _kept_or_resumed(run: RunDirectory, task: Task, stage: Stage, sinks: Sequenc
     """What an earlier campaign did of this mission. Raises BadInput where another mission is there."""
     from harvey.run_files.run_head import RunHead
     from harvey.runner.result import MissionResult
-    from harvey.runner.resume import remains_of
-    from harvey.simulation.run import head_of, resume_mission
+    from harvey.runner.resume import find_remains
+    from harvey.simulation.run import build_head, resume_mission
 
-    if not RunHead.read(run.path).is_like(head_of(stage, task.seed, task.body, task.agent_settings)):
+    if not RunHead.read(run.path).is_like(build_head(stage, task.seed, task.body, task.agent_settings)):
         raise BadInput(f"{run.path}: expected a run of {task.named}, got one that began otherwise")
-    remains, record = remains_of(run), run.read_result()
+    remains, record = find_remains(run), run.read_result()
     if remains.outcome is None or record.get("outcome") != remains.outcome.kind:
         return resume_mission(run, remains, sinks=sinks, live=live, stage=stage)
     try:
@@ -179,10 +179,10 @@ def _kept_or_resumed(run: RunDirectory, task: Task, stage: Stage, sinks: Sequenc
         raise BadInput(f"{run.result}: {error}") from None
 
 
-def run_all(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Task, MissionResult]]:
+def run_tasks(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Task, MissionResult]]:
     """Run several missions; they come as they are done, in whatever order.
 
     A mission's result follows from its task alone, so that the number of workers changes nothing but the time.
     """
-    for number, result in by_workers(run_task, tasks, workers):
+    for number, result in map_over_workers(run_task, tasks, workers):
         yield tasks[number], result

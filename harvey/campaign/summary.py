@@ -56,14 +56,14 @@ def several(results: Sequence[MissionResult]) -> str:
     return "\n".join([rows, *(f"seed {r.seed}: {text}" for r in results for text in r.amiss)])
 
 
-def prospects(ahead: Sequence[MilestonePreview]) -> str:
+def format_previews(ahead: Sequence[MilestonePreview]) -> str:
     """The milestones to come, one a row."""
     columns = ("milestone", "in", "x m", "y m", "looking", "landmarks", "lines", "place mm", "heading deg",
                "p wrong", "verdict")
-    return table(columns, [_prospect(p) for p in ahead])
+    return table(columns, [_preview(p) for p in ahead])
 
 
-def foreseen(ahead: Sequence[MilestonePreview], outcome: Outcome) -> tuple[str, bool]:
+def summarize_dry_run(ahead: Sequence[MilestonePreview], outcome: Outcome) -> tuple[str, bool]:
     """How a mission ends in thought, and whether nothing speaks against driving it.
 
     In thought every milestone is taken for verified, so that the goal is reached says little where one could not be.
@@ -78,7 +78,7 @@ def foreseen(ahead: Sequence[MilestonePreview], outcome: Outcome) -> tuple[str, 
     return f"ends: {outcome.kind}, {outcome.reason}" + (f"; {' and '.join(doubts)}" if doubts else ""), False
 
 
-def _prospect(p: MilestonePreview) -> tuple[str, ...]:
+def _preview(p: MilestonePreview) -> tuple[str, ...]:
     return (p.what, p.locale, f"{p.x_m:.2f}", f"{p.y_m:.2f}", f"{math.degrees(p.look_heading_rad):.0f}",
             str(p.landmarks), str(p.lines), f"{p.sigma_m * 1000:.1f}", f"{math.degrees(p.sigma_rad):.2f}",
             f"{p.p_false:.1g}", f"{p.verdict}: {p.alike} looks like it" if p.alike else p.verdict)

@@ -24,7 +24,7 @@ TOLD_TO_STOP = 143
 """The exit code of a process that SIGTERM ended."""
 
 
-def by_workers(work: Callable[[T], R], items: Sequence[T], workers: int | None = None) -> Iterator[tuple[int, R]]:
+def map_over_workers(work: Callable[[T], R], items: Sequence[T], workers: int | None = None) -> Iterator[tuple[int, R]]:
     """(place in ``items``, what ``work`` gives for it) as they are done, in whatever order.
 
     Whoever stops asking, or is interrupted, stops the workers; each may close its files first.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RUNS, vacant
+from harvey.run_files.run_directory import RUNS, check_vacant
 
 if TYPE_CHECKING:
     from blackboard.journal import Decision
@@ -47,13 +47,13 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
     from harvey.agent_settings import build_settings, split_pairs
-    from harvey.campaign.campaign import room_for, settings_of
+    from harvey.campaign.campaign import make_room, parse_pairs
     from harvey.hardware.mission import FORMAT
     from harvey.hardware.preflight import Preflight
 
-    pairs, numbers = split_pairs(settings_of(args.settings), FORMAT.keys())
+    pairs, numbers = split_pairs(parse_pairs(args.settings), FORMAT.keys())
     mission = _mission(args, pairs)
-    out = vacant(Path(args.out) if args.out else RUNS / f"{mission.name}-drive")
+    out = check_vacant(Path(args.out) if args.out else RUNS / f"{mission.name}-drive")
     began = time.monotonic()
 
     def clock() -> float:
@@ -65,7 +65,7 @@ def _run(args: Namespace) -> int:
         if args.dry_run:
             print("\neverything is ready; nothing was moved")
             return 0
-        return _drive(mission, dry, clock, room_for(out, mission.name, 0), args.live, numbers)
+        return _drive(mission, dry, clock, make_room(out, mission.name, 0), args.live, numbers)
 
 
 def checked(dry: Preflight) -> bool:

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harvey.campaign.campaign import settings_of
+from harvey.campaign.campaign import parse_pairs
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RunDirectory, open_run, vacant
+from harvey.run_files.run_directory import RunDirectory, check_vacant, open_run
 from world_models.words import count
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    run, settings = open_run(args.run), settings_of(args.settings)
+    run, settings = open_run(args.run), parse_pairs(args.settings)
     if args.without or settings:
         return _otherwise(run, args, settings)
     if args.out or args.record_only:
@@ -48,7 +48,7 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
     from harvey.replay.counterfactual_words import told
     from harvey.run_files.run_head import RunHead
 
-    out = RunDirectory(vacant(Path(args.out))) if args.out else None
+    out = RunDirectory(check_vacant(Path(args.out))) if args.out else None
     if out is not None and out.path.resolve() == run.path.resolve():
         raise BadInput(f"--out {args.out}: expected another directory than that of the run, got the same")
     elsewhere = RunHead.read(run.path).decided_elsewhere()
@@ -64,13 +64,13 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
 
 def _again(run: RunDirectory) -> int:
     """Decide it again as it was."""
-    from harvey.agent import agent_of
+    from harvey.agent import build_agent
     from harvey.run_files.run_head import RunHead
-    from harvey.runner.replay import pictures_of, replay
+    from harvey.runner.replay import open_pictures, replay
 
-    pictures, agreed, head = pictures_of(run), 0, RunHead.read(run.path)
+    pictures, agreed, head = open_pictures(run), 0, RunHead.read(run.path)
     elsewhere = head.decided_elsewhere()
-    agent = agent_of(head)
+    agent = build_agent(head)
     try:
         for decision in shown(replay(run, pictures, agent.scheduler())):
             if not decision.same:

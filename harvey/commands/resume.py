@@ -31,9 +31,9 @@ def _run(args: Namespace) -> int:
     run = open_run(args.run, "run.json")
     from harvey.campaign.summary import one
     from harvey.run_files.run_head import HARDWARE, RunHead
-    from harvey.runner.resume import remains_of
+    from harvey.runner.resume import find_remains
 
-    remains = remains_of(run)
+    remains = find_remains(run)
     if remains.outcome is not None and run.read_result().get("outcome") == remains.outcome.kind:
         print(f"{run.path} was not cut off: it ended with {remains.outcome.kind}, {remains.outcome.reason}")
         return 0 if remains.outcome.kind == "reached" else 1
@@ -58,12 +58,12 @@ def _on_hardware(
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
     from harvey.agent import settings_of
     from harvey.commands.drive import checked, follow, summary, tell_how_to_stop
-    from harvey.hardware.mission import mission_of
+    from harvey.hardware.mission import rebuild_mission
     from harvey.hardware.preflight import Preflight
     from harvey.hardware.resume import time_of_last_observation
     from harvey.hardware.run import resume
 
-    mission, began_s = mission_of(head, moved), time.monotonic() - time_of_last_observation(run)
+    mission, began_s = rebuild_mission(head, moved), time.monotonic() - time_of_last_observation(run)
 
     def clock() -> float:
         return time.monotonic() - began_s

@@ -6,10 +6,10 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from harvey.campaign.campaign import Task, run_all, run_task, seeds_of, settings_of
+from harvey.campaign.campaign import Task, parse_pairs, parse_seeds, run_task, run_tasks
 from harvey.commands.command import Command
 from harvey.errors import BadInput, Terminated
-from harvey.run_files.run_directory import RUNS, vacant
+from harvey.run_files.run_directory import RUNS, check_vacant
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -36,7 +36,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     from harvey.simulation.serial_body import body_kind
 
-    seeds, settings, body = seeds_of(args.seed), settings_of(args.settings), body_kind(args.body)
+    seeds, settings, body = parse_seeds(args.seed), parse_pairs(args.settings), body_kind(args.body)
     tasks = tuple(
         Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1), body, args.go_on) for seed in seeds)
     if args.check:
@@ -53,21 +53,21 @@ def _run(args: Namespace) -> int:
 def _out(args: Namespace, seed: int, many: bool) -> Path:
     name = Path(args.scenario).stem
     if args.out:
-        return vacant(Path(args.out) / str(seed) if many else Path(args.out))
-    return vacant(RUNS / name / str(seed) if many else RUNS / f"{name}-{seed}")
+        return check_vacant(Path(args.out) / str(seed) if many else Path(args.out))
+    return check_vacant(RUNS / name / str(seed) if many else RUNS / f"{name}-{seed}")
 
 
 def _check(task: Task) -> int:
     stage = task.stage()
     from harvey.agent_settings import build_settings
-    from harvey.campaign.summary import foreseen, prospects
+    from harvey.campaign.summary import format_previews, summarize_dry_run
     from harvey.dry_run import dry_run
-    from harvey.simulation.run import robot_model
+    from harvey.simulation.run import build_robot_model
 
     scenario = stage.scenario
-    ahead, outcome = dry_run(robot_model(scenario), scenario.command, build_settings(task.agent_settings))
-    print(prospects(ahead))
-    told, bodes_well = foreseen(ahead, outcome)
+    ahead, outcome = dry_run(build_robot_model(scenario), scenario.command, build_settings(task.agent_settings))
+    print(format_previews(ahead))
+    told, bodes_well = summarize_dry_run(ahead, outcome)
     print(f"\nin thought, {scenario.name} {told}")
     return 0 if bodes_well else 1
 
@@ -92,7 +92,7 @@ def _several(tasks: tuple[Task, ...]) -> int:
 
     tasks[0].stage()
     try:
-        results = {task.seed: result for task, result in counted(run_all(tasks), len(tasks), sys.stderr)}
+        results = {task.seed: result for task, result in counted(run_tasks(tasks), len(tasks), sys.stderr)}
     except (KeyboardInterrupt, Terminated) as stop:
         stop.add_note("what was recorded is kept; the same command with --go-on goes on")
         raise

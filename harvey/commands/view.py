@@ -12,7 +12,7 @@ from pathlib import Path
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RunDirectory, named_directory, open_run
+from harvey.run_files.run_directory import RunDirectory, find_directory, open_run
 
 OVERVIEW = "overview.rrd"
 
@@ -25,7 +25,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    if len(args.runs) == 1 and not _is_campaign(named_directory(args.runs[0])):
+    if len(args.runs) == 1 and not _is_campaign(find_directory(args.runs[0])):
         if args.save:
             raise BadInput("--save: expected several runs, or a directory of them, got one run")
         return _open(_whole(open_run(args.runs[0], "recording.rrd")))
@@ -49,7 +49,7 @@ def _whole(run: RunDirectory) -> Path:
 
 def _runs(text: str) -> list[RunDirectory]:
     """One run, or all runs of a directory in the order of their numbers. Raises BadInput where there is none."""
-    here = named_directory(text)
+    here = find_directory(text)
     if not _is_campaign(here):
         return [open_run(text)]
     return [RunDirectory(path) for path in sorted((p.parent for p in here.glob("*/journal.jsonl")), key=_natural)]

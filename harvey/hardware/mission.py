@@ -93,7 +93,7 @@ def load_mission(path: Path | None, settings: Mapping[str, Any]) -> HardwareMiss
         raise BadInput(str(error)) from None
 
 
-def mission_of(head: RunHead, settings: Mapping[str, Any]) -> HardwareMission:
+def rebuild_mission(head: RunHead, settings: Mapping[str, Any]) -> HardwareMission:
     """The mission of a run that was begun on hardware, with some settings replaced; see :func:`load_mission`."""
     try:
         return _mission(Source("run.json", head.scenario, {}), settings, head.name, Path(head.folder))

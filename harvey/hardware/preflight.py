@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from harvey.campaign.summary import foreseen
+from harvey.campaign.summary import summarize_dry_run
 from harvey.dry_run import MilestonePreview, dry_run
 from harvey.errors import BadInput
 from harvey.hardware.base import kind_of, open_base
@@ -61,7 +61,7 @@ class Preflight:
     Attributes:
         checks: in the order in which they were made.
         robot, base, camera: None where a check before them failed.
-        prospects: the milestones to come.
+        previews: the milestones to come.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Preflight:
         self.robot: RobotModel | None = None
         self.base: Base | None = None
         self.camera: VideoCamera | None = None
-        self.prospects: tuple[MilestonePreview, ...] = ()
+        self.previews: tuple[MilestonePreview, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -147,11 +147,11 @@ class Preflight:
             yield Check("goal", f"{lost[0]} is not within its locale", todo)
             return
         yield Check("goal", f"from {origin} to {destination}")
-        self.prospects, outcome = dry_run(robot, self._mission.command, self._settings)
+        self.previews, outcome = dry_run(robot, self._mission.command, self._settings)
         if outcome.kind != "reached":
             yield Check("plan", outcome.reason, "another start or goal, or a world with a way between them")
             return
-        said, can_be = foreseen(self.prospects, outcome)
+        said, can_be = summarize_dry_run(self.previews, outcome)
         yield Check("plan", said, "" if can_be else "put into the world what hangs on the walls there")
 
     def _base(self) -> Iterator[Check]:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from blackboard.journal import Sink
-from harvey.agent import agent_of
+from harvey.agent import build_agent
 from harvey.agent_settings import Pairs
 from harvey.hardware.body import Eye, HardwareBody, Watching
 from harvey.hardware.drivers.bases.base import Base
@@ -67,7 +67,7 @@ def _hardware_run(
     """A run whose body can be stopped by a key, and whose base hears a heartbeat; closes the base."""
     body = HardwareBody(base, eye, clock=clock)
     try:
-        agent = agent_of(head)
+        agent = build_agent(head)
         with stop_key(body.stop_for_good), Heartbeat(base) as heartbeat:
             recorder = RunRecorder(files, head, agent.robot, live=live, whole=whole)
             yield Run(head, agent, body, recorder, limits=mission.limits, clock=clock, sinks=sinks,

@@ -17,8 +17,8 @@ from blackboard.encoding import plain
 from blackboard.journal import Decision, decision_line, decision_record
 from blackboard.kinds import Registry, Role, is_request
 from blackboard.scheduler import Scheduler
-from harvey.agent import agent_of
-from harvey.campaign.campaign import room_for
+from harvey.agent import build_agent
+from harvey.campaign.campaign import make_room
 from harvey.replay.hidden_segments import check_segments
 from harvey.run_files.observations import effect_of
 from harvey.run_files.records import DecisionRecord, EntryRecord, as_line, decision_of, read_records
@@ -26,11 +26,11 @@ from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import SIMULATOR, RunHead
 from harvey.run_files.run_recorder import RunRecorder
 from harvey.runner.ports import BodyPort
-from harvey.runner.replay import Live, ignore, pictures_of
+from harvey.runner.replay import Live, ignore, open_pictures
 from harvey.runner.result import UNFINISHED, MissionResult
 from harvey.runner.resume import RESUME
 from harvey.runner.run import Over, run_to_outcome
-from harvey.simulation.run import SimulatedRun, stage_of
+from harvey.simulation.run import SimulatedRun, rebuild_stage
 from world_models.entries.task import Outcome
 
 
@@ -89,11 +89,11 @@ def what_if(
     """
     then = RunHead.read(run.path)
     head = replace(then.here(), without=(*then.without, *without), constants=(*then.constants, *constants))
-    agent = agent_of(head)
+    agent = build_agent(head)
     player = _Player(run, agent.kinds)
     check_segments(player.records, without, then.without)
     if out is not None:
-        room_for(out.path, head.name, head.seed)
+        make_room(out.path, head.name, head.seed)
     recorder = RunRecorder(out, head, agent.robot)
     if head.kind != SIMULATOR:
         scheduler = agent.scheduler(sinks=(*recorder.sinks, player.heard))
@@ -101,7 +101,7 @@ def what_if(
             return player.answer(player.played(scheduler, head, recorder), None)
         finally:
             recorder.close()
-    with SimulatedRun(stage_of(head), head, agent, recorder, (player.heard,)) as simulated:
+    with SimulatedRun(rebuild_stage(head), head, agent, recorder, (player.heard,)) as simulated:
         result = simulated.drive(out, lambda: _drive_changed(simulated, player, go_on))
     return player.answer(Outcome(result.outcome, result.reason), result)
 
@@ -133,7 +133,7 @@ class _Player:
     """Answers a agent by the record of a run, as long as it asks for the same."""
 
     def __init__(self, run: RunDirectory, kinds: Registry) -> None:
-        self.pictures = pictures_of(run)
+        self.pictures = open_pictures(run)
         self.records = list(read_records(run.journal))
         self._requests = frozenset(kind.__name__ for kind in kinds.of_role(Role.REQUEST))
         self._steps = _steps(self.records, self._requests)

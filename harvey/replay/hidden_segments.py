@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from harvey.agent import segments_named
+from harvey.agent import parse_segments
 from harvey.errors import BadInput
 from harvey.run_files.records import DecisionRecord
 from world_models.words import listed
@@ -20,10 +20,10 @@ def check_segments(records: Sequence[DecisionRecord], names: Sequence[str], hidd
         names: as ``frame 88 segment 12``; other names are passed over.
         hidden: what was taken from the run itself: segments keep the numbers that they have without that.
     """
-    wanted = segments_named(names)
+    wanted = parse_segments(names)
     if not wanted:
         return
-    frames, found, already = _frames(records), _found(records), segments_named(hidden)
+    frames, found, already = _frames(records), _found(records), parse_segments(hidden)
     for frame, segment in wanted:
         where = f"--without frame {frame} segment {segment}: expected"
         if frame not in frames.values():

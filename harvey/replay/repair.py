@@ -6,13 +6,13 @@ import os
 from collections.abc import Sequence
 
 from blackboard.journal import Sink
-from harvey.agent import agent_of
+from harvey.agent import build_agent
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import SIMULATOR, RunHead
 from harvey.run_files.run_recorder import RunRecorder
-from harvey.runner.replay import check_same, pictures_of, replay
-from harvey.runner.resume import remains_of, replay_run
-from harvey.simulation.run import SimulatedRun, stage_of
+from harvey.runner.replay import check_same, open_pictures, replay
+from harvey.runner.resume import find_remains, replay_run
+from harvey.simulation.run import SimulatedRun, rebuild_stage
 
 
 def redraw(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
@@ -22,17 +22,17 @@ def redraw(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
         BadInput: the run cannot be replayed as it was.
         RecordingError: the recording cannot be written.
     """
-    decisions = remains_of(run).decisions
+    decisions = find_remains(run).decisions
     head, part = RunHead.read(run.path), run.recording.with_name("recording.rrd.part")
-    agent = agent_of(head)
+    agent = build_agent(head)
     recorder = RunRecorder(None, head, agent.robot, drawing=part)
     try:
         if head.kind == SIMULATOR:
-            with SimulatedRun(stage_of(head), head, agent, recorder, sinks) as simulated:
+            with SimulatedRun(rebuild_stage(head), head, agent, recorder, sinks) as simulated:
                 replay_run(run, simulated, simulated.body_replay)
         else:
             scheduler = agent.scheduler(sinks=(*recorder.sinks, *sinks))
-            for decision in replay(run, pictures_of(run), scheduler):
+            for decision in replay(run, open_pictures(run), scheduler):
                 check_same(run, decision)
         recorder.close()
         os.replace(part, run.recording)

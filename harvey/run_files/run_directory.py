@@ -84,7 +84,7 @@ class RunDirectory:
             raise
 
 
-def vacant(path: Path) -> Path:
+def check_vacant(path: Path) -> Path:
     """A place where a run may be written: nothing, or an older run. Raises BadInput where there is anything else."""
     try:
         here = next(p for p in (path, *path.parents) if p.exists())
@@ -99,7 +99,7 @@ def vacant(path: Path) -> Path:
     return path
 
 
-def new_run(path: Path, name: str, seed: int) -> tuple[Path, Path | None]:
+def prepare_directory(path: Path, name: str, seed: int) -> tuple[Path, Path | None]:
     """Make room for a run of a scenario and seed.
 
     An older run of the same goes; one of another scenario or seed is moved aside, since nobody asked to do that again.
@@ -111,7 +111,7 @@ def new_run(path: Path, name: str, seed: int) -> tuple[Path, Path | None]:
         BadInput: that cannot be.
     """
     try:
-        vacant(path).mkdir(parents=True, exist_ok=True)
+        check_vacant(path).mkdir(parents=True, exist_ok=True)
         aside = None if _is_of(path, name, seed) else _free_beside(path)
         if aside is not None:
             path.rename(aside)
@@ -144,7 +144,7 @@ def open_run(text: str, needed: str = "journal.jsonl") -> RunDirectory:
     Raises:
         BadInput: there is none (near ones are listed), or it lacks the needed file.
     """
-    run = RunDirectory(named_directory(text))
+    run = RunDirectory(find_directory(text))
     inner = sorted(str(p.parent) for p in run.path.glob("*/journal.jsonl"))
     if inner and not run.journal.exists():
         raise BadInput(f"expected one run, got {text!r}, which holds {len(inner)} of them, as {inner[0]}")
@@ -153,7 +153,7 @@ def open_run(text: str, needed: str = "journal.jsonl") -> RunDirectory:
     return run
 
 
-def named_directory(text: str) -> Path:
+def find_directory(text: str) -> Path:
     """The directory that a user names, as it is or under ``runs/``, or by a run's file in it. Raises BadInput."""
     path = next((p for p in (Path(text), RUNS / text) if p.exists()), None)
     if path is None:

@@ -162,7 +162,7 @@ class RunHead:
         return made
 
 
-def known_world(path: Path) -> World:
+def load_known_world(path: Path) -> World:
     """The world of a file as it is now; runs that begin in one process with the same world share what they know of it.
 
     Raises WorldError, OSError.

@@ -78,7 +78,7 @@ def check_same(run: RunDirectory, told: ReplayedDecision) -> ReplayedDecision:
     return told
 
 
-def pictures_of(run: RunDirectory) -> Mapping[int, bytes]:
+def open_pictures(run: RunDirectory) -> Mapping[int, bytes]:
     """The pictures of a run: from its camera file or, where it has none, from its recording.
 
     Raises:

@@ -21,7 +21,7 @@ from harvey.errors import BadInput
 from harvey.run_files.records import read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_recorder import Extent
-from harvey.runner.replay import Live, camera_bytes, check_same, pictures_of, replay
+from harvey.runner.replay import Live, camera_bytes, check_same, open_pictures, replay
 from harvey.runner.run import Run
 from logs.camera_file import Pictures
 from world_models.entries.body import Course, MotorCommand
@@ -48,7 +48,7 @@ class Remains:
     dropped: tuple[str, ...]
 
 
-def remains_of(run: RunDirectory) -> Remains:
+def find_remains(run: RunDirectory) -> Remains:
     """Look at a run without touching it. Raises BadInput where it cannot be used at all."""
     there = camera_bytes(run)
     decisions, outcome = _decided(run) if run.journal.is_file() else (0, None)
@@ -56,7 +56,7 @@ def remains_of(run: RunDirectory) -> Remains:
         _check_not_lost(run, there)
     if not run.journal.is_file():
         return Remains(Extent(), 0, None, ())
-    whole, pictures = _whole_lines(run.journal), pictures_of(run)
+    whole, pictures = _whole_lines(run.journal), open_pictures(run)
     end = pictures.end if isinstance(pictures, Pictures) else 0
     dropped = []
     if run.journal.stat().st_size > whole:
@@ -97,7 +97,7 @@ def replay_run(files: RunDirectory, run: Run, body: ResumedBody) -> Decision | N
     Raises:
         BadInput: a decision, or an answer of the body, is not what it was.
     """
-    pictures, last = pictures_of(files), None
+    pictures, last = open_pictures(files), None
     with body.replay(pictures) as live:
         for decision in replay(files, pictures, run.scheduler, live=live, before=run.before_cycle):
             last = check_same(files, decision).now

@@ -7,11 +7,11 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from blackboard.journal import Sink
-from harvey.agent import Agent, Sources, agent_of
+from harvey.agent import Agent, Sources, build_agent
 from harvey.agent_settings import Pairs
 from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import HARDWARE, SIMULATOR, RunHead, known_world
+from harvey.run_files.run_head import HARDWARE, SIMULATOR, RunHead, load_known_world
 from harvey.run_files.run_recorder import RunRecorder
 from harvey.runner.ports import Body
 from harvey.runner.result import MissionResult
@@ -61,9 +61,9 @@ def run_mission(
         body: how the body is reached (:func:`harvey.simulation.serial_body.open_body`), where ``head`` does not say it.
         around: puts something between the agent and the body.
     """
-    head = head or head_of(stage, seed, body)
+    head = head or build_head(stage, seed, body)
     files = None if out is None else RunDirectory(out)
-    agent = agent_of(head, sources)
+    agent = build_agent(head, sources)
     recorder = RunRecorder(files, head, agent.robot, live=live)
     with SimulatedRun(stage, head, agent, recorder, sinks, around) as run:
         return run.drive(files)
@@ -84,22 +84,22 @@ def resume_mission(
         BadInput: it is no run of the simulator, or cannot be replayed as it was.
     """
     head = RunHead.read(files.path)
-    stage = stage or stage_of(head)
-    agent = agent_of(head)
+    stage = stage or rebuild_stage(head)
+    agent = build_agent(head)
     recorder = RunRecorder(files, head, agent.robot, live=live, whole=remains.extent)
     with SimulatedRun(stage, head, agent, recorder, sinks, around) as run:
         return run.drive(files, lambda: continue_run(files, run, run.body_replay))
 
 
-def head_of(stage: Stage, seed: int, body: str = IN_PROCESS, settings: Pairs = ()) -> RunHead:
+def build_head(stage: Stage, seed: int, body: str = IN_PROCESS, settings: Pairs = ()) -> RunHead:
     """How a run of a scenario begins; ``settings`` are those of the agent."""
     s = stage.scenario
-    robot = robot_model(s, known_world(s.world))
+    robot = build_robot_model(s, load_known_world(s.world))
     return RunHead.of(SIMULATOR, s.name, seed, s.world, robot, s.servo, s.command, scenario=s.source.data,
                       folder=str(s.folder), body=body, constants=settings)
 
 
-def stage_of(head: RunHead) -> Stage:
+def rebuild_stage(head: RunHead) -> Stage:
     """The building of a simulator's run. Raises BadInput."""
     if head.kind == HARDWARE:
         raise BadInput(f"expected a run of the simulator, got one on hardware: harvey drive {head.name} begins it anew")
@@ -109,7 +109,7 @@ def stage_of(head: RunHead) -> Stage:
         raise BadInput(f"run.json: {error}") from None
 
 
-def robot_model(scenario: Scenario, world: World | None = None) -> RobotModel:
+def build_robot_model(scenario: Scenario, world: World | None = None) -> RobotModel:
     """What the robot knows: the world file without the building's details, its camera and its wheels' kind.
 
     ``world`` is that file's world where it has been read already.

@@ -50,10 +50,10 @@ def _instead(history: History, cycle: int, acted: bool) -> Iterator[str]:
 
 
 def _never(run: RunDirectory, source: str) -> Iterator[str]:
-    from harvey.agent import agent_of
+    from harvey.agent import build_agent
     from harvey.run_files.run_head import RunHead
 
-    agent = agent_of(RunHead.read(run.path))
+    agent = build_agent(RunHead.read(run.path))
     expert = _named(source, agent.sources)
     if not agent.servoing.allows(expert.closes):
         yield f"The {expert.closes} level of servoing was off, and the {words(source)} closes it."
@@ -61,7 +61,7 @@ def _never(run: RunDirectory, source: str) -> Iterator[str]:
 
 def _asked_again(run: RunDirectory, history: History, source: str, cycle: int) -> Iterator[str]:
     """The expert is asked once more, on the board as it was."""
-    from harvey.agent import agent_of
+    from harvey.agent import build_agent
     from harvey.run_files.run_head import RunHead
     from harvey.why.ask import why_absent
 
@@ -69,7 +69,7 @@ def _asked_again(run: RunDirectory, history: History, source: str, cycle: int) -
     if source in head.without:
         yield f"The {words(source)} was left out of this run."
         return
-    agent = agent_of(head)
+    agent = build_agent(head)
     expert = _named(source, agent.sources)
     if not agent.servoing.allows(expert.closes):
         yield f"The {expert.closes} level of servoing was off, and the {words(source)} closes it."

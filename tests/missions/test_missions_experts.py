@@ -15,7 +15,7 @@ from blackboard.effect import Effect, Post
 from blackboard.journal import Decision, plain
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from harvey.simulation.run import robot_model, run_mission
+from harvey.simulation.run import build_robot_model, run_mission
 from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources
 from knowledge_sources.settings import Settings
 from sim.body.simulated_body import SimulatedBody
@@ -72,7 +72,7 @@ def test_adding_one_takes_one_line(short_stage: Stage) -> None:
 def test_no_expert_holds_the_truth(short_stage: Stage) -> None:
     """Nothing of the simulator can be reached from what an expert is built with."""
     body = short_stage.body(3)
-    for source in knowledge_sources(robot_model(short_stage.scenario)):
+    for source in knowledge_sources(build_robot_model(short_stage.scenario)):
         assert not any(isinstance(thing, Truth | SimulatedBody | Stage) for thing in _reachable(source)), source.name
     assert any(isinstance(thing, Truth) for thing in _reachable(body))  # the walk does find it where it is
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from harvey.agent import agent_of
+from harvey.agent import build_agent
 from harvey.run_files.records import read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
-from harvey.runner.replay import pictures_of, replay
-from harvey.runner.resume import remains_of
+from harvey.runner.replay import open_pictures, replay
+from harvey.runner.resume import find_remains
 from harvey.simulation.run import resume_mission, run_mission
 from sim.scenario import parse_scenario, with_settings
 from sim.stage import Stage, build_stage
@@ -50,8 +50,8 @@ def run(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
 
 
 def decided_again(run: RunDirectory) -> bool:
-    agent = agent_of(RunHead.read(run.path))
-    return all(told.same for told in replay(run, pictures_of(run), agent.scheduler()))
+    agent = build_agent(RunHead.read(run.path))
+    return all(told.same for told in replay(run, open_pictures(run), agent.scheduler()))
 
 
 def test_each_picture_on_the_move_corrects_the_course_and_all_of_it_is_decided_again_to_the_byte(
@@ -77,7 +77,7 @@ def test_a_run_that_is_cut_off_on_the_move_goes_on(run: RunDirectory, stage: Sta
     for name in ("run.json", "camera.mjpeg"):
         (cut.path / name).write_bytes((run.path / name).read_bytes())
     cut.journal.write_bytes(b"".join(lines[: rolling[30]]))
-    assert resume_mission(cut, remains_of(cut), stage=stage).outcome == "reached"
+    assert resume_mission(cut, find_remains(cut), stage=stage).outcome == "reached"
     told = next(e for r in read_records(cut.journal) for e in r.observed if e.type == "Resumed")
     assert told.value["interrupted"] == [next(
         e.ref for r in read_records(cut.journal) if r.cycle == rolling[30] for e in r.made if e.type == "Course")]

@@ -13,15 +13,15 @@ from typing import Any
 import pytest
 
 from experiments.robustness import crash
-from harvey.agent import agent_of
+from harvey.agent import build_agent
 from harvey.cli import main
 from harvey.replay.repair import redraw
 from harvey.run_files.records import DecisionRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
-from harvey.runner.replay import pictures_of, replay
+from harvey.runner.replay import open_pictures, replay
 from harvey.runner.result import MissionResult
-from harvey.runner.resume import remains_of
+from harvey.runner.resume import find_remains
 from harvey.simulation.run import resume_mission, run_mission
 from logs import disk
 from logs.reader import damage_of, read_decisions, read_frames
@@ -51,13 +51,13 @@ def cut(whole: RunDirectory, to: Path, decisions: int, *, tail: int = 40) -> Run
 
 
 def gone_on(run: RunDirectory, stage: Stage) -> MissionResult:
-    return resume_mission(run, remains_of(run), stage=stage)
+    return resume_mission(run, find_remains(run), stage=stage)
 
 
 def decided_again(run: RunDirectory) -> bool:
     """Whether the whole journal, the crash included, comes out again byte for byte."""
-    agent = agent_of(RunHead.read(run.path))
-    return all(told.same for told in replay(run, pictures_of(run), agent.scheduler()))
+    agent = build_agent(RunHead.read(run.path))
+    return all(told.same for told in replay(run, open_pictures(run), agent.scheduler()))
 
 
 def made_by(records: list[DecisionRecord], kind: str, which: int) -> int:
@@ -176,7 +176,7 @@ def test_a_damaged_recording_is_drawn_anew(
     assert redraw(run) == 30
     assert damage_of(run.recording) is None
     assert [d["cycle"] for d in read_decisions(run.recording)] == list(range(1, 31))
-    drawn, known = read_frames(run.recording), pictures_of(run)
+    drawn, known = read_frames(run.recording), open_pictures(run)
     assert drawn == dict(known)
 
 

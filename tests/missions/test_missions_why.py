@@ -17,7 +17,7 @@ import pytest
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import registry_of
 from experiments.scale.long_journal import write_hour
-from harvey.agent import agent_of
+from harvey.agent import build_agent
 from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
 from harvey.diff.cause import grounds, parting, same
@@ -60,7 +60,7 @@ def history(runs: tuple[Path, Path]) -> History:
 
 @pytest.fixture(scope="module")
 def experts(runs: tuple[Path, Path]) -> Iterator[tuple[KnowledgeSource, ...]]:
-    agent = agent_of(RunHead.read(runs[0]))
+    agent = build_agent(RunHead.read(runs[0]))
     yield agent.sources
 
 

@@ -19,7 +19,7 @@ from blackboard.kinds import Kind, NotAKindError, Registry, Role, inference, is_
 from blackboard.scheduler import Scheduler, registry_of
 from blackboard.servoing import Discrepancy
 from harvey.runner.ports import BodyPort
-from harvey.simulation.run import robot_model
+from harvey.simulation.run import build_robot_model
 from harvey.wiring import knowledge_sources
 from logs import disk
 from logs.journal_file import JournalFile, read_journal
@@ -102,7 +102,7 @@ def test_no_request_reaches_a_port_before_it_is_on_the_disk(kinds: list[type[Any
 
 
 def test_every_kind_that_is_watched_or_written_is_registered() -> None:
-    sources = knowledge_sources(robot_model(load_scenario("lab-to-allens-office")))
+    sources = knowledge_sources(build_robot_model(load_scenario("lab-to-allens-office")))
     registry = registry_of(sources, KINDS)
     assert set(registry.values()) == set(ALL)
     for source in sources:
@@ -116,7 +116,7 @@ def test_every_kind_says_what_it_is_in_one_sentence_of_its_own(kind: type[Any]) 
 
 def test_what_a_knowledge_source_writes_from_outside_is_an_observation_or_a_request() -> None:
     """Nobody on the board makes up what a port alone can know."""
-    sources = knowledge_sources(robot_model(load_scenario("lab-to-allens-office")))
+    sources = knowledge_sources(build_robot_model(load_scenario("lab-to-allens-office")))
     written = {kind for source in sources for kind in source.writes}
     posted_by_ports = {kind for kind in ALL if kind_of(kind).role is Role.OBSERVATION}
     assert {kind.__name__ for kind in written & posted_by_ports} == {"BodyFault"}  # the fault handler closes it

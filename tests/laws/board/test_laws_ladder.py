@@ -24,7 +24,7 @@ from blackboard.journal import Decision
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
-from harvey.simulation.run import robot_model
+from harvey.simulation.run import build_robot_model
 from harvey.wiring import KNOWLEDGE_SOURCES
 from knowledge_sources.questions import (
     active_goal,
@@ -168,7 +168,7 @@ class ScriptedBody:
 @cache
 def robot(continuous: bool) -> RobotModel:
     goal = {"goal": "(ptrans (allens-office (7,4,0)) (allens-office (13,12,0)))", "motion.continuous": continuous}
-    return robot_model(with_settings(load_scenario("lab-to-allens-office"), goal))
+    return build_robot_model(with_settings(load_scenario("lab-to-allens-office"), goal))
 
 
 class Ladder:

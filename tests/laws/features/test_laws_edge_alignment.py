@@ -11,7 +11,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey.simulation.run import robot_model
+from harvey.simulation.run import build_robot_model
 from knowledge_sources.methods.arrays import Floats, Image
 from knowledge_sources.methods.features.images import decode
 from knowledge_sources.methods.motion.routes import compute_free_space
@@ -36,7 +36,7 @@ def stage() -> Stage:
 
 @cache
 def robot() -> RobotModel:
-    return robot_model(stage().scenario)
+    return build_robot_model(stage().scenario)
 
 
 def draw_pose(rng: np.random.Generator) -> Pose2:

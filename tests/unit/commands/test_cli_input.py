@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from harvey.cli import main
 from harvey.commands import COMMANDS
-from harvey.run_files.run_directory import new_run
+from harvey.run_files.run_directory import prepare_directory
 from sim.scenario import SCENARIOS
 from world_models.entries.task import Outcome
 
@@ -238,11 +238,11 @@ def headed(folder: Path, name: str, seed: int) -> str:
 
 def test_a_run_of_something_else_is_moved_aside_and_one_of_the_same_goes(tmp_path: Path) -> None:
     headed(tmp_path / "kept", "bump", 3)
-    assert new_run(tmp_path / "kept", "bump", 4) == (tmp_path / "kept", tmp_path / "kept-older-1")
+    assert prepare_directory(tmp_path / "kept", "bump", 4) == (tmp_path / "kept", tmp_path / "kept-older-1")
     headed(tmp_path / "kept", "hallway-kidnap", 4)
-    assert new_run(tmp_path / "kept", "bump", 4) == (tmp_path / "kept", tmp_path / "kept-older-2")
+    assert prepare_directory(tmp_path / "kept", "bump", 4) == (tmp_path / "kept", tmp_path / "kept-older-2")
     headed(tmp_path / "kept", "bump", 4)
-    assert new_run(tmp_path / "kept", "bump", 4) == (tmp_path / "kept", None)
+    assert prepare_directory(tmp_path / "kept", "bump", 4) == (tmp_path / "kept", None)
     assert not any((tmp_path / "kept").iterdir())
     for number, name in ((1, "bump"), (2, "hallway-kidnap")):
         assert json.loads((tmp_path / f"kept-older-{number}" / "run.json").read_text())["name"] == name

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from harvey.arithmetic import arithmetic
-from harvey.campaign.campaign import Task, run_all, seeds_of, settings_of
+from harvey.campaign.campaign import Task, parse_pairs, parse_seeds, run_tasks
 from harvey.cli import main
 from harvey.errors import BadInput, Terminated
 from harvey.run_files.deciding_code import deciding_code
@@ -326,7 +326,7 @@ def test_several_seeds_make_a_table_and_workers_do_not_matter(run: Path, both: t
 def test_a_mistake_in_a_worker_comes_back(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(BadInput, match="servo"):
-        list(run_all([Task("bump", (("servo.acton", "off"),), 0, tmp_path)], workers=1))
+        list(run_tasks([Task("bump", (("servo.acton", "off"),), 0, tmp_path)], workers=1))
 
 
 STOPS = [(KeyboardInterrupt, 130, "interrupted"), (Terminated, 143, "terminated")]
@@ -369,7 +369,7 @@ def test_sigterm_closes_the_recording(tmp_path: Path) -> None:
 
 
 def test_seeds_and_settings_are_read() -> None:
-    assert seeds_of("3") == (3,)
-    assert seeds_of("0..4") == (0, 1, 2, 3, 4)
-    assert seeds_of("7,1..2,7") == (7, 1, 2)
-    assert settings_of(["a.b=off", "goal=(x=1)"]) == (("a.b", "off"), ("goal", "(x=1)"))
+    assert parse_seeds("3") == (3,)
+    assert parse_seeds("0..4") == (0, 1, 2, 3, 4)
+    assert parse_seeds("7,1..2,7") == (7, 1, 2)
+    assert parse_pairs(["a.b=off", "goal=(x=1)"]) == (("a.b", "off"), ("goal", "(x=1)"))

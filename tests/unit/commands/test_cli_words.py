@@ -16,7 +16,7 @@ from blackboard.servoing import Discrepancy
 from experiments.paper.levels import _row
 from experiments.report import Report
 from experiments.scale.render_speed import measure_edge_offsets_px
-from harvey.campaign.summary import foreseen, format_error, one, several
+from harvey.campaign.summary import format_error, one, several, summarize_dry_run
 from harvey.dry_run import MilestonePreview
 from harvey.errors import BadInput
 from harvey.run_files.records import EntryRecord
@@ -99,7 +99,7 @@ REACHED, BLOCKED = Outcome("reached", "all verified"), Outcome("blocked", "no wa
 def test_what_is_foreseen_agrees_with_the_milestones(
     verdicts: tuple[str, ...], outcome: Outcome, told: str, well: bool
 ) -> None:
-    assert foreseen(ahead(*verdicts), outcome) == (told, well)
+    assert summarize_dry_run(ahead(*verdicts), outcome) == (told, well)
 
 
 def result(seed: int, outcome: str, error_m: float, collisions: int = 0) -> MissionResult:

@@ -30,12 +30,12 @@ def robot() -> RobotModel:
     return RobotModel(load_world(WORLD), camera, CameraMount(0.8, 0.05, 0.1), ActuatorModel(reach=0.97), radius_m=0.2)
 
 
-def head_of(robot: RobotModel, world: Path = WORLD) -> RunHead:
+def build_head(robot: RobotModel, world: Path = WORLD) -> RunHead:
     return RunHead.of(HARDWARE, "flat", 0, world, robot, Servo(plan=False), COMMAND)
 
 
 def test_what_the_robot_knows_comes_back(robot: RobotModel, tmp_path: Path) -> None:
-    head_of(robot).write(tmp_path)
+    build_head(robot).write(tmp_path)
     head = RunHead.read(tmp_path)
     model = head.model()
     assert head.task() == COMMAND
@@ -48,7 +48,7 @@ def test_what_the_robot_knows_comes_back(robot: RobotModel, tmp_path: Path) -> N
 def test_another_world_file_is_refused(robot: RobotModel, tmp_path: Path) -> None:
     world = tmp_path / "flat.toml"
     world.write_bytes(WORLD.read_bytes())
-    head = head_of(robot, world)
+    head = build_head(robot, world)
     world.write_bytes(WORLD.read_bytes() + b"\n# a new coat of paint\n")
     with pytest.raises(BadInput, match=r"flat\.toml: expected the world file as it was"):
         head.model()
@@ -64,7 +64,7 @@ def test_a_malformed_head_is_named(tmp_path: Path, text: str, word: str) -> None
 
 @pytest.mark.parametrize(("key", "value"), [("seed", "three"), ("servo", []), ("without", [3]), ("kind", None)])
 def test_a_value_of_the_wrong_kind_is_named(robot: RobotModel, tmp_path: Path, key: str, value: object) -> None:
-    (tmp_path / "run.json").write_text(json.dumps({**dataclasses.asdict(head_of(robot)), key: value}))
+    (tmp_path / "run.json").write_text(json.dumps({**dataclasses.asdict(build_head(robot)), key: value}))
     with pytest.raises(BadInput, match=rf"run\.json: {key}.*: expected"):
         RunHead.read(tmp_path)
 
@@ -85,7 +85,7 @@ def test_a_value_of_the_wrong_kind_is_named(robot: RobotModel, tmp_path: Path, k
 def test_what_cannot_be_used_is_named_by_where_it_stands(
     robot: RobotModel, tmp_path: Path, part: str, spoilt: dict[str, object], told: str
 ) -> None:
-    data = dataclasses.asdict(head_of(robot))
+    data = dataclasses.asdict(build_head(robot))
     (tmp_path / "run.json").write_text(json.dumps({**data, part: merged(data[part], spoilt)}))
     head = RunHead.read(tmp_path)
     with pytest.raises(BadInput, match=rf"run\.json: {told}"):
@@ -99,7 +99,7 @@ def merged(whole: dict[str, Any], spoilt: Any) -> dict[str, Any]:
 
 def test_a_head_that_lacks_what_is_lacking_by_default_is_read(robot: RobotModel, tmp_path: Path) -> None:
     """As an older version wrote it; what has no default is asked for by name."""
-    data = dataclasses.asdict(head_of(robot))
+    data = dataclasses.asdict(build_head(robot))
     del data["robot"]["camera"]["obstruction"], data["robot"]["continuous"], data["robot"]["actuator"]["turn_sigma"]
     (tmp_path / "run.json").write_text(json.dumps(data))
     assert RunHead.read(tmp_path).model().actuator == robot.actuator

@@ -13,7 +13,7 @@ from harvey.cli import main, parser
 from harvey.dry_run import dry_run
 from harvey.hardware.body import BASE_WORDS, CAMERA_WORDS
 from harvey.hardware.mission import load_mission
-from harvey.simulation.run import robot_model
+from harvey.simulation.run import build_robot_model
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.actuator import ActuatorModel
@@ -47,9 +47,9 @@ def test_its_flat_is_a_world_without_faults_and_its_mission_is_planned_with_ever
     mission, scenario = load_mission(FLAT / "mission.toml", {}), load_scenario(FLAT / "flat-sim.toml")
     assert mission.goal == scenario.goal and mission.world == scenario.world
     assert mission.start == scenario.start
-    prospects, outcome = dry_run(robot_model(scenario), mission.command)
-    assert outcome.kind == "reached" and {p.verdict for p in prospects} == {"clear"}
-    assert f"{len(prospects)} milestones, 0 of them weak" in TEXT
+    previews, outcome = dry_run(build_robot_model(scenario), mission.command)
+    assert outcome.kind == "reached" and {p.verdict for p in previews} == {"clear"}
+    assert f"{len(previews)} milestones, 0 of them weak" in TEXT
 
 
 def test_what_goes_into_a_missions_file_may_stand_there(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from blackboard.entry import Entry, Ref
 from blackboard.journal import plain
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from harvey.simulation.run import robot_model, run_mission
+from harvey.simulation.run import build_robot_model, run_mission
 from harvey.wiring import knowledge_sources
 from sim.scenario import load_scenario
 from sim.stage import build_stage
@@ -103,7 +103,7 @@ def test_it_knows_no_other_expert(stem: str) -> None:
 
 
 def a_robot() -> RobotModel:
-    return robot_model(load_scenario("lab-to-allens-office"))
+    return build_robot_model(load_scenario("lab-to-allens-office"))
 
 
 def effect_record(effect: Effect) -> list[Any]:
