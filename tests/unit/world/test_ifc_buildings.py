@@ -43,7 +43,7 @@ def doors(world: World) -> set[tuple[str, ...]]:
 
 def row(house: House, gap_m: float, *, wall_m: float | None = None) -> House:
     """Rooms a, b and c of 3 by 3 m so far from each other, with walls between them, and no space boundaries."""
-    house.storey("PlanOrigin", 0.0)
+    house.storey("Ground", 0.0)
     for i, name in enumerate("abc"):
         house.space(name, box((3.0 + gap_m) * i, 0.0, (3.0 + gap_m) * i + 3.0, 3.0))
     thick = gap_m if wall_m is None else wall_m
@@ -127,7 +127,7 @@ def test_a_wall_on_the_border_of_spaces_that_touch_is_a_wall(tmp_path: Path) -> 
 
 def test_where_a_wall_ends_the_rest_is_open_and_no_railing_is(tmp_path: Path) -> None:
     house = House()
-    house.storey("PlanOrigin", 0.0)
+    house.storey("Ground", 0.0)
     for name, x in (("a", 0.0), ("b", 3.0), ("c", 6.0)):
         house.space(name, box(x, 0.0, x + 3.0, 6.0))
     house.wall(2.95, 0.0, 3.05, 3.5)
@@ -141,7 +141,7 @@ def test_where_a_wall_ends_the_rest_is_open_and_no_railing_is(tmp_path: Path) ->
 
 def test_openings_without_doors_and_virtual_boundaries_are_ways_through(tmp_path: Path) -> None:
     house = House()
-    house.storey("PlanOrigin", 0.0)
+    house.storey("Ground", 0.0)
     a, b, c = (house.space(name, box(x, 0.0, x + 3.0, 3.0)) for name, x in (("a", 0.0), ("b", 3.0), ("c", 6.2)))
     for space in (a, b):
         house.bound(space, house.rooted("IfcVirtualElement", None), "VIRTUAL")
@@ -170,7 +170,7 @@ def test_a_step_between_rooms_is_told(tmp_path: Path) -> None:
 
 def test_a_door_in_a_curved_wall(tmp_path: Path) -> None:
     house = House()
-    house.storey("PlanOrigin", 0.0)
+    house.storey("Ground", 0.0)
     house.space("round", (), shape=house.shape(house.extruded(house.circle(3.0, 3.0, 3.0), 0.0, 2.5)))
     bends = [math.pi * i / 24 - math.pi / 2 for i in range(25)]
     inner, outer = ([(3 + r * math.cos(t), 3 + r * math.sin(t)) for t in bends] for r in (3.2, 5.0))
@@ -184,7 +184,7 @@ def test_a_door_in_a_curved_wall(tmp_path: Path) -> None:
 
 def test_a_corridor_round_a_core_and_a_column(tmp_path: Path) -> None:
     house = House()
-    house.storey("PlanOrigin", 0.0)
+    house.storey("Ground", 0.0)
     hall = house.profile(box(0, 0, 12, 10), box(3, 3, 9, 7), box(10.0, 5.0, 10.4, 5.4))
     house.space("hall", (), shape=house.shape(house.extruded(hall, 0.0, 2.5)))
     house.space("core", box(3.2, 3.2, 8.8, 6.8))
@@ -197,7 +197,7 @@ def test_a_corridor_round_a_core_and_a_column(tmp_path: Path) -> None:
 
 def test_areas_over_rooms_and_rooms_told_twice_are_no_rooms(tmp_path: Path) -> None:
     house = House()
-    house.storey("PlanOrigin", 0.0)
+    house.storey("Ground", 0.0)
     house.space("gross", box(-0.3, -0.3, 6.5, 3.3), PredefinedType="GFA")
     house.space("1", box(0.0, 0.0, 3.0, 3.0))
     house.space("2", box(3.2, 0.0, 6.2, 3.0))
