@@ -1,4 +1,4 @@
-"""Milestones by the thousand: does the judge verify right places, refute wrong ones, and know how sure it may be?"""
+"""The milestone judge on right and wrong places: false accepts, false rejects, and whether its probability is true."""
 
 from __future__ import annotations
 
@@ -10,10 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from experiments.chart import OURS, PAPER, PEER, chart
-from experiments.perception.milestones_cases import GONE, KINDS, MOST_HIDDEN, ROOMS, SAME, cases, site
+from experiments.perception.milestones_cases import (
+    KINDS,
+    MAX_HIDDEN_SHARE,
+    MIN_DIFFERENCE,
+    MISSING_SHARE,
+    ROOMS,
+    generate_cases,
+    get_site,
+)
 from experiments.perception.milestones_picture import draw_case
-from experiments.perception.milestones_trials import BLOCK, FLOOR_M, Judged, Trial, judge_trial
-from experiments.perception.milestones_trials import Found as FoundCases
+from experiments.perception.milestones_trials import BLOCK, MARGIN_M, JudgedCase, Trial, TrialResult, judge_trial
 from experiments.report import Cell, Report
 from experiments.trials import campaign_folder, run_trials
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
@@ -22,31 +29,31 @@ FLOORS, EACH = 25, 420
 QUICK_FLOORS, QUICK_EACH = 1, 45
 FIRST_FLOOR = 10_000
 """Floors with smaller numbers are for calibration."""
-MOST_FALSE_ACCEPTS, MOST_FALSE_REJECTS, MOST_OFF = 0.001, 0.01, 0.02
+MAX_FALSE_ACCEPTS, MAX_FALSE_REJECTS, MAX_CALIBRATION_ERROR = 0.001, 0.01, 0.02
 BINS = (0.0, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 0.7, 0.9, 0.99, 1.0)
-WORST = 8
-COLUMNS = ("places", "cases", "verified", "refuted", "not testable", "wrong accepts", "p of wrong: median", "paper")
+WORST_SHOWN = 8
+COLUMNS = ("places", "cases", "verified", "refuted", "not testable", "false accepts", "median p of wrong", "paper")
 Bin = tuple[float, float, float, float, int]
-"""Of the stated probability: mean stated, part found wrong, from and to (95 %), cases."""
+"""Bin of the stated probability: mean stated, share that was wrong, its 95 % interval, cases."""
 
 
 def run(quick: bool, seed: int) -> Report:
-    """Floors ``10000 + 100 seed`` and following."""
+    """Judge cases on floors ``10000 + 100 seed`` and following."""
     folder = campaign_folder("milestones", seed, quick=quick)
-    judged = judged_on(FIRST_FLOOR + 100 * seed, *((QUICK_FLOORS, QUICK_EACH) if quick else (FLOORS, EACH)), folder)
-    told = [j for j in judged if not j.is_same]
-    right, wrong = [j for j in told if j.kind == "right"], [j for j in told if j.kind != "right"]
-    bins = reliability(told)
+    judged = judge_floors(FIRST_FLOOR + 100 * seed, *((QUICK_FLOORS, QUICK_EACH) if quick else (FLOORS, EACH)), folder)
+    counted = [j for j in judged if not j.is_same]
+    right, wrong = [j for j in counted if j.kind == "right"], [j for j in counted if j.kind != "right"]
+    bins = compute_reliability(counted)
     _draw_reliability(bins, folder / "reliability.png")
     rates = _draw_roc(right, wrong, folder / "roc.png")
-    worst = _worst(told)
+    worst = _worst(counted)
     for j in worst:
         _draw_worst(j, folder / "worst")
     report = Report(
-        "Milestones on floors that nobody drew", COLUMNS, tuple(_rows(judged, right, wrong)),
+        "The milestone judge on generated floors", COLUMNS, tuple(_rows(judged, right, wrong)),
         notes=(
-            *_notes(judged, told, folder), *rates,
-            *(f"stated {mean:.4g}: {found:.4g} were wrong ({low:.4g} to {high:.4g} with 95 %), {n} cases"
+            *_notes(judged, counted, folder), *rates,
+            *(f"stated {mean:.4g}: {found:.4g} were wrong (95 % interval {low:.4g} to {high:.4g}), {n} cases"
               for mean, found, low, high, n in bins),
             *(f"worst: floor {j.floor} case {j.number} ({j.kind}): {j.verdict}, p_false {j.p_false:.2g}; {j.reason}"
               for j in worst),
@@ -57,49 +64,51 @@ def run(quick: bool, seed: int) -> Report:
     return report
 
 
-def judged_on(first_floor: int, floors: int, each: int, folder: Path) -> list[Judged]:
-    """Every case of so many floors, in order; what the folder has already is not done again."""
+def judge_floors(first_floor: int, floors: int, each: int, folder: Path) -> list[JudgedCase]:
+    """Judge the cases of some floors, in order; results that the folder has are not computed again."""
     trials = [Trial(first_floor + k, first, min(BLOCK, each - first))
               for k in range(floors) for first in range(0, each, BLOCK)]
-    found = run_trials(judge_trial, trials, FoundCases, folder, "block")
-    return [Judged(**table) for block in found for table in block.judged]
+    results = run_trials(judge_trial, trials, TrialResult, folder, "block")
+    return [JudgedCase(**table) for block in results for table in block.judged]
 
 
-def _rows(judged: Sequence[Judged], right: Sequence[Judged], wrong: Sequence[Judged]) -> list[tuple[Cell, ...]]:
+def _rows(
+    judged: Sequence[JudgedCase], right: Sequence[JudgedCase], wrong: Sequence[JudgedCase]
+) -> list[tuple[Cell, ...]]:
     sure = [j for j in right if not j.doubted]
-    conditions: tuple[tuple[str, Callable[[Judged], bool]], ...] = (
-        ("  nothing but clutter", lambda j: not (j.hidden or j.gone or j.light)),
+    conditions: tuple[tuple[str, Callable[[JudgedCase], bool]], ...] = (
+        ("  clutter only", lambda j: not (j.hidden or j.missing or j.light)),
         ("  part of the view hidden", lambda j: j.hidden > 0.0),
         ("  light changed", lambda j: j.light != 0.0),
-        ("  model parts missing", lambda j: j.gone > 0.0),
+        ("  parts of the model missing", lambda j: j.missing > 0.0),
     )
     same = [j for j in judged if j.is_same]
     return [
         _row("right", sure),
         *(_row(name, [j for j in sure if holds(j)]) for name, holds in conditions),
         *(_row(kind, [j for j in wrong if j.kind == kind and not j.doubted]) for kind in KINDS[1:]),
-        _row("right, the twin place as likely", [j for j in right if j.doubted]),
-        _row("wrong, the twin place as likely", [j for j in wrong if j.doubted]),
-        _row("nobody could tell, but as likely", [j for j in same if j.doubted]),
-        _row("nobody could tell, and not doubted", [j for j in same if not j.doubted]),
+        _row("right, alias as likely", [j for j in right if j.doubted]),
+        _row("wrong, alias as likely", [j for j in wrong if j.doubted]),
+        _row("indistinguishable, alias as likely", [j for j in same if j.doubted]),
+        _row("indistinguishable, no alias", [j for j in same if not j.doubted]),
     ]
 
 
-def _row(name: str, judged: Sequence[Judged]) -> tuple[Cell, ...]:
+def _row(name: str, judged: Sequence[JudgedCase]) -> tuple[Cell, ...]:
     counts = [sum(j.verdict == verdict for j in judged) for verdict in ("verified", "refuted", "not testable")]
     return (name, len(judged), *counts, sum(is_false_accept(j) for j in judged),
             float(np.median([j.p_false for j in judged])) if judged else None, None)
 
 
-def is_false_accept(judged: Judged) -> bool:
-    """Verified, with a pose that is wrong."""
+def is_false_accept(judged: JudgedCase) -> bool:
+    """Whether a wrong pose was verified."""
     return judged.verdict == "verified" and judged.is_wrong
 
 
-def reliability(judged: Sequence[Judged]) -> list[Bin]:
-    """(mean stated, found, from, to, cases) of each bin of the stated probability.
+def compute_reliability(judged: Sequence[JudgedCase]) -> list[Bin]:
+    """Compute (mean stated, share wrong, interval, cases) of each bin of the stated probability.
 
-    Right and wrong places count the same in all; the interval is Wilson's, on as many cases as the weights leave.
+    Right and wrong places have the same total weight; the interval is Wilson's, with the effective number of cases.
     """
     p, wrong = np.array([j.p_false for j in judged]), np.array([j.is_wrong for j in judged])
     weight = np.where(wrong, 0.5 / max(1, wrong.sum()), 0.5 / max(1, (~wrong).sum()))
@@ -121,69 +130,70 @@ def _wilson(share: float, n: float, z: float = 1.96) -> tuple[float, float]:
             z / spread * math.sqrt(share * (1.0 - share) / n + z * z / (4 * n * n)))
 
 
-def calibration_error(bins: Sequence[Bin]) -> float:
-    """Mean distance of what was stated and what was found, by the number of cases."""
+def compute_calibration_error(bins: Sequence[Bin]) -> float:
+    """Compute the mean difference of stated and found probability, weighted by the number of cases."""
     total = sum(n for *_, n in bins)
     return math.fsum(n * abs(stated - found) for stated, found, _, _, n in bins) / max(1, total)
 
 
 def _claims(
-    right: Sequence[Judged], wrong: Sequence[Judged], bins: Sequence[Bin], quick: bool
+    right: Sequence[JudgedCase], wrong: Sequence[JudgedCase], bins: Sequence[Bin], quick: bool
 ) -> tuple[tuple[str, bool], ...]:
     accepts, rejects = sum(map(is_false_accept, wrong)), sum(j.verdict == "refuted" for j in right)
-    most = max(MOST_FALSE_ACCEPTS * len(wrong), 0.5)
-    fewest = MOST_FALSE_REJECTS * len(right)
+    most = max(MAX_FALSE_ACCEPTS * len(wrong), 0.5)
+    fewest = MAX_FALSE_REJECTS * len(right)
     claims = [
-        (f"false accepts at most {MOST_FALSE_ACCEPTS:.1%}: {accepts} of {len(wrong)}", accepts <= most),
-        (f"false rejects at most {MOST_FALSE_REJECTS:.0%}: {rejects} of {len(right)}",
+        (f"false accepts at most {MAX_FALSE_ACCEPTS:.1%}: {accepts} of {len(wrong)}", accepts <= most),
+        (f"false rejects at most {MAX_FALSE_REJECTS:.0%}: {rejects} of {len(right)}",
          rejects <= (max(fewest, 2.0) if quick else fewest)),
     ]
     if not quick:
-        error = calibration_error(bins)
-        claims.append((f"what is stated and what was found differ by {error:.2%} on average, at most {MOST_OFF:.0%}",
-                       error <= MOST_OFF))
+        error = compute_calibration_error(bins)
+        claims.append((f"stated and found probability differ by {error:.2%} on average, at most"
+                       f" {MAX_CALIBRATION_ERROR:.0%}",
+                       error <= MAX_CALIBRATION_ERROR))
         claims.append((f"at least 10,000 cases: {len(right) + len(wrong)}", len(right) + len(wrong) >= 10_000))
     return tuple(claims)
 
 
-def _notes(judged: Sequence[Judged], told: Sequence[Judged], folder: Path) -> list[str]:
+def _notes(judged: Sequence[JudgedCase], counted: Sequence[JudgedCase], folder: Path) -> list[str]:
     floors = sorted({j.floor for j in judged})
     return [
         f"Floors {floors[0]} to {floors[-1]} of {ROOMS} rooms (sim/made_up/generated_floors.py); every fifth is"
-        " symmetric, every fifth has identical doors. None served for calibration.",
-        "right: the robot is where the wheels may have left it after a leg, drawn from the covariance that it holds;"
-        " the wrong places have the same spread about them. Every building has clutter that the model lacks, every"
-        f" second one has lost {GONE:.0%} of the model's things; up to {MOST_HIDDEN:.0%} of the view is hidden in 3 of"
-        " 10 cases, and in 5 of 10 the light differs (gain 0.35 to 1.5, colour by 12 %, 30 % across the picture).",
-        f"A pose is wrong beyond 3 of its own deviations and {FLOOR_M:.2f} m or 0.6 degrees more. A wrong accept is a"
-        " wrong pose verified, a false reject a right place refuted; not testable is neither, and has its column.",
-        "the twin place as likely: in a symmetric corridor the robot holds the place across its middle for as likely"
-        " (another hypothesis is on the board), and must not verify.",
-        f"nobody could tell: the bare model looks otherwise in less than {SAME:.0%} of the picture from the wrong"
-        " place. These count in no rate: only where the robot was before speaks against them.",
-        f"{len(told)} cases count. Verified up to p_false {POSE_CONFIDENCE.accept:.3g}, refuted from"
-        f" {POSE_CONFIDENCE.refute:.3g}; p_false holds where half of the places are wrong. It was fitted by harvey"
+        " symmetric, every fifth has identical doors. None was used for calibration.",
+        "right: the true pose is drawn from the covariance of the believed one; the wrong places have the same"
+        " covariance. Every building has clutter that the model lacks, every second one lacks"
+        f" {MISSING_SHARE:.0%} of the model's things; up to {MAX_HIDDEN_SHARE:.0%} of the view is hidden in 3 of 10"
+        " cases, and in 5 of 10 the light differs (gain 0.35 to 1.5, colour by 12 %, 30 % across the frame).",
+        f"A pose is wrong if its error exceeds 3 of its standard deviations plus {MARGIN_M:.2f} m or 0.6 degrees. A"
+        " false accept is a wrong pose verified, a false reject a right place refuted; not testable is neither.",
+        "alias as likely: in a symmetric corridor the mirrored place is as likely (it is a second hypothesis on the"
+        " board), and the judge must not verify.",
+        f"indistinguishable: from the wrong place the bare model differs in less than {MIN_DIFFERENCE:.0%} of the"
+        " frame. These count in no rate: only the robot's past speaks against them.",
+        f"{len(counted)} cases count. Verified up to p_false {POSE_CONFIDENCE.accept:.3g}, refuted from"
+        f" {POSE_CONFIDENCE.refute:.3g}; p_false assumes that half of the places are wrong. It was fitted by harvey"
         " experiment milestones-calibrate.",
         f"Pictures, every case and this table: {folder}",
     ]
 
 
-def _worst(judged: Sequence[Judged]) -> list[Judged]:
-    """Wrong accepts, then the wrong place that convinced most, then right places refuted."""
+def _worst(judged: Sequence[JudgedCase]) -> list[JudgedCase]:
+    """Select false accepts, then wrong places with the smallest p_false, then right places refuted."""
     wrong = sorted((j for j in judged if j.is_wrong), key=lambda j: (not is_false_accept(j), j.p_false))
     refuted = sorted((j for j in judged if j.kind == "right" and j.verdict == "refuted"), key=lambda j: -j.p_false)
-    return [*wrong[: WORST // 2], *refuted[: WORST // 2]]
+    return [*wrong[: WORST_SHOWN // 2], *refuted[: WORST_SHOWN // 2]]
 
 
-def _draw_worst(judged: Judged, folder: Path) -> None:
-    robot = site(judged.floor).robot
-    case = next(iter(cases(judged.floor, judged.number, 1)))
+def _draw_worst(judged: JudgedCase, folder: Path) -> None:
+    robot = get_site(judged.floor).robot
+    case = next(iter(generate_cases(judged.floor, judged.number, 1)))
     draw_case(robot, case, folder / f"floor-{judged.floor}-case-{judged.number}.png")
 
 
 def _draw_reliability(bins: Sequence[Bin], path: Path) -> None:
     with chart(path, "Is the stated probability true?", "stated probability that the pose is wrong",
-               "part that was wrong") as axes:
+               "share that was wrong") as axes:
         stated, found, low, high, n = (np.array(column) for column in zip(*bins, strict=True))
         shown = np.maximum(found, 1e-5)
         axes.errorbar(np.maximum(stated, 1e-5), shown, yerr=[shown - np.maximum(np.minimum(low, shown), 1e-5),
@@ -195,11 +205,11 @@ def _draw_reliability(bins: Sequence[Bin], path: Path) -> None:
         axes.set_yscale("log")
 
 
-def _draw_roc(right: Sequence[Judged], wrong: Sequence[Judged], path: Path) -> list[str]:
-    """The judge beside a threshold on the covariance, over the same cases; what each accepts at the wanted rate."""
+def _draw_roc(right: Sequence[JudgedCase], wrong: Sequence[JudgedCase], path: Path) -> list[str]:
+    """Draw the ROC curves of the judge and of a threshold on the covariance; describe each at the required rate."""
     lines = []
     with chart(path, "Accepting right places and wrong ones", "wrong places accepted", "right places accepted") as axes:
-        scores: tuple[tuple[str, str, Callable[[Judged], float]], ...] = (
+        scores: tuple[tuple[str, str, Callable[[JudgedCase], float]], ...] = (
             ("probability", OURS, lambda j: j.p_false), ("covariance", PEER, lambda j: j.sigma_m))
         for name, colour, score in scores:
             good, bad = (np.sort([score(j) for j in group if not j.doubted and (j.kind == "right") != j.is_wrong])
@@ -209,9 +219,9 @@ def _draw_roc(right: Sequence[Judged], wrong: Sequence[Judged], path: Path) -> l
             x = np.searchsorted(bad, good, side="right") / len(bad)
             y = np.arange(1, len(good) + 1) / len(good)
             axes.step(np.maximum(x, 1e-4), y, where="post", color=colour, label=f"threshold on the {name}")
-            at = float(np.max(y[x <= MOST_FALSE_ACCEPTS], initial=0.0))
+            at = float(np.max(y[x <= MAX_FALSE_ACCEPTS], initial=0.0))
             area = 1.0 - float(np.mean(x))
             lines.append(f"threshold on the {name}: {at:.1%} of the right places are accepted where at most"
-                         f" {MOST_FALSE_ACCEPTS:.1%} of the wrong ones are; area under the curve {area:.4f}")
+                         f" {MAX_FALSE_ACCEPTS:.1%} of the wrong ones are; area under the curve {area:.4f}")
         axes.set_xscale("log")
     return lines

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.perception.milestones import calibration_error, judged_on, reliability
-from experiments.perception.milestones_trials import Judged
+from experiments.perception.milestones import compute_calibration_error, compute_reliability, judge_floors
+from experiments.perception.milestones_trials import JudgedCase
 from experiments.report import Report
 from experiments.trials import campaign_folder
 from knowledge_sources.methods.verification.pose_confidence import (
@@ -28,68 +28,69 @@ from knowledge_sources.methods.verification.pose_confidence import (
 Floats = NDArray[np.float64]
 FIRST_FLOOR, FLOORS, EACH = 1000, 30, 180
 QUICK_FLOORS, QUICK_EACH = 1, 45
-FALSE_ACCEPTS, FALSE_REJECTS = 0.001, 0.002
-"""Parts of the wrong and of the right places, by the fitted probabilities, that the limits let through."""
+MAX_FALSE_ACCEPTS, MAX_FALSE_REJECTS = 0.001, 0.002
+"""Expected shares of wrong places accepted and of right places rejected, by the fitted probabilities."""
 LIMITS = np.geomspace(1e-5, 0.1, 81)
 REFUTED = np.linspace(0.5, 0.999, 500)
 
 
 def run(quick: bool, seed: int) -> Report:
-    """Floors ``1000 + 100 seed`` and following."""
+    """Fit on floors ``1000 + 100 seed`` and following."""
     folder = campaign_folder("milestones-calibrate", seed, quick=quick)
     floors, each = (QUICK_FLOORS, QUICK_EACH) if quick else (FLOORS, EACH)
     first = FIRST_FLOOR + 100 * seed
-    told = [j for j in judged_on(first, floors, each, folder) if not j.is_same and not j.doubted]
-    found = fit_confidence(told)
-    how = (f"{len(told)} cases of {floors} floors from {first} on: harvey experiment milestones-calibrate"
+    cases = [j for j in judge_floors(first, floors, each, folder) if not j.is_same and not j.doubted]
+    found = fit_confidence(cases)
+    how = (f"{len(cases)} cases of {floors} floors from {first} on: harvey experiment milestones-calibrate"
            f"{' --quick' if quick else ''} --seed {seed}")
-    (folder / WEIGHTS_FILE.name).write_text(as_toml(found, how), encoding="utf-8")
+    (folder / WEIGHTS_FILE.name).write_text(format_toml(found, how), encoding="utf-8")
     weights = (POSE_CONFIDENCE.lines_and_colors, found.lines_and_colors, POSE_CONFIDENCE.lines_only, found.lines_only)
     rows = list(zip((*TERMS, "bias"), *((*w.each, w.bias) for w in weights), strict=True))
     rows += [("accept up to", POSE_CONFIDENCE.accept, found.accept, None, None),
              ("refute from", POSE_CONFIDENCE.refute, found.refute, None, None)]
-    error = calibration_error(reliability(told))
+    error = compute_calibration_error(compute_reliability(cases))
     return Report(
         "Weights of the evidence for a milestone",
-        ("evidence", "in use", "fitted now", "lines only: in use", "fitted now"), tuple(rows),
+        ("evidence", "in use", "fitted now", "lines only: in use", "lines only: fitted now"), tuple(rows),
         notes=(
-            f"From {how}.", f"With what is in use, stated and found differ by {error:.2%} on average over these cases.",
-            f"To go by it: cp {folder / WEIGHTS_FILE.name} {WEIGHTS_FILE.relative_to(WEIGHTS_FILE.parents[3])}",
+            f"From {how}.",
+            f"With the weights in use, stated and found probability differ by {error:.2%} on average over these cases.",
+            f"To use the fit: cp {folder / WEIGHTS_FILE.name} {WEIGHTS_FILE.relative_to(WEIGHTS_FILE.parents[3])}",
         ),
         claims=(("no evidence speaks against a pose",
                  min(*found.lines_and_colors.each, *found.lines_only.each) >= 0.0),),
     )
 
 
-def fit_confidence(told: Sequence[Judged]) -> PoseConfidence:
+def fit_confidence(cases: Sequence[JudgedCase]) -> PoseConfidence:
     """Fit the weights to judged cases, and derive the limits."""
-    evidence, right = np.array([j.evidence for j in told]), np.array([not j.is_wrong for j in told])
+    evidence, right = np.array([j.evidence for j in cases]), np.array([not j.is_wrong for j in cases])
     weights, lines_only = fit_weights(evidence, right), fit_weights(remove_colors(evidence), right)
     p = weights.p_false(evidence)
     weight = np.where(right, 1.0 / max(1, right.sum()), 1.0 / max(1, (~right).sum()))
-    return PoseConfidence(weights, lines_only, accept_limit(p, weight), refute_limit(p, weight))
+    return PoseConfidence(weights, lines_only, find_accept_limit(p, weight), find_refute_limit(p, weight))
 
 
-def accept_limit(p: Floats, weight: Floats) -> float:
-    """The largest limit below which, by the probabilities themselves, few enough of the wrong places lie."""
+def find_accept_limit(p: Floats, weight: Floats) -> float:
+    """Find the largest limit below which the expected share of wrong places is small enough."""
     all_wrong = float(np.sum(weight * p))
-    good = [limit for limit in LIMITS if np.sum((weight * p)[p <= limit]) <= FALSE_ACCEPTS * all_wrong]
+    good = [limit for limit in LIMITS if np.sum((weight * p)[p <= limit]) <= MAX_FALSE_ACCEPTS * all_wrong]
     return float(max(good, default=LIMITS[0]))
 
 
-def refute_limit(p: Floats, weight: Floats) -> float:
-    """The smallest limit beyond which few enough of the right places lie."""
+def find_refute_limit(p: Floats, weight: Floats) -> float:
+    """Find the smallest limit beyond which the expected share of right places is small enough."""
     all_right = float(np.sum(weight * (1.0 - p)))
-    good = [limit for limit in REFUTED if np.sum((weight * (1.0 - p))[p >= limit]) <= FALSE_REJECTS * all_right]
+    good = [limit for limit in REFUTED if np.sum((weight * (1.0 - p))[p >= limit]) <= MAX_FALSE_REJECTS * all_right]
     return float(min(good, default=REFUTED[-1]))
 
 
-def as_toml(confidence: PoseConfidence, how: str) -> str:
+def format_toml(confidence: PoseConfidence, how: str) -> str:
     """Write the file of weights, with a comment on how they were fitted."""
     return (
         f"# Weights of the evidence for a pose, in log odds; see pose_confidence.py. Fitted on\n# {how}.\n"
-        f"# accept: {FALSE_ACCEPTS:.2%} of the wrong places lie below it; refute: {FALSE_REJECTS:.1%} of the right ones"
-        f" lie above it.\naccept = {confidence.accept:.3g}\nrefute = {confidence.refute:.4g}\n"
+        f"# accept: {MAX_FALSE_ACCEPTS:.2%} of the wrong places lie below it;"
+        f" refute: {MAX_FALSE_REJECTS:.1%} of the right ones lie above it.\naccept = {confidence.accept:.3g}\nrefute = {confidence.refute:.4g}\n"
         f"\n[lines_and_colors]\n{_table(confidence.lines_and_colors)}"
         f"\n[lines_only]   # where no colors can be compared\n{_table(confidence.lines_only)}"
     )

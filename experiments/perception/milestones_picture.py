@@ -1,4 +1,4 @@
-"""One case as a picture: what the camera saw, and where the model's lines would lie at the pose that was found."""
+"""Picture of one case: the frame, and the model's lines at the pose found."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from experiments.chart import OURS, PEER
 from experiments.perception.milestones_cases import Case
-from experiments.perception.milestones_trials import certified
+from experiments.perception.milestones_trials import certify
 from knowledge_sources.methods.features.images import decode_colour
 from knowledge_sources.methods.verification.line_check import check_lines
 from world_models.entries.percepts import PoseFix, Segments
@@ -17,11 +17,11 @@ from world_models.robot import RobotModel
 
 
 def draw_case(robot: RobotModel, case: Case, path: Path) -> None:
-    """Accounted lines in blue, the others in orange (PNG)."""
+    """Draw matched lines in blue and the others in orange (PNG)."""
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
-    view = certified(robot, case)
+    view = certify(robot, case)
     certificate, fix, segments = view.latest(Certificate), view.latest(PoseFix), view.latest(Segments)
     assert certificate is not None and fix is not None and segments is not None
     lines = np.array(case.milestone.expected, float).reshape(-1, 2, 3)

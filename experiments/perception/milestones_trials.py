@@ -1,4 +1,4 @@
-"""What the judge says in each case: the experts themselves on a board of their own, as in a mission."""
+"""Verdicts of the milestone judge, with the knowledge sources on a board of their own, as in a mission."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from blackboard.board import View
 from blackboard.effect import Effect, Post
 from blackboard.scheduler import Scheduler
-from experiments.perception.milestones_cases import SAME, Case, cases, site
+from experiments.perception.milestones_cases import MIN_DIFFERENCE, Case, generate_cases, get_site
 from knowledge_sources.methods.verification.color_check import check_colors, decode_small_color
 from knowledge_sources.methods.verification.line_check import check_lines
 from knowledge_sources.methods.verification.pose_evidence import compute_evidence
@@ -25,15 +25,15 @@ from world_models.entries.task import Certificate
 from world_models.frames import wrap_angle
 from world_models.robot import RobotModel
 
-SIGMAS, FLOOR_M, FLOOR_RAD = 3.0, 0.05, math.radians(0.6)
-"""A pose is wrong that is off by more than so many of its own deviations and so much more."""
+MAX_SIGMAS, MARGIN_M, MARGIN_RAD = 3.0, 0.05, math.radians(0.6)
+"""A pose is wrong if its error exceeds this many of its standard deviations plus the margin."""
 BLOCK = 60
-"""Cases of one floor that are done at a time."""
+"""Cases per trial."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """Some cases of a floor: number ``first`` and so many more."""
+    """Cases of a floor, ``count`` from number ``first`` on."""
 
     floor: int
     first: int
@@ -41,14 +41,14 @@ class Trial:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
-    """One case and what was said of it, in plain types.
+class JudgedCase:
+    """One case and its verdict, in plain types.
 
     Attributes:
-        doubted: whether another hypothesis was on the board.
-        is_wrong: whether the pose is; is_same: whether nobody could tell the wrong place from the believed one.
-        sigma_m: the largest deviation of the pose by its covariance. error_m: infinite on another floor.
-        evidence: what spoke for the pose (:class:`knowledge_sources.methods.verification.pose_evidence.PoseEvidence`).
+        doubted: whether a second hypothesis was on the board.
+        is_wrong: whether the pose is; is_same: whether wrong and believed place are indistinguishable.
+        sigma_m: largest standard deviation of the position. error_m: infinite on another floor.
+        evidence: of the pose (:class:`knowledge_sources.methods.verification.pose_evidence.PoseEvidence`).
     """
 
     floor: int
@@ -62,32 +62,32 @@ class Judged:
     sigma_m: float
     error_m: float
     hidden: float
-    gone: float
+    missing: float
     light: float
     evidence: list[float]
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """What a trial found: the cases as tables."""
+class TrialResult:
+    """The cases of a trial as tables."""
 
     judged: list[dict[str, Any]]
 
 
-def judge_trial(trial: Trial) -> Found:
-    """Every case of a trial."""
-    robot = site(trial.floor).robot
-    out = [_judged(robot, trial.floor, number, case)
-           for number, case in enumerate(cases(trial.floor, trial.first, trial.count), trial.first)]
-    return Found([{name: getattr(j, name) for name in Judged.__slots__} for j in out])
+def judge_trial(trial: Trial) -> TrialResult:
+    """Judge every case of a trial."""
+    robot = get_site(trial.floor).robot
+    out = [_judge_case(robot, trial.floor, number, case)
+           for number, case in enumerate(generate_cases(trial.floor, trial.first, trial.count), trial.first)]
+    return TrialResult([{name: getattr(j, name) for name in JudgedCase.__slots__} for j in out])
 
 
-def certified(robot: RobotModel, case: Case) -> View:
-    """The board after the experts have judged a case."""
+def certify(robot: RobotModel, case: Case) -> View:
+    """Judge a case; returned is the board with its certificate."""
     scheduler = Scheduler([LineFinder(robot), Matcher(robot), MedRAndT(robot), MilestoneJudge(robot)])
-    told: list[Effect] = [Post(case.belief), Post(case.milestone), Post(Frame(case.jpeg, 0, 0.0, "milestone"))]
-    scheduler.tell([Post(case.rival), *told] if case.rival else told, "case")
+    effects: list[Effect] = [Post(case.belief), Post(case.milestone), Post(Frame(case.jpeg, 0, 0.0, "milestone"))]
+    scheduler.tell([Post(case.alternative), *effects] if case.alternative else effects, "case")
     while scheduler.view.latest(Certificate) is None:
         decision = scheduler.step()
         if decision is None or decision.refused:
@@ -95,13 +95,13 @@ def certified(robot: RobotModel, case: Case) -> View:
     return scheduler.view
 
 
-def _judged(robot: RobotModel, floor: int, number: int, case: Case) -> Judged:
-    view = certified(robot, case)
+def _judge_case(robot: RobotModel, floor: int, number: int, case: Case) -> JudgedCase:
+    view = certify(robot, case)
     certificate, fix, segments = view.latest(Certificate), view.latest(PoseFix), view.latest(Segments)
     assert certificate is not None and fix is not None and segments is not None
     c, pose, covariance = certificate.value, fix.value.world_from_robot, np.asarray(fix.value.covariance)
     lines = np.array(case.milestone.expected, float).reshape(-1, 2, 3)
-    told = compute_evidence(
+    evidence = compute_evidence(
         robot, lines, segments.value.segments_px, pose, covariance, case.belief.world_from_robot(robot.world),
         case.belief.covariance_world(robot.world), check_lines(robot, lines, segments.value.segments_px, pose),
         check_colors(robot, pose, decode_small_color(case.jpeg), case.milestone.looks),
@@ -109,9 +109,9 @@ def _judged(robot: RobotModel, floor: int, number: int, case: Case) -> Judged:
     sigma_m, sigma_rad = (math.sqrt(float(v)) for v in (np.linalg.eigvalsh(covariance[:2, :2])[-1], covariance[2, 2]))
     error_m = math.inf if case.is_elsewhere else pose.distance_to(case.true)
     turned = abs(wrap_angle(pose.heading_rad - case.true.heading_rad))
-    return Judged(
-        floor, number, case.kind, case.rival is not None, c.verdict, c.p_false,
-        error_m > SIGMAS * sigma_m + FLOOR_M or turned > SIGMAS * sigma_rad + FLOOR_RAD,
-        case.kind != "right" and case.unlike < SAME, sigma_m, error_m, case.hidden, case.gone, case.light,
-        told.values.tolist(), c.reason,
+    return JudgedCase(
+        floor, number, case.kind, case.alternative is not None, c.verdict, c.p_false,
+        error_m > MAX_SIGMAS * sigma_m + MARGIN_M or turned > MAX_SIGMAS * sigma_rad + MARGIN_RAD,
+        case.kind != "right" and case.difference < MIN_DIFFERENCE, sigma_m, error_m, case.hidden, case.missing,
+        case.light, evidence.values.tolist(), c.reason,
     )

@@ -1,4 +1,4 @@
-"""One kidnap: a robot that stands elsewhere than it believes, and the experts that are to find out."""
+"""One kidnap: a robot that stands elsewhere than it believes, and the knowledge sources that relocalize it."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ from world_models.frames import Pose2
 from world_models.robot import RobotModel
 from world_models.units import FOOT_M
 
-ROOM_M = 0.45
-"""The robot is put down so far from walls and furniture at least."""
+MIN_CLEARANCE_M = 0.45
+"""Smallest distance of the robot's centre from walls and furniture."""
 
 
 @dataclass(frozen=True, slots=True)
 class Kidnap:
-    """Which one.
+    """A kidnap.
 
     Attributes:
-        floor: the seed that the floor is made with; rooms: how many it has.
+        floor: seed of the floor; rooms: number of its rooms.
         symmetric: its corridors look the same from both ends, and the robot is put into one of them.
-        number: of the kidnap on that floor; with the floor's seed it gives all chance.
+        number: of the kidnap on that floor; with the floor's seed it determines all random numbers.
     """
 
     floor: int
@@ -59,15 +59,15 @@ class Kidnap:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """What came of one.
+class KidnapResult:
+    """Result of a kidnap.
 
     Attributes:
-        room, x_m, y_m, heading_rad: where the robot was put [world].
+        room, x_m, y_m, heading_rad: true pose [world].
         verdict: found, ambiguous or lost.
-        believed: the locale that it says it is in; error_m: how far it is from where it says; infinite for neither.
-        probes: looks that it took; places: how many were still thought possible at the end.
-        cpu_s: processor time, without the pictures and what is worked out once for a floor.
+        believed: reported locale; error_m: distance from the reported pose; infinite if there is none.
+        probes: number of looks; places: number of pose candidates at the end.
+        cpu_s: processor time, without rendering and what is computed once per floor.
     """
 
     floor: int
@@ -87,7 +87,7 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A floor with its building and a robot that knows the model of it."""
+    """A floor with its building, and a robot that has its model."""
 
     floor: Floor
     robot: RobotModel
@@ -99,8 +99,8 @@ def _floor(seed: int, rooms: int, symmetric: bool) -> Floor:
     return generated_floor(seed, rooms, symmetric=symmetric)
 
 
-def floor_of(trial: Kidnap) -> Floor:
-    """The floor of a kidnap."""
+def get_floor(trial: Kidnap) -> Floor:
+    """Get the floor of a kidnap."""
     return _floor(trial.floor, trial.rooms, trial.symmetric)
 
 
@@ -115,16 +115,16 @@ def _scene(floor: Floor) -> Scene:
     return Scene(floor, robot, building)
 
 
-def found_in(trial: Kidnap) -> Found:
-    """Carry the robot off, and let it find out."""
-    scene = _scene(floor_of(trial))
-    room, there, belief = _drawn(trial, scene.floor)
+def run_kidnap(trial: Kidnap) -> KidnapResult:
+    """Kidnap the robot, and let it relocalize."""
+    scene = _scene(get_floor(trial))
+    room, there, belief = _draw_poses(trial, scene.floor)
     body = SimulatedBody(scene.building, there, scene.robot.camera, scene.robot.mount, seed=trial.number)
-    watch = _Watch(body)
-    scheduler = _lost(scene.robot, watch, belief)
+    timed = _TimedBody(body)
+    scheduler = _build_lost_agent(scene.robot, timed, belief)
     began = time.process_time()
     run_to_outcome(scheduler, over=lambda s: "found" if _is_found(s) else None)
-    cpu_s = time.process_time() - began - watch.cpu_s
+    cpu_s = time.process_time() - began - timed.cpu_s
     view = scheduler.view
     held = view.latest(Hypothesis, lambda h: h.is_held)
     candidates = view.where(Hypothesis, lambda h: h.status == "candidate")
@@ -133,15 +133,15 @@ def found_in(trial: Kidnap) -> Found:
     pose = body.truth.world_from_robot
     error_m = held.value.world_from_robot(scene.robot.world).distance_to(pose) if held and is_found else math.inf
     verdict = "found" if is_found else "ambiguous" if len(candidates) > 1 else "lost"
-    return Found(
+    return KidnapResult(
         trial.floor, trial.rooms, trial.number, room, there.x_m, there.y_m, there.heading_rad, verdict,
         held.value.locale if held and is_found else "", error_m, len(panorama.value.glimpses) if panorama else 0,
         len(candidates), cpu_s,
     )
 
 
-class _Watch(FaultyBody):
-    """The body, with the time that its pictures take."""
+class _TimedBody(FaultyBody):
+    """The body, with the time of its rendering."""
 
     def __init__(self, body: SimulatedBody) -> None:
         super().__init__(body)
@@ -155,8 +155,8 @@ class _Watch(FaultyBody):
             self.cpu_s += time.process_time() - began
 
 
-def _lost(robot: RobotModel, body: FaultyBody, belief: Place) -> Scheduler:
-    """The experts round a board on which the goal level is in doubt."""
+def _build_lost_agent(robot: RobotModel, body: FaultyBody, belief: Place) -> Scheduler:
+    """Build a scheduler whose goal level is in doubt."""
     sources = (LineFinder(robot), DeadReckoner(robot), Relocalizer(robot), MissionMonitor(robot))
     scheduler = Scheduler(sources, ports=(BodyPort(body),), servoing=Servoing(), kinds=KINDS)
     held = Hypothesis(belief.locale, Pose2(belief.x_m, belief.y_m, belief.heading_rad or 0.0), diagonal(0.05, 0.02),
@@ -172,18 +172,18 @@ def _is_found(scheduler: Scheduler) -> bool:
     return held is not None and held.value.basis == "relocalization"
 
 
-def _drawn(trial: Kidnap, floor: Floor) -> tuple[str, Pose2, Place]:
-    """The room and pose [world] where the robot is put, and the place where it believes to be."""
+def _draw_poses(trial: Kidnap, floor: Floor) -> tuple[str, Pose2, Place]:
+    """Draw the true room and pose [world], and the believed place."""
     rng = np.random.default_rng([trial.floor, trial.number])
     rooms = floor.corridors if trial.symmetric else (*floor.corridors, *floor.rooms)
-    room, there = _anywhere(floor.building, rooms, rng)
-    believed, pose = _anywhere(floor.world, (*floor.corridors, *floor.rooms), rng)
+    room, there = _draw_pose(floor.building, rooms, rng)
+    believed, pose = _draw_pose(floor.world, (*floor.corridors, *floor.rooms), rng)
     return room, there, Place.of_world(floor.world, believed, pose.x_m, pose.y_m, pose.heading_rad)
 
 
-def _anywhere(world: World, rooms: tuple[str, ...], rng: np.random.Generator) -> tuple[str, Pose2]:
-    """A free place, every square metre being as likely as any other, with any heading."""
-    free = [compute_free_space(world.outline(name), world.obstacles(name), ROOM_M) for name in rooms]
+def _draw_pose(world: World, rooms: tuple[str, ...], rng: np.random.Generator) -> tuple[str, Pose2]:
+    """Draw a free pose, uniformly over the area and the headings."""
+    free = [compute_free_space(world.outline(name), world.obstacles(name), MIN_CLEARANCE_M) for name in rooms]
     areas = np.array([space.area for space in free])
     number = int(rng.choice(len(rooms), p=areas / areas.sum()))
     x0, y0, x1, y1 = (float(v) for v in free[number].bounds)
@@ -193,12 +193,12 @@ def _anywhere(world: World, rooms: tuple[str, ...], rng: np.random.Generator) ->
             return rooms[number], Pose2(float(x), float(y), float(heading))
 
 
-def scenario_text(trial: Kidnap) -> str:
-    """A mission in which it happens: the robot sets out from where it believes to be, and is carried off at once."""
-    floor = floor_of(trial)
-    room, there, belief = _drawn(trial, floor)
+def format_scenario(trial: Kidnap) -> str:
+    """Format a scenario in which it happens: the robot starts at the believed place and is kidnapped at once."""
+    floor = get_floor(trial)
+    room, there, belief = _draw_poses(trial, floor)
     place = Place.of_world(floor.world, room, there.x_m, there.y_m, there.heading_rad)
-    goal, spot = _anywhere(floor.world, (belief.locale,), np.random.default_rng([trial.floor, trial.number, 1]))
+    goal, spot = _draw_pose(floor.world, (belief.locale,), np.random.default_rng([trial.floor, trial.number, 1]))
     end = Place.of_world(floor.world, goal, spot.x_m, spot.y_m)
     return f'''description = "Carried off to {room} at once. Written by harvey experiment kidnap."
 world = "floor-{floor.seed}.toml"
