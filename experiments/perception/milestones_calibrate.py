@@ -89,8 +89,8 @@ def format_toml(confidence: PoseConfidence, how: str) -> str:
     """Write the file of weights, with a comment on how they were fitted."""
     return (
         f"# Weights of the evidence for a pose, in log odds; see pose_confidence.py. Fitted on\n# {how}.\n"
-        f"# accept: {MAX_FALSE_ACCEPTS:.2%} of the wrong places lie below it;"
-        f" refute: {MAX_FALSE_REJECTS:.1%} of the right ones lie above it.\naccept = {confidence.accept:.3g}\nrefute = {confidence.refute:.4g}\n"
+        f"# accept: {MAX_FALSE_ACCEPTS:.2%} of the wrong places lie below it; refute: {MAX_FALSE_REJECTS:.1%} of the"
+        f" right ones lie above it.\naccept = {confidence.accept:.3g}\nrefute = {confidence.refute:.4g}\n"
         f"\n[lines_and_colors]\n{_table(confidence.lines_and_colors)}"
         f"\n[lines_only]   # where no colors can be compared\n{_table(confidence.lines_only)}"
     )

@@ -1,4 +1,4 @@
-"""Two small sound building files, IndoorGML and IFC, that use what the importers read."""
+"""Two small valid building files, IndoorGML and IFC, that use what the importers read."""
 
 from __future__ import annotations
 

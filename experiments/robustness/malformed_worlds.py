@@ -1,9 +1,8 @@
-"""World files that somebody has spoilt: each must give a clear error, or a world that can be checked.
+"""Malformed world files: each must give a clear error, or a world that can be checked.
 
-Texts are cut, doubled, swapped and filled with what does not belong there; values of sound files are made huge, tiny,
-negative, of another type, or the name of something else; compiled worlds lose and change bytes; building files of
-other formats (IndoorGML, IFC) are spoilt in the same ways before they are imported. A time limit a file finds what
-never ends.
+Words and lines of texts are deleted, doubled, swapped and replaced; values are made huge, tiny, negative, of another
+type, or another name; compiled worlds lose and change bytes; building files (IndoorGML, IFC) are corrupted in the same
+ways before import. A time limit per file finds endless loops.
 """
 
 from __future__ import annotations
@@ -37,11 +36,11 @@ from world_models.files.world_files import compile_file, load_world, read_world
 
 FILES, QUICK_FILES = 10_000, 400
 CHUNK, QUICK_CHUNK = 100, 20
-"""Files that a worker takes at once."""
+"""Files per trial of a worker."""
 IFC_EVERY = 50
-"""One file of so many is IFC: reading one takes a process of its own."""
+"""One file of this many is IFC: reading one takes a process of its own."""
 LIMIT_S = 30.0
-"""No file takes longer, on a machine that does other things too."""
+"""Time limit of a file, generous for a busy machine."""
 
 TOKEN = re.compile(r'"[^"\n]*"|[\w.+-]+|[^\w\s]|\s+')
 JUNK = ("-1", "0", "1e400", "1e-300", "nan", "inf", "-3.5", "99999999", "9" * 400, "true", "[]", "{}", '""', "'''", "=",
@@ -50,43 +49,44 @@ JUNK = ("-1", "0", "1e400", "1e-300", "nan", "inf", "-3.5", "99999999", "9" * 40
 
 
 def run(quick: bool, seed: int) -> Report:
-    """Spoil, read and check so many files."""
+    """Corrupt, read and check files."""
     files, chunk = (QUICK_FILES, QUICK_CHUNK) if quick else (FILES, CHUNK)
-    found = list(_found(files, chunk, seed))
+    results = list(_judge_files(files, chunk, seed))
     tally: dict[str, Counter[str]] = {}
-    for one in found:
-        tally.setdefault(one.spoiler, Counter())[one.verdict.split(":")[0]] += 1
-    wrong = [f"file {number} ({one.spoiler}): {one.verdict}" for number, one in enumerate(found)
-             if one.verdict.startswith(("traceback", "hang", "unclear"))]
+    for result in results:
+        tally.setdefault(result.spoiler, Counter())[result.verdict.split(":")[0]] += 1
+    wrong = [f"file {number} ({result.spoiler}): {result.verdict}" for number, result in enumerate(results)
+             if result.verdict.startswith(("traceback", "hang", "unclear"))]
     rows = tuple((name, sum(seen.values()), seen["error"], seen["sound"], seen["faults"], seen["traceback"],
                   seen["hang"], seen["unclear"]) for name, seen in tally.items())
     return Report(
-        "Malformed worlds",
-        ("spoilt by", "files", "clear error", "sound", "with faults", "traceback", "hang", "unclear"), rows,
-        notes=(f"{files} files, seed {seed}; the slowest took {max(one.seconds for one in found):.2f} s (limit"
+        "Malformed world and building files",
+        ("corrupted in", "files", "clear error", "sound", "with faults", "traceback", "hang", "unclear"), rows,
+        notes=(f"{files} files, seed {seed}; the slowest took {max(result.seconds for result in results):.2f} s (limit"
                f" {LIMIT_S:.0f} s).",
                "words, lines, values, characters: of a world's text; bytes: of a compiled world (SQLite); IndoorGML,"
-               " IFC: building files, spoilt in words and lines, then imported."
+               " IFC: building files, corrupted in words and lines, then imported."
                + ("" if _with_ifc() else " No IFC file was tried: ifcopenshell is not installed."),
-               "with faults: a world that could be read, whose check names what is wrong, with file and line.",
-               "unclear: an error or fault that does not say file, what was expected and what came.", *wrong[:10]),
+               "with faults: a world that was read, whose check names its faults with file and line.",
+               "unclear: an error or fault that does not name the file, what was expected and what it got.",
+               *wrong[:10]),
         claims=((f"all {files}: a clear error or a checked world, never a traceback or a hang", not wrong),),
     )
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """What became of one file: how it was spoilt, ``judged``, and how long that took."""
+class FileResult:
+    """Result of one file: how it was corrupted, its verdict, and the time taken [s]."""
 
     spoiler: str
     verdict: str
     seconds: float
 
 
-def _found(files: int, chunk: int, seed: int) -> Iterator[Found]:
-    """All files in order, from worker processes."""
+def _judge_files(files: int, chunk: int, seed: int) -> Iterator[FileResult]:
+    """Judge all files in worker processes; results come in order."""
     parts = [range(first, min(first + chunk, files)) for first in range(0, files, chunk)]
-    known: dict[int, list[Found]] = {}
+    known: dict[int, list[FileResult]] = {}
     with tqdm(total=files, unit="file", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
         for place, found in map_over_workers(partial(judged_all, seed=seed), parts):
             known[place] = found
@@ -95,8 +95,8 @@ def _found(files: int, chunk: int, seed: int) -> Iterator[Found]:
         yield from known[place]
 
 
-def judged_all(numbers: Sequence[int], seed: int) -> list[Found]:
-    """What becomes of the files with these numbers."""
+def judged_all(numbers: Sequence[int], seed: int) -> list[FileResult]:
+    """Judge the files with these numbers."""
     found = []
     with tempfile.TemporaryDirectory() as folder:
         sound = _compiled(Path(folder))
@@ -105,7 +105,7 @@ def judged_all(numbers: Sequence[int], seed: int) -> list[Found]:
             content = spoil(np.random.default_rng([seed, number]), sound)
             began = time.perf_counter()
             verdict = judged(content, Path(folder), suffix)
-            found.append(Found(name, verdict, time.perf_counter() - began))
+            found.append(FileResult(name, verdict, time.perf_counter() - began))
     return found
 
 
@@ -117,7 +117,7 @@ Spoiler = Callable[[np.random.Generator, bytes], str | bytes]
 
 
 def spoiler_of(number: int) -> tuple[str, str, Spoiler]:
-    """How the file of this number is spoilt: name, ending of the file, and how."""
+    """Choose how the file of this number is corrupted: name, file ending, and function."""
     if number % IFC_EVERY == IFC_EVERY - 1 and _with_ifc():
         return SPOILERS[-1]
     return SPOILERS[number % (len(SPOILERS) - 1)]
@@ -129,7 +129,7 @@ class _TooLongError(BaseException):
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """Raises _TooLongError after so long; only the main thread can."""
+    """Raise _TooLongError after a time; works in the main thread only."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -147,14 +147,14 @@ def _limited(seconds: float) -> Iterator[None]:
 
 
 def judged(content: str | bytes, folder: Path, suffix: str = ".toml") -> str:
-    """``error``, ``sound`` or ``faults``; or what must not be: ``traceback: ...``, ``hang``, ``unclear: ...``."""
+    """Read a file: ``error``, ``sound``, ``faults``; or a failure: ``traceback: ...``, ``hang``, ``unclear: ...``."""
     try:
         with _limited(LIMIT_S):
             return _read(content, folder / f"world{suffix}")
     except (WorldError, BuildingError) as error:
-        told = str(error)
-        clear = "world." in told and "expected" in told and ("got" in told or isinstance(error, BuildingError))
-        return "error" if clear else f"unclear: {told}"
+        text = str(error)
+        clear = "world." in text and "expected" in text and ("got" in text or isinstance(error, BuildingError))
+        return "error" if clear else f"unclear: {text}"
     except _TooLongError:
         return "hang"
     except Exception as error:
@@ -186,7 +186,7 @@ def _compiled(folder: Path) -> bytes:
 
 
 def _words(text: str) -> Spoiler:
-    """Words and signs changed, taken out, put in or swapped."""
+    """Replace, delete, insert or swap words and signs."""
     def spoil(rng: np.random.Generator, _sound: bytes) -> str:
         tokens = TOKEN.findall(text)
         for _ in range(int(rng.integers(1, 5))):
@@ -208,7 +208,7 @@ def _words(text: str) -> Spoiler:
 
 
 def _lines(text: str) -> Spoiler:
-    """Lines taken out, doubled or moved, or the end cut off."""
+    """Delete, double or move lines, or cut off the end."""
     def spoil(rng: np.random.Generator, _sound: bytes) -> str:
         lines = text.splitlines(keepends=True)
         for _ in range(int(rng.integers(1, 4))):
@@ -232,7 +232,7 @@ def _either(one: Spoiler, other: Spoiler) -> Spoiler:
 
 
 def _values(rng: np.random.Generator, _sound: bytes) -> str:
-    """Numbers made other numbers, names other names: the text stays TOML."""
+    """Replace numbers by numbers and names by names: the text stays TOML."""
     numbers = list(re.finditer(r"(?<![\w.\"-])-?\d+(?:\.\d+)?(?![\w\"])", SMALL))
     names = list(re.finditer(r'"[\w-]+"', SMALL))
     text = SMALL
@@ -250,7 +250,7 @@ def _values(rng: np.random.Generator, _sound: bytes) -> str:
 
 
 def _characters(rng: np.random.Generator, _sound: bytes) -> str:
-    """Single characters changed."""
+    """Change single characters."""
     text = list(SMALL)
     for _ in range(int(rng.integers(1, 8))):
         text[int(rng.integers(len(text)))] = chr(int(rng.choice([rng.integers(32, 127), rng.integers(1, 0xD7FF)])))
@@ -258,7 +258,7 @@ def _characters(rng: np.random.Generator, _sound: bytes) -> str:
 
 
 def _bytes(rng: np.random.Generator, sound: bytes) -> bytes:
-    """A compiled world with bytes changed, or cut off."""
+    """Change bytes of a compiled world, or cut it off."""
     content = bytearray(sound)
     if rng.random() < 0.1:
         return bytes(content[: int(rng.integers(len(content)))])
@@ -268,7 +268,7 @@ def _bytes(rng: np.random.Generator, sound: bytes) -> bytes:
 
 
 def _building(text: str) -> Spoiler:
-    """A building file, a line an element, spoilt in its words or its lines."""
+    """Corrupt a building file in its words or its lines, one line per element."""
     return _either(_words(text), _lines(text.replace("><", ">\n<")))
 
 

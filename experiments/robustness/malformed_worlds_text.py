@@ -1,4 +1,4 @@
-"""A small sound world that uses all there is in the format."""
+"""A small valid world file that uses every feature of the format."""
 
 SMALL = """\
 name = "cottage"

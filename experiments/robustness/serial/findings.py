@@ -1,4 +1,4 @@
-"""What a driver over a bad line has to hold, and what was found of it."""
+"""Bounds of a driver over a bad line, and the findings of trials."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ PROTOCOLS = ("denning", "p2os", "create2")
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What a protocol has to hold.
+    """Bounds of a protocol.
 
     Attributes:
-        done_m, done_rad: by how much a motion that is reported done may fall short of what was asked for.
-        beyond_m, beyond_rad: how far any motion may go beyond what was asked for, while the base can be reached.
+        done_m, done_rad: largest shortfall of a motion that is reported done.
+        beyond_m, beyond_rad: largest excess of a motion over its command, while the base can be reached.
         operations: reads and writes within which a line breaks.
     """
 
@@ -32,27 +32,27 @@ BOUNDS: Mapping[str, Bounds] = {
     "p2os": Bounds(0.02, math.radians(2.0), 0.35, math.radians(45.0), 100),
     "create2": Bounds(0.02, math.radians(10.0), 0.35, math.radians(120.0), 400),
 }
-"""Denning: nothing but rounding. P2OS and Create 2: what can be gone while the driver finds out and says stop."""
+"""Denning: rounding only. P2OS and Create 2: the distance until the driver notices and stops the base."""
 
 
 @dataclass
 class Findings:
-    """What came of trials.
+    """Findings of trials.
 
     Attributes:
-        violations: in words; none, if all is well.
-        beyond_m, beyond_rad: the furthest that a motion went beyond what was asked, while the base could be reached.
-        strays: motions that went beyond by more than 2 cm or 2 degrees, while the base could be reached.
-        overtaken: reports of a motion that the base had left behind, by a late command, when they were given.
-        restarted: times that noise set a base going again that had stood when its driver last heard of it.
-        forged: commands that the base accepted and nobody had given.
-        stops, late: how often it had to stand within the watchdog time, and how often it did not.
-        unreachable: times that a base without a watchdog ran on: line cut, host dead, or told another baud rate.
-        ran_on_m: the furthest that it ran on so.
-        resumed, ended: trials in which a command was carried out as asked once the line was good again, of all.
-        deafened: times that noise told it another baud rate, so that somebody had to switch it off and on.
+        violations: descriptions of violated bounds.
+        beyond_m, beyond_rad: largest excess of a motion over its command, while the base could be reached.
+        strays: motions with an excess of more than 2 cm or 2 degrees, while the base could be reached.
+        overtaken: reports of a motion given after a late command had moved the base on.
+        restarted: times that noise restarted a base that stood when its driver last heard from it.
+        forged: commands that the base accepted but nobody sent.
+        stops, late: how often it had to stop within the watchdog time, and how often it did not.
+        unreachable: times that a base without watchdog ran on: line cut, host dead, or another baud rate.
+        ran_on_m: largest distance that it ran on.
+        resumed, ended: trials in which a command was executed once the line was good again, of all.
+        deafened: times that noise set another baud rate, so that the base had to be power-cycled.
         deaths, blackouts, cuts: of the host, of the base, of the line.
-        states: (what the host had said last, whether the base moved) when the line broke.
+        states: (last message of the host, whether the base moved) when the line broke.
     """
 
     frames: int = 0

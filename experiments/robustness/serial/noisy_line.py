@@ -1,4 +1,4 @@
-"""A line in memory, with a clock of its own, that does to the bytes what the worst of cables does, and breaks."""
+"""A line in memory with its own clock, which makes errors in the bytes, and breaks."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from experiments.robustness.serial.line_noise import Noise
 from sim.emulators.emulator import Emulator
 
 LATENCY_S = 0.003
-LEAST_S = 1e-6
-"""Every read takes at least so long, so that time goes on whatever the host does."""
+MIN_READ_S = 1e-6
+"""Shortest duration of a read, so that time goes on whatever the host does."""
 
 
 class Killed(BaseException):
-    """The host process dies here; nothing that it wanted to do is done any more."""
+    """The host process dies here."""
 
 
 class NoisyLine:
-    """A link (as the drivers want one) between a host and an emulated base.
+    """A link between a host's driver and an emulated base.
 
     Attributes:
-        frames: how many pieces were said, by both sides.
-        said, ever_said: the last one from the host, and all that it ever said.
-        cuts: (what the host had said last, whether the base was moving) for each time that the line broke.
+        frames: number of messages of both sides.
+        said, ever_said: the host's last message, and all of its messages.
+        cuts: (last message of the host, whether the base was moving) for each time that the line broke.
     """
 
     def __init__(self, emulator: Emulator, to_base: Noise, to_host: Noise, *, tick_s: float) -> None:
-        """``tick_s``: the emulator's time goes on in steps of at most this."""
+        """``tick_s``: largest step of the emulator's time."""
         self._emulator, self._tick_s = emulator, tick_s
         self._noise = {"base": to_base, "host": to_host}
         self._free_s = {"base": 0.0, "host": 0.0}
@@ -40,7 +40,7 @@ class NoisyLine:
         self.cuts: list[tuple[bytes, bool]] = []
 
     def break_after(self, operations: int, for_s: float) -> None:
-        """Break at the host's so manieth read or write from now, for a time; for ever: the host dies there."""
+        """Break after a number of reads and writes of the host, for a time; if infinite, the host dies there."""
         self._left, self._pause_s = operations, for_s
 
     def write(self, data: bytes) -> None:
@@ -51,7 +51,7 @@ class NoisyLine:
 
     def read(self, timeout_s: float) -> bytes:
         self._operation()
-        ends_s = self._time_s + max(timeout_s, LEAST_S)
+        ends_s = self._time_s + max(timeout_s, MIN_READ_S)
         while not (data := self._due("host")) and self._time_s < ends_s:
             self._step(ends_s)
         return data
@@ -64,10 +64,10 @@ class NoisyLine:
             raise OSError("no such device")
 
     def close(self) -> None:
-        """Nothing is left open."""
+        """Do nothing: nothing is open."""
 
     def wait(self, duration_s: float) -> None:
-        """Time passes, while the host does nothing."""
+        """Let time pass while the host does nothing."""
         ends_s = self._time_s + duration_s
         while self._time_s < ends_s:
             self._step(ends_s)
@@ -81,11 +81,11 @@ class NoisyLine:
 
     @property
     def settled_s(self) -> float:
-        """When the last of what the host has said will have arrived."""
+        """Time at which the host's last message will have arrived."""
         return max([self._time_s, *(arrives_s for arrives_s, _, _ in self._flying["base"])])
 
     def quieten(self) -> None:
-        """From now on the line is good."""
+        """Make the line good from now on."""
         self._left, self._down_s = math.inf, -math.inf
         for noise in self._noise.values():
             noise.probability = 0.0
@@ -104,9 +104,9 @@ class NoisyLine:
             raise OSError("the device is gone")
 
     def _step(self, ends_s: float) -> None:
-        """To whatever happens next, at most to then."""
+        """Advance to the next event, at most to ``ends_s``."""
         coming = [f[0][0] for f in self._flying.values() if f and f[0][0] > self._time_s]
-        then_s = min([max(ends_s, self._time_s + LEAST_S), self._time_s + self._tick_s, *coming])
+        then_s = min([max(ends_s, self._time_s + MIN_READ_S), self._time_s + self._tick_s, *coming])
         if then_s > self._time_s:
             self._emulator.advance(then_s - self._time_s)
             self._time_s = then_s
@@ -121,21 +121,21 @@ class NoisyLine:
             self._say("host", said)
 
     def _say(self, to: str, data: bytes) -> None:
-        """Bytes keep their order on a line, except those that come once more."""
+        """Send a message; messages keep their order, except repeated ones."""
         self.frames += 1
-        garbled = self._noise[to].garbled(data)
-        arrives_s = max(self._free_s[to], self._time_s + LATENCY_S) + garbled.delay_s
+        result = self._noise[to].garble(data)
+        arrives_s = max(self._free_s[to], self._time_s + LATENCY_S) + result.delay_s
         self._free_s[to] = arrives_s
-        self._push(to, arrives_s, garbled.data)
-        if garbled.again_s:
-            self._push(to, arrives_s + garbled.again_s, data)
+        self._push(to, arrives_s, result.data)
+        if result.again_s:
+            self._push(to, arrives_s + result.again_s, data)
 
     def _push(self, to: str, arrives_s: float, data: bytes) -> None:
         self._number += 1
         heapq.heappush(self._flying[to], (arrives_s, self._number, data))
 
     def _due(self, to: str) -> bytes:
-        """What has arrived by now."""
+        """Take the bytes that have arrived by now."""
         flying, data = self._flying[to], b""
         while flying and flying[0][0] <= self._time_s:
             data += heapq.heappop(flying)[2]

@@ -1,4 +1,4 @@
-"""One trial of a driver over the worst of lines: commands, noise, broken cables, dead hosts; and what came of it."""
+"""One trial of a driver over a bad line: commands, noise, broken cables, dead hosts; and its findings."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Trial:
     """A host, a base and the line between them."""
 
     def __init__(self, protocol: str, rng: np.random.Generator, findings: Findings, noise: float) -> None:
-        """``noise``: the probability that something is done to what is said, either way."""
+        """``noise``: probability of an error per message, both ways."""
         self._protocol, self._rng, self._found, self._bounds = protocol, rng, findings, BOUNDS[protocol]
         self._floor = IdealGround()
         self._accepted: list[bytes] = []
@@ -40,10 +40,10 @@ class Trial:
         self._out_of_reach = False
 
     def run(self, commands: int, breaks: float = 0.5) -> None:
-        """Ask for motions on the bad line, then for one on a good line.
+        """Command motions on the bad line, then one on a good line.
 
         Args:
-            breaks: the probability that the line breaks, or the host dies, during a motion.
+            breaks: probability that the line breaks, or the host dies, during a motion.
         """
         for _ in range(commands):
             if self._rng.random() < breaks:
@@ -58,7 +58,7 @@ class Trial:
         self._end()
 
     def _ask(self, command: MotorCommand) -> bool:
-        self._settle_account()
+        self._record_excess()
         self._asked.append(command)
         self._from = (self._floor.turned_rad, self._floor.moved_m)
         self._found.asked += 1
@@ -82,7 +82,7 @@ class Trial:
             self._guarded(self._host.heartbeat, MotorCommand(0.0, 0.0))
 
     def _guarded(self, call: Callable[[], object], command: MotorCommand) -> bool:
-        """Do it; where it fails, see that the base stands, and wait until it may be reached again."""
+        """Call a driver; if it fails, check that the base stops, and wait until it can be reached again."""
         began_s = self.line.now()
         try:
             call()
@@ -102,7 +102,7 @@ class Trial:
         return False
 
     def _stands(self, known: bool, *, dead: bool = False) -> None:
-        """The base has to stand: now, if that is known; else when the watchdog has had its time."""
+        """Check that the base stands: now, if that is known; else after the watchdog's time."""
         self._found.stops += 1
         if known:
             if self._base_end.moving and self._protocol == "create2":
@@ -116,7 +116,7 @@ class Trial:
             self._late_if(self._base_end.moving, "the watchdog time was over")
 
     def _stop_by_hand(self, dead: bool) -> None:
-        """No watchdog: the host has to say it. Where it cannot, the base runs on, and that is all there is to say."""
+        """Stop a base without watchdog; if it cannot be reached, it runs on."""
         gone = self._since()[1]
         unreachable = dead or self.line.is_down or self._base_end.deaf
         if unreachable:
@@ -126,7 +126,7 @@ class Trial:
         for _ in range(20):
             self.line.wait(0.1)
             if self._base_end.deaf:
-                self._take_it_up()
+                self._power_cycle()
             self._host = self._driver() if dead else self._host
             try:
                 self._host.stop()
@@ -137,32 +137,32 @@ class Trial:
                 self.line.wait(0.3)
         if unreachable:
             self._found.ran_on_m = max(self._found.ran_on_m, abs(self._since()[1] - gone))
-        self._late_if(self._base_end.moving, "it was told to stop, over and over")
+        self._late_if(self._base_end.moving, "it was sent stop repeatedly")
 
-    def _take_it_up(self) -> None:
-        """Somebody takes the robot up and switches it off and on."""
+    def _power_cycle(self) -> None:
+        """Power-cycle the base by hand."""
         self._found.deafened += 1
         self._out_of_reach = True
         self._base_end.power_cycle()
 
     def _end(self) -> None:
-        """The line is good: one more motion must come out as asked, at the second try at the latest."""
+        """On a good line, one more motion must succeed, at the second try at the latest."""
         self.line.wait(4.0)
         self.line.quieten()
         self.line.wait(1.0)
         if self._protocol == "create2" and self._base_end.deaf:
-            self._take_it_up()
+            self._power_cycle()
         last = MotorCommand(0.5, 0.25)
         self._found.ended += 1
         if self._ask(last) or self._ask(last):
             self._found.resumed += 1
         else:
-            self._violated("it did not go on when the line was good again")
-        self._settle_account()
-        self._note_line()
+            self._violated("it did not recover when the line was good again")
+        self._record_excess()
+        self._record_line()
 
-    def _settle_account(self) -> None:
-        """How far the last command, and what followed it, went beyond what was asked for."""
+    def _record_excess(self) -> None:
+        """Record the excess of the last command, and of what followed it."""
         asked = self._asked[-1] if self._asked else MotorCommand(0.0, 0.0)
         turn, move = self._since()
         beyond = (_beyond(turn, asked.turn_rad), _beyond(move, asked.move_m))
@@ -175,7 +175,7 @@ class Trial:
         if beyond[0] > bounds.beyond_rad or beyond[1] > bounds.beyond_m:
             self._violated(f"{asked} became {turn} rad, {move} m")
 
-    def _note_line(self) -> None:
+    def _record_line(self) -> None:
         found = self._found
         found.frames += self.line.frames
         found.cuts += len(self.line.cuts)
@@ -187,13 +187,13 @@ class Trial:
             self._check_executed()
 
     def _check_executed(self) -> None:
-        """Every command at most once, in order, and with the numbers that were asked for."""
+        """Check that each command was executed at most once, in order, and unaltered."""
         done = self._base_end.executed
         if len({(e.token, e.seq) for e in done}) != len(done):
-            self._violated("a command was carried out twice")
+            self._violated("a command was executed twice")
         asked = iter((c.turn_rad, c.move_m) for c in self._asked)
         if not all(any(a == (e.turn_rad, e.move_m) for a in asked) for e in done):
-            self._violated("a command was carried out that nobody had asked for, or twice")
+            self._violated("a command was executed that was never sent, or twice")
 
     def _since(self) -> tuple[float, float]:
         return self._floor.turned_rad - self._from[0], self._floor.moved_m - self._from[1]
@@ -220,18 +220,18 @@ class Trial:
 
 
 def _beyond(done: float, asked: float) -> float:
-    """How far outside [0, asked] it is."""
+    """Distance outside of [0, asked]."""
     along = done if asked >= 0 else -done
     return max(0.0, -along, along - abs(asked))
 
 
 def _short(done: float, asked: float) -> float:
-    """How much is wanting."""
+    """Shortfall."""
     return abs(asked) - (done if asked >= 0 else -done)
 
 
 def _spoken(protocol: str, said: bytes) -> str:
-    """What the host had said last, in a word."""
+    """Describe the host's last message in a word."""
     if protocol == "denning":
         return said.split(b" ")[2].split(b"*")[0].decode() if said.count(b" ") >= 2 else "nothing"
     if protocol == "p2os":
