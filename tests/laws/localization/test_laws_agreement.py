@@ -43,7 +43,7 @@ def projected(lines: Floats, pose: Pose2) -> Floats:
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds, count=st.integers(1, 25))
-def test_lines_account_for_themselves_and_not_for_what_is_far(seed: int, count: int) -> None:
+def test_lines_cover_themselves_and_nothing_far(seed: int, count: int) -> None:
     lines = some_lines(seed, count)
     assert np.all(compute_coverage(lines, lines, 2.0, 0.05) == 1.0)
     assert np.all(compute_coverage(lines, lines + np.array([2000.0, 0.0]), 2.0, 0.05) == 0.0)
@@ -52,7 +52,7 @@ def test_lines_account_for_themselves_and_not_for_what_is_far(seed: int, count: 
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds, count=st.integers(2, 20))
-def test_coverage_knows_no_order_of_segments_or_of_their_ends(seed: int, count: int) -> None:
+def test_coverage_does_not_depend_on_the_order_of_segments_or_of_their_ends(seed: int, count: int) -> None:
     lines, data = some_lines(seed, count), some_lines(seed + 1, 3 * count)
     rng = np.random.default_rng(seed)
     shuffled = data[rng.permutation(len(data))][:, :: int(rng.choice([-1, 1]))]
@@ -61,7 +61,7 @@ def test_coverage_knows_no_order_of_segments_or_of_their_ends(seed: int, count: 
 
 @settings(deadline=None, max_examples=30)
 @given(seed=seeds)
-def test_more_segments_never_account_for_less(seed: int) -> None:
+def test_more_segments_never_cover_less(seed: int) -> None:
     lines, data = some_lines(seed, 10), some_lines(seed + 1, 30)
     assert np.all(compute_coverage(lines, data, 4.0, 0.2) >= compute_coverage(lines, data[:15], 4.0, 0.2))
 
@@ -103,7 +103,7 @@ def test_the_true_pose_scores_best_by_chamfer(seed: int, turn: float) -> None:
 
 @settings(deadline=None, max_examples=30)
 @given(seed=seeds, count=st.integers(3, 25))
-def test_more_lines_never_tell_less(seed: int, count: int) -> None:
+def test_more_lines_never_make_a_pose_less_precise(seed: int, count: int) -> None:
     lines = model_lines(seed)
     few = compute_view_quality(lines[:count], CAMERA, MOUNT.camera_from_robot, Pose2(0.0, 0.0, 0.0), 0.7)
     all_of_them = compute_view_quality(lines, CAMERA, MOUNT.camera_from_robot, Pose2(0.0, 0.0, 0.0), 0.7)

@@ -53,7 +53,7 @@ def segments(draw: st.DrawFn) -> Floats:
 
 @few
 @given(segments(), segments(), segments())
-def test_what_speaks_for_one_speaks_against_the_other(one: Floats, other: Floats, seen: Floats) -> None:
+def test_the_margin_is_antisymmetric(one: Floats, other: Floats, seen: Floats) -> None:
     assert margin(one, other, seen) == pytest.approx(-margin(other, one, seen), abs=1e-9)
 
 
@@ -72,19 +72,19 @@ def test_the_order_of_lines_and_segments_does_not_matter(
 
 @few
 @given(segments(), segments())
-def test_the_same_view_from_two_places_tells_nothing(one: Floats, seen: Floats) -> None:
+def test_the_same_view_from_two_poses_has_no_margin(one: Floats, seen: Floats) -> None:
     assert margin(one, one, seen) == pytest.approx(0.0, abs=1e-9)
 
 
 @few
 @given(segments())
-def test_what_only_one_view_shows_speaks_for_it_where_it_is_seen_and_against_it_where_not(one: Floats) -> None:
+def test_lines_of_one_view_only_support_it_where_they_are_seen_and_oppose_it_where_not(one: Floats) -> None:
     half = 0.5 * float(np.sum(np.minimum(np.linalg.norm(one[:, 1] - one[:, 0], axis=1), 100.0) / 30.0))
     assert margin(one, NONE, one) == pytest.approx(half, abs=1e-9)
     assert margin(one, NONE, NONE) == pytest.approx(-half, abs=1e-9)
 
 
-def test_from_the_middle_of_the_hallway_the_other_way_round_is_told() -> None:
+def test_in_the_middle_of_the_hallway_the_opposite_direction_is_told_apart() -> None:
     """What should be seen in one direction is not what should be seen from where the hallway repeats itself."""
     here = Pose2(*WORLD.world_from_locale("hallway").apply([6.0, 1.2, 0.0])[:2], 0.0)
     seen = predict_lines(ROBOT, here).segments_px
@@ -114,7 +114,7 @@ def test_lines_visible_from_the_grid_are_projected_to_where_they_are_seen_from_t
     assert min(shares) >= 0.5
 
 
-def test_to_have_thought_of_it_beforehand_changes_no_answer() -> None:
+def test_computing_views_beforehand_changes_no_answer() -> None:
     here = Pose2(*WORLD.world_from_locale("hallway").apply([7.31, 1.17, 0.0])[:2], 0.013)
     seen = predict_lines(ROBOT, here).segments_px
     world = load_world(WORLDS / "research_center.toml", details=[])

@@ -65,7 +65,7 @@ def seen(robot: RobotModel, pose: Pose2, before: Obstruction | None, rng: np.ran
     return np.asarray(both + rng.normal(0.0, 0.2, both.shape))
 
 
-def looks(pose: Pose2, before: Obstruction | None, rng: np.random.Generator) -> list[CameraView]:
+def take_views(pose: Pose2, before: Obstruction | None, rng: np.random.Generator) -> list[CameraView]:
     turns = [Pose2(0.0, 0.0, k * 2.0 * math.pi / LOOKS) for k in range(LOOKS)]
     return [CameraView(seen(ROBOT, pose @ turn, before, rng), turn, np.zeros((3, 3))) for turn in turns]
 
@@ -92,22 +92,22 @@ def test_points_are_covered_as_cv2_says(seed: int) -> None:
     corners = hull.reshape(-1, 2).astype(float)
     if rng.random() < 0.5:
         corners = corners[::-1]
-    told = Obstruction(tuple((float(x), float(y)) for x, y in corners))
+    obstruction = Obstruction(tuple((float(x), float(y)) for x, y in corners))
     for x, y in rng.uniform(0, 512, (60, 2)):
         depth = cv2.pointPolygonTest(hull, (float(x), float(y)), True)
         assume(abs(depth) > 1e-3)
-        assert bool(told.covers([x, y])) is (depth > 0.0)
+        assert bool(obstruction.covers([x, y])) is (depth > 0.0)
 
 
 @few
 @given(seed=seeds)
-def test_what_is_hidden_of_a_line_does_not_depend_on_its_direction(seed: int) -> None:
+def test_the_hidden_part_of_a_line_does_not_depend_on_its_direction(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    told, lines = outline(rng), rng.uniform(0, 512, (20, 2, 2))
-    part = told.hidden_part(lines)
-    assert told.hidden_part(lines[:, ::-1]) == pytest.approx(part)
+    obstruction, lines = outline(rng), rng.uniform(0, 512, (20, 2, 2))
+    part = obstruction.hidden_part(lines)
+    assert obstruction.hidden_part(lines[:, ::-1]) == pytest.approx(part)
     assert np.all((part >= 0.0) & (part <= 1.0))
-    assert np.array_equal(told.shows(lines), part <= MOST_HIDDEN)
+    assert np.array_equal(obstruction.shows(lines), part <= MOST_HIDDEN)
 
 
 # -- what is not expected --------------------------------------------------------------------------------------------
@@ -115,34 +115,34 @@ def test_what_is_hidden_of_a_line_does_not_depend_on_its_direction(seed: int) ->
 
 @few
 @given(seed=seeds)
-def test_behind_something_the_robot_expects_what_it_did_but_for_what_is_hidden(seed: int) -> None:
+def test_the_robot_expects_the_same_view_without_what_the_obstruction_hides(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    told, pose = outline(rng), somewhere(rng)
-    robot = ROBOT.with_obstruction(told)
+    obstruction, pose = outline(rng), somewhere(rng)
+    robot = ROBOT.with_obstruction(obstruction)
     before, after = predict_lines(ROBOT, pose).segments_px, predict_lines(robot, pose).segments_px
-    assert np.array_equal(before[told.shows(before)], after)
+    assert np.array_equal(before[obstruction.shows(before)], after)
     points = visible_points(WORLD, robot.camera, robot.camera_from_world(pose)).points_px
-    assert not np.any(told.covers(points))
+    assert not np.any(obstruction.covers(points))
     for _, at in predict_face_colors(robot, pose):
         pixels = robot.camera.project(robot.camera_from_world(pose).apply(np.array(at)))
-        assert not np.any(told.covers(pixels))
+        assert not np.any(obstruction.covers(pixels))
     assert robot.with_obstruction(None).camera.obstruction is None
-    assert robot.with_obstruction(told) is robot
+    assert robot.with_obstruction(obstruction) is robot
 
 
 # -- how it is known -------------------------------------------------------------------------------------------------
 
 
-def test_what_hides_a_part_of_every_look_is_found_where_it_is() -> None:
+def test_what_hides_a_part_of_every_view_is_found_where_it_is() -> None:
     """In nineteen of twenty cases: most of it, and little beside it (where a wall's edge goes on along its side)."""
     grid = np.stack(np.meshgrid(np.arange(0, 512, 8.0), np.arange(0, 512, 8.0)), axis=-1)
     right = 0
     for seed in range(200):
         rng = np.random.default_rng(seed)
-        told = outline(rng)
-        found = find_obstruction(looks(somewhere(rng), told, rng), CAMERA)
+        obstruction = outline(rng)
+        found = find_obstruction(take_views(somewhere(rng), obstruction, rng), CAMERA)
         if found is not None:
-            hidden, said = told.covers(grid), found.covers(grid, -4.0)
+            hidden, said = obstruction.covers(grid), found.covers(grid, -4.0)
             right += bool(np.sum(said & hidden) >= 0.4 * np.sum(hidden) and np.mean(said & ~hidden) <= 0.12)
     assert right >= 190
 
@@ -151,21 +151,21 @@ def test_what_hides_a_part_of_every_look_is_found_where_it_is() -> None:
 @given(seed=seeds)
 def test_where_nothing_is_before_the_camera_nothing_is_found(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    found = find_obstruction(looks(somewhere(rng), None, rng), CAMERA)
+    found = find_obstruction(take_views(somewhere(rng), None, rng), CAMERA)
     assert found is None
 
 
-def test_it_is_found_by_looks_for_milestones_too_and_hardly_ever_where_nothing_is() -> None:
+def test_views_of_milestones_find_it_too_and_hardly_ever_where_nothing_is() -> None:
     """Six looks in two directions from places along the way: nine in ten. Of a hundred where nothing is at the
     most three find a little something, which the next looks take back."""
     grid = np.stack(np.meshgrid(np.arange(0, 512, 8.0), np.arange(0, 512, 8.0)), axis=-1)
     right, wrong = 0, 0
     for seed in range(100):
         rng = np.random.default_rng([seed, 6])
-        told, pose = outline(rng), somewhere(rng)
-        found = find_obstruction(driving(pose, told, rng, 6), CAMERA)
+        obstruction, pose = outline(rng), somewhere(rng)
+        found = find_obstruction(driving(pose, obstruction, rng, 6), CAMERA)
         if found is not None:
-            hidden, said = told.covers(grid), found.covers(grid, -4.0)
+            hidden, said = obstruction.covers(grid), found.covers(grid, -4.0)
             right += bool(np.sum(said & hidden) >= 0.4 * np.sum(hidden) and np.mean(said & ~hidden) <= 0.12)
         nothing = find_obstruction(driving(pose, None, rng, 6), CAMERA)
         if nothing is not None:
@@ -176,7 +176,7 @@ def test_it_is_found_by_looks_for_milestones_too_and_hardly_ever_where_nothing_i
 
 @few
 @given(seed=seeds)
-def test_a_robot_that_did_not_turn_though_its_wheels_say_so_has_nothing_before_its_camera(seed: int) -> None:
+def test_a_robot_that_did_not_turn_although_odometry_says_so_finds_no_obstruction(seed: int) -> None:
     rng = np.random.default_rng(seed)
     segments = seen(ROBOT, somewhere(rng), None, rng)
     stuck = [CameraView(segments, Pose2(0.0, 0.0, 0.5 * k), np.zeros((3, 3))) for k in range(LOOKS)]
@@ -190,31 +190,32 @@ def _part(found: Obstruction) -> float:
 
 @few
 @given(seed=seeds)
-def test_what_was_found_before_is_believed_until_something_is_seen_through_it(seed: int) -> None:
+def test_a_known_obstruction_is_kept_until_something_is_seen_inside_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    told, pose = outline(rng), somewhere(rng)
-    one = [CameraView(seen(ROBOT, pose, told, rng), Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))]
+    obstruction, pose = outline(rng), somewhere(rng)
+    one = [CameraView(seen(ROBOT, pose, obstruction, rng), Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))]
     assert update_obstruction(one, CAMERA, None) is None
-    assert update_obstruction(one, CAMERA, told) == told
-    (left, top), _, (right, bottom), _ = told.outline_px
+    assert update_obstruction(one, CAMERA, obstruction) == obstruction
+    (left, top), _, (right, bottom), _ = obstruction.outline_px
     across = np.array([[[left + 10, top + 10], [right - 10, bottom - 10]]])
-    assert update_obstruction([CameraView(across, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))], CAMERA, told) is None
+    assert update_obstruction([CameraView(across, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))], CAMERA, obstruction) is None
 
 
 @few
 @given(seed=seeds)
-def test_one_direction_tells_nothing(seed: int) -> None:
+def test_views_in_one_direction_find_nothing(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    told, pose = outline(rng), somewhere(rng)
-    here = [CameraView(seen(ROBOT, pose, told, rng), Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))) for _ in range(LOOKS)]
+    obstruction, pose = outline(rng), somewhere(rng)
+    here = [CameraView(seen(ROBOT, pose, obstruction, rng), Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))
+            for _ in range(LOOKS)]
     assert find_obstruction(here, CAMERA) is None
 
 
 @few
 @given(seed=seeds)
-def test_the_order_of_looks_and_segments_does_not_matter(seed: int) -> None:
+def test_the_order_of_views_and_segments_does_not_matter(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    there = looks(somewhere(rng), outline(rng), rng)
+    there = take_views(somewhere(rng), outline(rng), rng)
     mixed = [CameraView(rng.permutation(g.segments_px), g.now_from_then, g.covariance)
              for g in (there[k] for k in rng.permutation(LOOKS))]
     one, other = find_obstruction(there, CAMERA), find_obstruction(mixed, CAMERA)
@@ -225,18 +226,18 @@ def test_the_order_of_looks_and_segments_does_not_matter(seed: int) -> None:
 
 @few
 @given(seed=seeds)
-def test_what_can_be_looked_through_is_not_opaque(seed: int) -> None:
+def test_an_outline_with_segments_inside_is_not_opaque(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    told = outline(rng)
-    (left, top), _, (right, bottom), _ = told.outline_px
+    obstruction = outline(rng)
+    (left, top), _, (right, bottom), _ = obstruction.outline_px
     across = np.array([[[left + 10, top + 10], [right - 10, bottom - 10]]])
-    assert is_opaque(told, [np.zeros((0, 2, 2))])
-    assert not is_opaque(told, [across])
+    assert is_opaque(obstruction, [np.zeros((0, 2, 2))])
+    assert not is_opaque(obstruction, [across])
 
 
 @few
 @given(seed=seeds)
-def test_a_segment_is_its_own_twin_and_none_of_one_further_off(seed: int) -> None:
+def test_a_segment_is_its_own_counterpart_and_not_that_of_a_distant_one(seed: int) -> None:
     rng = np.random.default_rng(seed)
     start, angle, length = rng.uniform(100, 400, (8, 2)), rng.uniform(0, math.pi, 8), rng.uniform(12, 90, 8)
     along = np.column_stack([np.cos(angle), np.sin(angle)])

@@ -76,7 +76,7 @@ def _evidence(lines: np.ndarray, segments: np.ndarray, pose: Pose2, faces: Color
 
 
 @given(EVIDENCE, st.sampled_from(EVIDENCE_NAMES), st.floats(0.0, 0.5))
-def test_more_evidence_never_makes_a_pose_less_sure(found: PoseEvidence, name: str, more: float) -> None:
+def test_more_evidence_never_makes_a_pose_less_certain(found: PoseEvidence, name: str, more: float) -> None:
     values = dict(zip(EVIDENCE_NAMES, found.values.tolist(), strict=True))
     values[name] += more
     assert POSE_CONFIDENCE.p_false(PoseEvidence(**values)) <= POSE_CONFIDENCE.p_false(found) + 1e-15
@@ -97,7 +97,7 @@ def test_the_order_of_lines_and_segments_does_not_matter(seed: int) -> None:
     assert mixed.values == pytest.approx(_evidence(lines, segments, there).values, abs=1e-9)
 
 
-def test_the_right_place_is_surer_than_those_about_it() -> None:
+def test_the_right_pose_is_more_certain_than_those_around_it() -> None:
     faces = ColorCheck(8, 1.0, 0.2, is_testable=True)
     here = POSE_CONFIDENCE.p_false(_evidence(_lines(), _segments(_place()), _place(), faces))
     for x, y, turn in ((0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.1), (-0.5, 0.2, 0.05)):
@@ -105,14 +105,14 @@ def test_the_right_place_is_surer_than_those_about_it() -> None:
         assert POSE_CONFIDENCE.p_false(_evidence(_lines(), _segments(_place()), there, faces)) > 10.0 * here
 
 
-def test_the_tolerance_grows_with_what_the_wheels_may_have_done() -> None:
+def test_the_tolerance_grows_with_the_covariance_of_the_motion() -> None:
     small, large = (compute_motion_tolerance_px(_robot(), _lines(), _place(), factor * SPREAD) for factor in (1.0, 9.0))
     assert 0.0 < small < large
     assert large == pytest.approx(3.0 * small)
     assert compute_motion_tolerance_px(_robot(), _lines()[:0], _place(), SPREAD) == 0.0
 
 
-def test_the_fit_finds_weights_that_part_right_from_wrong_and_none_is_negative() -> None:
+def test_the_fit_separates_right_from_wrong_with_no_negative_weight() -> None:
     rng = np.random.default_rng(0)
     right = rng.random(400) < 0.5
     found = rng.random((400, len(EVIDENCE_NAMES)))
@@ -147,7 +147,7 @@ def test_faces_of_other_colours_do_not_agree() -> None:
     assert check_colors(robot, _place(), _picture(), strange).agreeing < right.agreeing - 0.2
 
 
-def test_one_colour_everywhere_tells_nothing() -> None:
+def test_one_colour_everywhere_is_not_testable() -> None:
     looks = predict_face_colors(_robot(), _place())
     same = [((0.5, 0.5, 0.5), points) for _, points in looks]
     assert not predict_color_check(same).is_testable
@@ -155,7 +155,7 @@ def test_one_colour_everywhere_tells_nothing() -> None:
     assert not check_colors(_robot(), _place(), _picture(), []).is_testable
 
 
-def test_expected_points_are_in_sight_and_of_the_models_world() -> None:
+def test_predicted_points_are_in_view() -> None:
     robot = _robot()
     points = np.array([p for _, some in predict_face_colors(robot, _place()) for p in some])
     pixels = robot.camera.project(robot.camera_from_world(_place()).apply(points))

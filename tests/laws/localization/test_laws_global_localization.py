@@ -56,7 +56,7 @@ TWIN = RobotModel(SYMMETRIC.world, CAMERA, MOUNT, ActuatorModel())
 
 
 def seen_from(robot: RobotModel, pose: Pose2, rng: np.random.Generator) -> Floats:
-    """Segments as a line finder would tell them: a tenth missing, ends cut, a third of a pixel off, and clutter."""
+    """Segments as a line finder would find them: a tenth missing, ends cut, a third of a pixel off, and clutter."""
     lines = predict_lines(robot, pose).segments_px
     kept = lines[rng.random(len(lines)) > 0.1]
     cut = rng.uniform(0.0, 0.15, (len(kept), 2, 1))
@@ -80,7 +80,7 @@ def test_weights_sum_to_one_and_do_not_depend_on_the_order(values: list[float], 
     assert weights[likeliest] == max(weights)
 
 
-# -- the choice of a probe -------------------------------------------------------------------------------------------
+# -- the choice of the next view -------------------------------------------------------------------------------------
 
 
 def made_up_view(pose: Pose2) -> Floats:
@@ -93,7 +93,9 @@ def made_up_view(pose: Pose2) -> Floats:
 
 @settings(deadline=None, max_examples=25)
 @given(where=st.lists(poses, min_size=1, max_size=4), looked=st.lists(angles, max_size=3), odd=st.booleans())
-def test_the_probe_is_the_one_that_parts_the_places_best(where: list[Pose2], looked: list[float], odd: bool) -> None:
+def test_the_next_view_is_the_one_that_separates_the_hypotheses_best(
+    where: list[Pose2], looked: list[float], odd: bool
+) -> None:
     places = [PoseHypothesis("room", pose, 1.0 / len(where)) for pose in where]
     looks = [HERE, *(Pose2(0.0, 0.0, a) for a in looked)]
 
@@ -103,14 +105,14 @@ def test_the_probe_is_the_one_that_parts_the_places_best(where: list[Pose2], loo
     best = choose_sensing_action(places, looks, made_up_view, is_safe)
     assume(best is not None and best.expected_separation > 0.0)
     assert best is not None
-    told = []
+    expected = []
     for degrees in (180, 90, -90, 135, -135, 45, -45):
         turn = math.radians(degrees)
         if all(abs(wrap_angle(turn - look.heading_rad)) >= math.radians(30) for look in looks):
-            told.append(oracle(places, turn, 0.0))
+            expected.append(oracle(places, turn, 0.0))
     if all(is_safe(place, best) for place in places):
-        told += [oracle(places, math.radians(degrees), 0.6) for degrees in (0, 90, -90, 180)]
-    assert best.expected_separation == pytest.approx(max(told))
+        expected += [oracle(places, math.radians(degrees), 0.6) for degrees in (0, 90, -90, 180)]
+    assert best.expected_separation == pytest.approx(max(expected))
     assert best.expected_separation == pytest.approx(oracle(places, best.turn_rad, best.move_m))
 
 
@@ -125,7 +127,7 @@ def oracle(places: list[PoseHypothesis], turn_rad: float, move_m: float) -> floa
 
 
 @given(seed=seeds)
-def test_views_that_are_one_do_not_part(seed: int) -> None:
+def test_equal_views_do_not_separate_hypotheses(seed: int) -> None:
     pose = Pose2(*np.random.default_rng(seed).uniform(-3, 3, 3))
     view = made_up_view(pose)
     assert compute_view_difference(view, view) == pytest.approx(0.0)
@@ -144,7 +146,7 @@ def test_the_widest_gap_is_as_far_as_can_be_from_every_look(looked: list[float])
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds)
-def test_a_probing_move_stays_free_from_every_place_that_is_kept(seed: int) -> None:
+def test_a_sensing_move_is_collision_free_from_every_hypothesis(seed: int) -> None:
     rng = np.random.default_rng(seed)
     places = []
     for room in rng.choice(CENTRE.world.rooms, 2):
@@ -161,12 +163,12 @@ def test_a_probing_move_stays_free_from_every_place_that_is_kept(seed: int) -> N
         assert not any(shapely.Polygon(o).intersects(way) for o in CENTRE.world.obstacles(place.room))
 
 
-# -- looks composed --------------------------------------------------------------------------------------------------
+# -- views related by motions ----------------------------------------------------------------------------------------
 
 
 @settings(deadline=None, max_examples=40)
 @given(steps=st.lists(st.tuples(angles, st.floats(0, 1)), min_size=1, max_size=5), start=poses)
-def test_looks_are_composed_as_the_robot_moved(steps: list[tuple[float, float]], start: Pose2) -> None:
+def test_earlier_poses_are_propagated_as_the_robot_moved(steps: list[tuple[float, float]], start: Pose2) -> None:
     actuator, now, then, spread = ActuatorModel(), start, HERE, np.zeros((3, 3))
     for turn, way in steps:
         step = actuator.predict_motion(turn, way)
@@ -181,7 +183,7 @@ def test_looks_are_composed_as_the_robot_moved(steps: list[tuple[float, float]],
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds)
-def test_level_lines_tell_the_heading_but_for_right_angles(seed: int) -> None:
+def test_level_lines_measure_the_heading_modulo_right_angles(seed: int) -> None:
     rng = np.random.default_rng(seed)
     spots = get_visibility_map(CENTRE.world, "conference-room", 1.0).positions
     x, y = spots[int(rng.integers(len(spots)))]
@@ -190,12 +192,12 @@ def test_level_lines_tell_the_heading_but_for_right_angles(seed: int) -> None:
     ends = lines.lines_world[..., 2]
     level = (np.ptp(ends, axis=1) < 0.01) & (np.abs(ends[:, 0] - 1.0) > 0.3)  # at the eye's height none tells
     assume(np.count_nonzero(level) >= 12)
-    told = find_level_direction(lines.segments_px, CAMERA, MOUNT.camera_from_robot)
-    assert told is not None
-    assert abs(math.remainder(told + pose.heading_rad, RIGHT_ANGLE_RAD)) < math.radians(1.0)
+    found = find_level_direction(lines.segments_px, CAMERA, MOUNT.camera_from_robot)
+    assert found is not None
+    assert abs(math.remainder(found + pose.heading_rad, RIGHT_ANGLE_RAD)) < math.radians(1.0)
 
 
-def test_turns_between_looks_are_corrected_by_what_is_seen() -> None:
+def test_turns_between_views_are_corrected_by_level_lines() -> None:
     rng, pose, turn = np.random.default_rng(3), Pose2(12.0, 5.0, 0.4), math.radians(95.0)
     first = CameraView(seen_from(CENTRE, pose, rng), Pose2(0.0, 0.0, -turn + math.radians(6.0)), np.zeros((3, 3)))
     second = CameraView(seen_from(CENTRE, pose @ Pose2(0.0, 0.0, turn), rng), HERE, np.zeros((3, 3)))
@@ -203,17 +205,17 @@ def test_turns_between_looks_are_corrected_by_what_is_seen() -> None:
     assert straight[0].now_from_then.heading_rad == pytest.approx(-turn, abs=math.radians(0.5))
 
 
-def test_marks_on_a_bare_wall_tell_no_heading() -> None:
-    rng, told = np.random.default_rng(4), 0
+def test_marks_on_a_bare_wall_give_no_heading() -> None:
+    rng, found = np.random.default_rng(4), 0
     for _ in range(200):
         middle, angle = rng.uniform(20, 490, (6, 2)), rng.uniform(0, math.pi, 6)
         half = 25.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         marks = np.stack([middle - half, middle + half], axis=1)
-        told += find_level_direction(marks, CAMERA, MOUNT.camera_from_robot) is not None
-    assert told <= 2
+        found += find_level_direction(marks, CAMERA, MOUNT.camera_from_robot) is not None
+    assert found <= 2
 
 
-def test_looks_are_set_straight_by_one_another_where_the_last_shows_a_bare_wall() -> None:
+def test_views_are_aligned_with_one_another_where_the_last_shows_a_bare_wall() -> None:
     rng, pose, turn = np.random.default_rng(3), Pose2(12.0, 5.0, 0.4), math.radians(95.0)
     spread = np.diag([0.0, 0.0, 1e-4])
     off = CameraView(seen_from(CENTRE, pose, rng), Pose2(0.0, 0.0, -turn + math.radians(6.0)), spread)
@@ -227,7 +229,7 @@ def test_looks_are_set_straight_by_one_another_where_the_last_shows_a_bare_wall(
 
 @settings(deadline=None, max_examples=20)
 @given(error=st.floats(-0.15, 0.15), turn=angles, move=st.floats(0.0, 0.7))
-def test_a_turn_that_is_corrected_takes_the_way_after_it_along(error: float, turn: float, move: float) -> None:
+def test_a_corrected_turn_also_corrects_the_move_after_it(error: float, turn: float, move: float) -> None:
     rng, start = np.random.default_rng(3), Pose2(12.0, 5.0, 0.4)
     true = Pose2(0.0, 0.0, turn) @ Pose2(move, 0.0, 0.0)
     now = start @ true
@@ -242,7 +244,7 @@ def test_a_turn_that_is_corrected_takes_the_way_after_it_along(error: float, tur
 
 @settings(deadline=None, max_examples=20)
 @given(error=st.floats(-0.06, 0.06), turn=angles, heading=angles)
-def test_a_turn_that_is_unsure_is_corrected_and_not_the_pose(error: float, turn: float, heading: float) -> None:
+def test_an_uncertain_turn_is_corrected_and_not_the_pose(error: float, turn: float, heading: float) -> None:
     rng, before = np.random.default_rng(3), Pose2(12.0, 5.0, heading)
     pose = before @ Pose2(0.0, 0.0, turn)
     assume(all(len(predict_lines(CENTRE, there)) >= 20 for there in (before, pose)))
@@ -252,15 +254,15 @@ def test_a_turn_that_is_unsure_is_corrected_and_not_the_pose(error: float, turn:
     assert there.distance_to(pose) < 0.02
     assert abs(wrap_angle(there.heading_rad - pose.heading_rad)) < math.radians(0.3)
     assert np.linalg.eigvalsh(covariance)[0] > 0.0
-    told = refine_view_motions(CENTRE, looks, there, covariance)[0].now_from_then.heading_rad
-    assert abs(wrap_angle(told + turn)) < math.radians(0.5)
+    corrected = refine_view_motions(CENTRE, looks, there, covariance)[0].now_from_then.heading_rad
+    assert abs(wrap_angle(corrected + turn)) < math.radians(0.5)
 
 
-# -- what is in sight ------------------------------------------------------------------------------------------------
+# -- what is visible -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("room", ["robot-laboratory", "hallway"])
-def test_what_is_in_sight_is_what_the_exact_computation_sees(room: str) -> None:
+def test_the_visibility_map_agrees_with_the_exact_computation(room: str) -> None:
     room_map = get_visibility_map(CENTRE.world, room, 1.0)
     agree = []
     for square in range(0, len(room_map.first) - 1, 12):
@@ -307,7 +309,7 @@ def test_in_a_corridor_that_looks_the_same_from_both_ends_it_never_says_where_it
 @settings(deadline=None, max_examples=6)
 @example(part=0.05, heading=1.36, turn=math.pi)  # few lines are in sight
 @given(part=st.floats(0.05, 0.95), heading=angles, turn=angles)
-def test_the_twin_of_a_place_is_found_from_the_model_alone(part: float, heading: float, turn: float) -> None:
+def test_the_alias_of_a_place_is_found_from_the_model_alone(part: float, heading: float, turn: float) -> None:
     outline = SYMMETRIC.world.outline("corridor-0")
     low, high = outline.min(axis=0), outline.max(axis=0)
     pose = Pose2(low[0] + part * (high[0] - low[0]), 0.5 * (low[1] + high[1]) + 0.3, heading)
@@ -341,7 +343,7 @@ parts = st.floats(0.0, 1.0)
 @settings(max_examples=200)
 @given(seen=st.integers(1, 200), accounted=parts, likelihood=st.floats(-20.0, 80.0), explained=parts, weakest=parts,
        more=parts)
-def test_a_place_that_stands_stands_with_more_evidence_too(
+def test_more_evidence_never_makes_a_pose_less_acceptable(
     seen: int, accounted: float, likelihood: float, explained: float, weakest: float, more: float
 ) -> None:
     count = int(accounted * seen)
