@@ -22,6 +22,8 @@ JPEG = "EncodedImage:blob"
 TRANSLATION, QUATERNION = "Transform3D:translation", "Transform3D:quaternion"
 CYCLE = "cycle"
 """The timeline of a recording."""
+Series = list[tuple[int, Any]]
+"""(cycle, value) in the order of time."""
 
 
 def read_decisions(path: Path) -> list[dict[str, Any]]:
@@ -55,6 +57,20 @@ def read_true_track(path: Path) -> list[tuple[int, float, float, float]]:
     return track
 
 
+def read_series(path: Path, entity: str, component: str) -> Series:
+    """(cycle, value) of a component in the order in which it was logged; a value of many is a list.
+
+    Raises:
+        RecordingError: the file is no recording, or is damaged.
+    """
+    found: list[tuple[bytes, int, Any]] = []
+    for batch in _whole_batches(path, entity):
+        if component in batch.schema.names:
+            found += zip(*(batch.column(name).to_pylist() for name in (ROW_ID, CYCLE, component)), strict=True)
+    in_order = sorted((row for row in found if row[2]), key=lambda row: row[0])
+    return [(cycle, values[0] if len(values) == 1 else values) for _, cycle, values in in_order]
+
+
 def damage_of(path: Path) -> str | None:
     """What is wrong with a recording, as where a crash cut it off; None for a whole one. Its contents are not read."""
     try:
@@ -83,14 +99,19 @@ def _rows(path: Path, entity: str, components: tuple[str, ...], timeline: str = 
 
     Each has its time on a timeline too, where one is named.
     """
+    rows = [row for batch in _whole_batches(path, entity) for row in _complete(batch, components, timeline)]
+    return [row for _, row in sorted(rows, key=lambda pair: pair[0])]
+
+
+def _whole_batches(path: Path, entity: str) -> list[Any]:
+    """What was logged at an entity path. Raises RecordingError."""
     if not path.is_file():
         raise RecordingError(f"{path}: expected a recording, got no such file")
     try:
-        rows = [row for batch in _batches(path, entity) for row in _complete(batch, components, timeline)]
+        return list(_batches(path, entity))
     except Exception as error:  # as above
         raise RecordingError(f"{path}: expected a whole Rerun recording, got: {error} (harvey repair {path.parent} "
                              "draws it anew)") from None
-    return [row for _, row in sorted(rows, key=lambda pair: pair[0])]
 
 
 def _batches(path: Path, entity: str) -> Iterator[Any]:

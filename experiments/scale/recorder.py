@@ -16,7 +16,7 @@ from experiments.report import Cell, Report
 from harvey.simulation.run import build_robot_model, run_mission
 from logs.recording.loggers.frames import Frames
 from logs.recording.stream import FLUSH_CYCLES
-from logs.recording.writer import RecordingWriter, all_loggers
+from logs.recording.writer import RecordingWriter, logger_classes
 from sim.body.simulated_body import SimulatedBody
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
@@ -150,11 +150,10 @@ class _Bench:
         robot, self._line = build_robot_model(stage.scenario), ""
         self._recorders = []
         for name in (REST, FRAMES, ALL):
-            loggers = all_loggers(robot.world, robot.camera, robot.mount, lambda _decision: self._line)
-            wanted = [lg for lg in loggers if name == ALL or isinstance(lg, Frames) == (name == FRAMES)]
+            wanted = [one for one in logger_classes() if name == ALL or (one is Frames) == (name == FRAMES)]
             self._recorders.append(RecordingWriter(
                 folder / f"{name}.rrd", world=robot.world, camera=robot.camera, mount=robot.mount, title=name,
-                recording_id=name, loggers=wanted))
+                recording_id=name, line_of=lambda _decision: self._line, loggers=wanted))
         self._times_ms: list[list[float]] = [[] for _ in self._recorders]
 
     def record(self, step: Step) -> None:

@@ -174,7 +174,7 @@ def _kept_or_resumed(run: RunDirectory, task: Task, stage: Stage, sinks: Sequenc
     if remains.outcome is None or record.get("outcome") != remains.outcome.kind:
         return resume_mission(run, remains, sinks=sinks, live=live, stage=stage)
     try:
-        return MissionResult(**record)
+        return MissionResult.of_record(record)
     except TypeError as error:
         raise BadInput(f"{run.result}: {error}") from None
 

@@ -30,6 +30,7 @@ class Bar:
         tally = self._tally
         self._bar.n = min(max(0.0, tally.way_m - tally.to_go_m), tally.way_m)
         told = f"{tally.to_go_m:.1f} m to go, {count(tally.verified, 'milestone')} verified, cycle {decision.cycle}"
+        told += ", lost" * tally.is_lost
         self._bar.set_description_str(told, refresh=False)
         self._bar.update(0)
 
@@ -38,12 +39,14 @@ class Bar:
 
 
 class Lines:
-    """A line whenever a milestone is verified."""
+    """A line whenever a milestone is verified, and at each turning point that must not be left out."""
 
     def __init__(self, tally: Tally, out: TextIO) -> None:
         self._tally, self._out, self._told = tally, out, 0
 
     def __call__(self, decision: Decision) -> None:
+        for point in self._tally.turns:
+            print(f"cycle {point.cycle}: {point.kind}: {point.text}", file=self._out, flush=True)
         if self._tally.verified > self._told:
             self._told = self._tally.verified
             verified = f"{count(self._told, 'milestone')} verified"

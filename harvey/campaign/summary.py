@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harvey.tables import table
+from world_models.entries.location import Place
 from world_models.units import FOOT_M, INCH_M
-from world_models.words import count, degrees
+from world_models.words import count, degrees, listed
 
 if TYPE_CHECKING:
     from harvey.dry_run import MilestonePreview
@@ -39,7 +40,8 @@ def one(r: MissionResult, out: Path | None) -> str:
         f" {m['false_accepts']} accepted wrongly",
         f"  plans         {count(r.sketches, 'sketch', 'sketches')}, {count(r.replans, 'replan')},"
         f" {count(r.relocalizations, 'relocalization')}",
-        f"  collisions    {r.collisions}",
+        f"  collisions    {r.collisions}{_places(r)}",
+        *(f"  {point.kind:<12}  cycle {point.cycle}: {point.text}" for point in r.turning_points),
         *(f"  amiss         {text}" for text in r.amiss),
         f"  way           {r.path_length_m:.1f} m in {r.sim_time_s:.0f} s of the robot's time",
         f"  took          {r.wall_time_s:.1f} s for {count(r.decisions, 'cycle')} and {count(r.frames, 'frame')}",
@@ -48,6 +50,12 @@ def one(r: MissionResult, out: Path | None) -> str:
         lines += [f"  recording     {out / 'recording.rrd'}", "",
                   f"open it with    harvey view {out}", f"ask it with     harvey why {out}"]
     return "\n".join(lines)
+
+
+def _places(r: MissionResult) -> str:
+    """Where the robot truly touched something."""
+    where = listed([f"in cycle {c.cycle} at {Place(c.locale, c.x_m, c.y_m).words()}" for c in r.contacts])
+    return f": {where}" if where else ""
 
 
 def several(results: Sequence[MissionResult]) -> str:

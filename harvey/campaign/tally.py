@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from blackboard.journal import Decision
+from logs.turning_points import TurningPoint, TurningPointFinder
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Milestone
 
@@ -18,14 +19,23 @@ class Tally:
     Attributes:
         verified: milestones so far.
         way_m, to_go_m: distance to the goal as the crow flies, at first and now.
+        turns: the turning points of the last decision that must not be left out.
+        is_lost: whether the robot does not know where it is.
     """
 
     def __init__(self, stage: Stage) -> None:
         self._world, self._goal = stage.world, stage.goal_world
         self.verified = 0
+        self.turns: tuple[TurningPoint, ...] = ()
+        self.is_lost = False
+        self._finder = TurningPointFinder()
         self.to_go_m = self.way_m = stage.start_world.distance_to(stage.goal_world)
 
     def __call__(self, decision: Decision) -> None:
+        self.turns = tuple(point for point in self._finder.find(decision) if point.is_told)
+        for point in self.turns:
+            if point.kind in ("lost", "found"):
+                self.is_lost = point.kind == "lost"
         for change in decision.made:
             value = change.entry.value
             if isinstance(value, Milestone):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +18,7 @@ from logs.disk import sync_folder
 from logs.journal_file import JournalFile
 from logs.recording.writer import RecordingWriter
 from world_models.entries.body import Frame
+from world_models.entries.location import Place
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
@@ -93,10 +94,10 @@ class RunRecorder:
         if self._camera is not None and isinstance(value, Frame):
             self._camera.add(value.jpeg)
 
-    def draw_truth(self, pose: Pose2, sim_time_s: float) -> None:
-        """Where the robot truly is, for the drawing."""
+    def draw_truth(self, pose: Pose2, sim_time_s: float, contacts: Sequence[Place] = ()) -> None:
+        """Where the robot truly is, and where it touched something since the last cycle, for the drawing."""
         if self._recording_writer is not None:
-            self._recording_writer.truth(pose, sim_time_s)
+            self._recording_writer.truth(pose, sim_time_s, contacts)
 
     def close(self) -> None:
         """No more decisions. Raises RecordingError where the recording's last part could not be written."""

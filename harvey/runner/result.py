@@ -4,16 +4,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from blackboard.journal import Decision
+from logs.turning_points import TurningPoint, TurningPointFinder
 from world_models.entries.body import Frame, MotionReport
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch
 
 UNFINISHED = "unfinished"
 """The outcome in ``result.json`` of a run that has none yet."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A collision, by the truth.
+
+    Attributes:
+        cycle: the first that began after it.
+        locale: where the robot was, "" outside all locales; x_m, y_m: in the frame of the locale, else of the world.
+    """
+
+    cycle: int
+    locale: str
+    x_m: float
+    y_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +44,8 @@ class MissionResult:
         replans: sketches adjusted or drawn anew; relocalizations: how often it found itself again.
         sketches: how many plan sketches were drawn.
         max_cross_track_m: how far the robot truly strayed from the line of the leg it was driving.
+        contacts: each of the collisions.
+        turning_points: what changed the course of the run, as the robot itself knew it.
         amiss: which of the scenario's faults did not happen, or not as they were asked for, in words.
     """
 
@@ -50,6 +68,8 @@ class MissionResult:
     collisions: int | None
     max_cross_track_m: float | None
     amiss: Sequence[str] = ()
+    contacts: Sequence[Contact] = ()
+    turning_points: Sequence[TurningPoint] = ()
 
     @property
     def error_m(self) -> float:
@@ -63,7 +83,15 @@ class MissionResult:
 
     def record(self) -> dict[str, Any]:
         """As JSON types."""
-        return {name: getattr(self, name) for name in self.__slots__}
+        record = {name: getattr(self, name) for name in self.__slots__}
+        return record | {name: [asdict(one) for one in record[name]] for name in ("contacts", "turning_points")}
+
+    @staticmethod
+    def of_record(record: Mapping[str, Any]) -> MissionResult:
+        """From JSON types. Raises TypeError where they are not those of a result."""
+        contacts = tuple(Contact(**one) for one in record.get("contacts", ()))
+        turning_points = tuple(TurningPoint(**one) for one in record.get("turning_points", ()))
+        return MissionResult(**{**record, "contacts": contacts, "turning_points": turning_points})
 
 
 class RunCounts:
@@ -73,9 +101,12 @@ class RunCounts:
         self.decisions = self.replans = self.relocalizations = self.sketches = self.frames = 0
         self.milestones = {"verified": 0, "refuted": 0, "not_testable": 0}
         self.path_m = self.time_s = 0.0
+        self.turning_points: list[TurningPoint] = []
+        self._finder = TurningPointFinder()
 
     def __call__(self, decision: Decision) -> None:
         self.decisions += 1
+        self.turning_points += [point for point in self._finder.find(decision) if point.is_told]
         for change in decision.observed:
             value = change.entry.value
             if isinstance(value, MotionReport):
@@ -102,4 +133,5 @@ class RunCounts:
             wall_time_s=wall_time_s, frames=self.frames, decisions=self.decisions,
             milestones={**self.milestones, "false_accepts": None}, replans=self.replans,
             relocalizations=self.relocalizations, sketches=self.sketches, collisions=None, max_cross_track_m=None,
+            turning_points=tuple(self.turning_points),
         )

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from blackboard.journal import Decision
-from harvey.runner.result import MissionResult
+from harvey.runner.result import Contact, MissionResult
+from harvey.simulation.contacts import ContactWatch
 from sim.body.simulated_body import SimulatedBody
 from sim.stage import Stage
 from sim.truth import cross_track_m
@@ -31,9 +32,12 @@ class Referee:
         self._leg: Leg | None = None
         self._fix: Pose2 | None = None
         self._followed = 0
+        self._contact_watch = ContactWatch(robot.world, body)
+        self._contacts: list[Contact] = []
 
     def __call__(self, decision: Decision) -> None:
         self._follow()
+        self._note_contacts(decision.cycle)
         for change in decision.made:
             value = change.entry.value
             if isinstance(value, Leg):
@@ -52,6 +56,7 @@ class Referee:
 
     def complete(self, result: MissionResult, belief: Hypothesis | None) -> MissionResult:
         """The result with the true errors; ``belief`` is the last one held."""
+        self._note_contacts(result.decisions)
         score = self._stage.score(self._body.track)
         return replace(
             result,
@@ -62,9 +67,13 @@ class Referee:
             frames=self._body.frames,
             milestones={**result.milestones, "false_accepts": self._false_accepts},
             collisions=score.collisions,
+            contacts=tuple(self._contacts),
             max_cross_track_m=self._max_cross_track_m,
             amiss=self._body.missed_faults,
         )
+
+    def _note_contacts(self, cycle: int) -> None:
+        self._contacts += [Contact(cycle, p.locale, p.x_m, p.y_m) for p in self._contact_watch.new_contacts()]
 
     def _follow(self) -> None:
         """How far the robot truly strayed from the leg that it was driving since the last decision."""

@@ -18,6 +18,7 @@ from harvey.runner.result import MissionResult
 from harvey.runner.resume import Remains, continue_run
 from harvey.runner.run import Run
 from harvey.simulation.body_replay import BodyReplay
+from harvey.simulation.contacts import ContactWatch
 from harvey.simulation.referee import Referee
 from harvey.simulation.serial_body import IN_PROCESS, open_body
 from harvey.wiring import knowledge_sources
@@ -132,13 +133,17 @@ class SimulatedRun(Run):
         around: Around = unchanged,
     ) -> None:
         self.simulated_body = body = stage.body(head.seed)
-        self._line = ExitStack()
+        self._line, self._contact_watch = ExitStack(), ContactWatch(agent.robot.world, body)
         reached = around(self._line.enter_context(open_body(body, head.body)), lambda: recorder.replaying)
         super().__init__(
             head, agent, reached, recorder, limits=stage.scenario.limits, clock=lambda: body.truth.time_s,
             referee=Referee(agent.robot, stage, body), sinks=sinks,
-            before_cycle=lambda: recorder.draw_truth(body.truth.world_from_robot, body.truth.time_s))
+            before_cycle=self._draw_truth)
         self.body_replay = BodyReplay(self.port, body, head.seed, stage.scenario.actuator)
+
+    def _draw_truth(self) -> None:
+        truth = self.simulated_body.truth
+        self.recorder.draw_truth(truth.world_from_robot, truth.time_s, self._contact_watch.new_contacts())
 
     def __enter__(self) -> SimulatedRun:
         return self

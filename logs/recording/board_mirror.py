@@ -10,6 +10,7 @@ from blackboard.change import Change, Retracted
 from blackboard.entry import Entry
 from blackboard.journal import Decision
 from blackboard.kinds import always
+from world_models.entries.location import Place
 from world_models.frames import Pose2
 
 T = TypeVar("T")
@@ -70,11 +71,13 @@ class Moment:
         decision: what was decided.
         mirror: the board after it.
         truth: where the robot truly was since the last cycle, oldest first; empty where nobody knows.
+        contacts: where it truly touched something since then.
     """
 
     decision: Decision
     mirror: Mirror
     truth: tuple[Pose2, ...] = ()
+    contacts: tuple[Place, ...] = ()
     _changes: tuple[Change, ...] = field(init=False)
     _kinds: frozenset[type[Any]] = field(init=False)
 

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import rerun.blueprint as rrb
 
-from logs.recording.blueprint import building_view
-from logs.recording.loggers.building import Building
+from logs.recording.loggers.building import building_view, log_building
 from logs.recording.stream import RecordingStream
 from world_models.building.world import World
 
@@ -17,6 +16,6 @@ def record_building(world: World, out: Path) -> None:
     look = rrb.Blueprint(building_view(world, world.name), rrb.TimePanel(state="hidden"), auto_views=False)
     stream = RecordingStream(out, f"building of {world.name}", world.name, look)
     try:
-        Building(world).begin(stream)
+        log_building(stream, world)
     finally:
         stream.close()

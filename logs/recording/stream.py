@@ -11,6 +11,7 @@ from rerun.chunk import RrdReader
 
 from logs.errors import RecordingError
 from logs.recording.columns import Batch, Columnar, Columns, Row
+from logs.recording.signs import viewable
 
 APPLICATION = "harvey"
 
@@ -43,7 +44,7 @@ class RecordingStream:
         self._stream.set_log_time_enabled(False)
         self._stream.set_log_tick_enabled(False)
         self._guarded(lambda: self._stream.set_sinks(*_sinks(path, live, live_port), default_blueprint=blueprint))
-        self._stream.send_recording_name(title)
+        self._stream.send_recording_name(viewable(title))
         self._cycles, self._flush_cycles = 0, LIVE_FLUSH_CYCLES if live else FLUSH_CYCLES
         self._now = (0, 0.0)
         self._columns = Columns()
@@ -55,7 +56,8 @@ class RecordingStream:
 
     def log(self, path: str, kind: type[Columnar], **components: Batch) -> None:
         """Log one row at an entity path, now; each component is a batch of values, which may be empty."""
-        self._rows.setdefault((path, kind, tuple(components)), []).append((*self._now, components))
+        shown = {name: _viewable(batch) for name, batch in components.items()}
+        self._rows.setdefault((path, kind, tuple(shown)), []).append((*self._now, shown))
 
     def fix(self, path: str, *what: Any) -> None:
         """Log archetypes that hold at all times."""
@@ -95,6 +97,13 @@ class RecordingStream:
             act()
         except (RuntimeError, OSError, ValueError) as error:
             raise RecordingError(f"{self._path or 'live recording'}: cannot be written: {error}") from None
+
+
+def _viewable(batch: Batch) -> Batch:
+    """Texts without signs that the viewer cannot show; anything else as it is."""
+    if isinstance(batch, list | tuple) and batch and isinstance(batch[0], str):
+        return [viewable(text) for text in batch]
+    return batch
 
 
 def _expect_free_port(port: int) -> None:

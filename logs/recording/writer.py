@@ -1,43 +1,52 @@
-"""RecordingWriter: the scheduler's sink that keeps the recorder, ``recording.rrd``."""
+"""RecordingWriter: the scheduler's sink that draws ``recording.rrd`` with every logger that is found."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import pkgutil
+from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
 
 from blackboard.journal import Decision, decision_line
+from logs.errors import RecordingError
+from logs.recording import loggers as built_in
 from logs.recording.belief import Belief
-from logs.recording.blueprint import blueprint, describe
+from logs.recording.blueprint import blueprint
 from logs.recording.board_mirror import Mirror, Moment
-from logs.recording.loggers import Logger
-from logs.recording.loggers.building import Building
-from logs.recording.loggers.chapters import Chapters
-from logs.recording.loggers.decisions import Decisions
-from logs.recording.loggers.errors import Errors
-from logs.recording.loggers.frames import Frames
-from logs.recording.loggers.image import Image
-from logs.recording.loggers.lanes import Lanes
-from logs.recording.loggers.plan import Plan
-from logs.recording.loggers.robots import Robots
-from logs.recording.loggers.sketch_tree import SketchTree
-from logs.recording.loggers.why import Why
-from logs.recording.paths import DESCRIPTION
+from logs.recording.logger import LoggerClass, Subject
 from logs.recording.stream import LIVE_PORT, RecordingStream
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import Frame, MotionReport
+from world_models.entries.location import Place
 from world_models.frames import Pose2
+from world_models.plugins import list_plugins, load_plugin
+
+GROUP = "harvey.loggers"
+"""Entry points of this group name logger classes of other packages."""
 
 
-def all_loggers(
-    world: World, camera: Camera, mount: CameraMount, line_of: Callable[[Decision], str] = decision_line,
-) -> tuple[Logger, ...]:
-    """Everything that a recording shows."""
-    belief = Belief(world)
-    return (
-        Building(world), Robots(world, camera, mount, belief), Plan(world), Frames(camera), Image(camera),
-        SketchTree(), Lanes(), Decisions(line_of), Errors(belief), Chapters(belief), Why(belief),
-    )
+def logger_classes() -> tuple[LoggerClass, ...]:
+    """Everything that a recording shows: the loggers of the project, then those of other packages.
+
+    Raises:
+        RecordingError: a logger of another package cannot be loaded.
+    """
+    return (*_built_in(), *_foreign())
+
+
+def _built_in() -> Iterator[LoggerClass]:
+    """Those in the folder ``loggers``, in the order of their files' names."""
+    for module in pkgutil.iter_modules(built_in.__path__):
+        yield import_module(f"{built_in.__name__}.{module.name}").LOGGER
+
+
+def _foreign() -> Iterator[LoggerClass]:
+    for point in list_plugins(GROUP):
+        try:
+            yield load_plugin(point, "a logger class")
+        except ImportError as error:
+            raise RecordingError(str(error)) from error
 
 
 class RecordingWriter:
@@ -50,30 +59,32 @@ class RecordingWriter:
     def __init__(
         self, path: Path | None, *, world: World, camera: Camera, mount: CameraMount, title: str, recording_id: str,
         live: bool = False, live_port: int = LIVE_PORT, line_of: Callable[[Decision], str] = decision_line,
-        loggers: Sequence[Logger] | None = None,
+        loggers: Sequence[LoggerClass] | None = None,
     ) -> None:
         """Begin a recording in a file (``path``), for a viewer that connects now (``live``), or both.
 
         Args:
             line_of: gives a decision's line in the journal; :meth:`JournalFile.line` spares making it twice.
-            loggers: what is drawn; all of it unless said.
+            loggers: classes of what is drawn; all that there are unless said.
 
         Raises:
             RecordingError: the file cannot be written.
             ValueError: neither path nor live.
         """
+        subject = Subject(title, world, camera, mount, Belief(world), line_of)
+        self._loggers = tuple(logger(subject) for logger in (logger_classes() if loggers is None else loggers))
         self._stream = RecordingStream(
-            path, recording_id, title, blueprint(world, camera), live=live, live_port=live_port)
+            path, recording_id, title, blueprint(self._loggers), live=live, live_port=live_port)
         self._mirror = Mirror()
         self._sim_time_s = 0.0
         self._truth: list[Pose2] = []
-        self._loggers = all_loggers(world, camera, mount, line_of) if loggers is None else tuple(loggers)
-        self._stream.fix(DESCRIPTION, describe(title))
+        self._contacts: list[Place] = []
         for logger in self._loggers:
             logger.begin(self._stream)
 
-    def truth(self, world_from_robot: Pose2, sim_time_s: float) -> None:
-        """Where the robot truly is; drawn with the next decision."""
+    def truth(self, world_from_robot: Pose2, sim_time_s: float, contacts: Sequence[Place] = ()) -> None:
+        """Where the robot truly is, and where it touched something; drawn with the next decision."""
+        self._contacts += contacts
         self._truth.append(world_from_robot)
         self._sim_time_s = max(self._sim_time_s, sim_time_s)
 
@@ -106,8 +117,9 @@ class RecordingWriter:
         self._stream.close()
 
     def _moment(self, decision: Decision) -> Moment:
-        moment = Moment(decision, self._mirror, tuple(self._truth))
+        moment = Moment(decision, self._mirror, tuple(self._truth), tuple(self._contacts))
         self._truth.clear()
+        self._contacts.clear()
         for change in moment.changes:
             self._mirror.take(change)
         times = [*(e.value.sim_time_s for e in moment.changed(Frame)),

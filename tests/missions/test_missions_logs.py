@@ -9,8 +9,7 @@ import pytest
 from harvey.run_files.run_directory import RunDirectory
 from harvey.simulation.run import run_mission
 from logs.journal_file import read_journal
-from logs.reader import read_decisions, read_frames
-from logs.recording.overview import read_series
+from logs.reader import read_decisions, read_frames, read_series
 from logs.recording.paths import CHAPTERS, HARVEY, TABLE, WHY
 from sim.made_up.short_missions import HALLWAY, fault
 from sim.scenario import parse_scenario

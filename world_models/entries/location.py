@@ -58,7 +58,7 @@ class Place:
 
     def words(self) -> str:
         """``allens-office (3.96, 3.66) m``."""
-        return f"{self.locale} {words.point(self.x_m, self.y_m)}"
+        return f"{self.locale or 'the world'} {words.point(self.x_m, self.y_m)}"
 
     def __str__(self) -> str:
         return f"({self.words()})"
@@ -127,6 +127,10 @@ class Hypothesis:
         """How far it is from another hypothesis in the same locale, in words."""
         by = other.locale_from_robot.inverse() @ self.locale_from_robot
         return f"{words.metres(math.hypot(by.x_m, by.y_m))} and {words.degrees(abs(by.heading_rad))}"
+
+    def place(self) -> str:
+        """``hallway (12.21, 0.50) m``."""
+        return Place(self.locale, self.locale_from_robot.x_m, self.locale_from_robot.y_m).words()
 
     def sentence(self) -> str:
         pose = self.locale_from_robot

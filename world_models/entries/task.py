@@ -134,8 +134,11 @@ class PlanSketch:
         """The current subgoal is done; its milestone is yet to be verified."""
         return replace(self, at=self.at + 1, verified=False)
 
+    def where(self) -> str:
+        """Through which locale it leads, in words."""
+        return f"through {self.locale}" if self.locale else "from locale to locale"
+
     def sentence(self) -> str:
-        where = f"through {self.locale}" if self.locale else "from locale to locale"
         if self.status != "active":
             progress = f"{self.status} at milestone M{self.at}"
         else:
@@ -144,7 +147,7 @@ class PlanSketch:
         steps = " then ".join(step.destination.words() + (f" by {step.passage}" if step.passage else "")
                               for step in self.subgoals)
         adjusted = f", adjusted {words.count(self.adjustments, 'time')}" if self.adjustments else ""
-        return f"plan sketch {where}: {progress}; to {steps}{adjusted}"
+        return f"plan sketch {self.where()}: {progress}; to {steps}{adjusted}"
 
 
 @inference(keep=2)
@@ -220,6 +223,10 @@ class Milestone:
     @property
     def is_open(self) -> bool:
         return self.status in ("turning", "expected")
+
+    def name(self) -> str:
+        """``M1 of the route``, or ``check of the belief``; without the reason for a check."""
+        return self.what.partition(", because")[0]
 
     def sentence(self) -> str:
         names = [words.landmark(name) for name in self.landmarks]

@@ -1,18 +1,9 @@
-"""One small logger a file: each turns what changed in a cycle into what a person sees of it."""
+"""The loggers of a recording, one a file: each turns what changed in a cycle into what a person sees of it.
 
-from __future__ import annotations
+In reading order: ``frames`` (the shortest), ``errors``, ``decisions``, ``chapters``, ``lanes``, ``plan``,
+``sketch_tree``, ``robots``, ``building``, ``image``, ``why``, ``description``.
 
-from typing import Protocol
-
-from logs.recording.board_mirror import Moment
-from logs.recording.stream import RecordingStream
-
-
-class Logger(Protocol):
-    """Draws one thing."""
-
-    def begin(self, stream: RecordingStream) -> None:
-        """What holds at all times: shapes, styles."""
-
-    def log(self, stream: RecordingStream, moment: Moment) -> None:
-        """What this cycle changed."""
+To add one: a file in this folder with a class as :class:`logs.recording.logger.Logger` says, and
+``LOGGER = TheClass`` at its end. In another package: the same class, and an entry point of the group
+``harvey.loggers`` that names it.
+"""

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from logs.recording.board_mirror import Moment
+from logs.recording.logger import Subject
 from logs.recording.palette import DOOR, NAME
-from logs.recording.paths import BUILDING, DOORWAYS, NAMES, WORLD
+from logs.recording.panel import Panel
+from logs.recording.paths import BELIEVED_TRAIL, BUILDING, DOORWAYS, NAMES, TRUE_TRAIL, WORLD
+from logs.recording.signs import viewable
 from logs.recording.stream import RecordingStream
 from world_models.building.regions import LAMP
 from world_models.building.world import World
@@ -26,21 +30,59 @@ SOFT_LIGHT = 0.75
 LAMP_LIGHT = 0.35
 
 
+ABOVE, SOUTH = 0.56, 0.11
+"""The eye stands so high above the building and so far to the south of its middle, in lengths of its diagonal: steeply
+enough to look over the walls into a narrow hallway."""
+EYE_HEIGHT_M = 3.0
+"""Added to the eye's height."""
+
+SINCE_THE_START = rrb.VisibleTimeRange(
+    "cycle", start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative())
+
+
 class Building:
     """Logs the world model once."""
 
-    def __init__(self, world: World) -> None:
-        self._world = world
+    def __init__(self, subject: Subject) -> None:
+        self._world = subject.world
+
+    def panels(self) -> Sequence[Panel]:
+        name = "Where it is: true robot green, believed blue, plan orange"
+        return (Panel(building_view(self._world, name), "world", 1, 13),)
 
     def begin(self, stream: RecordingStream) -> None:
-        stream.fix(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        for path, mesh in _meshes(self._world):
-            stream.fix(path, mesh)
-        stream.fix(NAMES, _names(self._world))
-        stream.fix(DOORWAYS, _doorways(self._world))
+        log_building(stream, self._world)
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         """Buildings do not change."""
+
+
+def log_building(stream: RecordingStream, world: World) -> None:
+    """Surfaces, room names and doorways."""
+    stream.fix(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    for path, mesh in _meshes(world):
+        stream.fix(path, mesh)
+    stream.fix(NAMES, _names(world))
+    stream.fix(DOORWAYS, _doorways(world))
+
+
+def building_view(world: World, name: str) -> Any:
+    """The building from above and a little from the south."""
+    corners = np.concatenate([world.outline(room) for room in world.rooms])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    middle, size = (low + high) / 2, float(np.linalg.norm(high - low))
+    eye = rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital, position=[middle[0], middle[1] - SOUTH * size, EYE_HEIGHT_M + ABOVE * size],
+        look_target=[middle[0], middle[1], 0.0], eye_up=[0.0, 0.0, 1.0])
+    return space_view(name, eye)
+
+
+def space_view(name: str, eye: Any, *without: str) -> Any:
+    """The world with both robots and their ways since the start, but for the paths ``without``."""
+    return rrb.Spatial3DView(
+        origin=WORLD, contents=["$origin/**", *without], name=name, line_grid=False,
+        background=rrb.Background(color=[28, 30, 34, 255]), eye_controls=eye,
+        overrides={path: rrb.VisibleTimeRanges([SINCE_THE_START]) for path in (TRUE_TRAIL, BELIEVED_TRAIL)})
 
 
 def _meshes(world: World) -> Iterator[tuple[str, Any]]:
@@ -78,7 +120,8 @@ def _triangles(count: int, corners: int) -> NDArray[np.int64]:
 
 def _names(world: World) -> Any:
     middles = [[*world.outline(name).mean(axis=0), world.floor_m(name) + 0.05] for name in world.rooms]
-    return rr.Points3D(middles, labels=list(world.rooms), show_labels=True, radii=0.02, colors=[NAME])
+    labels = [viewable(name) for name in world.rooms]
+    return rr.Points3D(middles, labels=labels, show_labels=True, radii=0.02, colors=[NAME])
 
 
 def _doorways(world: World) -> Any:
@@ -88,3 +131,6 @@ def _doorways(world: World) -> Any:
         height_m = world.floor_m(doorway.between[0]) + 0.02
         strips.append([[*corner, height_m] for corner in (a, b, c, d, a)])
     return rr.LineStrips3D(strips, colors=[DOOR], radii=0.03)
+
+
+LOGGER = Building

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from blackboard.activation import Activation
 from blackboard.change import Change
 from blackboard.journal import Decision
 from blackboard.servoing import Discrepancy
 from logs.recording.board_mirror import Moment
+from logs.recording.logger import Subject
 from logs.recording.messages import Messages
 from logs.recording.palette import DONE, LEVELS, REJECTED
+from logs.recording.panel import Panel, log_view
 from logs.recording.paths import RECORDS, TABLE
+from logs.recording.signs import TROUBLE
 from logs.recording.stream import RecordingStream
 from world_models import words
 
@@ -26,7 +30,7 @@ COLUMNS = ("focus_level", "chosen_knowledge_source", "rating", "trigger_entry", 
            "runner_up_with_rating", "waiting")
 """Of the decision table; the viewer makes a column as wide as its name."""
 
-MARKS: Mapping[str, str] = {"ERROR": "⚠ ", "WARN": "⚠ ", "INFO": "", "DEBUG": ""}
+MARKS: Mapping[str, str] = {"ERROR": f"{TROUBLE} ", "WARN": f"{TROUBLE} ", "INFO": "", "DEBUG": ""}
 
 RECORD = "record"
 """The component that holds a decision's line."""
@@ -53,10 +57,17 @@ class TableRow:
 class Decisions:
     """Logs every decision in three forms."""
 
-    def __init__(self, line_of: Callable[[Decision], str]) -> None:
-        """``line_of`` gives a decision's line in the journal."""
-        self._line_of = line_of
+    def __init__(self, subject: Subject) -> None:
+        self._line_of = subject.line_of
         self._messages = Messages()
+
+    def panels(self) -> Sequence[Panel]:
+        """The sentences, and behind them the table."""
+        columns = [f"/{TABLE}:{name}" for name in COLUMNS]
+        query = rrb.archetypes.DataframeQuery(timeline="cycle", select=["cycle", *columns])
+        table = rrb.DataframeView(origin=TABLE, name="Decision table", query=query)
+        return (Panel(log_view(TABLE, "What is decided: one decision a cycle", "body"), "decisions", 1, 12),
+                Panel(table, "decisions", 1, 12))
 
     def begin(self, stream: RecordingStream) -> None:
         """Nothing holds at all times."""
@@ -133,3 +144,6 @@ def _messages(made: tuple[Change, ...]) -> str:
     parts = [f"{kind} {named[kind, what]}" if count == 1 else f"{kind} {count} x {what}"
              for (kind, what), count in counts.items()]
     return ", ".join(parts) or "did nothing"
+
+
+LOGGER = Decisions

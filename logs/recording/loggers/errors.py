@@ -6,14 +6,17 @@ Where nobody knows the truth, the bands lie round nought.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from blackboard.servoing import Discrepancy
-from logs.recording.belief import Belief, Held
+from logs.recording.belief import Held
 from logs.recording.board_mirror import Moment
+from logs.recording.logger import Subject
 from logs.recording.palette import BELIEVED, LEVELS, PLANNED, faint
+from logs.recording.panel import NEAR, Panel
 from logs.recording.paths import DEVIATION, HEADING, POSITION
 from logs.recording.stream import RecordingStream
 from world_models.entries.location import Hypothesis
@@ -27,15 +30,26 @@ OFF_SCALE = 2.0
 """What could not be measured at all is drawn so many times its bound high."""
 
 
+MAX_SHOWN_MM, MAX_SHOWN_DEG, MAX_SHOWN_PX = 60.0, 2.0, 40.0
+"""Reach of the plots; what is beyond it is off the scale, and meant to look so."""
+
+
 class Errors:
     """Logs how far the belief is from the truth, where that is known, and what differs from what was expected.
 
     One standard deviation of the belief lies to either side of an error: a band far from nought is too sure of itself.
     """
 
-    def __init__(self, belief: Belief) -> None:
-        self._belief = belief
+    def __init__(self, subject: Subject) -> None:
+        self._belief = subject.belief
         self._truth: Pose2 | None = None
+
+    def panels(self) -> Sequence[Panel]:
+        """Place and, behind it, heading; below them the discrepancies."""
+        place = _plot(POSITION, "Position error of the belief [mm]", -MAX_SHOWN_MM, MAX_SHOWN_MM)
+        heading = _plot(HEADING, "Heading error of the belief [degrees]", -MAX_SHOWN_DEG, MAX_SHOWN_DEG)
+        surprise = _plot(DEVIATION, "Surprise, and what is allowed [px]", 0.0, MAX_SHOWN_PX)
+        return Panel(place, order=2), Panel(heading, order=2), Panel(surprise, order=3)
 
     def begin(self, stream: RecordingStream) -> None:
         stream.fix(POSITION, _style(["ahead ±1 sigma", "left ±1 sigma"], "mm"))
@@ -75,3 +89,12 @@ def _deviation(stream: RecordingStream, found: Discrepancy) -> None:
         return
     seen = found.magnitude if math.isfinite(found.magnitude) else OFF_SCALE * found.bound
     stream.log(f"{DEVIATION}/{found.level}", rr.Scalars, scalars=[seen, found.bound])
+
+
+def _plot(origin: str, name: str, low: float, high: float) -> rrb.TimeSeriesView:
+    legend = rrb.PlotLegend(rrb.Corner2D.LeftBottom if low < 0 else rrb.Corner2D.LeftTop)
+    return rrb.TimeSeriesView(
+        origin=origin, name=name, plot_legend=legend, axis_x=NEAR, axis_y=rrb.ScalarAxis(range=(low, high)))
+
+
+LOGGER = Errors

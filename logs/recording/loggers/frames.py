@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from logs.recording.board_mirror import Moment
+from logs.recording.logger import Subject
+from logs.recording.panel import Panel
 from logs.recording.paths import CAMERA, IMAGE
 from logs.recording.stream import RecordingStream
-from world_models.camera import Camera
 from world_models.entries.body import Frame
 
 NUMBER = "number"
@@ -32,8 +34,14 @@ class Picture:
 class Frames:
     """Logs each picture as it is delivered."""
 
-    def __init__(self, camera: Camera) -> None:
-        self._camera = camera
+    def __init__(self, subject: Subject) -> None:
+        self._camera = subject.camera
+
+    def panels(self) -> Sequence[Panel]:
+        view = rrb.Spatial2DView(
+            origin=CAMERA, name="Eye: yellow expected, cyan found, green fits, red not",
+            visual_bounds=rrb.VisualBounds2D(x_range=[0, self._camera.width], y_range=[0, self._camera.height]))
+        return (Panel(view, "world", 2, 9),)
 
     def begin(self, stream: RecordingStream) -> None:
         camera = self._camera
@@ -45,3 +53,6 @@ class Frames:
             frame = entry.value
             stream.log(IMAGE, Picture, blob=[frame.jpeg], **{NUMBER: [frame.number]}, purpose=[frame.purpose],
                      entry=[str(entry.ref)])
+
+
+LOGGER = Frames

@@ -11,14 +11,16 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from logs.recording.board_mirror import Mirror, Moment
+from logs.recording.logger import Subject
 from logs.recording.palette import DONE, EXPECTED, FOUND, MATCHED, NOT_TESTABLE, PLANNED, REJECTED, Colour
+from logs.recording.panel import Panel
 from logs.recording.paths import DRIFTS, LANDMARK_NAMES, OBSTRUCTION, WAITING, WINDOWS
 from logs.recording.paths import EXPECTED as EXPECTED_PATH
 from logs.recording.paths import MATCHED as MATCHED_PATH
 from logs.recording.paths import REJECTED as REJECTED_PATH
 from logs.recording.paths import SEGMENTS as SEGMENTS_PATH
 from logs.recording.stream import RecordingStream
-from world_models.camera import Camera, clip_segments
+from world_models.camera import clip_segments
 from world_models.entries.body import Frame
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
@@ -47,11 +49,16 @@ Floats = NDArray[np.float64]
 class Image:
     """Logs the overlays of the newest frame, and takes them away when the next one comes."""
 
-    def __init__(self, camera: Camera) -> None:
+    def __init__(self, subject: Subject) -> None:
+        camera = subject.camera
         self._size = camera.width, camera.height
         self._lens, self._pinhole = camera, camera.pinhole
         self._shown: dict[str, None] = {}
         self._waits = False
+
+    def panels(self) -> Sequence[Panel]:
+        """The view of the picture shows them."""
+        return ()
 
     def begin(self, stream: RecordingStream) -> None:
         for path, colour, width in STYLES:
@@ -193,3 +200,6 @@ def _largest(
         if name not in best and all(abs(u - x) > 2 * LABEL_PX or abs(v - y) > LABEL_HIGH_PX for x, y in best.values()):
             best[name] = u, v
     return best
+
+
+LOGGER = Image

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from blackboard.activation import Activation
 from logs.recording.activity import ACTIVITIES, ACTIVITY_KINDS, activity
 from logs.recording.board_mirror import Moment
+from logs.recording.logger import Subject
 from logs.recording.palette import LEVELS, REJECTED, Colour
+from logs.recording.panel import NEAR, Panel
 from logs.recording.paths import FAULTS, FOCUS, HARVEY, WHO
+from logs.recording.signs import viewable
 from logs.recording.stream import RecordingStream
 from world_models.entries.body import BodyFault
 
@@ -20,10 +24,14 @@ ACTS, GAP = "acts", ""
 class Lanes:
     """Logs a lane only when its state changes."""
 
-    def __init__(self) -> None:
+    def __init__(self, subject: Subject) -> None:
         self._known: dict[str, None] = {}
         self._states: dict[str, str] = {}
         self._acting = ""
+
+    def panels(self) -> Sequence[Panel]:
+        view = rrb.StateTimelineView(origin="/", contents=contents(), name="Who acts when, by level", time_view=NEAR)
+        return (Panel(view, order=1, share=19),)
 
     def begin(self, stream: RecordingStream) -> None:
         stream.fix(HARVEY, style(ACTIVITIES))
@@ -77,6 +85,10 @@ def contents() -> list[str]:
 
 def style(states: Mapping[str, Colour]) -> rr.StateConfiguration:
     """How the states of a lane look."""
+    names = [viewable(state) for state in (*states, GAP)]
     return rr.StateConfiguration(
-        values=[*states, GAP], labels=[*states, GAP], colors=[*states.values(), (0, 0, 0, 0)],
+        values=names, labels=names, colors=[*states.values(), (0, 0, 0, 0)],
         visible=[True] * len(states) + [False])
+
+
+LOGGER = Lanes

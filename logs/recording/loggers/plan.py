@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import rerun as rr
 
 from logs.recording.board_mirror import Mirror, Moment
+from logs.recording.logger import Subject
 from logs.recording.palette import DONE, EXPECTED, PLANNED, faint
+from logs.recording.panel import Panel
 from logs.recording.paths import GOAL, LANDMARKS, LEG, PATH
 from logs.recording.stream import RecordingStream
-from world_models.building.world import World
 from world_models.entries.location import Place
 from world_models.entries.task import Goal, Leg, Milestone, PlanSketch
 
@@ -21,9 +24,13 @@ FLAG_M = 3.0
 class Plan:
     """Logs goal, sketches, leg and milestone when they change."""
 
-    def __init__(self, world: World) -> None:
-        self._world = world
+    def __init__(self, subject: Subject) -> None:
+        self._world = subject.world
         self._last: dict[str, object] = {}
+
+    def panels(self) -> Sequence[Panel]:
+        """The views of the building show it."""
+        return ()
 
     def begin(self, stream: RecordingStream) -> None:
         stream.fix(GOAL, rr.Arrows3D.from_fields(radii=0.08, colors=[PLANNED], show_labels=True))
@@ -84,3 +91,6 @@ class Plan:
         lines = last.value.expected if last and last.value.is_open else ()
         if self._is_new(LANDMARKS, lines):
             stream.log(LANDMARKS, rr.LineStrips3D, strips=np.array(lines, np.float32).reshape(-1, 2, 3))
+
+
+LOGGER = Plan

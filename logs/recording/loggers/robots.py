@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from logs.recording.belief import Belief
 from logs.recording.board_mirror import Mirror, Moment
+from logs.recording.logger import Subject
+from logs.recording.loggers.building import space_view
 from logs.recording.palette import BELIEVED, CANDIDATE, TRUE, Colour, faint
-from logs.recording.paths import BELIEVED_BODY, BELIEVED_ROBOT, BELIEVED_TRAIL, CANDIDATES, TRUE_ROBOT, TRUE_TRAIL
+from logs.recording.panel import Panel
+from logs.recording.paths import (
+    BELIEVED_BODY,
+    BELIEVED_ROBOT,
+    BELIEVED_TRAIL,
+    CANDIDATES,
+    NAMES,
+    TRUE_ROBOT,
+    TRUE_TRAIL,
+)
 from logs.recording.stream import RecordingStream
-from world_models.building.world import World
-from world_models.camera import Camera, CameraMount
+from world_models.camera import Camera
 from world_models.entries.location import Hypothesis
 from world_models.frames import Pose2, frozen
 
@@ -34,13 +45,25 @@ SIGHT_M = 2.5
 """Length of the wedge that shows where the camera looks."""
 
 
+CLOSE_ABOVE_M, CLOSE_SOUTH_M = 6.0, 1.2
+"""The eye of the near view: above the robot, and to the south."""
+
+
 class Robots:
     """Logs both robots when they move."""
 
-    def __init__(self, world: World, camera: Camera, mount: CameraMount, belief: Belief) -> None:
-        self._world, self._camera, self._mount, self._belief = world, camera, mount, belief
+    def __init__(self, subject: Subject) -> None:
+        self._world, self._belief = subject.world, subject.belief
+        self._camera, self._mount = subject.camera, subject.mount
         self._last: dict[str, Pose2] = {}
         self._has_candidates = False
+
+    def panels(self) -> Sequence[Panel]:
+        """The building from near by; the eye goes with the believed robot."""
+        eye = rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=[0.0, -CLOSE_SOUTH_M, CLOSE_ABOVE_M], look_target=[0.0, 0.0, 0.0],
+            eye_up=[0.0, 0.0, 1.0], tracking_entity=f"/{BELIEVED_BODY}")
+        return (Panel(space_view("Close by", eye, f"- /{NAMES}"), "decisions", 3, 6),)
 
     def begin(self, stream: RecordingStream) -> None:
         wires = rr.components.FillMode.MajorWireframe
@@ -128,3 +151,6 @@ def ring(pose: Pose2, covariance_world: NDArray[np.float64]) -> NDArray[np.float
     c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     robot_from_world = np.array([[c, s], [-s, c]])
     return np.asarray((SIGMA_SCALE * (robot_from_world @ root) @ CIRCLE).T)
+
+
+LOGGER = Robots

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from blackboard.entry import Entry
 from logs.recording.board_mirror import Mirror, Moment
+from logs.recording.logger import Subject
 from logs.recording.palette import DONE, PLANNED, VERDICTS, WAITING, Colour
+from logs.recording.panel import Panel
 from logs.recording.paths import SKETCH
+from logs.recording.signs import REFUTED, VERIFIED
 from logs.recording.stream import RecordingStream
 from world_models.entries.task import Certificate, Goal, Milestone, PlanSketch, Subgoal
 from world_models.words import short
@@ -23,7 +27,7 @@ LETTER, BORDER = 5.4, 26.0
 NO_SKETCH = "the way there is yet to be sketched"
 
 MARKS: Mapping[str, str] = {
-    "verified": "✔", "refuted": "✘", "not testable": "?", "turning": "…", "expected": "…", "": "·",
+    "verified": VERIFIED, "refuted": REFUTED, "not testable": "?", "turning": "…", "expected": "…", "": "·",
 }
 
 
@@ -50,8 +54,18 @@ class Tree:
 class SketchTree:
     """Logs the whole tree when any of it changes."""
 
-    def __init__(self) -> None:
+    def __init__(self, subject: Subject) -> None:
         self._last: list[Node] = []
+
+    def panels(self) -> Sequence[Panel]:
+        view = rrb.GraphView(
+            origin=SKETCH, name="The plan",
+            force_link=rrb.archetypes.ForceLink(enabled=False),
+            force_many_body=rrb.archetypes.ForceManyBody(enabled=False),
+            force_position=rrb.archetypes.ForcePosition(enabled=False),
+            force_collision_radius=rrb.archetypes.ForceCollisionRadius(enabled=False),
+            force_center=rrb.archetypes.ForceCenter(enabled=False))
+        return (Panel(view, "decisions", 2, 6),)
 
     def begin(self, stream: RecordingStream) -> None:
         stream.fix(SKETCH, rr.GraphNodes.from_fields(show_labels=True),
@@ -138,3 +152,6 @@ def subgoal_label(subgoal: Subgoal) -> str:
 
 def _middles(nodes: list[Node]) -> list[tuple[float, float]]:
     return [(INDENT * n.depth + (BORDER + LETTER * len(n.label)) / 2, ROW * row) for row, n in enumerate(nodes)]
+
+
+LOGGER = SketchTree

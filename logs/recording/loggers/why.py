@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from blackboard.entry import Entry
 from blackboard.servoing import Discrepancy
 from logs.recording.activity import ACTIVITY_KINDS, activity, leg_under_way
-from logs.recording.belief import Belief, Held, believed, sigma_m
+from logs.recording.belief import Held, believed, sigma_m
 from logs.recording.board_mirror import Mirror, Moment
+from logs.recording.logger import Subject
 from logs.recording.loggers.sketch_tree import subgoal_label
+from logs.recording.panel import Panel
 from logs.recording.paths import WHY
 from logs.recording.stream import RecordingStream
 from world_models import words
@@ -31,11 +34,14 @@ Tell = Callable[[Mirror], str]
 class Why:
     """Logs the text when something in it changed; only what rests on a change is worded anew."""
 
-    def __init__(self, belief: Belief) -> None:
-        self._belief = belief
+    def __init__(self, subject: Subject) -> None:
+        self._belief = subject.belief
         self._truth: Pose2 | None = None
         self._told: dict[str, str] = {}
         self._last = ""
+
+    def panels(self) -> Sequence[Panel]:
+        return (Panel(rrb.TextDocumentView(origin=WHY, name="What Harvey thinks now"), "words", 1, 11),)
 
     def begin(self, stream: RecordingStream) -> None:
         stream.fix(WHY, rr.TextDocument.from_fields(media_type="text/markdown"))
@@ -253,3 +259,6 @@ CHAPTERS: tuple[tuple[str, Tell, tuple[type[Any], ...]], ...] = (
     ("Last order:", _because, (MotorCommand,)),
 )
 """Title, what tells it, and the types of values that it rests on."""
+
+
+LOGGER = Why

@@ -13,9 +13,11 @@ from rerun.chunk import RrdReader
 import docs.tools.look as looking
 from docs.tools.look import look
 from logs.errors import RecordingError
+from logs.recording.belief import Belief
 from logs.recording.blueprint import blueprint
+from logs.recording.logger import Subject
 from logs.recording.paths import BELIEVED_BODY, FAULTS, IMAGE
-from logs.recording.writer import RecordingWriter
+from logs.recording.writer import RecordingWriter, logger_classes
 from rehearsal import CAMERA, MOUNT, house, play
 from world_models.frames import Pose2
 
@@ -47,6 +49,12 @@ def logged(recording: Path) -> Logged:
     for chunk in RrdReader(recording).stream():
         known.setdefault(chunk.entity_path, set()).update(chunk.to_record_batch().schema.names)
     return known
+
+
+def window() -> Any:
+    """The blueprint of a whole recording."""
+    subject = Subject("house", house(), CAMERA, MOUNT, Belief(house()))
+    return blueprint([logger(subject) for logger in logger_classes()]).root_container
 
 
 def views(part: Any) -> Iterator[Any]:
@@ -87,7 +95,7 @@ def faults(view: Any, logged: Logged) -> list[str]:
 
 
 def test_every_view_finds_what_it_is_to_show(logged: Logged) -> None:
-    shown = list(views(blueprint(house(), CAMERA).root_container))
+    shown = list(views(window()))
     assert {view.class_identifier for view in shown} == set(NEEDED)
     assert [fault for view in shown for fault in faults(view, logged)] == []
 
@@ -101,7 +109,7 @@ def test_a_view_that_asks_in_vain_is_caught(view: Any, logged: Logged) -> None:
 
 
 def test_the_table_selects_columns_that_there_are(logged: Logged) -> None:
-    (table,) = (v for v in views(blueprint(house(), CAMERA).root_container) if v.class_identifier == "Dataframe")
+    (table,) = (v for v in views(window()) if v.class_identifier == "Dataframe")
     query = table.properties["DataframeQuery"]
     selected = query.select.as_arrow_array().to_pylist()[0]["component_columns"]
     assert selected

@@ -6,7 +6,6 @@ It is made from the runs' recordings alone: what each was busy with, its milesto
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,13 +13,12 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
-from rerun.chunk import RrdReader
-from rerun.error_utils import RerunWarning
 
 from logs.errors import RecordingError
+from logs.reader import Series, read_series
 from logs.recording.activity import ACTIVITIES
 from logs.recording.loggers.lanes import GAP, style
-from logs.recording.overview_blueprint import overview_blueprint
+from logs.recording.overview.blueprint import overview_blueprint
 from logs.recording.palette import BELIEVED, DONE, MATCHED, REJECTED, VERDICTS, Colour, faint
 from logs.recording.paths import (
     BELIEVED_ROBOT,
@@ -50,9 +48,6 @@ HEIGHT_M = 0.2
 """Ways are drawn so high above the floor."""
 
 COLUMNS = ("run", "scenario", "seed", "outcome", "error", "milestones", "refuted", "relocated", "collisions", "cycles")
-
-Series = list[tuple[int, Any]]
-"""(cycle, value) in the order of time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +146,7 @@ class _Row:
 
     def __init__(self, stream: RecordingStream, number: int, run: RunFiles) -> None:
         """A row's name begins with its number, since rows are sorted by name."""
-        self._tape, self._run = stream, run
+        self._stream, self._run = stream, run
         self._part = rr.escape_entity_path_part(f"{number:03}_{run.name}")
 
     def draw(self, tale: _Tale) -> None:
@@ -162,26 +157,26 @@ class _Row:
         self._way(tale.way)
 
     def _lane(self, path: str, states: Series, styles: Mapping[str, Colour]) -> None:
-        self._tape.fix(path, style(styles))
+        self._stream.fix(path, style(styles))
         for cycle, state in states:
-            self._tape.at(cycle, 0.0)
-            self._tape.log(path, rr.StateChange, state=[state])
+            self._stream.at(cycle, 0.0)
+            self._stream.log(path, rr.StateChange, state=[state])
 
     def _errors(self, errors: Series) -> None:
         path = f"{OFF}/{self._part}"
-        self._tape.fix(path, rr.SeriesLines(names=[self._run.name], colors=[self._run.colour], widths=[1.5]))
+        self._stream.fix(path, rr.SeriesLines(names=[self._run.name], colors=[self._run.colour], widths=[1.5]))
         for cycle, (ahead_mm, left_mm) in errors:
-            self._tape.at(cycle, 0.0)
-            self._tape.log(path, rr.Scalars, scalars=[math.hypot(ahead_mm, left_mm)])
+            self._stream.at(cycle, 0.0)
+            self._stream.log(path, rr.Scalars, scalars=[math.hypot(ahead_mm, left_mm)])
 
     def _way(self, places: Series) -> None:
         path, colour = f"{FLEET}/{self._part}", self._run.colour
-        self._tape.fix(path, rr.Points3D.from_fields(colors=[colour], radii=0.25))
+        self._stream.fix(path, rr.Points3D.from_fields(colors=[colour], radii=0.25))
         strip = np.array([(x, y, z + HEIGHT_M) for _, (x, y, z) in places], float).reshape(-1, 3)
-        self._tape.fix(f"{path}/way", rr.LineStrips3D([strip], colors=[faint(colour, 120)], radii=0.03))
+        self._stream.fix(f"{path}/way", rr.LineStrips3D([strip], colors=[faint(colour, 120)], radii=0.03))
         for cycle, place in places:
-            self._tape.at(cycle, 0.0)
-            self._tape.log(path, rr.Points3D, positions=[place])
+            self._stream.at(cycle, 0.0)
+            self._stream.log(path, rr.Points3D, positions=[place])
 
 
 def _marks(chapters: Series) -> Iterator[tuple[int, str]]:
@@ -192,29 +187,3 @@ def _marks(chapters: Series) -> Iterator[tuple[int, str]]:
         following = marks[number + 1][0] if number + 1 < len(marks) else cycle + MARK_CYCLES + 1
         if following > cycle + MARK_CYCLES:
             yield cycle + MARK_CYCLES, GAP
-
-
-def read_series(path: Path, entity: str, component: str) -> Series:
-    """(cycle, value) of a component in the order in which it was logged; a value of many is a list.
-
-    Raises:
-        RecordingError: the file is no recording, or is damaged.
-    """
-    if not path.is_file():
-        raise RecordingError(f"{path}: expected a recording, got no such file")
-    try:
-        rows = [row for batch in _batches(path, entity) if component in batch.schema.names
-                for row in zip(batch.column("rerun.controls.RowId").to_pylist(), batch.column("cycle").to_pylist(),
-                               batch.column(component).to_pylist(), strict=True)]
-    except Exception as error:  # the reader's errors have no common type; the cause is in the file in any case
-        raise RecordingError(f"{path}: expected a whole Rerun recording, got: {error}") from None
-    known = [row for row in sorted(rows, key=lambda row: row[0]) if row[2]]
-    return [(cycle, values[0] if len(values) == 1 else values) for _, cycle, values in known]
-
-
-def _batches(path: Path, entity: str) -> Iterator[Any]:
-    with warnings.catch_warnings():  # a recording without its footer, as a crash leaves it, is read as well
-        warnings.simplefilter("ignore", RerunWarning)
-        reader = RrdReader(path)
-    for chunk in reader.stream().filter(content=f"/{entity}", is_static=False):
-        yield chunk.to_record_batch()

@@ -1,0 +1,1 @@
+"""Several runs side by side in a recording of their own: ``overview`` (what of them), ``blueprint`` (its views)."""

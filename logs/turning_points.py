@@ -1,0 +1,114 @@
+"""Turning points of a run: goals, plans, verdicts, doubts, lost and found, faults, the end; as the robot itself knew
+them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from blackboard.change import Change, Posted, Retracted
+from blackboard.entry import Entry
+from blackboard.journal import Decision
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from logs.recording.board_mirror import Mirror
+from world_models import words
+from world_models.entries.body import BodyFault
+from world_models.entries.location import Hypothesis
+from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch, Resumed
+
+TOLD = ("refuted", "lost", "found", "fault", "resumed")
+"""Kinds that a short account of a run must not leave out."""
+REMEMBERED = 8
+"""The newest entries of a type that are looked back for."""
+
+Get = Callable[[str], Entry[Any] | None]
+"""Gives the current revision of an entry by its id."""
+
+
+@dataclass(frozen=True, slots=True)
+class TurningPoint:
+    """Something that changed the course of a run.
+
+    Attributes:
+        cycle: when.
+        kind: goal, plan, a verdict, doubt, lost, found, fault, resumed or the end.
+        text: what happened, without a full stop.
+    """
+
+    cycle: int
+    kind: str
+    text: str
+
+    @property
+    def is_told(self) -> bool:
+        """Whether a short account of the run must not leave it out."""
+        return self.kind in TOLD
+
+
+class TurningPointFinder:
+    """Follows the decisions of a run."""
+
+    def __init__(self) -> None:
+        self._mirror = Mirror(REMEMBERED)
+
+    def find(self, decision: Decision) -> list[TurningPoint]:
+        """The turning points of the next decision."""
+        points: list[TurningPoint] = []
+        before = self._mirror.latest(Hypothesis, _is_held)
+        changes = (*decision.observed, *decision.made)
+        for change in changes:
+            self._mirror.take(change)
+        now = self._mirror.latest(Hypothesis, _is_held)
+        for change in changes:
+            points += turning_points(change, decision.cycle, self._mirror.get, now or before)
+        return points
+
+
+def turning_points(change: Change, cycle: int, get: Get, belief: Entry[Hypothesis] | None) -> Iterator[TurningPoint]:
+    """The turning point that a change is, if it is one.
+
+    Args:
+        cycle: of the decision.
+        get: gives an entry by its id.
+        belief: where the robot believed to be.
+    """
+    if isinstance(change, Retracted):
+        return
+    value, is_new = change.entry.value, isinstance(change, Posted)
+    if isinstance(value, Goal) and (is_new or not value.is_active):
+        yield TurningPoint(cycle, "goal", f"{value.destination.locale}{'' if is_new else ': ' + value.status}")
+    elif isinstance(value, PlanSketch) and is_new:
+        yield TurningPoint(cycle, "plan", f"{value.where()}, {words.count(len(value.subgoals), 'part')}")
+    elif isinstance(value, Certificate):
+        yield TurningPoint(cycle, value.verdict, _verdict(value, get))
+    elif isinstance(value, Discrepancy) and value.status == "escalated":
+        yield _escalated(value, cycle, belief)
+    elif isinstance(value, Hypothesis) and value.is_held and value.basis == "relocalization":
+        yield TurningPoint(cycle, "found", f"it knows again where it is: {value.place()}")
+    elif isinstance(value, BodyFault):
+        yield TurningPoint(cycle, "fault", f"{value.part}: {value.what}{'' if value.is_open else ', over'}")
+    elif isinstance(value, Resumed):
+        yield TurningPoint(cycle, "resumed", f"after cycle {value.after_cycle}, where the run was cut off")
+    elif isinstance(value, Outcome):
+        yield TurningPoint(cycle, "the end", f"{value.kind}: {value.reason}")
+
+
+def _escalated(discrepancy: Discrepancy, cycle: int, belief: Entry[Hypothesis] | None) -> TurningPoint:
+    if discrepancy.level.above is not Level.GOAL:
+        return TurningPoint(cycle, "doubt", discrepancy.what)
+    where = f", where it believed to be: {belief.value.place()}" if belief is not None else ""
+    return TurningPoint(cycle, "lost", f"nothing fits{where}")
+
+
+def _verdict(certificate: Certificate, get: Get) -> str:
+    entry = get(certificate.milestone)
+    what = entry.value.name() if entry is not None and isinstance(entry.value, Milestone) else certificate.milestone
+    if certificate.verdict == "verified":
+        return f"{what}: {words.metres(certificate.deviation_m)} off"
+    return f"{what}: {certificate.reason}"
+
+
+def _is_held(value: Hypothesis) -> bool:
+    return value.is_held
