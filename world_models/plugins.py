@@ -4,7 +4,7 @@
 ``harvey.knowledge_sources``  a class under ``blackboard.knowledge_source.KnowledgeSource``
 ``harvey.bases``              a ``harvey.hardware.drivers.bases.base.BaseKind``
 ``harvey.faults``             a class under ``sim.faults.fault.Fault``
-``harvey.loggers``            a class under ``logs.recording.loggers.Logger``
+``harvey.loggers``            a class under ``logs.recording.logger.Logger``
 ============================  ==========================================================================
 
 The name of an entry point is the name under which Harvey knows what it points to.

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from blackboard.journal import Decision, decision_line
 from logs.recording.belief import Belief
@@ -34,17 +34,19 @@ class Subject:
     line_of: Callable[[Decision], str] = decision_line
 
 
-class Logger(Protocol):
-    """Draws one thing. Its class is called with the :class:`Subject` of the recording."""
+class Logger(ABC):
+    """Draws one thing."""
+
+    def __init__(self, subject: Subject) -> None:
+        """``subject``: what the recording is of."""
 
     def panels(self) -> Sequence[Panel]:
         """The views that show it; none where those of other loggers do."""
+        return ()
 
-    def begin(self, stream: RecordingStream) -> None:
+    def begin(self, stream: RecordingStream) -> None:  # noqa: B027  (most loggers have something to log here, not all)
         """Log what holds at all times: shapes, styles."""
 
+    @abstractmethod
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         """Log what this cycle changed."""
-
-
-LoggerClass = Callable[[Subject], Logger]

@@ -13,20 +13,20 @@ from logs.recording import loggers as built_in
 from logs.recording.belief import Belief
 from logs.recording.blueprint import blueprint
 from logs.recording.board_mirror import Mirror, Moment
-from logs.recording.logger import LoggerClass, Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.stream import LIVE_PORT, RecordingStream
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import Frame, MotionReport
 from world_models.entries.location import Place
 from world_models.frames import Pose2
-from world_models.plugins import list_plugins, load_plugin
+from world_models.plugins import PluginError, load_plugin_classes
 
 GROUP = "harvey.loggers"
 """Entry points of this group name logger classes of other packages."""
 
 
-def logger_classes() -> tuple[LoggerClass, ...]:
+def logger_classes() -> tuple[type[Logger], ...]:
     """Everything that a recording shows: the loggers of the project, then those of other packages.
 
     Raises:
@@ -35,18 +35,17 @@ def logger_classes() -> tuple[LoggerClass, ...]:
     return (*_built_in(), *_foreign())
 
 
-def _built_in() -> Iterator[LoggerClass]:
+def _built_in() -> Iterator[type[Logger]]:
     """Those in the folder ``loggers``, in the order of their files' names."""
     for module in pkgutil.iter_modules(built_in.__path__):
         yield import_module(f"{built_in.__name__}.{module.name}").LOGGER
 
 
-def _foreign() -> Iterator[LoggerClass]:
-    for point in list_plugins(GROUP):
-        try:
-            yield load_plugin(point, "a logger class")
-        except ImportError as error:
-            raise RecordingError(str(error)) from error
+def _foreign() -> Iterator[type[Logger]]:
+    try:
+        yield from load_plugin_classes(GROUP, Logger).values()
+    except PluginError as error:
+        raise RecordingError(str(error)) from error
 
 
 class RecordingWriter:
@@ -59,7 +58,7 @@ class RecordingWriter:
     def __init__(
         self, path: Path | None, *, world: World, camera: Camera, mount: CameraMount, title: str, recording_id: str,
         live: bool = False, live_port: int = LIVE_PORT, line_of: Callable[[Decision], str] = decision_line,
-        loggers: Sequence[LoggerClass] | None = None,
+        loggers: Sequence[type[Logger]] | None = None,
     ) -> None:
         """Begin a recording in a file (``path``), for a viewer that connects now (``live``), or both.
 

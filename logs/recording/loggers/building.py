@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.palette import DOOR, NAME
 from logs.recording.panel import Panel
 from logs.recording.paths import BELIEVED_TRAIL, BUILDING, DOORWAYS, NAMES, TRUE_TRAIL, WORLD
@@ -40,7 +40,7 @@ SINCE_THE_START = rrb.VisibleTimeRange(
     "cycle", start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative())
 
 
-class Building:
+class Building(Logger):
     """Logs the world model once."""
 
     def __init__(self, subject: Subject) -> None:

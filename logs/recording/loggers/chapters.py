@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import rerun as rr
 
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.palette import BELIEVED, DONE, LEVELS, MATCHED, PLANNED, REJECTED, TRUE, VERDICTS, Colour
 from logs.recording.panel import Panel, log_view
 from logs.recording.paths import CHAPTERS
@@ -25,7 +25,7 @@ COLOURS: Mapping[str, Colour] = {
 }
 
 
-class Chapters:
+class Chapters(Logger):
     """Logs a line when something turns."""
 
     def __init__(self, subject: Subject) -> None:
@@ -37,9 +37,6 @@ class Chapters:
     def panels(self) -> Sequence[Panel]:
         view = log_view(CHAPTERS, "The story so far: turning points", "loglevel", "body")
         return (Panel(view, "words", 2, 7),)
-
-    def begin(self, stream: RecordingStream) -> None:
-        """Nothing holds at all times."""
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         points = (*self._of_the_truth(moment), *self._finder.find(moment.decision))

@@ -14,7 +14,7 @@ from blackboard.change import Change
 from blackboard.journal import Decision
 from blackboard.servoing import Discrepancy
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.messages import Messages
 from logs.recording.palette import DONE, LEVELS, REJECTED
 from logs.recording.panel import Panel, log_view
@@ -54,7 +54,7 @@ class TableRow:
             yield from kind.columns(**{name: values}) if kind else rr.AnyValues.columns(True, **{name: values})
 
 
-class Decisions:
+class Decisions(Logger):
     """Logs every decision in three forms."""
 
     def __init__(self, subject: Subject) -> None:
@@ -68,9 +68,6 @@ class Decisions:
         table = rrb.DataframeView(origin=TABLE, name="Decision table", query=query)
         return (Panel(log_view(TABLE, "What is decided: one decision a cycle", "body"), "decisions", 1, 12),
                 Panel(table, "decisions", 1, 12))
-
-    def begin(self, stream: RecordingStream) -> None:
-        """Nothing holds at all times."""
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         decision = moment.decision

@@ -8,7 +8,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.panel import Panel
 from logs.recording.paths import DESCRIPTION
 from logs.recording.signs import viewable
@@ -25,7 +25,7 @@ long. **Grey:** done. Ask on with `harvey why`.
 """
 
 
-class Description:
+class Description(Logger):
     """Logs the text once."""
 
     def __init__(self, subject: Subject) -> None:

@@ -14,7 +14,7 @@ import rerun.blueprint as rrb
 from blackboard.servoing import Discrepancy
 from logs.recording.belief import Held
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.palette import BELIEVED, LEVELS, PLANNED, faint
 from logs.recording.panel import NEAR, Panel
 from logs.recording.paths import DEVIATION, HEADING, POSITION
@@ -34,7 +34,7 @@ MAX_SHOWN_MM, MAX_SHOWN_DEG, MAX_SHOWN_PX = 60.0, 2.0, 40.0
 """Reach of the plots; what is beyond it is off the scale, and meant to look so."""
 
 
-class Errors:
+class Errors(Logger):
     """Logs how far the belief is from the truth, where that is known, and what differs from what was expected.
 
     One standard deviation of the belief lies to either side of an error: a band far from nought is too sure of itself.

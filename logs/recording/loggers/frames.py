@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.panel import Panel
 from logs.recording.paths import CAMERA, IMAGE
 from logs.recording.stream import RecordingStream
@@ -31,7 +31,7 @@ class Picture:
                 yield from rr.AnyValues.columns(True, **{name: values})
 
 
-class Frames:
+class Frames(Logger):
     """Logs each picture as it is delivered."""
 
     def __init__(self, subject: Subject) -> None:

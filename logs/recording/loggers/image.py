@@ -11,9 +11,8 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from logs.recording.board_mirror import Mirror, Moment
-from logs.recording.logger import Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.palette import DONE, EXPECTED, FOUND, MATCHED, NOT_TESTABLE, PLANNED, REJECTED, Colour
-from logs.recording.panel import Panel
 from logs.recording.paths import DRIFTS, LANDMARK_NAMES, OBSTRUCTION, WAITING, WINDOWS
 from logs.recording.paths import EXPECTED as EXPECTED_PATH
 from logs.recording.paths import MATCHED as MATCHED_PATH
@@ -46,7 +45,7 @@ NO_LINES, NO_POINTS = frozen(np.zeros((0, 2, 2))), frozen(np.zeros((0, 2)))
 Floats = NDArray[np.float64]
 
 
-class Image:
+class Image(Logger):
     """Logs the overlays of the newest frame, and takes them away when the next one comes."""
 
     def __init__(self, subject: Subject) -> None:
@@ -55,10 +54,6 @@ class Image:
         self._lens, self._pinhole = camera, camera.pinhole
         self._shown: dict[str, None] = {}
         self._waits = False
-
-    def panels(self) -> Sequence[Panel]:
-        """The view of the picture shows them."""
-        return ()
 
     def begin(self, stream: RecordingStream) -> None:
         for path, colour, width in STYLES:

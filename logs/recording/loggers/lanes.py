@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 from blackboard.activation import Activation
 from logs.recording.activity import ACTIVITIES, ACTIVITY_KINDS, activity
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.palette import LEVELS, REJECTED, Colour
 from logs.recording.panel import NEAR, Panel
 from logs.recording.paths import FAULTS, FOCUS, HARVEY, WHO
@@ -21,7 +21,7 @@ from world_models.entries.body import BodyFault
 ACTS, GAP = "acts", ""
 
 
-class Lanes:
+class Lanes(Logger):
     """Logs a lane only when its state changes."""
 
     def __init__(self, subject: Subject) -> None:

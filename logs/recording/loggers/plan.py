@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import rerun as rr
 
 from logs.recording.board_mirror import Mirror, Moment
-from logs.recording.logger import Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.palette import DONE, EXPECTED, PLANNED, faint
-from logs.recording.panel import Panel
 from logs.recording.paths import GOAL, LANDMARKS, LEG, PATH
 from logs.recording.stream import RecordingStream
 from world_models.entries.location import Place
@@ -21,16 +18,12 @@ Point = tuple[float, float, float]
 FLAG_M = 3.0
 
 
-class Plan:
+class Plan(Logger):
     """Logs goal, sketches, leg and milestone when they change."""
 
     def __init__(self, subject: Subject) -> None:
         self._world = subject.world
         self._last: dict[str, object] = {}
-
-    def panels(self) -> Sequence[Panel]:
-        """The views of the building show it."""
-        return ()
 
     def begin(self, stream: RecordingStream) -> None:
         stream.fix(GOAL, rr.Arrows3D.from_fields(radii=0.08, colors=[PLANNED], show_labels=True))

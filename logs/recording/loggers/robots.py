@@ -12,7 +12,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from logs.recording.board_mirror import Mirror, Moment
-from logs.recording.logger import Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.loggers.building import space_view
 from logs.recording.palette import BELIEVED, CANDIDATE, TRUE, Colour, faint
 from logs.recording.panel import Panel
@@ -49,7 +49,7 @@ CLOSE_ABOVE_M, CLOSE_SOUTH_M = 6.0, 1.2
 """The eye of the near view: above the robot, and to the south."""
 
 
-class Robots:
+class Robots(Logger):
     """Logs both robots when they move."""
 
     def __init__(self, subject: Subject) -> None:

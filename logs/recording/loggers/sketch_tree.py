@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 
 from blackboard.entry import Entry
 from logs.recording.board_mirror import Mirror, Moment
-from logs.recording.logger import Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.palette import DONE, PLANNED, VERDICTS, WAITING, Colour
 from logs.recording.panel import Panel
 from logs.recording.paths import SKETCH
@@ -51,7 +51,7 @@ class Tree:
             yield from (rr.GraphEdges if name == "edges" else rr.GraphNodes).columns(**{name: values})
 
 
-class SketchTree:
+class SketchTree(Logger):
     """Logs the whole tree when any of it changes."""
 
     def __init__(self, subject: Subject) -> None:

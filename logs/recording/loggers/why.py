@@ -14,7 +14,7 @@ from blackboard.servoing import Discrepancy
 from logs.recording.activity import ACTIVITY_KINDS, activity, leg_under_way
 from logs.recording.belief import Held, believed, sigma_m
 from logs.recording.board_mirror import Mirror, Moment
-from logs.recording.logger import Subject
+from logs.recording.logger import Logger, Subject
 from logs.recording.loggers.sketch_tree import subgoal_label
 from logs.recording.panel import Panel
 from logs.recording.paths import WHY
@@ -31,7 +31,7 @@ MOST_REASONS = 5
 Tell = Callable[[Mirror], str]
 
 
-class Why:
+class Why(Logger):
     """Logs the text when something in it changed; only what rests on a change is worded anew."""
 
     def __init__(self, subject: Subject) -> None:
