@@ -21,7 +21,7 @@ from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.verification.milestone_preview import find_alias, predict_p_false
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.methods.verification.view_quality import compute_view_quality
-from knowledge_sources.questions import held
+from knowledge_sources.questions import find_belief
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.entries.body import MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.location import Hypothesis, Place, diagonal
@@ -73,7 +73,7 @@ class AcceptEveryMilestone(KnowledgeSource):
     writes = (Milestone, Hypothesis)
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, milestone = held(view), trigger.entry
+        belief, milestone = find_belief(view), trigger.entry
         if belief is not None:
             sure = replace(belief.value, covariance=diagonal(SEEN_M, SEEN_RAD), basis="milestone")
             yield Revise(belief, sure, (milestone,))
@@ -118,7 +118,7 @@ def _previews(
     robot: RobotModel, view: View, made: Sequence[Change], settings: Settings
 ) -> list[MilestonePreview]:
     """Those of the milestones that were just taken for verified."""
-    belief = held(view)
+    belief = find_belief(view)
     if belief is None:
         return []
     values = (change.entry.value for change in made)

@@ -1,1 +1,1 @@
-"""The experts round the blackboard: one a file, saying when and why; ``methods`` says how."""
+"""The knowledge sources round the blackboard, one a file by servo level: when and why; ``methods``: how."""

@@ -1,4 +1,4 @@
-"""Questions that several experts ask of the board; pure reads."""
+"""Questions that several knowledge sources ask of the board; pure reads."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ ACTIVE_SKETCH: Index[PlanSketch] = Index(PlanSketch, lambda s: s.goal if s.is_ac
 OPEN_FAULT: Index[BodyFault] = Index(BodyFault, lambda f: f.is_open or None)
 
 
-def held(view: View) -> Entry[Hypothesis] | None:
-    """Where the robot believes it is."""
+def find_belief(view: View) -> Entry[Hypothesis] | None:
+    """The hypothesis that is held: where the robot believes it is."""
     return view.newest(HELD, True)
 
 
-def standing_in(view: View, robot: RobotModel, locale: str) -> RobotModel:
-    """The robot on the floor of a locale, behind whatever is known to stand before its camera."""
+def robot_in(view: View, robot: RobotModel, locale: str) -> RobotModel:
+    """The robot's model on the floor of a locale, with what is known to stand before its camera."""
     obstruction = view.latest(Obstruction)
     return robot.with_obstruction(None if obstruction is None else obstruction.value).on_floor_of(locale)
 
@@ -36,8 +36,8 @@ def standing_in(view: View, robot: RobotModel, locale: str) -> RobotModel:
 def has_followed(view: View, settings: ActionSettings) -> bool:
     """Whether enough landmarks were in sight in the last tracked frame.
 
-    A robot that holds so many landmarks in sight is at no other door: when they are not where they should be, all are
-    given up.
+    With so many landmarks in sight the robot is at no other door: the tracker drops all of them when they are not where
+    they should be.
     """
     tracks = view.latest(Tracks)
     if tracks is None:
@@ -46,6 +46,7 @@ def has_followed(view: View, settings: ActionSettings) -> bool:
 
 
 def active_goal(view: View) -> Entry[Goal] | None:
+    """The goal that is pursued."""
     return view.newest(ACTIVE_GOAL, True)
 
 
@@ -60,7 +61,7 @@ def open_discrepancy(view: View, level: Level) -> Entry[Discrepancy] | None:
 
 
 def unmeasured_doubt(view: View) -> Entry[Discrepancy] | None:
-    """What the action level has passed up, while the plan level has not yet looked how far off it is."""
+    """What the action level has passed up and the plan level has not measured yet."""
     doubt = open_discrepancy(view, Level.PLAN)
     return doubt if doubt is not None and doubt.value.magnitude is None else None
 
@@ -74,8 +75,8 @@ def deepest_sketch(view: View) -> Entry[PlanSketch] | None:
     return max(active, key=lambda entry: len(entry.value.path), default=None)
 
 
-def under_way(view: View) -> tuple[Entry[Leg], Entry[PlanSketch]] | None:
-    """The leg that is being driven and the sketch that wants it; None when there is none."""
+def current_leg(view: View) -> tuple[Entry[Leg], Entry[PlanSketch]] | None:
+    """The leg that is being driven, and its sketch; None when no leg is."""
     leg, sketch = view.latest(Leg), deepest_sketch(view)
     if leg is None or sketch is None or leg.value.status != "moving":
         return None
@@ -84,34 +85,34 @@ def under_way(view: View) -> tuple[Entry[Leg], Entry[PlanSketch]] | None:
 
 
 def last_motion(view: View) -> Entry[MotorCommand] | Entry[Course] | None:
-    """What was asked of the wheels last."""
+    """The last motion that was asked of the wheels."""
     command, course = view.latest(MotorCommand), view.latest(Course)
     if command is None or course is None:
         return command or course
     return course if course.cycle > command.cycle else command
 
 
-def rolling(view: View) -> Entry[Course] | None:
-    """The motion that goes on at present; None while the robot stands, or is to come to a stand."""
+def rolling_course(view: View) -> Entry[Course] | None:
+    """The course that is being driven; None while the robot stands or is to stop."""
     last, course = last_motion(view), view.latest(Course)
     return course if course is not None and course is last and course.value.is_rolling else None
 
 
-def is_heard(view: View) -> bool:
-    """Whether what was asked of the wheels last was reported, and every report is in the belief."""
-    belief, motion, report = held(view), last_motion(view), view.latest(MotionReport)
+def is_up_to_date(view: View) -> bool:
+    """Whether the last motion was reported, and the belief includes the report."""
+    belief, motion, report = find_belief(view), last_motion(view), view.latest(MotionReport)
     if belief is None or motion is None:
         return belief is not None
     return report is not None and report.because == (motion.ref,) and belief.value.motion == report.id
 
 
-def is_settled(view: View) -> bool:
-    """Whether the robot stands, and where it thinks: no motion goes on, and every report is in the belief."""
-    return is_heard(view) and rolling(view) is None
+def is_standing(view: View) -> bool:
+    """Whether the robot stands, and the belief includes every motion."""
+    return is_up_to_date(view) and rolling_course(view) is None
 
 
 def is_in_doubt(view: View) -> bool:
-    """Whether something is open above the action level that its level has not measured within its bound."""
+    """Whether a discrepancy is open that its level has not measured within its bound."""
     for level in (Level.PLAN, Level.GOAL):
         found = open_discrepancy(view, level)
         if found is not None and (found.value.magnitude is None or found.value.exceeds or level is Level.GOAL):
@@ -121,7 +122,7 @@ def is_in_doubt(view: View) -> bool:
 
 
 def open_fault(view: View) -> Entry[BodyFault] | None:
-    """What is wrong with the body now; nobody moves while anything is."""
+    """The fault of the body that is open; the robot does not move while there is one."""
     return view.newest(OPEN_FAULT, True)
 
 

@@ -1,4 +1,4 @@
-"""What each servo level may correct, in the image: from the actuator model (§3.2) and the matcher's window (§6.1.4)."""
+"""Tolerances of the servo levels in the image, from the actuator model (§3.2) and the matcher's window (§6.1.4)."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ Floats = NDArray[np.float64]
 def action_px(robot: RobotModel, belief: Hypothesis, points_world: Floats, settings: Settings = DEFAULT) -> float:
     """The action level's tolerance [px]: how far landmarks may be off by the uncertainty of the believed pose (§3.2).
 
-    A heading that is wrong moves the image by the focal length times it, a place that is wrong by as much less as the
-    landmarks (n, 3) are far ahead; without any, only the heading counts. ``min_tolerance_px`` is added for the error of
-    correlation itself.
+    An error of the heading moves the image by the focal length times the error; an error of the place by the focal
+    length times the error over the distance ahead of the landmarks, ``points_world`` (n, 3). Without landmarks only the
+    heading counts. ``min_tolerance_px`` is added for the error of correlation itself; the plan level's bound is the
+    largest tolerance.
     """
     pose = belief.world_from_robot(robot.world)
     ahead_m = robot.on_floor_of(belief.locale).camera_from_world(pose).apply(points_world.reshape(-1, 3))[:, 2]

@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.plan.milestone_selector import best_heading, expectation
+from knowledge_sources.plan.milestone_selector import choose_heading, predict_milestone
 from knowledge_sources.settings import DEFAULT
 from sim.body.building import Building
 from sim.made_up.generated_floors import Floor, generated_floor
@@ -122,7 +122,7 @@ def _generate_case(floor_seed: int, kind: str, rng: np.random.Generator) -> Case
         if believed is None or (other is None and kind != "another floor"):
             continue
         covariance = _draw_covariance(here.robot.actuator, believed, rng)
-        heading = best_heading(here.robot, believed, _headings(believed), 0.1)
+        heading = choose_heading(here.robot, believed, _headings(believed), 0.1)
         turned = wrap_angle(heading - believed.heading_rad)
         believed = Pose2(believed.x_m, believed.y_m, heading)
         there, building = get_site(floor_seed), int(rng.integers(2))
@@ -137,7 +137,7 @@ def _generate_case(floor_seed: int, kind: str, rng: np.random.Generator) -> Case
         true = _draw_true_pose(believed, other, covariance, rng)
         if not _is_free(there, true):
             continue
-        milestone = expectation(here.robot, believed, Milestone("", 0, "a case", heading))
+        milestone = predict_milestone(here.robot, believed, Milestone("", 0, "a case", heading))
         locale = here.robot.world.locale_at(believed.position) or ""
         belief = Hypothesis.of_world(here.robot.world, locale, believed, covariance, "odometry")
         alternative = None

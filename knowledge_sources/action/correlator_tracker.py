@@ -1,8 +1,7 @@
-"""Correlator tracker (§5): landmarks are followed by template correlation, and correct the belief while moving.
+"""Correlator tracker (§5): follows landmarks by template correlation, and corrects the belief by them.
 
-Before each increment the motion of each landmark in the image is predicted; the difference between the prediction and
-the place where its template correlates best tells how the motion deviated (Figure 10). New landmarks are taken as old
-ones leave the view.
+The place of each landmark in the image is predicted; where its template correlates best, the difference tells how the
+motion deviated (Figure 10). New landmarks are taken as old ones leave the view.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from knowledge_sources.methods.tracking.template_tracking import (
     follow_landmarks,
     select_landmarks,
 )
-from knowledge_sources.questions import held, open_discrepancy, standing_in, unmeasured_doubt
+from knowledge_sources.questions import find_belief, open_discrepancy, robot_in, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.tolerances import action_px
@@ -58,7 +57,7 @@ class Renewed(NamedTuple):
 
 
 class CorrelatorTracker(RobotKnowledgeSource):
-    """Follows landmarks from frame to frame; revises the held hypothesis; posts what it had to correct."""
+    """Follows landmarks from frame to frame, corrects the belief by them, and posts the size of the correction."""
 
     level = Level.ACTION
     closes = Level.ACTION
@@ -74,14 +73,14 @@ class CorrelatorTracker(RobotKnowledgeSource):
         self._template = lru_cache(maxsize=4 * settings.tracking.max_tracks)(self._cut)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        if held(view) is None or view.latest(Frame) is None or open_discrepancy(view, Level.GOAL) is not None:
+        if find_belief(view) is None or view.latest(Frame) is None or open_discrepancy(view, Level.GOAL) is not None:
             return None
-        if unmeasured_doubt(view) is not None:  # it could not explain what it saw; others look for where the robot is
+        if unmeasured_doubt(view) is not None:  # tracking failed: the plan level looks where the robot is
             return None
         return 0.9
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        frame, belief, old = view.latest(Frame), held(view), view.latest(Tracks)
+        frame, belief, old = view.latest(Frame), find_belief(view), view.latest(Tracks)
         if belief is None or frame is None:
             return
         if isinstance(trigger.entry.value, Hypothesis):
@@ -92,7 +91,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
     def _track(
         self, view: View, frame: Entry[Frame], belief: Entry[Hypothesis], old: Entry[Tracks] | None
     ) -> Iterable[Effect]:
-        """Follow the landmarks into a new frame; correct the belief by them, or say that they cannot be explained."""
+        """Follow the landmarks into a new frame; correct the belief, or post that tracking failed."""
         image = self._picture(frame.value.jpeg)
         followed = self._follow(view, None if old is None else old.value, image, belief.value)
         seen = [f.track for f in followed if f.track.found_px is not None]
@@ -128,7 +127,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
     def _begin_anew(
         self, view: View, frame: Entry[Frame], belief: Entry[Hypothesis], old: Entry[Tracks] | None
     ) -> Iterable[Effect]:
-        """Take all landmarks anew where a milestone or a relocalization has told the place."""
+        """Take all landmarks anew after a milestone or a relocalization."""
         fresh = self._take_new(view, frame, self._picture(frame.value.jpeg), (), (), belief.value)
         tracks = _post_or_revise(old, fresh.tracks, (frame, belief))
         yield tracks
@@ -152,7 +151,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         if tracks is None:
             return []
         world = self._robot.world
-        return follow_landmarks(standing_in(view, self._robot, belief.locale), tracks.items,
+        return follow_landmarks(robot_in(view, self._robot, belief.locale), tracks.items,
                       lambda track: self._template(view[track.template_frame].value.jpeg, track.template_px), image,
                       belief.world_from_robot(world), belief.covariance_world(world), self._settings)
 
@@ -177,7 +176,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
     ) -> Renewed:
         """Keep the landmarks that still serve, and take new ones where too few are left."""
         s, anchors = self._settings.action, () if old is None else old.value.anchors
-        near = self._near(anchors, belief)
+        near = self._find_near_frames(anchors, belief)
         kept = tuple(f.track for f in followed if f.expected and f.track.misses < s.max_misses
                      and f.track.template_frame in near)
         taken = 0 if old is None else old.value.taken
@@ -191,7 +190,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
     ) -> Renewed:
         """Take new landmarks beside those that are kept, once the belief is aligned with the model's edges."""
         world, s = self._robot.world, self._settings.action
-        robot, pose = standing_in(view, self._robot, belief.locale), belief.world_from_robot(world)
+        robot, pose = robot_in(view, self._robot, belief.locale), belief.world_from_robot(world)
         lines = visible_lines(
             world, robot.camera, robot.camera_from_world(pose), min_length_px=s.min_edge_length_px,
             min_contrast=s.min_edge_contrast, max_distance_m=s.max_edge_distance_m,
@@ -204,7 +203,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         items = (*kept, *select_landmarks(robot, kept, frame.id, image, pose, self._settings))
         return Renewed(self._with_anchors(items, anchors, frame, belief, len(items)), belief)
 
-    def _near(self, anchors: tuple[Anchor, ...], belief: Hypothesis) -> frozenset[str]:
+    def _find_near_frames(self, anchors: tuple[Anchor, ...], belief: Hypothesis) -> frozenset[str]:
         """The frames that were taken near enough to here for their templates to be used."""
         here, s = belief.world_from_robot(self._robot.world), self._settings.action
         far_m = s.max_template_distance_rolling_m if self._robot.continuous else s.max_template_distance_m
@@ -229,7 +228,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         bounds = (action_px(self._robot, belief, points, self._settings), self._settings.plan.max_deviation_px)
         found = Discrepancy(Level.ACTION, what, magnitude_px, bounds, "px")
         last = open_discrepancy(view, Level.ACTION)
-        if last is None or not last.value.exceeds:  # what is beyond its bound already is not for landmarks to close
+        if last is None or not last.value.exceeds:  # one beyond its bound is the escalator's
             yield Post(found, because) if last is None else Revise(last, found, because)
 
 

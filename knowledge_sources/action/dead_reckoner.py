@@ -1,4 +1,4 @@
-"""Dead reckoner (§3.2): the belief follows the wheels' claim, and becomes less sure by what wheels are known to do."""
+"""Dead reckoner (§3.2): the belief follows the odometry, with the covariance of the actuator model."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.questions import held
+from knowledge_sources.questions import find_belief
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import BodyFault, Course, Look, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis
@@ -22,11 +22,10 @@ from world_models.frames import Pose2
 
 
 class DeadReckoner(RobotKnowledgeSource):
-    """Moves the held hypothesis by a motion report, on the arc that these wheels are known to drift by, and asks for a
-    picture to check it by.
+    """Moves the belief by the odometry's report, corrected for drift, and asks for a picture to check it.
 
-    What a broken-off motion lacks may have been done all the same, in part or whole, before the base stood: the belief
-    becomes less sure by that.
+    Of a motion that was broken off, the unreported rest may have been driven in part or whole: it is added to the
+    covariance.
     """
 
     level = Level.ACTION
@@ -34,11 +33,11 @@ class DeadReckoner(RobotKnowledgeSource):
     writes = (Hypothesis, Drift, Look, Discrepancy)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        belief = held(view)
+        belief = find_belief(view)
         return None if belief is None or belief.value.motion == trigger.entry.id else 1.0
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief = held(view)
+        belief = find_belief(view)
         if belief is None:
             return
         world, report = self._robot.world, trigger.entry.value
@@ -54,14 +53,15 @@ class DeadReckoner(RobotKnowledgeSource):
         locale = there if there and world.is_room(there) else belief.value.locale  # in a doorway: still the old room
         fault = None if request is None else view.latest(BodyFault, lambda f: f.request == request.id)
         if request is not None and fault is not None:
-            covariance = covariance + _spread_of(pose, *self._lacking(request.value, report))
+            missing = self._compute_missing_motion(request.value, report)
+            covariance = covariance + _compute_partial_covariance(pose, *missing)
         moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=trigger.entry.id)
         step = Revise(belief, moved, (trigger.entry, belief) if fault is None else (trigger.entry, belief, fault))
         yield step
         rolled = drift.after_motion(actuator, report.turn_rad, report.move_m, on_the_spot=not on_the_move)
         yield Post(rolled, (trigger.entry,)) if known is None else Revise(known, rolled, (trigger.entry, known))
         if on_the_move and fault is None:
-            return  # the picture is there: it was taken on the move
+            return  # a picture was taken on the move
         yield Post(Look("track"), (step,))
         if request is None or fault is not None or on_the_move:
             return
@@ -71,15 +71,15 @@ class DeadReckoner(RobotKnowledgeSource):
             stopped = Discrepancy(Level.ACTION, what, math.inf, (bound_px, bound_px), "px")
             yield Post(stopped, (trigger.entry,))
 
-    def _lacking(self, request: MotorCommand | Course, report: MotionReport) -> tuple[float, float]:
-        """What may have been done beyond what is claimed: (turn [rad], move [m])."""
+    def _compute_missing_motion(self, request: MotorCommand | Course, report: MotionReport) -> tuple[float, float]:
+        """What may have been driven beyond the report: (turn [rad], move [m])."""
         if isinstance(request, Course):
             return 0.0, self._robot.actuator.stopping_distance_m()
         return request.turn_rad - report.turn_rad, request.move_m - report.move_m
 
 
-def _spread_of(pose: Pose2, turn_rad: float, move_m: float) -> NDArray[np.float64]:
-    """(3, 3) covariance, world, of a TURN and a MOVE of which any part may have been done, about where none was.
+def _compute_partial_covariance(pose: Pose2, turn_rad: float, move_m: float) -> NDArray[np.float64]:
+    """(3, 3) second moment, world frame, of a TURN and a MOVE of which any part may have been driven.
 
     A part that is uniform in 0..d has the second moment d^2 / 3.
     """

@@ -1,4 +1,4 @@
-"""ElevatorRider (§4, Figure 8): an elevator is no place to drive through: the robot asks to be carried, and is."""
+"""Elevator rider (§4, Figure 8): the robot asks for a ride between floors, as it cannot drive there."""
 
 from __future__ import annotations
 
@@ -12,7 +12,14 @@ from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.questions import deepest_sketch, held, is_over, is_settled, open_discrepancy, open_fault
+from knowledge_sources.questions import (
+    deepest_sketch,
+    find_belief,
+    is_over,
+    is_standing,
+    open_discrepancy,
+    open_fault,
+)
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.locales import Link
 from world_models.entries.body import BodyFault, Ride, RideReport
@@ -23,9 +30,9 @@ from world_models.frames import Pose2
 
 
 class ElevatorRider(RobotKnowledgeSource):
-    """Asks for the ride that a verified sketch wants, and takes the belief over to the floor where the doors open.
+    """Asks for the ride that a verified sketch needs, and moves the belief to the floor where the doors open.
 
-    It believes what it is told: that this is the floor. So nothing is done there before a milestone is verified.
+    It takes the reported floor for true. So nothing else is done there before a milestone is verified.
     """
 
     level = Level.ACTION
@@ -37,27 +44,27 @@ class ElevatorRider(RobotKnowledgeSource):
     writes = (Ride, Hypothesis, PlanSketch, Tracks)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        if is_over(view) or held(view) is None:
+        if is_over(view) or find_belief(view) is None:
             return None
         if isinstance(trigger.entry.value, RideReport):
             return 1.0
-        return 0.3 if self._wanted(view) is not None else None
+        return 0.3 if self._find_wanted_ride(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         if isinstance(trigger.entry.value, RideReport):
-            yield from self._carried(view, trigger.entry)
+            yield from self._take_over_belief(view, trigger.entry)
             return
-        wanted, belief = self._wanted(view), held(view)
+        wanted, belief = self._find_wanted_ride(view), find_belief(view)
         if wanted is not None and belief is not None:
             sketch, link = wanted
             s = sketch.value
             there = s.subgoals[s.at].destination.locale
             yield Post(Ride(sketch.id, s.at, link.name, link.other(there), there), (sketch, belief))
 
-    def _wanted(self, view: View) -> tuple[Entry[PlanSketch], Link] | None:
-        """The sketch whose next subgoal is a ride that was not asked for yet, while nothing is in doubt."""
+    def _find_wanted_ride(self, view: View) -> tuple[Entry[PlanSketch], Link] | None:
+        """The sketch whose next subgoal is a ride that was not asked for, if nothing is in doubt; and the elevator."""
         sketch = deepest_sketch(view)
-        if sketch is None or not sketch.value.verified or not is_settled(view) or open_fault(view) is not None:
+        if sketch is None or not sketch.value.verified or not is_standing(view) or open_fault(view) is not None:
             return None
         if any(open_discrepancy(view, level) is not None for level in (Level.PLAN, Level.GOAL)):
             return None
@@ -68,23 +75,23 @@ class ElevatorRider(RobotKnowledgeSource):
         asked = view.latest(Ride, lambda r: r.sketch == sketch.id and r.index == s.at)
         return (sketch, passage) if asked is None and isinstance(passage, Link) else None
 
-    def _carried(self, view: View, report: Entry[RideReport]) -> Iterable[Effect]:
-        ride, belief = view.latest(Ride), held(view)
+    def _take_over_belief(self, view: View, report: Entry[RideReport]) -> Iterable[Effect]:
+        ride, belief = view.latest(Ride), find_belief(view)
         if ride is None or belief is None:
             return
         link = self._robot.world.passage(ride.value.passage)
         assert isinstance(link, Link)
-        there = Revise(belief, self._after(belief.value, link, ride.value.destination), (report, belief))
+        there = Revise(belief, self._predict_hypothesis(belief.value, link, ride.value.destination), (report, belief))
         yield there
         tracks = view.latest(Tracks)
-        if tracks is not None:  # what was followed is left behind
+        if tracks is not None:  # the landmarks are on the other floor
             yield Revise(tracks, replace(tracks.value, items=(), anchors=()), (report,))
         sketch = view.get(ride.value.sketch)
         if sketch is not None and sketch.value.is_active and sketch.value.at == ride.value.index:
             yield Revise(sketch, sketch.value.advanced(), (report, there))
 
-    def _after(self, belief: Hypothesis, link: Link, destination: str) -> Hypothesis:
-        """As it stood to the one stop it stands to the other."""
+    def _predict_hypothesis(self, belief: Hypothesis, link: Link, destination: str) -> Hypothesis:
+        """The belief after a ride: the pose relative to the car's stop is the same on both floors."""
         world = self._robot.world
         before, behind = (Pose2(*link.stop_of(name)) for name in (link.other(destination), destination))
         pose = behind @ (before.inverse() @ belief.world_from_robot(world))

@@ -1,4 +1,4 @@
-"""FaultHandler (§2, §4): answers what goes wrong with the body itself, at the level at which it goes wrong."""
+"""Fault handler (§2, §4): retries after a fault of the body, or ends the mission."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from world_models.entries.task import Outcome
 
 
 class FaultHandler(RobotKnowledgeSource):
-    """While the body is at fault it keeps the robot standing and tries again; it says when the fault is over, or final.
+    """Asks for recovery from a fault of the body, and closes the fault when it is over, or ends the mission.
 
-    A motion that was broken off leaves the belief in doubt: it has to be checked by a milestone before anybody moves
-    on. The stop key ends the mission, and so do a fault that does not pass within ``max_fault_s`` and a base that never
-    gets on.
+    A motion that was broken off puts the belief in doubt: a milestone must be verified before the robot moves on. The
+    mission ends at the stop key, at a fault longer than ``max_fault_s``, and when ``max_broken_motions`` motions in a
+    row were broken off.
     """
 
     level = Level.ACTION
@@ -38,21 +38,21 @@ class FaultHandler(RobotKnowledgeSource):
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         value = trigger.entry.value
         if isinstance(value, BodyFault):
-            yield from self._noticed(trigger.entry)
+            yield from self._ask_for_recovery(trigger.entry)
         elif value.status == "over":
-            yield from self._over(view, trigger.entry)
+            yield from self._close_fault(view, trigger.entry)
         else:
-            yield from self._in_vain(view, trigger.entry)
+            yield from self._retry(view, trigger.entry)
 
-    def _noticed(self, fault: Entry[BodyFault]) -> Iterable[Effect]:
+    def _ask_for_recovery(self, fault: Entry[BodyFault]) -> Iterable[Effect]:
         f = fault.value
         if f.what == STOP_KEY:
             yield Post(Outcome("stopped", f.detail), (fault,))
         else:
             yield Post(Recovery(fault.id, f.request, f.when_s, self._settings.action.min_retry_wait_s), (fault,))
 
-    def _in_vain(self, view: View, recovery: Entry[Recovery]) -> Iterable[Effect]:
-        """Again after a longer pause, or it is final."""
+    def _retry(self, view: View, recovery: Entry[Recovery]) -> Iterable[Effect]:
+        """Retry after twice the pause (exponential backoff), or end the mission."""
         r, fault = recovery.value, view.get(recovery.value.fault)
         if fault is None:
             return
@@ -65,8 +65,8 @@ class FaultHandler(RobotKnowledgeSource):
             wait_s = min(2.0 * r.wait_s, self._settings.action.max_retry_wait_s)
             yield Revise(recovery, replace(r, status="asked", wait_s=wait_s), (recovery,))
 
-    def _over(self, view: View, recovery: Entry[Recovery]) -> Iterable[Effect]:
-        """Closed; where the robot was moving, what it did is only claimed, so a milestone has to hold anew."""
+    def _close_fault(self, view: View, recovery: Entry[Recovery]) -> Iterable[Effect]:
+        """Close a fault; after a broken-off motion, ask the plan level for a milestone."""
         fault, request = view.get(recovery.value.fault), view.get(recovery.value.request)
         if fault is None:
             return

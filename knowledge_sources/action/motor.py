@@ -1,4 +1,4 @@
-"""Motor (§5): a primitive subgoal becomes a (TURN angle) and (MOVE distance), carried out increment by increment."""
+"""Motor (§5): a primitive subgoal becomes (TURN angle) and (MOVE distance), one increment at a time."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from knowledge_sources.methods.motion.pure_pursuit import (
     update_leg,
 )
 from knowledge_sources.questions import (
+    current_leg,
     deepest_sketch,
-    held,
+    find_belief,
     is_in_doubt,
     is_over,
-    is_settled,
+    is_standing,
     open_discrepancy,
     open_fault,
     open_milestone,
-    under_way,
     unmeasured_doubt,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -40,11 +40,11 @@ from world_models.frames import Pose2, wrap_angle
 
 
 class Motor(RobotKnowledgeSource):
-    """Commands the next increment of a leg from where the robot believes it is: this closes the action-level loop.
+    """Commands the next increment of a leg, steered from the believed pose by pure pursuit.
 
-    It begins a leg when a verified sketch has a primitive subgoal; it turns where a milestone is to be looked for; it
-    keeps still while a command is under way, or the body is at fault. While anything above the action level is in
-    doubt it does not drive, and turns only to where a look is to end that doubt.
+    It begins a leg when a verified sketch has a primitive subgoal, and turns to where a milestone is to be looked for.
+    It stands still while a command is being carried out or the body is at fault. While anything above the action level
+    is in doubt it does not drive, and turns only for the look that is to end the doubt.
     """
 
     level = Level.ACTION
@@ -59,42 +59,42 @@ class Motor(RobotKnowledgeSource):
     writes = (MotorCommand, Leg, Discrepancy)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        if is_over(view) or open_fault(view) is not None or not is_settled(view):
+        if is_over(view) or open_fault(view) is not None or not is_standing(view):
             return None
         milestone = open_milestone(view)
-        if is_in_doubt(view) and (milestone is None or not _is_to_end_doubt(view, milestone)):
+        if is_in_doubt(view) and (milestone is None or not _ends_doubt(view, milestone)):
             return None
         if milestone is not None:
             return 0.3 if milestone.value.status == "turning" and self._look_error(view, milestone.value) else None
-        if under_way(view) is not None:
+        if current_leg(view) is not None:
             return 0.3
-        return 0.3 if _leg_wanted(view) is not None else None
+        return 0.3 if _sketch_for_leg(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, milestone = held(view), open_milestone(view)
+        belief, milestone = find_belief(view), open_milestone(view)
         if belief is None:
             return
         if milestone is not None:
-            turn = self._bounded(self._look_error(view, milestone.value) or 0.0)
+            turn = self._limit_turn(self._look_error(view, milestone.value) or 0.0)
             yield Post(MotorCommand(turn, 0.0), (milestone, belief))
             return
-        driving = under_way(view)
+        driving = current_leg(view)
         if driving is None:
-            yield from self._set_off(view, belief)
+            yield from self._begin_leg(view, belief)
             return
-        yield from self._increment(view, driving[0], belief)
+        yield from self._command_increment(view, driving[0], belief)
 
     def _look_error(self, view: View, milestone: Milestone) -> float | None:
-        """How far to turn to face a milestone's landmarks [rad]; None when it faces them."""
-        belief = held(view)
+        """The turn to face a milestone's landmarks [rad]; None when the robot faces them."""
+        belief = find_belief(view)
         if belief is None:
             return None
         here = belief.value.world_from_robot(self._robot.world)
         error = wrap_angle(milestone.look_heading_rad - here.heading_rad)
         return error if abs(error) > self._settings.action.max_heading_error_rad else None
 
-    def _set_off(self, view: View, belief: Entry[Hypothesis]) -> Iterable[Effect]:
-        sketch = _leg_wanted(view)
+    def _begin_leg(self, view: View, belief: Entry[Hypothesis]) -> Iterable[Effect]:
+        sketch = _sketch_for_leg(view)
         if sketch is None or sketch.value.current is None:
             return
         subgoal, world = sketch.value.current, self._robot.world
@@ -105,10 +105,10 @@ class Motor(RobotKnowledgeSource):
         leg = Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m, subgoal.tolerance_m, heading)
         yield Post(leg, (sketch, belief))
 
-    def _increment(self, view: View, leg: Entry[Leg], belief: Entry[Hypothesis]) -> Iterable[Effect]:
+    def _command_increment(self, view: View, leg: Entry[Leg], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         here = belief.value.world_from_robot(self._robot.world)
         drift = view.latest(Drift)
-        command = self._next(leg.value, here, 0.0 if drift is None else drift.value.curvature_per_m)
+        command = self._plan_increment(leg.value, here, 0.0 if drift is None else drift.value.curvature_per_m)
         seen = update_leg(leg.value, here, self._aim(leg.value, here))
         discrepancy = open_discrepancy(view, Level.ACTION)
         corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
@@ -120,8 +120,8 @@ class Motor(RobotKnowledgeSource):
         yield step
         yield Post(command, (step, belief, *(() if drift is None else (drift,))))
 
-    def _next(self, leg: Leg, here: Pose2, curvature_per_m: float) -> MotorCommand | None:
-        """The next increment; None on arrival. It is an arc, whose chord is to lie in the direction to be gone."""
+    def _plan_increment(self, leg: Leg, here: Pose2, curvature_per_m: float) -> MotorCommand | None:
+        """The next increment; None on arrival. A move is an arc whose chord points at the aim."""
         s, (along, left) = self._settings.action, measure_progress(leg, here)
         within_m = leg.tolerance_m * s.arrival_part
         away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
@@ -129,14 +129,14 @@ class Motor(RobotKnowledgeSource):
             return self._final_turn(leg, here)
         turn = compute_bearing(self._aim(leg, here), here)
         if abs(turn) > s.max_heading_error_rad:
-            return MotorCommand(self._bounded(turn), 0.0)
+            return MotorCommand(self._limit_turn(turn), 0.0)
         actuator = self._robot.actuator
         distance = min(actuator.increment_m, actuator.compute_command_m(away))
         turn = compute_chord_turn(turn, curvature_per_m, actuator.reach * distance)
         return MotorCommand(turn if abs(turn) > s.max_arrival_heading_error_rad / 10 else 0.0, distance)
 
     def _aim(self, leg: Leg, here: Pose2) -> tuple[float, float]:
-        """The point of the line to steer at [m, world]: its end, once that is near."""
+        """The point of the line to steer at [m, world]: ahead by ``lookahead_m``, near the end the end itself."""
         along, _ = measure_progress(leg, here)
         if along < self._settings.action.aim_at_end_m:
             return leg.x1_m, leg.y1_m
@@ -147,22 +147,22 @@ class Motor(RobotKnowledgeSource):
             return None
         turn = wrap_angle(leg.heading_rad - here.heading_rad)
         most = self._settings.action.max_arrival_heading_error_rad
-        return MotorCommand(self._bounded(turn), 0.0) if abs(turn) > most else None
+        return MotorCommand(self._limit_turn(turn), 0.0) if abs(turn) > most else None
 
-    def _bounded(self, turn_rad: float) -> float:
-        """One increment of a turn; a long one in equal parts, so that landmarks stay in view from part to part."""
+    def _limit_turn(self, turn_rad: float) -> float:
+        """One increment of a turn; a long turn is divided equally, so that landmarks stay in view."""
         largest = self._robot.actuator.turn_increment_rad
         return turn_rad / max(1, math.ceil(abs(turn_rad) / largest))
 
 
-def _is_to_end_doubt(view: View, milestone: Entry[Milestone]) -> bool:
-    """Whether a milestone was chosen as another view by which to measure what the plan level doubts."""
+def _ends_doubt(view: View, milestone: Entry[Milestone]) -> bool:
+    """Whether a milestone was chosen after the plan level's doubt, to measure it."""
     doubt = unmeasured_doubt(view)
     return (doubt is not None and milestone.cycle >= doubt.cycle and open_discrepancy(view, Level.GOAL) is None)
 
 
-def _leg_wanted(view: View) -> Entry[PlanSketch] | None:
-    """The sketch that is being carried out, if its milestone is verified and its subgoal at hand is primitive."""
+def _sketch_for_leg(view: View) -> Entry[PlanSketch] | None:
+    """The deepest sketch, if its milestone is verified and its current subgoal is primitive."""
     sketch = deepest_sketch(view)
     if sketch is None:
         return None

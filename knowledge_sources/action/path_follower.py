@@ -1,4 +1,4 @@
-"""PathFollower (§5): steers on the move, corrected by each picture; stops the robot on any doubt."""
+"""Path follower (§5): steers on the move by pure pursuit, corrected by each picture."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from knowledge_sources.methods.motion.pure_pursuit import (
     update_leg,
 )
 from knowledge_sources.questions import (
-    held,
-    is_heard,
+    current_leg,
+    find_belief,
     is_in_doubt,
     is_over,
-    is_settled,
+    is_standing,
+    is_up_to_date,
     open_discrepancy,
     open_fault,
     open_milestone,
-    rolling,
-    under_way,
+    rolling_course,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Course
@@ -39,10 +39,10 @@ from world_models.frames import Pose2
 
 
 class PathFollower(RobotKnowledgeSource):
-    """Drives a leg without stopping at each increment, where the robot can: pictures on the move correct the course.
+    """Drives a leg without stopping at each increment, and corrects the course by each picture.
 
-    It stops at once when anything is in doubt, above the action level or beyond its bound there, and before the end
-    of the leg, whose rest is the motor's.
+    It stops at once when anything is in doubt, above the action level or beyond the action level's bound. It also stops
+    before the end of the leg: the motor drives the rest.
     """
 
     level = Level.ACTION
@@ -58,23 +58,23 @@ class PathFollower(RobotKnowledgeSource):
     def rate(self, view: View, trigger: Change) -> float | None:
         if open_fault(view) is not None:
             return None
-        if rolling(view) is not None:
-            return (1.0 if self._must_stop(view) else 0.3) if is_heard(view) else None
-        return 0.4 if self._may_set_off(view) else None
+        if rolling_course(view) is not None:
+            return (1.0 if self._must_stop(view) else 0.3) if is_up_to_date(view) else None
+        return 0.4 if self._may_start(view) else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, course, driving = held(view), rolling(view), under_way(view)
+        belief, course, driving = find_belief(view), rolling_course(view), current_leg(view)
         if belief is None:
             return
         if course is not None and (driving is None or self._must_stop(view)):
             yield Revise(course, replace(course.value, speed_m_per_s=0.0), (course, belief, *_reasons(view)))
         elif driving is not None:
-            yield from self._steered(view, course, driving[0], belief)
+            yield from self._steer(view, course, driving[0], belief)
 
-    def _steered(
+    def _steer(
         self, view: View, course: Entry[Course] | None, leg: Entry[Leg], belief: Entry[Hypothesis]
     ) -> Iterable[Effect]:
-        """The arc to the point of the line ahead, less what the wheels bend it by themselves."""
+        """Steer an arc to the point of the line ahead, less the curvature that the wheels add."""
         here, drift = belief.value.world_from_robot(self._robot.world), view.latest(Drift)
         s, (along, _) = self._settings.action, measure_progress(leg.value, here)
         point = find_aim_point(leg.value, along, s.rolling_lookahead_m)
@@ -90,37 +90,37 @@ class PathFollower(RobotKnowledgeSource):
         because = (step, belief, *(() if drift is None else (drift,)))
         yield Post(told, because) if course is None else Revise(course, told, (course, *because))
 
-    def _may_set_off(self, view: View) -> bool:
-        """Standing before a leg that is long enough, and facing along it."""
-        belief, driving = held(view), under_way(view)
+    def _may_start(self, view: View) -> bool:
+        """Whether the robot stands before a leg that is long enough, and faces along it."""
+        belief, driving = find_belief(view), current_leg(view)
         if not self._robot.continuous or belief is None or driving is None:
             return False
-        if is_over(view) or not is_settled(view) or is_in_doubt(view) or open_milestone(view) is not None:
+        if is_over(view) or not is_standing(view) or is_in_doubt(view) or open_milestone(view) is not None:
             return False
         here = belief.value.world_from_robot(self._robot.world)
         leg, s = driving[0].value, self._settings.action
-        return self._is_worth_it(leg, here) and abs(self._off(leg, here)) <= s.max_rolling_start_error_rad
+        return self._is_long_enough(leg, here) and abs(self._aim_error(leg, here)) <= s.max_rolling_start_error_rad
 
     def _must_stop(self, view: View) -> bool:
-        belief, driving = held(view), under_way(view)
+        belief, driving = find_belief(view), current_leg(view)
         if belief is None or driving is None or is_over(view) or is_in_doubt(view) or open_milestone(view) is not None:
             return True
         here = belief.value.world_from_robot(self._robot.world)
         leg, s = driving[0].value, self._settings.action
-        return not self._is_worth_it(leg, here) or abs(self._off(leg, here)) > s.max_rolling_error_rad
+        return not self._is_long_enough(leg, here) or abs(self._aim_error(leg, here)) > s.max_rolling_error_rad
 
-    def _is_worth_it(self, leg: Leg, here: Pose2) -> bool:
-        """Whether there is way enough to come to a stand before the end of the leg."""
+    def _is_long_enough(self, leg: Leg, here: Pose2) -> bool:
+        """Whether the robot can drive and still stop before the end of the leg."""
         least_m = self._robot.actuator.stopping_distance_m() + self._settings.action.min_rolling_leg_m
         return measure_progress(leg, here)[0] > least_m
 
-    def _off(self, leg: Leg, here: Pose2) -> float:
-        """How far to the left of the robot's heading the point lies that it steers at [rad]."""
+    def _aim_error(self, leg: Leg, here: Pose2) -> float:
+        """Angle from the robot's heading to the point that it steers at, to the left [rad]."""
         along, _ = measure_progress(leg, here)
         return compute_bearing(find_aim_point(leg, along, self._settings.action.rolling_lookahead_m), here)
 
 
 def _reasons(view: View) -> tuple[Entry[Discrepancy], ...]:
-    """What is open and in doubt, if that is why it stops."""
+    """The open discrepancies: why it stops, where they are the reason."""
     found = (open_discrepancy(view, level) for level in Level)
     return tuple(entry for entry in found if entry is not None)

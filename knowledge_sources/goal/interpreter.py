@@ -1,4 +1,4 @@
-"""Interpreter (§3.3, §4): a command becomes a goal in conceptual-dependency form."""
+"""Interpreter (§3.3, §4): turns a command into a goal in conceptual-dependency form."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ from world_models.frames import Pose2
 
 
 class Interpreter(RobotKnowledgeSource):
-    """Reads ``(ptrans (locale (x,y,z)) (locale (x,y,z)))``: from where to where, feet in each locale's own frame.
+    """Reads ``(ptrans (locale (x,y,z)) (locale (x,y,z)))``, from where to where, in feet in each locale's frame.
 
     It also understands "Go from the laboratory to Allen's office", from the middle of one room to that of another. The
-    command's first place is also where the robot is told that it stands: the first hypothesis. What cannot be
-    understood ends the mission with the reason.
+    first place is also the first belief. A command that cannot be understood ends the mission with the reason.
     """
 
     level = Level.GOAL
@@ -31,7 +30,7 @@ class Interpreter(RobotKnowledgeSource):
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         command: Command = trigger.entry.value
         try:
-            origin, destination = self._places(command)
+            origin, destination = self._read_places(command)
         except ValueError as error:
             yield Post(Outcome("failed", f"the command was not understood: {error}"), (trigger.entry,))
             return
@@ -39,6 +38,6 @@ class Interpreter(RobotKnowledgeSource):
         yield Post(Hypothesis(origin.locale, pose, command.start_covariance, "command"), (trigger.entry,))
         yield Post(Goal(origin, destination), (trigger.entry,))
 
-    def _places(self, command: Command) -> tuple[Place, Place]:
+    def _read_places(self, command: Command) -> tuple[Place, Place]:
         origin, destination = parse_command(command.text, self._robot.world)
         return origin, replace(destination, heading_rad=command.arrival_heading_rad)

@@ -1,4 +1,4 @@
-"""Mission keeper (§4): says how the mission ended. Every mission ends in a declared outcome."""
+"""Mission monitor (§4): every mission ends in a declared outcome."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from world_models.entries.task import Goal, Outcome
 
 
 class MissionMonitor(RobotKnowledgeSource):
-    """Declares ``reached`` when the goal is, and ``lost`` or ``failed`` when the board falls still before that."""
+    """Declares ``reached`` when the goal is, and ``lost`` or ``failed`` when nothing is left to do before that."""
 
     level = Level.GOAL
     watches = (
@@ -36,7 +36,8 @@ class MissionMonitor(RobotKnowledgeSource):
         lost = open_discrepancy(view, Level.GOAL)
         if lost is not None:
             perhaps = view.where(Hypothesis, lambda h: h.status == "candidate")
-            yield Post(Outcome("lost", f"{lost.value.what}, {_where(perhaps)}"), (trigger.entry, lost, *perhaps))
+            reason = f"{lost.value.what}, {_describe_places(perhaps)}"
+            yield Post(Outcome("lost", reason), (trigger.entry, lost, *perhaps))
             return
         waiting, goal = open_milestone(view), view.latest(Goal)
         what = "nobody had anything left to do"
@@ -46,8 +47,8 @@ class MissionMonitor(RobotKnowledgeSource):
         yield Post(Outcome("failed", what), (trigger.entry, *unmet))
 
 
-def _where(perhaps: Sequence[Entry[Hypothesis]]) -> str:
-    """What is left of the question where the robot is, in words."""
+def _describe_places(perhaps: Sequence[Entry[Hypothesis]]) -> str:
+    """The places where the robot may be, in words."""
     places = []
     for entry in perhaps:
         h = entry.value

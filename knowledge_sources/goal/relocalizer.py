@@ -1,4 +1,4 @@
-"""Relocalizer (§2, §4): goal-level perceptual servoing. Lost, it looks about until it knows, and begins anew."""
+"""Relocalizer (§2, §4): goal-level perceptual servoing: finds a lost robot, and sets a new goal from there."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from knowledge_sources.methods.localization.global_localization import (
 )
 from knowledge_sources.methods.localization.obstructions import update_obstruction
 from knowledge_sources.methods.localization.views import CameraView, propagate_pose
-from knowledge_sources.questions import active_goal, held, is_over, is_settled, open_discrepancy
+from knowledge_sources.questions import active_goal, find_belief, is_over, is_standing, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Look, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis, Place, covariance_tuple
@@ -33,13 +33,12 @@ from world_models.frames import Pose2
 
 
 class Relocalizer(RobotKnowledgeSource):
-    """Keeps every place of the floor that bears out what it sees, and probes until one stands alone.
+    """Keeps every place of the floor that agrees with its pictures, and takes more until one place is left.
 
-    A probe is a turn or a short safe move, and a look: the one by which the places are expected to part best. When it
-    knows, a new top-level goal follows from the place where it is to the old destination, and so new sketches (§2).
-    When the building cannot tell the places apart it stays lost, and the places stay on the board: never does it choose
-    between places that look alike. What stands still in its looks while it turns is before the camera, and it looks
-    past it.
+    The next picture is taken after the turn or short safe move by which the candidates' views are expected to differ
+    most. Once the place is known, a new top-level goal leads from there to the old destination (§2). Where the building
+    looks the same at several places, the robot stays lost and the candidates stay on the board: it never guesses. What
+    is at the same place in its pictures while it turns is an obstruction, and is ignored.
     """
 
     level = Level.GOAL
@@ -53,12 +52,14 @@ class Relocalizer(RobotKnowledgeSource):
 
     def rate(self, view: View, trigger: Change) -> float | None:
         lost = open_discrepancy(view, Level.GOAL)
-        if lost is None or held(view) is None or not is_settled(view) or is_over(view) or _has_just_ridden(view):
+        if lost is None or find_belief(view) is None or is_over(view):
+            return None
+        if not is_standing(view) or _has_just_ridden(view):
             return None
         return 0.7
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        lost, belief = open_discrepancy(view, Level.GOAL), held(view)
+        lost, belief = open_discrepancy(view, Level.GOAL), find_belief(view)
         if lost is None or belief is None:
             return
         if not isinstance(trigger.entry.value, Segments):
@@ -68,18 +69,18 @@ class Relocalizer(RobotKnowledgeSource):
             if len(_probes_since(view, lost)) < self._settings.goal.max_dark_frames:
                 yield Post(Look("probe"), (trigger.entry, lost))
             return
-        yield from self._considered(view, trigger.entry, lost, belief)
+        yield from self._consider(view, trigger.entry, lost, belief)
 
     def _is_dark(self, segments: Segments) -> bool:
         """Whether a frame is dark; a bright one without contrast shows a bare wall."""
         s = self._settings.goal
         return segments.contrast < s.min_contrast and segments.brightness < s.min_brightness
 
-    def _considered(
+    def _consider(
         self, view: View, segments: Entry[Segments], lost: Entry[Discrepancy], belief: Entry[Hypothesis]
     ) -> Iterable[Effect]:
         before = _panorama_since(view, lost)
-        glimpses = self._glimpses(view, segments, before)
+        glimpses = self._collect_glimpses(view, segments, before)
         looks, hidden = [_to_view(view, g) for g in glimpses], view.latest(Obstruction)
         known, tuning = None if hidden is None else hidden.value, self._settings.localization
         obstruction = update_obstruction(looks, self._robot.camera, known, settings=tuning)
@@ -91,24 +92,24 @@ class Relocalizer(RobotKnowledgeSource):
         if obstruction is not None:
             because = (segments, lost, hidden if change is None else change)
         robot = self._robot.with_obstruction(obstruction).on_floor_of(belief.value.locale)
-        result = localize(robot, looks, self._rooms(belief.value), self._settings)
+        result = localize(robot, looks, self._list_rooms(belief.value), self._settings)
         is_last = len(glimpses) >= self._settings.goal.max_probes
         if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
-            result = self._within_reach(result, belief.value.locale)
+            result = self._prefer_reachable(result, belief.value.locale)
         for old in view.where(Hypothesis, lambda h: h.status == "candidate"):
             yield Retract(old, (segments,))
-        told = Panorama(glimpses, _in_words(result))
+        told = Panorama(glimpses, _describe(result))
         seen = Post(told, because) if before is None else Revise(before, told, (*because, before))
         yield seen
         if result.status is LocalizationStatus.FOUND:
-            yield from self._found(view, (segments, seen), lost, belief, result.candidates[0])
+            yield from self._adopt(view, (segments, seen), lost, belief, result.candidates[0])
             return
         for c in result.candidates:
-            yield Post(self._hypothesis(c, belief.value, "candidate", c.weight), (segments, seen, belief))
+            yield Post(self._to_hypothesis(c, belief.value, "candidate", c.weight), (segments, seen, belief))
         if result.status is LocalizationStatus.PROBE and result.next_action is not None and not is_last:
             yield Post(MotorCommand(result.next_action.turn_rad, result.next_action.move_m), (segments, lost, seen))
 
-    def _within_reach(self, result: LocalizationResult, locale: str) -> LocalizationResult:
+    def _prefer_reachable(self, result: LocalizationResult, locale: str) -> LocalizationResult:
         """Of places that nothing more can tell apart the only one to which wheels lead from where the robot was.
 
         Carried to another place of where it can drive to, it may look the same there: that stays ambiguous. But being
@@ -119,23 +120,23 @@ class Relocalizer(RobotKnowledgeSource):
             return result
         return LocalizationResult(LocalizationStatus.FOUND, (replace(near[0], weight=1.0),))
 
-    def _glimpses(
+    def _collect_glimpses(
         self, view: View, segments: Entry[Segments], before: Entry[Panorama] | None
     ) -> tuple[Glimpse, ...]:
         """The looks so far, as seen from where the robot is now, and the new one."""
         old = () if before is None else before.value.glimpses
         for report in () if before is None else view.since(MotionReport, before.cycle):
-            old = tuple(self._moved(g, report.value) for g in old)
+            old = tuple(self._move(g, report.value) for g in old)
         here = Glimpse(segments.id, Pose2(0.0, 0.0, 0.0), covariance_tuple(np.zeros((3, 3))))
         return (*old, here)
 
-    def _moved(self, glimpse: Glimpse, report: MotionReport) -> Glimpse:
+    def _move(self, glimpse: Glimpse, report: MotionReport) -> Glimpse:
         actuator, claim = self._robot.actuator, (report.turn_rad, report.move_m)
         step, spread = actuator.predict_motion(*claim), actuator.motion_covariance(*claim)
         pose, covariance = propagate_pose(glimpse.now_from_then, np.array(glimpse.covariance), step, spread)
         return replace(glimpse, now_from_then=pose, covariance=covariance_tuple(covariance))
 
-    def _rooms(self, belief: Hypothesis) -> list[str]:
+    def _list_rooms(self, belief: Hypothesis) -> list[str]:
         """The rooms of the floor, the nearest to the last belief first: nobody is carried off to another floor."""
         world, here = self._robot.world, belief.world_from_robot(self._robot.world)
         container, level_m = world.locale(belief.locale).parent or belief.locale, world.floor_m(belief.locale)
@@ -147,12 +148,12 @@ class Relocalizer(RobotKnowledgeSource):
         away = [(_distance(world.outline(name), here), name) for name in rooms]
         return [name for _, name in sorted(away)[:self._settings.goal.max_rooms]]
 
-    def _found(
+    def _adopt(
         self, view: View, seen: tuple[Entry[Segments], Effect], lost: Entry[Discrepancy], belief: Entry[Hypothesis],
         candidate: Candidate,
     ) -> Iterable[Effect]:
         """The belief is corrected, and a new top-level goal takes the place of the old one (§2)."""
-        here = Revise(belief, self._hypothesis(candidate, belief.value, "held", 1.0), (*seen, lost, belief))
+        here = Revise(belief, self._to_hypothesis(candidate, belief.value, "held", 1.0), (*seen, lost, belief))
         yield here
         yield Revise(lost, lost.value.corrected(), (here,))
         for level in (Level.ACTION, Level.PLAN):
@@ -168,7 +169,7 @@ class Relocalizer(RobotKnowledgeSource):
         origin = Place.of_world(self._robot.world, candidate.room, pose.x_m, pose.y_m)
         yield Post(Goal(origin, goal.value.destination), (here, abandon))
 
-    def _hypothesis(self, candidate: Candidate, belief: Hypothesis, status: str, weight: float) -> Hypothesis:
+    def _to_hypothesis(self, candidate: Candidate, belief: Hypothesis, status: str, weight: float) -> Hypothesis:
         return Hypothesis.of_world(
             self._robot.world, candidate.room, candidate.world_from_robot, candidate.covariance, "relocalization",
             status=status, weight=weight, motion=belief.motion, evidence=str(candidate.likelihood),
@@ -181,7 +182,7 @@ def _has_just_ridden(view: View) -> bool:
                        and s.subgoals[s.at - 1].is_ride) is not None
 
 
-def _in_words(result: LocalizationResult) -> str:
+def _describe(result: LocalizationResult) -> str:
     places = " or ".join(f"{c.room} ({c.weight:.0%})" for c in result.candidates)
     if result.status is LocalizationStatus.FOUND:
         return f"it is {places}, which stands alone"

@@ -1,4 +1,4 @@
-"""Escalator (§2, Figure 2): a discrepancy that its level may not correct goes one level up, but not for ever."""
+"""Escalator (§2, Figure 2): passes a discrepancy beyond its bound to the level above, a limited number of times."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ GIVEN_UP: Mapping[Level, tuple[str, str]] = {
     Level.PLAN: ("blocked", "on the way to one place it was not as expected {times} times, the last one:"),
     Level.GOAL: ("lost", "lost {times} times, the last one:"),
 }
-"""How it ends when a level was asked too often, and why."""
+"""The outcome when a level was asked too often, and its reason."""
 
 
 class Escalator(RobotKnowledgeSource):
-    """Closes a discrepancy beyond its bound and re-posts it one level up, to be measured anew there; when that was done
-    too often for the same thing, it ends the mission.
+    """Closes a discrepancy beyond its bound and posts it one level up; after too many, it ends the mission.
 
-    So the same failure is not answered in the same way for ever: each level is asked only so often.
+    The level above measures it by its own means. As each level is asked only so often, the same failure is not answered
+    in the same way for ever.
     """
 
     level = Level.PLAN
@@ -37,7 +37,7 @@ class Escalator(RobotKnowledgeSource):
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         closed, raised = trigger.entry.value.escalated()
-        tried, last = _tried(view, raised.level), last_escalated(view, closed.level)
+        tried, last = _describe_attempt(view, raised.level), last_escalated(view, closed.level)
         times = 1 + (last.value.times if last is not None and last.value.tried == tried else 0)
         close = Revise(trigger.entry, replace(closed, tried=tried, times=times), trigger.entry.because)
         yield close
@@ -49,7 +49,7 @@ class Escalator(RobotKnowledgeSource):
             yield Post(Outcome(kind, f"{why.format(times=times)} {closed.what}"), (close,))
 
 
-def _tried(view: View, level: Level) -> str:
-    """What is being tried: to reach the end of a subgoal, or, for the goal level, the mission."""
+def _describe_attempt(view: View, level: Level) -> str:
+    """What the robot is at: a subgoal for the plan level, the mission for the goal level."""
     sketch = deepest_sketch(view) if level is Level.PLAN else None
     return "the mission" if sketch is None else f"subgoal {sketch.value.at} of {sketch.id}"

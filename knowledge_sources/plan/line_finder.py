@@ -1,4 +1,4 @@
-"""Line finder (§1.2): straight line segments of a picture that was asked for."""
+"""Line finder (§1.2): straight line segments of a picture."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from world_models.robot import RobotModel
 
 
 class LineFinder(RobotKnowledgeSource):
-    """Finds the segments of a frame in which a milestone, or the way back from being lost, is looked for.
+    """Finds the line segments of a frame that was taken for a milestone or for relocalization.
 
-    It looks at the whole frame, not only where lines are expected: how much agrees by chance must be known too.
+    It searches the whole frame, not only where lines are expected: agreement by chance must be counted too.
     """
 
     level = Level.PLAN

@@ -1,4 +1,4 @@
-"""Matcher (§6.1): which of the segments show which of the lines that a milestone expects."""
+"""Matcher (§6.1): which segments show which of the lines that a milestone expects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
 from knowledge_sources.methods.matching import FloorMatch, Match, match_lines, match_on_floor
-from knowledge_sources.questions import held
+from knowledge_sources.questions import find_belief
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, Segments
@@ -24,10 +24,10 @@ Floats = NDArray[np.float64]
 
 
 class Matcher(RobotKnowledgeSource):
-    """Matches the projected model to the data lines before any pose is solved for.
+    """Matches the lines that a milestone expects to the segments of the picture.
 
-    The search, its objective and its start are §6.1's. Where the belief is sure enough the model is fitted as a rigid
-    figure in the image; where it is not, as a picture taken from a place on the floor near the believed one.
+    Search, objective and starts are §6.1's. Where the belief is sure enough, the projected model is fitted as a rigid
+    figure in the image; else it is fitted by a pose on the floor near the believed one.
     """
 
     level = Level.PLAN
@@ -36,10 +36,10 @@ class Matcher(RobotKnowledgeSource):
 
     def rate(self, view: View, trigger: Change) -> float | None:
         milestone = view.get(trigger.entry.value.milestone)
-        return 0.8 if milestone is not None and milestone.value.status == "expected" and held(view) else None
+        return 0.8 if milestone is not None and milestone.value.status == "expected" and find_belief(view) else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        segments, belief = trigger.entry, held(view)
+        segments, belief = trigger.entry, find_belief(view)
         milestone = view[segments.value.milestone]
         if belief is None:
             return
@@ -51,7 +51,7 @@ class Matcher(RobotKnowledgeSource):
             yield Post(LineMatch(milestone.id, segments.id, none, frozen(lines_world), frozen(data_px[:0]), 0.0,
                                  frozen(np.zeros(0))), (segments, milestone, belief))
             return
-        found = self._found(m, lines_world, data_px, belief.value)
+        found = self._match(m, lines_world, data_px, belief.value)
         pairs = np.asarray(found.pairs, np.int64).reshape(-1, 2)
         yield Post(
             LineMatch(
@@ -61,7 +61,7 @@ class Matcher(RobotKnowledgeSource):
             (segments, milestone, belief),
         )
 
-    def _found(
+    def _match(
         self, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
     ) -> Match | FloorMatch:
         s = self._settings.plan

@@ -1,4 +1,4 @@
-"""Med-R-and-T (§6.2.4): the robot's pose from matched lines of which some are matched wrongly."""
+"""Med-R-and-T (§6.2.4): the robot's pose from line matches with outliers, by least median of squares."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
 from knowledge_sources.methods.pose import planar_from_lines
-from knowledge_sources.questions import held
+from knowledge_sources.questions import find_belief
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.percepts import LineMatch, PoseFix
 from world_models.entries.task import Milestone
@@ -19,10 +19,10 @@ from world_models.frames import frozen
 
 
 class MedRAndT(RobotKnowledgeSource):
-    """Solves for the pose on the floor, and says which pairs do not agree with it.
+    """Solves for the pose on the floor, and names the pairs that are outliers.
 
-    The mounting of the camera is known (§3.2), so three of the six unknowns of §6.2 are left. Subsets of lines propose,
-    all lines judge, and those that agree decide together.
+    The mounting of the camera is known (§3.2), so three of the six unknowns of §6.2 are left. Subsets of lines propose
+    poses, the median residual of all lines chooses one, and the inliers refine it.
     """
 
     level = Level.PLAN
@@ -30,10 +30,10 @@ class MedRAndT(RobotKnowledgeSource):
     writes = (PoseFix,)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        return 0.8 if held(view) is not None else None
+        return 0.8 if find_belief(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        match, belief, milestone = trigger.entry, held(view), view.get(trigger.entry.value.milestone)
+        match, belief, milestone = trigger.entry, find_belief(view), view.get(trigger.entry.value.milestone)
         if belief is None or milestone is None:
             return
         m: Milestone = milestone.value

@@ -1,4 +1,4 @@
-"""Milestone judge (§4, §6): verified, refuted or not testable, with the evidence."""
+"""Milestone judge (§4, §6): a milestone is verified, refuted or not testable, with the evidence."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from knowledge_sources.methods.verification.line_check import LineCheck, check_l
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.methods.verification.pose_evidence import compute_evidence, compute_motion_tolerance_px
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
-from knowledge_sources.questions import has_followed, held, open_discrepancy, standing_in
+from knowledge_sources.questions import find_belief, has_followed, open_discrepancy, robot_in
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Frame
 from world_models.entries.location import Hypothesis
@@ -76,12 +76,12 @@ class Verdict:
 
 
 class MilestoneJudge(RobotKnowledgeSource):
-    """Certifies a milestone from a pose fix, and posts by how much what was expected and what was seen differ.
+    """Certifies a milestone from a pose fix, and posts how far the picture differs from what was expected.
 
-    Lines and the colours of faces speak for the pose
-    (:class:`knowledge_sources.methods.verification.pose_evidence.PoseEvidence`); what they are worth was counted on
-    rendered floors. A deviation may be as large as the wheels are known to err since the belief was sure; where
-    something happened that they do not explain, as large as the matcher looks (§6.1.4).
+    The evidence are lines and the colours of faces
+    (:class:`knowledge_sources.methods.verification.pose_evidence.PoseEvidence`), weighted as fitted on rendered floors.
+    The largest deviation is what the wheels can do since the belief was sure; where the belief is in doubt, it is the
+    matcher's window (§6.1.4).
     """
 
     level = Level.PLAN
@@ -116,8 +116,8 @@ class MilestoneJudge(RobotKnowledgeSource):
         match: LineMatch = view[fix.match].value
         segments: Segments = view[match.segments].value
         frame: Frame = view[segments.frame].value
-        pose, belief = fix.world_from_robot, held(view)
-        robot = self._robot if belief is None else standing_in(view, self._robot, belief.value.locale)
+        pose, belief = fix.world_from_robot, find_belief(view)
+        robot = self._robot if belief is None else robot_in(view, self._robot, belief.value.locale)
         before = pose if belief is None else belief.value.world_from_robot(robot.world)
         covariance = fix.covariance if belief is None else belief.value.covariance_world(robot.world)
         lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
@@ -131,7 +131,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         covariance = covariance + fix.covariance
         motion_px = compute_motion_tolerance_px(robot, lines, before, covariance, s.verification)
         tolerance_px = s.action.min_tolerance_px + motion_px
-        is_sure = POSE_CONFIDENCE.accepts(p_false)  # so much agrees only at the right place, whatever the wheels did
+        is_sure = POSE_CONFIDENCE.accepts(p_false)  # so much agrees at the right place only
         if is_sure or in_doubt:
             tolerance_px = s.plan.max_deviation_px
         p_wrong = s.plan.p_wrong_followed if followed else s.plan.p_wrong_unfollowed

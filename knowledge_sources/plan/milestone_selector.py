@@ -1,4 +1,4 @@
-"""Milestone selector (§3.3, §4): which landmarks should be seen where, and from which direction they tell most."""
+"""Milestone selector (§3.3, §4): chooses the view for a milestone, and predicts its landmarks."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from knowledge_sources.methods.verification.view_quality import ViewQuality, compute_view_quality
 from knowledge_sources.questions import (
     deepest_sketch,
+    find_belief,
     has_followed,
-    held,
     is_over,
-    is_settled,
+    is_standing,
     open_discrepancy,
     open_milestone,
-    standing_in,
+    robot_in,
     unmeasured_doubt,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -44,11 +44,11 @@ from world_models.visibility.lines_and_points import VisibleLines
 
 
 class MilestoneSelector(RobotKnowledgeSource):
-    """Says what should be seen before a subgoal (M0 first), and asks to look.
+    """Predicts what should be seen before a subgoal (M0 first), and asks for the picture.
 
-    It prefers the view that the robot has, then the one it will have next, then the one that would tell most; where a
-    view could not be told, another one is tried. It also checks the belief in between when tracking could not explain
-    what it saw, first in the view that it has. What was just found to stand before the camera is not looked behind.
+    It prefers the present view, then the next one on the way, then the one that tells the place best. Where a view was
+    not testable, it tries another. It also checks the belief when tracking failed, first in the present view. What an
+    obstruction hides is not expected.
     """
 
     level = Level.PLAN
@@ -63,34 +63,34 @@ class MilestoneSelector(RobotKnowledgeSource):
 
     def rate(self, view: View, trigger: Change) -> float | None:
         if isinstance(trigger.entry.value, Obstruction):
-            return 0.9 if held(view) is not None and _awaited(view) is not None else None
-        task = self._task(view)
+            return 0.9 if find_belief(view) is not None and _awaited_milestone(view) is not None else None
+        task = self._find_task(view)
         if task is None:
             return None
         return 0.7 if isinstance(task.value, Discrepancy) else 0.5
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief = held(view)
+        belief = find_belief(view)
         if belief is None:
             return
         if isinstance(trigger.entry.value, Obstruction):
-            yield from self._expected_anew(view, trigger.entry, belief)
+            yield from self._expect_again(view, trigger.entry, belief)
             return
-        task, waiting = self._task(view), open_milestone(view)
+        task, waiting = self._find_task(view), open_milestone(view)
         if task is None:
             return
         if isinstance(task.value, PlanSketch):
-            yield from self._proposed(view, task, belief)
+            yield from self._propose(view, task, belief)
         elif waiting is None:
-            yield from self._checked(view, task, belief)
+            yield from self._check_belief(view, task, belief)
         else:
             here = replace(waiting.value, look_heading_rad=self._heading(belief.value))
-            yield from self._looked_for(view, waiting, here, task, belief, _car_of(view.get(here.sketch), here.index))
+            yield from self._look_for(view, waiting, here, task, belief, _car_of(view.get(here.sketch), here.index))
 
-    def _task(self, view: View) -> Entry[Any] | None:
-        """What asks for a look now: a doubt, a milestone that is faced, or a sketch whose milestone is due."""
-        belief, waiting = held(view), open_milestone(view)
-        if belief is None or is_over(view) or not is_settled(view) or open_discrepancy(view, Level.GOAL) is not None:
+    def _find_task(self, view: View) -> Entry[Any] | None:
+        """What needs a look now: a doubt, a milestone that is faced, or a sketch whose milestone is due."""
+        belief, waiting = find_belief(view), open_milestone(view)
+        if belief is None or is_over(view) or not is_standing(view) or open_discrepancy(view, Level.GOAL) is not None:
             return None
         if waiting is not None and waiting.value.status == "expected":
             return None
@@ -102,49 +102,49 @@ class MilestoneSelector(RobotKnowledgeSource):
         sketch = deepest_sketch(view)
         return sketch if sketch is not None and not sketch.value.verified else None
 
-    def _checked(self, view: View, doubt: Entry[Discrepancy], belief: Entry[Hypothesis]) -> Iterable[Effect]:
-        """A look in between: in the view that the robot has, and if it could not be told, in another one from here."""
-        tried = _tried(view, lambda m: m.cycle >= doubt.cycle)
+    def _check_belief(self, view: View, doubt: Entry[Discrepancy], belief: Entry[Hypothesis]) -> Iterable[Effect]:
+        """Check the belief in the present view; if that was not testable, in another one."""
+        tried = _tried_headings(view, lambda m: m.cycle >= doubt.cycle)
         check = Milestone("", -1, f"check of the belief, because {doubt.value.what}", self._heading(belief.value),
                           tried=tried)
         if not tried:
-            yield from self._looked_for(view, None, check, doubt, belief)
+            yield from self._look_for(view, None, check, doubt, belief)
             return
-        robot, pose = self._standing(view, belief.value)
-        headings = self._otherwise(self._turned(pose), tried) or [pose.heading_rad]
-        heading = best_heading(robot, pose, headings, self._settings.plan.check_tolerance_m, settings=self._settings)
+        robot, pose = self._robot_and_pose(view, belief.value)
+        headings = self._find_untried(self._turned_headings(pose), tried) or [pose.heading_rad]
+        heading = choose_heading(robot, pose, headings, self._settings.plan.check_tolerance_m, settings=self._settings)
         yield Post(replace(check, look_heading_rad=heading), (doubt, belief))
 
-    def _expected_anew(
+    def _expect_again(
         self, view: View, hidden: Entry[Obstruction], belief: Entry[Hypothesis]
     ) -> Iterable[Effect]:
-        """The milestone whose picture was taken, without what is hidden in it."""
-        waiting = _awaited(view)
+        """Predict a milestone again whose picture is taken, without what the obstruction hides."""
+        waiting = _awaited_milestone(view)
         if waiting is None:
             return
-        m, (robot, pose) = waiting.value, self._standing(view, belief.value)
-        seen = expectation(robot, pose, m, _car_of(view.get(m.sketch), m.index), self._settings)
+        m, (robot, pose) = waiting.value, self._robot_and_pose(view, belief.value)
+        seen = predict_milestone(robot, pose, m, _car_of(view.get(m.sketch), m.index), self._settings)
         yield Revise(waiting, seen, (hidden, waiting, belief))
 
-    def _proposed(self, view: View, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
-        """The milestone before the sketch's next subgoal, seen from the first direction that is good enough."""
-        robot, pose = self._standing(view, belief.value)
+    def _propose(self, view: View, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
+        """Propose the milestone before the sketch's next subgoal, seen in the first good direction."""
+        robot, pose = self._robot_and_pose(view, belief.value)
         s = sketch.value
-        tried = _tried(view, lambda m: (m.value.sketch, m.value.index) == (sketch.id, s.at))
-        heading = self._direction(robot, s, pose, tried)
+        tried = _tried_headings(view, lambda m: (m.value.sketch, m.value.index) == (sketch.id, s.at))
+        heading = self._choose_direction(robot, s, pose, tried)
         milestone = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}", heading, tried=tried)
         if self._faces(belief.value, milestone):
-            yield from self._looked_for(view, None, milestone, sketch, belief, _car_of(sketch, s.at))
+            yield from self._look_for(view, None, milestone, sketch, belief, _car_of(sketch, s.at))
         else:
             yield Post(milestone, (sketch, belief))
 
-    def _looked_for(
+    def _look_for(
         self, view: View, old: Entry[Milestone] | None, milestone: Milestone, task: Entry[Any],
         belief: Entry[Hypothesis], car: str = "",
     ) -> Iterable[Effect]:
-        """Predict the landmarks from the believed pose, but those in a car, and ask for the picture."""
-        hidden, (robot, pose) = view.latest(Obstruction), self._standing(view, belief.value)
-        expected = expectation(robot, pose, milestone, car, self._settings)
+        """Predict the landmarks from the believed pose, without those of an elevator's car, and ask for the picture."""
+        hidden, (robot, pose) = view.latest(Obstruction), self._robot_and_pose(view, belief.value)
+        expected = predict_milestone(robot, pose, milestone, car, self._settings)
         if not has_followed(view, self._settings.action) or open_discrepancy(view, Level.PLAN) is not None:
             precompute_views(robot, belief.value.locale, pose, self._settings)  # the judge asks: another door?
         because = (task, belief) if hidden is None else (task, belief, hidden)
@@ -152,13 +152,13 @@ class MilestoneSelector(RobotKnowledgeSource):
         yield wish
         yield Post(Look("milestone"), (wish,))
 
-    def _direction(self, robot: RobotModel, sketch: PlanSketch, pose: Pose2, tried: Sequence[float]) -> float:
+    def _choose_direction(self, robot: RobotModel, sketch: PlanSketch, pose: Pose2, tried: Sequence[float]) -> float:
         before = sketch.subgoals[sketch.at - 1] if sketch.at else None
-        headings = self._otherwise(self._candidates(sketch, pose), tried)
+        headings = self._find_untried(self._candidate_headings(sketch, pose), tried)
         tolerance_m = before.tolerance_m if before else self._settings.plan.check_tolerance_m
-        return best_heading(robot, pose, headings, tolerance_m, _car(sketch, sketch.at), self._settings)
+        return choose_heading(robot, pose, headings, tolerance_m, _car(sketch, sketch.at), self._settings)
 
-    def _candidates(self, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
+    def _candidate_headings(self, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
         wanted = sketch.subgoals[sketch.at - 1].destination if sketch.at else None
         if wanted is not None and wanted.heading_rad is not None:
             yield wanted.in_world(self._robot.world).heading_rad
@@ -166,20 +166,20 @@ class MilestoneSelector(RobotKnowledgeSource):
         if sketch.current is not None:
             end = sketch.current.destination.in_world(self._robot.world)
             yield math.atan2(end.y_m - pose.y_m, end.x_m - pose.x_m)
-        yield from self._turned(pose)
+        yield from self._turned_headings(pose)
 
-    def _turned(self, pose: Pose2) -> Iterator[float]:
+    def _turned_headings(self, pose: Pose2) -> Iterator[float]:
         """The headings that are tried for a better view [rad, world]."""
         return (wrap_angle(pose.heading_rad + turn) for turn in self._settings.plan.look_turns_rad)
 
-    def _otherwise(self, headings: Iterable[float], tried: Sequence[float]) -> list[float]:
-        """Those that show something else than what was tried."""
+    def _find_untried(self, headings: Iterable[float], tried: Sequence[float]) -> list[float]:
+        """The headings whose views differ from those that were tried."""
         least = self._settings.plan.min_look_difference_rad
         return [h for h in headings if all(abs(wrap_angle(h - other)) > least for other in tried)]
 
-    def _standing(self, view: View, belief: Hypothesis) -> tuple[RobotModel, Pose2]:
-        """The robot where it believes that it stands, and its pose there in the world."""
-        return standing_in(view, self._robot, belief.locale), belief.world_from_robot(self._robot.world)
+    def _robot_and_pose(self, view: View, belief: Hypothesis) -> tuple[RobotModel, Pose2]:
+        """The robot's model on its floor, and the believed pose in the world."""
+        return robot_in(view, self._robot, belief.locale), belief.world_from_robot(self._robot.world)
 
     def _heading(self, belief: Hypothesis) -> float:
         return belief.world_from_robot(self._robot.world).heading_rad
@@ -189,8 +189,8 @@ class MilestoneSelector(RobotKnowledgeSource):
         return abs(error) <= self._settings.plan.max_look_error_rad
 
 
-def _awaited(view: View) -> Entry[Milestone] | None:
-    """The milestone whose picture was asked for and is not judged yet."""
+def _awaited_milestone(view: View) -> Entry[Milestone] | None:
+    """The milestone whose picture was asked for and is not judged."""
     waiting = open_milestone(view)
     return waiting if waiting is not None and waiting.value.status == "expected" else None
 
@@ -200,27 +200,27 @@ def _car_of(sketch: Entry[PlanSketch] | None, index: int) -> str:
 
 
 def _car(sketch: PlanSketch, index: int) -> str:
-    """The elevator's car in which the subgoal before a milestone ends, after a ride: it looks alike on every floor."""
+    """The elevator's car in which a ride before a milestone ends, or "": it looks the same on every floor."""
     before = sketch.subgoals[index - 1] if index > 0 else None
     return before.destination.locale if before is not None and before.is_ride else ""
 
 
-def _tried(view: View, is_same: Callable[[Entry[Milestone]], bool]) -> tuple[float, ...]:
-    """From where the last milestone, if it is the same one, was looked for in vain."""
+def _tried_headings(view: View, is_same: Callable[[Entry[Milestone]], bool]) -> tuple[float, ...]:
+    """The headings in which the last milestone, if it is the same one, was not testable."""
     last = view.latest(Milestone)
     if last is None or last.value.status != "not testable" or not is_same(last):
         return ()
     return (*last.value.tried, last.value.look_heading_rad)
 
 
-def best_heading(
+def choose_heading(
     robot: RobotModel, pose: Pose2, headings: Iterable[float], tolerance_m: float, car: str = "",
     settings: Settings = DEFAULT,
 ) -> float:
-    """The first heading from which the view is good enough for the tolerance, else the best [rad, world]."""
+    """The first heading whose view is good enough for a tolerance, else the best one [rad, world]."""
     rated: list[tuple[ViewQuality, float]] = []
     for heading in headings:
-        quality = _quality(robot, Pose2(pose.x_m, pose.y_m, heading), car, settings)
+        quality = _compute_quality(robot, Pose2(pose.x_m, pose.y_m, heading), car, settings)
         if is_good_view(quality, tolerance_m, settings.plan):
             return heading
         rated.append((quality, heading))
@@ -234,31 +234,31 @@ def is_good_view(quality: ViewQuality, tolerance_m: float, settings: PlanSetting
     return sharp and quality.lines >= settings.min_lines
 
 
-def expectation(
+def predict_milestone(
     robot: RobotModel, pose: Pose2, milestone: Milestone, car: str = "", settings: Settings = DEFAULT
 ) -> Milestone:
-    """The milestone with what should be seen from a pose; in an elevator's car, what is seen out of it."""
-    lines = _seen_from(robot, pose, car, settings)
+    """The milestone with the lines and colours that should be seen from a pose, without those of ``car``."""
+    lines = _predict_clear_lines(robot, pose, car, settings)
     marks = sorted({int(i) for i in lines.landmark})
     return replace(
         milestone,
         landmarks=tuple(robot.world.landmarks[i].name for i in marks),
-        expected=_nested(lines.lines_world),
-        expected_px=_nested(lines.segments_px),
+        expected=_to_tuples(lines.lines_world),
+        expected_px=_to_tuples(lines.segments_px),
         landmark_of=tuple(marks.index(int(i)) for i in lines.landmark),
         looks=predict_face_colors(robot, pose, settings.verification),
         status="expected",
     )
 
 
-def _quality(robot: RobotModel, pose: Pose2, car: str, settings: Settings) -> ViewQuality:
-    lines = _seen_from(robot, pose, car, settings)
+def _compute_quality(robot: RobotModel, pose: Pose2, car: str, settings: Settings) -> ViewQuality:
+    lines = _predict_clear_lines(robot, pose, car, settings)
     return compute_view_quality(
         lines.lines_world, robot.camera, robot.mount.camera_from_robot, pose, settings.features.sigma_across_px)
 
 
-def _seen_from(robot: RobotModel, pose: Pose2, car: str, settings: Settings) -> VisibleLines:
-    """The clearest of the lines that should be seen, long ones with contrast, but none of those in a car."""
+def _predict_clear_lines(robot: RobotModel, pose: Pose2, car: str, settings: Settings) -> VisibleLines:
+    """The clearest lines that should be seen from a pose, long ones with contrast, without those of ``car``."""
     lines = predict_lines(robot, pose, settings.verification)
     if car:
         marks = robot.world.landmarks
@@ -271,5 +271,5 @@ def _seen_from(robot: RobotModel, pose: Pose2, car: str, settings: Settings) -> 
     return lines[np.sort(np.argsort(-clear, kind="stable")[:s.max_lines])]
 
 
-def _nested(array: NDArray[np.float64]) -> tuple[tuple[tuple[float, ...], ...], ...]:
+def _to_tuples(array: NDArray[np.float64]) -> tuple[tuple[tuple[float, ...], ...], ...]:
     return tuple(tuple(map(tuple, line)) for line in array.tolist())

@@ -1,4 +1,4 @@
-"""Obstruction finder (§4: a model is incomplete, and so is a view): what hides a part of every picture of a place."""
+"""Obstruction finder (§4: models are incomplete): what stands before the camera and hides a part of each picture."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from world_models.frames import Pose2
 
 
 class ObstructionFinder(RobotKnowledgeSource):
-    """Finds what stands still in the last looks for milestones, in several directions, before the new one is judged.
+    """Finds what is at the same place in pictures taken in several directions: it is before the camera.
 
-    It asks when a view could not be told, or the belief is in doubt: where nothing is hidden all is as expected. While
-    the robot is lost the relocalizer asks the same of its probes.
+    It acts when a milestone was not testable or the belief is in doubt, before the new picture is judged. While the
+    robot is lost, the relocalizer does the same with its own pictures.
     """
 
     level = Level.PLAN
@@ -38,28 +38,28 @@ class ObstructionFinder(RobotKnowledgeSource):
         milestone = view.get(trigger.entry.value.milestone)
         if milestone is None or not (milestone.value.tried or unmeasured_doubt(view) is not None):
             return None
-        return 0.9 if self._news(view) is not None else None
+        return 0.9 if self._find_change(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        news = self._news(view)
+        news = self._find_change(view)
         if news is not None:
             yield news
 
-    def _news(self, view: View) -> Effect | None:
-        """What the last looks say that the board does not."""
-        looks, known = _looks(view, self._settings.plan.max_obstruction_looks), view.latest(Obstruction)
+    def _find_change(self, view: View) -> Effect | None:
+        """The obstruction in the last looks, as an effect where the board does not say it."""
+        looks, known = _list_last_looks(view, self._settings.plan.max_obstruction_looks), view.latest(Obstruction)
         views = [CameraView(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
                  for s, heading_rad in looks]
         if len(views) < self._settings.plan.min_obstruction_looks:
             return None
-        now = _seen_by_the_last(views, self._robot.camera, None if known is None else known.value, self._settings)
+        now = _find_in_last_looks(views, self._robot.camera, None if known is None else known.value, self._settings)
         return to_say(known, now, (*(s for s, _ in looks), *(() if known is None else (known,))))
 
 
-def _seen_by_the_last(
+def _find_in_last_looks(
     views: Sequence[CameraView], camera: Camera, known: Obstruction | None, settings: Settings
 ) -> Obstruction | None:
-    """What all looks show, the last first; else what fewer of them do, as it was not there in the earlier ones."""
+    """The obstruction that all looks show; else that fewer of the last ones show, as it may be new."""
     for number in range(len(views), settings.plan.min_obstruction_looks - 1, -1):
         found = update_obstruction(
             views[:number], camera, known, settings.plan.min_obstruction_part, settings.localization)
@@ -68,10 +68,10 @@ def _seen_by_the_last(
     return None
 
 
-def _looks(view: View, most: int) -> list[tuple[Entry[Segments], float]]:
-    """The last looks for milestones, each with the direction in which it was taken [rad, world].
+def _list_last_looks(view: View, most: int) -> list[tuple[Entry[Segments], float]]:
+    """The last looks for milestones, each with its heading [rad, world], the newest first.
 
-    None from before the goal: the robot was lost then, and did not know in which direction it looked.
+    None is older than the goal: when lost, the robot did not know its heading.
     """
     goal = active_goal(view)
     since = 0 if goal is None else goal.cycle

@@ -1,4 +1,4 @@
-"""Plan adjuster (§6): a milestone that is slightly off corrects where the robot believes it is, and so the sketch."""
+"""Plan adjuster (§6): corrects the belief by the pose of a verified milestone."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.questions import held, open_discrepancy
+from knowledge_sources.questions import find_belief, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import PoseFix
@@ -17,7 +17,7 @@ from world_models.entries.task import Certificate
 
 
 class PlanAdjuster(RobotKnowledgeSource):
-    """Takes over the pose of a verified milestone that deviates within the plan level's bound: closes the plan loop."""
+    """Replaces the belief by the pose of a verified milestone, within the plan level's bound."""
 
     level = Level.PLAN
     closes = Level.PLAN
@@ -26,10 +26,10 @@ class PlanAdjuster(RobotKnowledgeSource):
 
     def rate(self, view: View, trigger: Change) -> float | None:
         found = open_discrepancy(view, Level.PLAN)
-        return 0.9 if found is not None and not found.value.exceeds and held(view) is not None else None
+        return 0.9 if found is not None and not found.value.exceeds and find_belief(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, found, fix = held(view), open_discrepancy(view, Level.PLAN), view.get(trigger.entry.value.fix)
+        belief, found, fix = find_belief(view), open_discrepancy(view, Level.PLAN), view.get(trigger.entry.value.fix)
         if belief is None or found is None or fix is None:
             return
         pose_fix: PoseFix = fix.value

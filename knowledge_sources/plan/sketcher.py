@@ -1,4 +1,4 @@
-"""Sketcher (§3.3, §4): plan sketches, drawn lazily and depth first, adjusted when a milestone is slightly off."""
+"""Sketcher (§3.3, §4): plan sketches, drawn lazily and depth first, and adjusted at milestones."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from knowledge_sources.methods.motion.routes import (
     measure_thing_distance_m,
     measure_wall_distance_m,
 )
-from knowledge_sources.questions import held
+from knowledge_sources.questions import find_belief
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.locales import Link, Passage
@@ -34,10 +34,10 @@ from world_models.robot import RobotModel
 
 
 class Sketcher(RobotKnowledgeSource):
-    """Draws (M0 (ptrans a b) M1 ... Mg) for a goal, then for the subgoal at hand, until that is primitive (Figure 9).
+    """Draws (M0 (ptrans a b) M1 ... Mg) for a goal, then for the current subgoal, until that is primitive (Figure 9).
 
-    Triggers: a new goal; a verified milestone (go on, refine, or repeat a subgoal whose end is slightly off); a leg
-    that has arrived; a sketch that is done.
+    It acts on a new goal, a verified milestone (go on, refine, or repeat a subgoal whose end was missed), a leg that
+    has arrived, and a sketch that is done.
     """
 
     level = Level.PLAN
@@ -52,12 +52,12 @@ class Sketcher(RobotKnowledgeSource):
     def __init__(self, robot: RobotModel, settings: Settings = DEFAULT) -> None:
         super().__init__(robot, settings)
         self._world, self._plan = robot.world, settings.plan
-        self._frees: dict[tuple[str, float], Geometry] = {}
+        self._free_spaces: dict[tuple[str, float], Geometry] = {}
 
     def rate(self, view: View, trigger: Change) -> float | None:
         value = trigger.entry.value
         if isinstance(value, Goal):
-            return 0.8 if held(view) else None
+            return 0.8 if find_belief(view) else None
         return 0.6 if self._sketch_of(view, value) else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
@@ -71,12 +71,12 @@ class Sketcher(RobotKnowledgeSource):
             if sketch is not None and isinstance(value, Leg):
                 yield Revise(sketch, sketch.value.advanced(), (trigger.entry,))
             elif sketch is not None:
-                yield from self._verified(view, trigger.entry, sketch)
+                yield from self._continue(view, trigger.entry, sketch)
 
     def _sketch_of(self, view: View, value: Milestone | Leg | PlanSketch) -> Entry[PlanSketch] | None:
         """The active sketch that a milestone or a leg belongs to; for a sketch that is done, its parent."""
         if isinstance(value, PlanSketch):
-            return _parent(view, value) if value.path else _goal_sketch(view, value)
+            return _find_parent(view, value) if value.path else _find_goal_sketch(view, value)
         entry = view.get(value.sketch)
         if entry is None or not entry.value.is_active or entry.value.at != value.index:
             return None
@@ -86,27 +86,27 @@ class Sketcher(RobotKnowledgeSource):
         """The first level: from locale to locale; sketches for earlier goals are superseded (§2)."""
         for old in view.where(PlanSketch, lambda s: s.is_active):
             yield Revise(old, replace(old.value, status="superseded"), (goal,))
-        belief = held(view)
+        belief = find_belief(view)
         if belief is None:
             return
-        here = _place(belief.value)
+        here = _place_of(belief.value)
         unfit = self._why_not_at(goal.value.destination)
         if unfit:
             yield Post(Outcome("blocked", f"the goal {goal.value.destination} {unfit}"), (goal, belief))
             return
-        subgoals = self._between_locales(here, goal.value.destination, self._plan.goal_tolerance_m)
+        subgoals = self._plan_between_locales(here, goal.value.destination, self._plan.goal_tolerance_m)
         if subgoals is None:
             yield Post(Outcome("blocked", self._why_not(here.locale, goal.value.destination.locale)), (goal, belief))
         else:
             yield Post(PlanSketch(goal.id, (), "", subgoals), (goal, belief))
 
-    def _verified(self, view: View, milestone: Entry[Milestone], sketch: Entry[PlanSketch]) -> Iterable[Effect]:
-        """The milestone before subgoal ``at`` holds: adjust, finish, or go on to it, refined if it is not primitive."""
-        s, belief = sketch.value, held(view)
+    def _continue(self, view: View, milestone: Entry[Milestone], sketch: Entry[PlanSketch]) -> Iterable[Effect]:
+        """Go on after a verified milestone: adjust, finish, or begin the next subgoal, refined if not primitive."""
+        s, belief = sketch.value, find_belief(view)
         if belief is None:
             return
         if s.at > 0 and self._is_off(belief.value, s.subgoals[s.at - 1]):
-            yield from self._adjusted(milestone, sketch, belief)
+            yield from self._adjust(milestone, sketch, belief)
         elif s.at_end:
             yield Revise(sketch, replace(s, status="done", verified=True), (milestone, belief))
         else:
@@ -114,7 +114,7 @@ class Sketcher(RobotKnowledgeSource):
             yield go
             current = s.subgoals[s.at]
             if not current.primitive and not current.is_ride:
-                yield from self._refined(sketch, current, belief, go)
+                yield from self._refine(sketch, current, belief, go)
 
     def _why_not_at(self, there: Place) -> str:
         """Why the robot cannot stand at a place, as far as it knows; "" where it can."""
@@ -147,10 +147,10 @@ class Sketcher(RobotKnowledgeSource):
         turned = abs(error) > self._plan.goal_heading_tolerance_rad
         return here.distance_to(there) > subgoal.tolerance_m or turned
 
-    def _adjusted(
+    def _adjust(
         self, milestone: Entry[Milestone], sketch: Entry[PlanSketch], belief: Entry[Hypothesis]
     ) -> Iterable[Effect]:
-        """Plan-level servoing: the subgoal is taken up again from where the robot turned out to be (§6)."""
+        """Plan-level servoing: repeat the subgoal from where the robot turned out to be (§6)."""
         s = sketch.value
         if s.adjustments >= self._plan.max_adjustments:
             yield Post(Outcome("blocked", f"{sketch.id} was adjusted {s.adjustments} times in vain"), (milestone,))
@@ -163,15 +163,15 @@ class Sketcher(RobotKnowledgeSource):
         adjusted = replace(s, subgoals=subgoals, at=k, verified=True, adjustments=s.adjustments + 1)
         yield Revise(sketch, adjusted, (milestone, belief))
 
-    def _refined(
+    def _refine(
         self, sketch: Entry[PlanSketch], subgoal: Subgoal, belief: Entry[Hypothesis], go: Revise
     ) -> Iterable[Effect]:
-        """A more detailed sketch for the subgoal at hand, drawn only now that its locale is entered."""
+        """Draw a more detailed sketch for the current subgoal, only now that its locale is entered."""
         s, locale = sketch.value, self._world.common(subgoal.origin.locale, subgoal.destination.locale)
         if subgoal.origin.locale == subgoal.destination.locale:
-            parts = self._across(subgoal, belief.value)
+            parts = self._plan_across(subgoal, belief.value)
         else:
-            parts = self._between_locales(_place(belief.value), subgoal.destination, subgoal.tolerance_m)
+            parts = self._plan_between_locales(_place_of(belief.value), subgoal.destination, subgoal.tolerance_m)
         if parts is None:
             yield Post(Outcome("blocked", f"no way through {locale} to {subgoal.destination}"), (go,))
         else:
@@ -180,7 +180,7 @@ class Sketcher(RobotKnowledgeSource):
     def _close(self, view: View, done: Entry[PlanSketch]) -> Iterable[Effect]:
         """A sketch is done: so is the subgoal of its parent, or the goal itself."""
         if done.value.path:
-            parent = _parent(view, done.value)
+            parent = _find_parent(view, done.value)
             if parent is not None:
                 yield Revise(parent, parent.value.advanced(), (done,))
             return
@@ -188,25 +188,26 @@ class Sketcher(RobotKnowledgeSource):
         if goal is not None and goal.value.is_active:
             yield Revise(goal, replace(goal.value, status="reached"), (done,))
 
-    def _between_locales(self, here: Place, destination: Place, tolerance_m: float) -> tuple[Subgoal, ...] | None:
-        """To a passage, through it, and so on to the destination, at the highest level where they differ (Figure 9)."""
+    def _plan_between_locales(self, here: Place, destination: Place, tolerance_m: float) -> tuple[Subgoal, ...] | None:
+        """Subgoals through each passage to the destination, at the highest level where they differ (Figure 9)."""
         route = self._world.route(here.locale, destination.locale)
         if route is None:
             return None
         subgoals: list[Subgoal] = []
         for step in route.steps:
-            before, behind = (self._before(step.passage, locale) for locale in (step.origin, step.destination))
+            before = self._find_place_before(step.passage, step.origin)
+            behind = self._find_place_before(step.passage, step.destination)
             if before is None or behind is None:
                 return None
-            subgoals.append(self._subgoal(here, before, self._way_tolerance_m(step.passage)))
+            subgoals.append(self._build_subgoal(here, before, self._way_tolerance_m(step.passage)))
             on_wheels = not isinstance(step.passage, Link)  # else it is a ride: there is nothing to drive
             subgoals.append(Subgoal(before, behind, on_wheels, step.passage.name, self._plan.way_tolerance_m))
             here = behind
-        subgoals.append(self._subgoal(here, destination, tolerance_m))
+        subgoals.append(self._build_subgoal(here, destination, tolerance_m))
         return tuple(subgoals)
 
     def _way_tolerance_m(self, passage: Passage) -> float:
-        """How near to the place before a passage the robot must come to pass it straight without touching it."""
+        """Tolerance at the place before a passage, so that the robot passes it straight without contact."""
         if isinstance(passage, Link):
             return self._plan.way_tolerance_m
         beside = passage.width_m / 2 - self._robot.radius_m
@@ -214,44 +215,44 @@ class Sketcher(RobotKnowledgeSource):
             return self._plan.way_tolerance_m
         return max(beside, self._plan.clearances_m[-1])
 
-    def _before(self, passage: Passage, locale: str) -> Place | None:
-        """Where to stand before a passage, or behind it; None where something bars it."""
+    def _find_place_before(self, passage: Passage, locale: str) -> Place | None:
+        """The place from which a passage is passed straight; None where something is in the way."""
         if isinstance(passage, Link):
             x, y, heading = passage.stop_of(locale)
             return Place.of_world(self._world, locale, float(x), float(y), float(heading))
         middle, outward = passage.threshold_of(locale).mean(axis=0), passage.outward_from(locale)
-        free = self._free(locale, self._plan.clearances_m[-1])
+        free = self._free_space(locale, self._plan.clearances_m[-1])
         distances = self._plan.doorway_distances_m
         away = next((m for m in distances if free.covers(Point(middle - m * outward))), distances[0])
         x, y = middle - away * outward
-        if not is_clear(self._free(locale, -self._robot.radius_m), middle, (x, y)):
+        if not is_clear(self._free_space(locale, -self._robot.radius_m), middle, (x, y)):
             return None
         return Place.of_world(self._world, locale, float(x), float(y))
 
-    def _subgoal(self, origin: Place, destination: Place, tolerance_m: float) -> Subgoal:
-        """Primitive where a straight line leads there; between locales it is left to a sketch drawn on the way."""
+    def _build_subgoal(self, origin: Place, destination: Place, tolerance_m: float) -> Subgoal:
+        """A subgoal, primitive where a straight line leads there; between locales a later sketch refines it."""
         if origin.locale != destination.locale:
             return Subgoal(origin, destination, False, tolerance_m=tolerance_m)
         a, b = origin.in_world(self._world), destination.in_world(self._world)
-        free = self._free(destination.locale, self._plan.clearances_m[-1])
+        free = self._free_space(destination.locale, self._plan.clearances_m[-1])
         straight = a.distance_to(b) <= self._plan.max_leg_m and is_clear(free, a.position, b.position)
         return Subgoal(origin, destination, straight, tolerance_m=tolerance_m)
 
-    def _across(self, subgoal: Subgoal, belief: Hypothesis) -> tuple[Subgoal, ...] | None:
-        """Straight legs round the known obstacles of one locale, none longer than ``max_leg_m``."""
+    def _plan_across(self, subgoal: Subgoal, belief: Hypothesis) -> tuple[Subgoal, ...] | None:
+        """Straight legs round the obstacles of one locale, none longer than ``max_leg_m``."""
         locale = subgoal.destination.locale
         here, there = belief.world_from_robot(self._world), subgoal.destination.in_world(self._world)
 
         def floor() -> Geometry:
-            return self._free(locale, -self._robot.radius_m)
+            return self._free_space(locale, -self._robot.radius_m)
 
         for clearance in self._plan.clearances_m:
-            route = find_shortest_route(self._free(locale, clearance), here.position, there.position, floor)
+            route = find_shortest_route(self._free_space(locale, clearance), here.position, there.position, floor)
             if route is not None:
                 break
         else:
             return None
-        points = _divided(route, self._plan.max_leg_m)
+        points = _divide(route, self._plan.max_leg_m)
         places = [Place.of_world(self._world, locale, float(x), float(y)) for x, y in points]
         places[-1] = subgoal.destination
         last = len(places) - 2
@@ -260,20 +261,20 @@ class Sketcher(RobotKnowledgeSource):
             for i, (a, b) in enumerate(pairwise(places))
         )
 
-    def _free(self, locale: str, margin_m: float) -> Geometry:
-        if (locale, margin_m) not in self._frees:
+    def _free_space(self, locale: str, margin_m: float) -> Geometry:
+        if (locale, margin_m) not in self._free_spaces:
             clearance = self._robot.radius_m + margin_m
-            self._frees[locale, margin_m] = compute_free_space(
+            self._free_spaces[locale, margin_m] = compute_free_space(
                 self._world.outline(locale), self._world.obstacles(locale), clearance)
-        return self._frees[locale, margin_m]
+        return self._free_spaces[locale, margin_m]
 
 
-def _place(belief: Hypothesis) -> Place:
-    """Where the robot believes it is, any heading."""
+def _place_of(belief: Hypothesis) -> Place:
+    """The believed place, without a heading."""
     return Place(belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m)
 
 
-def _divided(route: list[NDArray[np.float64]], max_leg_m: float) -> list[NDArray[np.float64]]:
+def _divide(route: list[NDArray[np.float64]], max_leg_m: float) -> list[NDArray[np.float64]]:
     """The same route with way points in between, so that no leg is longer than ``max_leg_m``."""
     points = route[:1]
     for a, b in pairwise(route):
@@ -282,14 +283,14 @@ def _divided(route: list[NDArray[np.float64]], max_leg_m: float) -> list[NDArray
     return points
 
 
-def _parent(view: View, sketch: PlanSketch) -> Entry[PlanSketch] | None:
-    """The active sketch whose current subgoal this one refines."""
+def _find_parent(view: View, sketch: PlanSketch) -> Entry[PlanSketch] | None:
+    """The active sketch whose current subgoal a sketch refines."""
     path = sketch.path
     return view.latest(
         PlanSketch, lambda s: s.is_active and s.goal == sketch.goal and s.path == path[:-1] and s.at == path[-1]
     )
 
 
-def _goal_sketch(view: View, sketch: PlanSketch) -> Entry[PlanSketch] | None:
+def _find_goal_sketch(view: View, sketch: PlanSketch) -> Entry[PlanSketch] | None:
     goal = view.get(sketch.goal)
     return view.latest(PlanSketch, lambda s: s == sketch) if goal is not None and goal.value.is_active else None

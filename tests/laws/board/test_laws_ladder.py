@@ -28,10 +28,10 @@ from harvey.simulation.run import build_robot_model
 from harvey.wiring import KNOWLEDGE_SOURCES
 from knowledge_sources.questions import (
     active_goal,
-    held,
+    find_belief,
     open_discrepancy,
     open_milestone,
-    rolling,
+    rolling_course,
     unmeasured_doubt,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -68,10 +68,10 @@ class ScriptedTracker(RobotKnowledgeSource):
     def rate(self, view: View, trigger: Change) -> float | None:
         if unmeasured_doubt(view) is not None or open_discrepancy(view, Level.GOAL) is not None:
             return None
-        return 0.9 if held(view) is not None else None
+        return 0.9 if find_belief(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, last = held(view), open_discrepancy(view, Level.ACTION)
+        belief, last = find_belief(view), open_discrepancy(view, Level.ACTION)
         found = Discrepancy(Level.ACTION, "landmarks are elsewhere", figure(trigger.entry), (ACTION_PX, PLAN_PX), "px")
         assert belief is not None
         if not found.exceeds:
@@ -88,10 +88,10 @@ class ScriptedJudge(RobotKnowledgeSource):
     writes = (PoseFix, Certificate, Milestone, Discrepancy)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        return 0.8 if held(view) is not None and open_milestone(view) is not None else None
+        return 0.8 if find_belief(view) is not None and open_milestone(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, milestone, last = held(view), open_milestone(view), open_discrepancy(view, Level.PLAN)
+        belief, milestone, last = find_belief(view), open_milestone(view), open_discrepancy(view, Level.PLAN)
         assert belief is not None and milestone is not None
         px = figure(trigger.entry)
         verdict = "not testable" if px == UNTOLD else "verified" if px <= PLAN_PX else "refuted"
@@ -122,10 +122,10 @@ class ScriptedRelocalizer(RobotKnowledgeSource):
     writes = (Look, Hypothesis, Goal, Discrepancy)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        return 0.7 if open_discrepancy(view, Level.GOAL) is not None and held(view) is not None else None
+        return 0.7 if open_discrepancy(view, Level.GOAL) is not None and find_belief(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, lost, goal = held(view), open_discrepancy(view, Level.GOAL), active_goal(view)
+        belief, lost, goal = find_belief(view), open_discrepancy(view, Level.GOAL), active_goal(view)
         assert belief is not None and lost is not None
         if isinstance(trigger.entry.value, Discrepancy):
             yield Post(Look("probe"), (lost,))
@@ -292,7 +292,7 @@ class LadderMachine(RuleBasedStateMachine):
             for level in Level:
                 found = open_discrepancy(ladder.view, level)
                 assert found is None or not found.value.exceeds
-            assert rolling(ladder.view) is None
+            assert rolling_course(ladder.view) is None
         else:
             given_up = ladder.outcome.kind in ("lost", "blocked")
             assert given_up and (lost_before or any(d.times for d in ladder.seen.values()))

@@ -31,7 +31,7 @@ from knowledge_sources.methods.verification.pose_evidence import (
     compute_motion_tolerance_px,
 )
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from knowledge_sources.plan.milestone_selector import expectation
+from knowledge_sources.plan.milestone_selector import predict_milestone
 from sim.made_up.generated_floors import generated_floor
 from sim.render.renderer import Renderer
 from sim.scenario import CameraSettings
@@ -60,7 +60,7 @@ def _place() -> Pose2:
 
 @cache
 def _lines() -> np.ndarray:
-    milestone = expectation(_robot(), _place(), Milestone("", 0, "", 0.2))
+    milestone = predict_milestone(_robot(), _place(), Milestone("", 0, "", 0.2))
     return np.array(milestone.expected)
 
 
