@@ -1,4 +1,4 @@
-"""BuildingPlan between any two rooms of different floors of a university, imported from IndoorGML.
+"""Plan between any two rooms of different floors of a university, imported from IndoorGML.
 
 Three searches: on the graph that came with the file; on the imported world's doorways, stairs and elevators; and
 Harvey's route for wheels, level by level (Figure 9), refined until nothing is left to refine.
@@ -46,7 +46,7 @@ class Pair:
 
 
 def run(quick: bool, seed: int) -> Report:
-    """BuildingPlan between all pairs; nothing is random, so ``quick`` and ``seed`` change nothing."""
+    """Plan between all pairs; nothing is random, so ``quick`` and ``seed`` change nothing."""
     path = data_path(UNIVERSITY)
     if not path.is_file():
         return Report(TITLE, COLUMNS, (), (f"Nothing was tried: {describe_absence(UNIVERSITY)}.",),
@@ -83,7 +83,7 @@ def run(quick: bool, seed: int) -> Report:
 
 
 def plan_pairs(world: World, network: NavigationGraph | None) -> list[Pair]:
-    """BuildingPlan between any two rooms of different floors."""
+    """Plan between any two rooms of different floors."""
     pairs = []
     for rooms in combinations(world.rooms, 2):
         a, b = (world.path_of(room)[1] for room in rooms)

@@ -12,7 +12,7 @@ from blackboard.change import Quiescence
 from blackboard.effect import Post
 from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
-from experiments.paper.planning import TAKING_PART
+from experiments.paper.planning import SOURCES
 from experiments.perception.visibility import CAMERA, MOUNT
 from harvey.dry_run import AcceptEveryMilestone, IdealBodyPort
 from harvey.wiring import knowledge_sources
@@ -49,7 +49,7 @@ def driven(world: World, origin: str, destination: str) -> tuple[list[object], O
         made.extend(change.entry.value for change in decision.made)
 
     robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel())
-    experts = [source for source in knowledge_sources(robot) if source.name in TAKING_PART]
+    experts = [source for source in knowledge_sources(robot) if source.name in SOURCES]
     scheduler = Scheduler([*experts, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(note,))
     goal = f"(ptrans ({origin} (12,4.5,0)) ({destination} (14,4.2,0)))"
     scheduler.tell([Post(Command(goal, 0.5, None, diagonal(0.003, 0.001)))], "user")
