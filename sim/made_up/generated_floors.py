@@ -1,68 +1,33 @@
-"""Floors that nobody drew: corridors with rooms on both sides, furnished by chance, the same for the same seed.
+"""Generated floors: corridors with furnished rooms on both sides, the same for the same seed.
 
 A floor is the text of a world file, in feet, made of the finishes and parts that the project's worlds share; its
 details are what the building has and the model lacks. With ``symmetric`` every corridor looks the same from both ends:
-doors, boards and pictures are point-symmetric about its middle, and so is the light that they give back. With
-``repeated`` all rooms are as wide, and all doors alike.
+doors, boards and pictures are point-symmetric about its middle, and so is the light that they reflect. With
+``repeated`` all rooms have the same width, and all doors are alike.
 """
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, partial
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from sim.made_up.generated_floors_text import Table, as_toml, scaled, tinted
-from sim.render.renderer import illumination
+from sim.made_up.floor_plan import FloorPlan
+from sim.made_up.generated_floors_text import as_toml
 from world_models.building.world import World
 from world_models.files.toml.source import Source
-from world_models.files.world_files import WORLDS, read_world
-
-SOURCE = WORLDS / "parts" / "standard.toml"
-DETAILS = Path(__file__).parents[1] / "buildings" / "research_center_details.toml"
-ROOMS_ALONG = 7
-"""The most rooms on one side of a corridor."""
-WALL_FT = 0.5
-DOOR_FT, LINED_FT = 3.3, 2.1
-"""Width of a doorway, and how far from its middle nothing else hangs."""
-INWARD: Mapping[str, tuple[float, float, float]] = {
-    "south": (0.0, 1.0, 0.0), "east": (-1.0, 0.0, 0.0), "north": (0.0, -1.0, 0.0), "west": (1.0, 0.0, 0.0),
-}
-ACROSS: Mapping[str, str] = {"south": "north", "north": "south", "east": "west", "west": "east"}
-EVEN_LIGHT = 0.62
-"""In a symmetric corridor every wall and board gives back so much of its colour, whichever way it faces."""
-
-HALF_FT: Mapping[str, float] = {
-    "picture": 1.0, "notice-board": 1.5, "white-board": 1.7, "sign": 0.4, "window": 2.6, "blackboard": 5.0,
-    "pillar": 0.8, "hose-cabinet": 1.1, "fountain": 0.7, "exit-sign": 0.7, "desk": 2.8, "bookshelf": 1.8,
-    "file-cabinet": 0.75, "cupboard": 1.6, "rack": 1.0,
-}
-"""Half the width of parts that stand or hang along a wall."""
-DEEP = ("desk", "bookshelf", "file-cabinet", "cupboard", "rack")
-IN_CORRIDORS = ("picture", "notice-board", "white-board", "sign", "pillar", "hose-cabinet", "fountain", "notice-board",
-                "picture", "sign", "pillar")
-FLAT = ("picture", "notice-board", "white-board", "sign", "notice-board", "picture")
-IN_ROOMS = (*DEEP, *DEEP, "picture", "notice-board", "white-board", "sign", "window", "window", "blackboard", "pillar",
-            "picture")
-FRAMES = ("walnut", "navy", "rust", "teal", "dark-steel", "oak")
-LEAVES = ("oak", "teal", "navy", "mustard", "red", "steel", "brown")
-PANELS = (None, "pane", "kick-plate", "louvre")
-CLUTTER: Mapping[str, float] = {
-    "socket": 0.15, "switch": 0.15, "poster": 0.9, "leaflet": 0.5, "conduit": 0.1, "carton": 0.7, "basket": 0.5,
-}
+from world_models.files.world_files import read_world
 
 
 @dataclass(frozen=True, eq=False)
 class Floor:
-    """A floor that was made up.
+    """A generated floor.
 
     Attributes:
-        seed: that it was made with.
+        seed: of its random numbers.
         text: the world file.
         details: the file of what the building has and the model lacks.
         corridors, rooms: names of its locales.
@@ -84,19 +49,19 @@ class Floor:
         """The model with the details that it lacks."""
         return self.altered(0.0)
 
-    def altered(self, gone: float, rng: np.random.Generator | None = None) -> World:
-        """The building after so much of the model's things (0..1), drawn by chance, was taken away."""
+    def altered(self, missing: float, rng: np.random.Generator | None = None) -> World:
+        """The building without a random share (0..1) of the model's things."""
         data = tomllib.loads(self.text)
-        if gone > 0.0:
+        if missing > 0.0:
             chance = rng if rng is not None else np.random.default_rng([self.seed, 1])
             for locale in data["locales"].values():
                 if "things" in locale:
-                    locale["things"] = [thing for thing in locale["things"] if chance.random() >= gone]
+                    locale["things"] = [thing for thing in locale["things"] if chance.random() >= missing]
         details = Source.parse(self.details, f"floor-{self.seed}-details")
         return read_world(Source.parse(as_toml(data), f"floor-{self.seed}"), [details])
 
     def write(self, folder: Path) -> tuple[Path, Path]:
-        """The files of the model and of the details, for scenarios."""
+        """Write the files of the model and of the details, for scenarios."""
         world, details = folder / f"floor-{self.seed}.toml", folder / f"floor-{self.seed}-details.toml"
         world.write_text(self.text, "utf-8")
         details.write_text(self.details, "utf-8")
@@ -107,13 +72,14 @@ def generated_floor(
     seed: int, rooms: int = 12, *, symmetric: bool = False, repeated: bool = False, open_share: float = 0.5,
     clutter: float = 1.0,
 ) -> Floor:
-    """A floor with so many rooms, the same for the same arguments.
+    """Generate a floor, the same for the same arguments.
 
     Args:
+        rooms: number of rooms.
         symmetric: every corridor looks the same from both ends; its doors are closed.
-        repeated: all doors are alike, and follow each other at the same distance.
-        open_share: part of the doors that is open.
-        clutter: how much the building has that the model lacks; 1 is about as much as in the Research Center.
+        repeated: all doors are alike and at the same distance from each other.
+        open_share: share of the doors that is open.
+        clutter: amount of things that the model lacks; 1 is about as in the Research Center.
 
     Raises:
         ValueError: fewer than 2 rooms, or a share outside 0..1.
@@ -121,261 +87,6 @@ def generated_floor(
     if rooms < 2 or not 0.0 <= open_share <= 1.0 or clutter < 0.0:
         raise ValueError(f"expected at least 2 rooms, 0 <= open_share <= 1 and clutter >= 0, "
                          f"got {rooms}, {open_share} and {clutter}")
-    plan = _Plan(np.random.default_rng(seed), symmetric, repeated, 0.0 if symmetric else open_share)
+    plan = FloorPlan(np.random.default_rng(seed), symmetric, repeated, 0.0 if symmetric else open_share)
     plan.lay_out(rooms)
-    return Floor(seed, plan.text(seed), plan.details(clutter), tuple(plan.corridors), tuple(plan.rooms))
-
-
-@dataclass
-class _Side:
-    """A wall while it is furnished: the stretches of it that are still free [ft along it]."""
-
-    free: list[tuple[float, float]]
-
-    @staticmethod
-    def of(length: float, margin: float = 0.4) -> _Side:
-        return _Side([(margin, length - margin)])
-
-    def take(self, middle: float, half: float) -> None:
-        """Nothing else goes there."""
-        out = []
-        for low, high in self.free:
-            out += [(low, min(high, middle - half)), (max(low, middle + half), high)]
-        self.free = [(low, high) for low, high in out if high - low > 0.1]
-
-    def place(self, half: float, rng: np.random.Generator, low: float = 0.0, high: float = np.inf) -> float | None:
-        """A free place for so wide a thing, to the tenth of a foot, taken; None where there is none."""
-        rooms = [(max(a, low) + half, min(b, high) - half) for a, b in self.free]
-        rooms = [(a, b) for a, b in rooms if b > a]
-        if not rooms:
-            return None
-        a, b = rooms[int(rng.integers(len(rooms)))]
-        middle = round(float(rng.uniform(a, b)), 1)
-        self.take(middle, half + 0.3)
-        return middle
-
-
-@dataclass
-class _Plan:
-    """The floor while it is made."""
-
-    rng: np.random.Generator
-    symmetric: bool
-    repeated: bool
-    open_share: float
-    corridors: dict[str, Table] = field(default_factory=dict)
-    rooms: dict[str, Table] = field(default_factory=dict)
-    doors: dict[str, Table] = field(default_factory=dict)
-    finishes: dict[str, Table] = field(default_factory=dict)
-    sides: dict[tuple[str, str], _Side] = field(default_factory=dict)
-    gallery: Table | None = None
-
-    def __post_init__(self) -> None:
-        self._known: Mapping[str, Any] = tomllib.loads(SOURCE.read_text("utf-8"))
-
-    # -- rooms and doors -----------------------------------------------------------------------------------------------
-
-    def lay_out(self, rooms: int) -> None:
-        count = -(-rooms // (2 * ROOMS_ALONG))
-        shares = [rooms // count + (i < rooms % count) for i in range(count)]
-        y = 0.0
-        for number, share in enumerate(shares):
-            y = self._corridor(number, share, y)
-        if count > 1 and not self.symmetric:
-            self._join(y)
-        for name in (*self.corridors, *self.rooms):
-            self._furnish(name)
-
-    def _corridor(self, number: int, rooms: int, y: float) -> float:
-        """One corridor with its rooms, the lowest of which begin at y; returns where the next may begin."""
-        name, width = f"corridor-{number}", round(float(self.rng.uniform(7.0, 9.0)), 1)
-        per_side = (-(-rooms // 2), rooms // 2)
-        spans = [self._spans(n) for n in per_side]
-        length = round(max(s[-1][1] if s else 0.0 for s in spans) + self.rng.uniform(2.0, 8.0), 1)
-        if self.symmetric:
-            length = round(spans[0][-1][1] + spans[0][0][0], 1)
-            spans[1] = [(round(length - b, 1), round(length - a, 1)) for a, b in spans[0]][::-1][: per_side[1]]
-        depths = [[round(float(self.rng.uniform(10.0, 18.0)), 1) for _ in s] for s in spans]
-        bottom = y + max(depths[1], default=0.0) + WALL_FT
-        self.corridors[name] = {"kind": "hallway", "at": [0.0, round(bottom, 1)], "size": [length, width],
-                                "floor": str(self.rng.choice(["linoleum", "carpet"])), **self._walls(name)}
-        self._new_sides(name, length, width)
-        for side, wall in ((0, "north"), (1, "south")):
-            for i, ((x0, x1), depth) in enumerate(zip(spans[side], depths[side], strict=True)):
-                at = bottom + width + WALL_FT if wall == "north" else bottom - WALL_FT - depth
-                self._room(f"room-{number}-{wall}-{i}", name, wall, (x0, x1), (round(at, 1), depth))
-        self._hang_doors(name, spans, length)
-        return bottom + width + max(depths[0]) + 2 * WALL_FT
-
-    def _spans(self, rooms: int) -> list[tuple[float, float]]:
-        """From where to where along the corridor the rooms of one side reach [ft]."""
-        wide = self.rng.uniform(10.0, 22.0, rooms)
-        if self.repeated:
-            wide[:] = 14.0
-        begin = 0.0 if self.repeated else round(float(self.rng.uniform(0.5, 3.0)), 1)
-        ends = begin + np.cumsum(np.round(wide, 1) + WALL_FT)
-        return [(round(float(e - w), 1), round(float(e), 1)) for e, w in zip(ends, np.round(wide, 1), strict=True)]
-
-    def _room(
-        self, name: str, corridor: str, wall: str, x: tuple[float, float], y: tuple[float, float]
-    ) -> None:
-        size = [round(x[1] - x[0], 1), y[1]]
-        self.rooms[name] = {"kind": "office", "at": [x[0], y[0]], "size": size, "of": (corridor, wall),
-                            "floor": str(self.rng.choice(["linoleum", "carpet"])), **self._walls(name, even=False)}
-        self._new_sides(name, *size)
-
-    def _hang_doors(self, corridor: str, spans: Sequence[Sequence[tuple[float, float]]], length: float) -> None:
-        looks = [self._door_look() for _ in range(max(len(s) for s in spans))]
-        if self.repeated:
-            looks = looks[:1] * len(looks)
-        places = [[self._door_place(x0, x1) for x0, x1 in side] for side in spans]
-        if self.symmetric:
-            places[1] = [round(length - along, 1) for along in places[0]][::-1][: len(spans[1])]
-        for side, wall in ((0, "north"), (1, "south")):
-            for i, along in enumerate(places[side]):
-                look = looks[i] if side == 0 else looks[-1 - i] if self.symmetric else self._door_look()
-                room = f"room-{corridor.partition('-')[2]}-{wall}-{i}"
-                self._door(f"door-{room[5:]}", (corridor, room), wall, along, looks[0] if self.repeated else look)
-
-    def _door_place(self, x0: float, x1: float) -> float:
-        middle = 0.5 * (x0 + x1)
-        return round(middle if self.repeated else float(self.rng.uniform(x0 + 2.4, x1 - 2.4)), 1)
-
-    def _door_look(self) -> Table:
-        pick = self.rng.integers
-        look: Table = {"frame": FRAMES[pick(len(FRAMES))], "leaf": LEAVES[pick(len(LEAVES))]}
-        panel = PANELS[pick(len(PANELS))]
-        return look if panel is None else {**look, "panel": panel}
-
-    def _door(self, name: str, between: tuple[str, str], wall: str, along: float, look: Table) -> None:
-        is_open = bool(self.rng.random() < self.open_share)
-        self.doors[name] = {"between": list(between), "wall": wall, "along": along, "width": DOOR_FT,
-                            **({"open": True} if is_open else {}), **self._lit(look, wall)}
-        self.sides[between[0], wall].take(along, LINED_FT + 0.3)
-        x0 = self.rooms[between[1]]["at"][0]
-        self.sides[between[1], ACROSS[wall]].take(along - x0, LINED_FT + 0.3)
-
-    def _join(self, top: float) -> None:
-        """A gallery along the west ends of the corridors, with a wide doorway to each."""
-        width = 9.0
-        self.corridors["gallery"] = {"kind": "hallway", "at": [-width - WALL_FT, 0.0], "size": [width, round(top, 1)],
-                                     "floor": "linoleum", **self._walls("gallery")}
-        self._new_sides("gallery", width, round(top, 1))
-        for name, locale in self.corridors.items():
-            if name != "gallery":
-                along = round(locale["size"][1] / 2, 1)
-                self.doors[f"{name}-end"] = {"between": [name, "gallery"], "wall": "west", "along": along, "width": 5.0,
-                                             "open": True, "frame": str(self.rng.choice(FRAMES))}
-                self.sides[name, "west"].take(along, 3.4)
-                self.sides["gallery", "east"].take(locale["at"][1] + along, 3.4)
-
-    # -- what hangs on the walls and stands in the rooms ---------------------------------------------------------------
-
-    def _walls(self, name: str, even: bool = True) -> Table:
-        """A finish of its own for every wall; half of the rooms have one for all four."""
-        colours = [self._paint(f"{name}-{i}") for i in range(int(self.rng.integers(1, 4)))]
-        walls = {wall: colours[int(self.rng.integers(len(colours)))] for wall in INWARD}
-        if self.symmetric and even:
-            walls["south"], walls["west"] = walls["north"], walls["east"]
-            return {"walls": {wall: self._even(finish, wall) for wall, finish in walls.items()},
-                    "baseboard": "black", "moulding": "black"}
-        return {"walls": walls}
-
-    def _paint(self, name: str) -> str:
-        base = self._known["finishes"][str(self.rng.choice(["cream", "sand", "sage", "sky", "brick", "white"]))]
-        shade = np.array(base["colour"]) * self.rng.uniform(0.8, 1.1) + self.rng.uniform(-0.06, 0.06, 3)
-        shade = np.clip(shade, 0.1, 0.93)
-        self.finishes[f"paint-{name}"] = {**base, "colour": [round(float(c), 3) for c in shade]}
-        return f"paint-{name}"
-
-    def _even(self, finish: str, wall: str) -> str:
-        """The finish that looks on this wall as on the one across: what the lamps give more, it gives back less."""
-        name = f"{finish}-{wall}"
-        if name not in self.finishes:
-            gain = EVEN_LIGHT / float(illumination(np.array([INWARD[wall]]))[0])
-            base = self.finishes[finish] if finish in self.finishes else self._known["finishes"][finish]
-            self.finishes[name] = scaled(base, gain)
-        return name
-
-    def _lit(self, look: Table, wall: str) -> Table:
-        """A door's look, its finishes even where the corridor is symmetric."""
-        if not self.symmetric:
-            return look
-        out = {key: self._even(look[key], wall) for key in ("frame", "leaf")}
-        return {**out, **({"panel": f"{look['panel']}-{wall}"} if "panel" in look else {})}
-
-    def _new_sides(self, name: str, length: float, width: float) -> None:
-        for wall in INWARD:
-            self.sides[name, wall] = _Side.of(length if wall in ("south", "north") else width)
-
-    def _furnish(self, name: str) -> None:
-        corridor = name in self.corridors
-        locale = self.corridors[name] if corridor else self.rooms[name]
-        things = list(self._hung(name, locale) if corridor else self._furniture(name, locale))
-        locale["things"] = things
-
-    def _hung(self, name: str, locale: Table) -> Iterator[Table]:
-        """Boards and pictures along a corridor, about one in seven feet of each wall."""
-        kinds = ("picture", "sign") if self.repeated else FLAT if self.symmetric else IN_CORRIDORS
-        for wall in ("north", "east") if self.symmetric else INWARD:
-            length = locale["size"][0 if wall in ("south", "north") else 1]
-            for _ in range(round(length / (28.0 if self.repeated else 7.0))):
-                part = kinds[int(self.rng.integers(len(kinds)))]
-                along = self.sides[name, wall].place(HALF_FT[part], self.rng)
-                if along is not None:
-                    yield from self._pair(name, part, wall, along, length)
-
-    def _pair(self, name: str, part: str, wall: str, along: float, length: float) -> Iterator[Table]:
-        """A thing on a wall and, where the corridor is symmetric, its like across the middle."""
-        if not self.symmetric:
-            yield {"part": part, "wall": wall, "along": along}
-            return
-        for side, place in ((wall, along), (ACROSS[wall], round(length - along, 1))):
-            self.sides[name, side].take(place, HALF_FT[part] + 0.3)
-            yield {"part": f"{part}-{side}", "wall": side, "along": place}
-
-    def _furniture(self, name: str, locale: Table) -> Iterator[Table]:
-        """What stands along the walls of a room, and a table where there is room for one."""
-        width, depth = locale["size"]
-        for _ in range(int(self.rng.integers(6, 13))):
-            part, wall = IN_ROOMS[int(self.rng.integers(len(IN_ROOMS)))], str(self.rng.choice(list(INWARD)))
-            length = width if wall in ("south", "north") else depth
-            corner = 3.2 if part in DEEP else 0.4
-            along = self.sides[name, wall].place(HALF_FT[part], self.rng, corner, length - corner)
-            if along is not None:
-                yield {"part": part, "wall": wall, "along": along}
-        if min(width, depth) > 14.0 and self.rng.random() < 0.5:
-            x, y = (round(float(v / 2 + self.rng.uniform(-1.0, 1.0)), 1) for v in (width, depth))
-            yield {"part": "table", "at": [x, y], "turn": int(self.rng.choice([0, 90]))}
-
-    # -- texts ---------------------------------------------------------------------------------------------------------
-
-    def text(self, seed: int) -> str:
-        parts = dict(self._known["parts"])
-        if self.symmetric:
-            for wall in INWARD:
-                for part in sorted({*FLAT, *(panel for panel in PANELS if panel)}):
-                    parts[f"{part}-{wall}"] = tinted(self._known["parts"][part], partial(self._even, wall=wall))
-        locales = {"floor": {"kind": "floor"}}
-        for name, locale in (*self.corridors.items(), *self.rooms.items()):
-            locales[name] = {"in": "floor", **{key: value for key, value in locale.items() if key != "of"}}
-        return as_toml({
-            "name": f"floor-{seed}", "units": "feet", "finishes": {**self._known["finishes"], **self.finishes},
-            "defaults": self._known["defaults"], "parts": parts, "locales": locales, "doors": self.doors,
-        })
-
-    def details(self, clutter: float) -> str:
-        """What the model lacks: about one thing in ten feet of wall."""
-        known = tomllib.loads(DETAILS.read_text("utf-8"))
-        locales: dict[str, Table] = {}
-        for (name, wall), side in self.sides.items():
-            locale = self.corridors.get(name) or self.rooms[name]
-            length = locale["size"][0 if wall in ("south", "north") else 1]
-            for _ in range(int(self.rng.poisson(clutter * length / 10.0))):
-                part = list(CLUTTER)[int(self.rng.integers(len(CLUTTER)))]
-                along = side.place(CLUTTER[part], self.rng, 1.2, length - 1.2)
-                if along is not None:
-                    locales.setdefault(name, {"things": []})["things"].append(
-                        {"part": part, "wall": wall, "along": along})
-        return as_toml({"units": "feet", "finishes": known["finishes"], "parts": known["parts"],
-                        "locales": locales or {next(iter(self.rooms)): {"things": []}}})
+    return Floor(seed, plan.format_world(seed), plan.format_details(clutter), tuple(plan.corridors), tuple(plan.rooms))

@@ -1,4 +1,4 @@
-"""World files as text: just as much TOML as a world file needs."""
+"""World files as text: as much TOML as a world file needs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Table = dict[str, Any]
 
 
 def as_toml(data: Mapping[str, Any]) -> str:
-    """The text of a world file: plain values first, then a table for each name of a name."""
+    """Format a world file: plain values first, then its tables."""
     lines = [f"{key} = {_value(value)}" for key, value in data.items() if not isinstance(value, Mapping)]
     for table, entries in data.items():
         if isinstance(entries, Mapping):
@@ -31,10 +31,10 @@ def _value(value: Any) -> str:
 
 
 def scaled(finish: Mapping[str, Any], gain: float) -> Table:
-    """A finish with its colour made so much brighter."""
+    """Scale the colour of a finish."""
     return {**finish, "colour": [round(min(1.0, gain * channel), 4) for channel in finish["colour"]]}
 
 
 def tinted(boxes: Sequence[Mapping[str, Any]], finish: Callable[[str], str]) -> list[Table]:
-    """A part's boxes with other finishes."""
+    """Replace the finishes of a part's boxes."""
     return [{key: finish(value) if key in ("finish", "rim") else value for key, value in box.items()} for box in boxes]

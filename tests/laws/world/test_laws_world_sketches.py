@@ -12,9 +12,10 @@ from blackboard.effect import Post
 from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from experiments.paper.planning import SOURCES
-from experiments.perception.visibility import CAMERA, MOUNT, generate_house
+from experiments.perception.visibility import CAMERA, MOUNT
 from harvey.dry_run import AcceptEveryMilestone, IdealBodyPort
 from harvey.wiring import knowledge_sources
+from sim.made_up.generated_house import generate_house
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.entries.location import diagonal
