@@ -163,7 +163,8 @@ class _Search:
             return None
         pair_px, sigma_px = reach_px
         match = match_in_space(
-            self.model[lines], segments_px, self.camera, prior, covariance, pair_px=pair_px, sigma_px=sigma_px)
+            self.model[lines], segments_px, self.camera, prior, covariance, self.settings.matching, pair_px=pair_px,
+            sigma_px=sigma_px)
         if len(match.pairs) < tuning.camera_min_pairs:
             return None
         i, k = lines[match.pairs[:, 0]], match.pairs[:, 1]

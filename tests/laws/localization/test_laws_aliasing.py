@@ -1,6 +1,7 @@
 """Laws of telling a place from those at which its room repeats itself."""
 
 import math
+from dataclasses import replace
 from random import Random
 
 import numpy as np
@@ -17,13 +18,14 @@ from knowledge_sources.methods.localization.aliasing import (
     predict_views_on_grid,
     score_view,
 )
+from knowledge_sources.methods.localization.repetition import find_repetitions
 from knowledge_sources.methods.verification.agreement import compute_coverage
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
-from world_models.frames import Pose2
+from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 Floats = NDArray[np.float64]
@@ -121,3 +123,27 @@ def test_computing_views_beforehand_changes_no_answer() -> None:
     asked = RobotModel(world, ROBOT.camera, ROBOT.mount, ROBOT.actuator)
     precompute_views(asked, "hallway", here @ Pose2(0.02, -0.01, 0.004))
     assert find_strongest_alias(asked, seen, "hallway", here) == find_strongest_alias(ROBOT, seen, "hallway", here)
+
+
+@few
+@given(st.sampled_from(WORLD.rooms), st.integers(0, 2**32 - 1))
+def test_a_pose_at_a_door_is_repeated_at_each_other_door_of_its_room(room: str, seed: int) -> None:
+    """A pose at one door is repeated at each other door of the room, as far from it and facing it alike."""
+    doors = [doorway.pose_from(room) for doorway in WORLD.doorways_of(room)]
+    rng = np.random.default_rng(seed)
+    pose = doors[0] @ Pose2(-0.2, float(rng.uniform(-0.2, 0.2)), float(rng.uniform(-math.pi, math.pi)))
+    offset = doors[0].inverse() @ pose
+    repeated = [other for name, other in find_repetitions(WORLD, room, pose, (room,)) if name == room]
+    for door in doors[1:]:
+        there = door @ offset
+        assert any(other.distance_to(there) < 1e-9 and abs(wrap_angle(other.heading_rad - there.heading_rad)) < 1e-9
+                   for other in repeated)
+
+
+def test_settings_are_read_where_they_are_passed() -> None:
+    """Longer lines only: fewer are predicted, and the kept views of other settings are not returned."""
+    here = Pose2(*WORLD.world_from_locale("hallway").apply([7.31, 1.17, 0.0])[:2], 0.013)
+    default = predict_views_on_grid(ROBOT, [here])[0]
+    short = replace(DEFAULT, verification=replace(DEFAULT.verification, min_line_length_px=40.0))
+    assert len(predict_views_on_grid(ROBOT, [here], short)[0]) < len(default)
+    assert np.array_equal(predict_views_on_grid(ROBOT, [here])[0], default)
