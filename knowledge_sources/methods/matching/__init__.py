@@ -1,10 +1,24 @@
 """Which image line shows which model line (§6.1)?
 
-* :func:`match_lines`     in the image: the projected model moves as a rigid figure. For small pose errors.
-* :func:`match_on_floor`  with the three unknowns of a robot on the floor. For larger errors near the camera.
-* :func:`match_in_space`  with all six unknowns of the camera.
+* :func:`match_lines`     in the image, the projected model moving as a rigid figure: for small pose errors.
+* :func:`match_on_floor`  with the three unknowns of a robot on the floor: for larger errors, as perspective bends them.
+* :func:`match_in_space`  with all six unknowns of a camera.
 
-All three search for the correspondence of least match error by local search (§6.1.1 to §6.1.4).
+All three look for the correspondence of least match error by local search (§6.1.1 to §6.1.4): a start (a Hough
+transform in the image, or a robust fit of the pose), the pairs near it, and moves of one pair at a time. Their numbers
+are in :class:`knowledge_sources.settings.matching.MatchingSettings`.
+
+Three lines of a model, of which the data show two, moved by (5, -3) pixels, and the third not at all:
+
+>>> import numpy as np
+>>> from knowledge_sources.methods.matching import match_lines
+>>> model = np.array([[[100, 100], [100, 220]], [[100, 100], [220, 100]], [[220, 110], [160, 220]]])
+>>> data = np.array([[[300, 300], [310, 330]], [[110, 97], [220, 97]], [[105, 102], [105, 210]]])
+>>> match = match_lines(model, data)
+>>> match.pairs.tolist()
+[[0, 2], [1, 1]]
+>>> [round(shift) for shift in match.transform.shift_px]
+[5, -3]
 """
 
 from knowledge_sources.methods.matching.fit import Similarity2

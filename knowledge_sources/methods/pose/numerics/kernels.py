@@ -26,6 +26,8 @@ RigidMotion = tuple[Floats, Floats]
 """R, T."""
 LineArrays = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats]
 """Points (n, 2, 3), directions, moments (n, 3), rays (n, 2, 3), normals (n, 3), lengths, sigmas (n,), focal (2,)."""
+PoseProblem = tuple[int, LineArrays, Floats, RigidMotion, Floats]
+"""PLANES or IMAGE, lines, their weights (n,), the prior and its information (6, 6)."""
 FloorArrays = tuple[LineArrays, Floats, Floats, RigidMotion]
 """Lines, the prior's mean (3,) and information (3, 3), the mount ``camera_from_robot``."""
 PointArrays = tuple[Floats, Floats, Floats, Floats, Floats, Floats, RigidMotion]
@@ -80,7 +82,9 @@ def prepare_lines(
     return directions, moments, rays, normals, lengths, FINE, -1
 
 
-def _build_minimiser(linearise: Callable[..., float], move: Callable[..., Any]) -> Any:
+def _build_minimiser(
+    linearise: Callable[..., float], move: Callable[..., Any], unknowns: int, min_step: float
+) -> Any:
     """Levenberg-Marquardt on one kind of problem; the cost never rises. Source: §6.2.2 (Horn's increments), damped.
 
     Args:
@@ -88,14 +92,12 @@ def _build_minimiser(linearise: Callable[..., float], move: Callable[..., Any]) 
         move: (problem, state, step), the state a step (unknowns,) further.
 
     Returns:
-        (problem, state, unknowns, iterations, min_step), which returns the state, its Gauss-Newton Hessian, its cost
-        and the steps taken. It is compiled with its caller, and cached there.
+        (problem, state, iterations), which returns the state, its Gauss-Newton Hessian, its cost and the steps taken.
+        It is compiled with its caller, and cached there.
     """
 
     @njit(error_model="numpy")
-    def minimise(
-        problem: Any, state: Any, unknowns: int, iterations: int, min_step: float
-    ) -> tuple[Any, Floats, float, int]:
+    def minimise(problem: Any, state: Any, iterations: int) -> tuple[Any, Floats, float, int]:
         hessian, gradient = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
         trial_hessian, trial_gradient = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
         factor, step = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
@@ -142,27 +144,17 @@ def minimise_pose(
     if kind == PLANES:
         _minimise_translation(lines, weights, rotation, translation)
     problem = kind, lines, weights, prior, information
-    state, hessian, cost, done = _minimise_pose(problem, (rotation, translation), 6, iterations, MIN_STEP)
+    state, hessian, cost, done = _minimise_pose(problem, (rotation, translation), iterations)
     return state[0], state[1], hessian, cost, done
 
 
 @compiled
-def _linearise_pose(problem: Any, state: RigidMotion, hessian: Floats, gradient: Floats) -> float:
-    kind, lines, weights, prior, information = problem
-    return _build_normal_equations(kind, lines, weights, state[0], state[1], prior, information, hessian, gradient)
-
-
-@compiled
-def _move_pose(problem: Any, state: RigidMotion, step: Floats) -> RigidMotion:
+def _move_pose(problem: PoseProblem, state: RigidMotion, step: Floats) -> RigidMotion:
     """E1 is quadratic in T: after each step T is eliminated exactly."""
-    kind, lines, weights, _, _ = problem
     rotation, translation = _perturb(step, state[0], state[1])
-    if kind == PLANES:
-        _minimise_translation(lines, weights, rotation, translation)
+    if problem[0] == PLANES:
+        _minimise_translation(problem[1], problem[2], rotation, translation)
     return rotation, translation
-
-
-_minimise_pose = _build_minimiser(_linearise_pose, _move_pose)
 
 
 @compiled
@@ -339,9 +331,7 @@ def minimise_floor_pose(
     Returns:
         the state, the Hessian (3, 3) there with the prior's share, the cost and the steps taken.
     """
-    end: tuple[Floats, Floats, float, int] = _minimise_lines_on_floor(
-        (floor, weights), start.copy(), 3, iterations, MIN_STEP
-    )
+    end: tuple[Floats, Floats, float, int] = _minimise_lines_on_floor((floor, weights), start.copy(), iterations)
     return end
 
 
@@ -432,9 +422,9 @@ def _linearise_floor(
     """
     (lines, mean, information, mount), weights = problem
     camera = _compute_camera_pose(state, mount)
-    rotation, translation = camera
+    rotation = camera[0]
     full, slope, nothing = np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6))
-    cost = _build_normal_equations(IMAGE, lines, weights, rotation, translation, camera, nothing, full, slope)
+    cost = _linearise_pose((IMAGE, lines, weights, camera, nothing), camera, full, slope)
     moves = np.zeros((6, 3))
     axis = -mount[0][0, 2], -mount[0][1, 2], -mount[0][2, 2]
     about = _cross(mount[1], axis)
@@ -459,7 +449,7 @@ def _linearise_floor(
     return cost
 
 
-_minimise_lines_on_floor = _build_minimiser(_linearise_floor, _move_on_floor)
+_minimise_lines_on_floor = _build_minimiser(_linearise_floor, _move_on_floor, 3, MIN_STEP)
 
 
 @compiled
@@ -496,9 +486,7 @@ def minimise_points(
         the state, the Hessian (3, 3) there, the loss and the steps taken.
     """
     problem = points, chosen, huber, near_m
-    end: tuple[Floats, Floats, float, int] = _minimise_points(
-        problem, start.copy(), 3, iterations, MIN_POINT_STEP
-    )
+    end: tuple[Floats, Floats, float, int] = _minimise_points(problem, start.copy(), iterations)
     return end
 
 
@@ -558,15 +546,14 @@ def _linearise_points(problem: Any, state: Floats, hessian: Floats, gradient: Fl
     return cost
 
 
-_minimise_points = _build_minimiser(_linearise_points, _move_on_floor)
+_minimise_points = _build_minimiser(_linearise_points, _move_on_floor, 3, MIN_POINT_STEP)
 
 
 @compiled
-def _build_normal_equations(
-    kind: int, lines: LineArrays, weights: Floats, rotation: Floats, translation: Floats, prior: RigidMotion,
-    information: Floats, hessian: Floats, gradient: Floats,
-) -> float:
+def _linearise_pose(problem: PoseProblem, pose: RigidMotion, hessian: Floats, gradient: Floats) -> float:
     """Fill J'J (6, 6) and J'r (6,) at a pose; return the cost."""
+    kind, lines, weights, prior, information = problem
+    rotation, translation = pose
     points, directions, moments, rays, normals, _, sigma, focal = lines
     hessian[:] = 0.0
     gradient[:] = 0.0
@@ -585,6 +572,9 @@ def _build_normal_equations(
     if information[0, 0] > 0.0:
         cost += _add_prior(prior, information, rotation, translation, hessian, gradient)
     return cost
+
+
+_minimise_pose = _build_minimiser(_linearise_pose, _move_pose, 6, MIN_STEP)
 
 
 @compiled
