@@ -17,7 +17,7 @@ def failing(report: Report) -> list[str]:
 
 
 def here(work: Callable[[Any], Any], jobs: Sequence[Any], *_: Any) -> list[Any]:
-    """In this process, nothing kept."""
+    """Work the jobs in this process; keep nothing."""
     return [work(job) for job in jobs]
 
 
@@ -36,7 +36,7 @@ def test_med_r_and_t_holds_where_r_and_t_is_off_by_feet(monkeypatch: pytest.Monk
     assert len(report.claims) >= 4 + 3 + 3
 
 
-def test_times_are_told_beside_the_peer_s() -> None:
-    """Whatever else the machine does: times are not asserted."""
+def test_times_are_reported_beside_the_peer_s() -> None:
+    """Times depend on what else the machine does, so they are not asserted."""
     report = pose_speed.run(quick=True, seed=0, trials=1)
     assert [row[3] for row in report.rows if not isinstance(row[3], float)] == []

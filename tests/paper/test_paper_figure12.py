@@ -47,7 +47,7 @@ NUMBERS = list(DATA)
 BELONGS = {(A, 1), (A, 2), (B, 3), (C, 4), (D, 5), (D, 6)}
 
 
-def solved(**more: Any) -> Match:
+def solve(**more: Any) -> Match:
     segments = np.array([DATA[n] for n in NUMBERS])
     start = {(C, NUMBERS.index(8)), (D, NUMBERS.index(7))}
     return match_lines(
@@ -60,31 +60,31 @@ def solved(**more: Any) -> Match:
     )
 
 
-def numbered(match: Match) -> set[tuple[int, int]]:
+def number_pairs(match: Match) -> set[tuple[int, int]]:
     return {(int(m), NUMBERS[d]) for m, d in match.pairs}
 
 
 def test_the_evaluation_falls_at_each_step() -> None:
-    evaluations = [step.evaluation for step in solved().trace]
+    evaluations = [step.evaluation for step in solve().trace]
     assert len(evaluations) >= 6
     assert all(after < before for before, after in pairwise(evaluations))
 
 
 def test_each_step_adds_or_deletes_one_pair() -> None:
-    states = [set(step.pairs) for step in solved().trace]
+    states = [set(step.pairs) for step in solve().trace]
     assert states[0] == {(C, NUMBERS.index(8)), (D, NUMBERS.index(7))}
     assert all(len(before ^ after) == 1 for before, after in pairwise(states))
 
 
 def test_the_search_leaves_the_false_start_and_finds_the_model() -> None:
-    match = solved()
-    assert numbered(match) == BELONGS
+    match = solve()
+    assert number_pairs(match) == BELONGS
     assert np.all(match.coverage > 0.8)
 
 
 def test_the_evaluations_span_the_figure_s() -> None:
     """17.44 at the start, 1.61 at the end: omission weighted by relative model length, alpha .5, beta 4."""
-    trace = solved().trace
+    trace = solve().trace
     assert trace[0].evaluation == pytest.approx(17.44, rel=0.35)
     assert trace[-1].evaluation == pytest.approx(1.61, abs=0.9)
 
@@ -92,11 +92,11 @@ def test_the_evaluations_span_the_figure_s() -> None:
 def test_the_likelihood_agrees_from_the_nearest_pairs() -> None:
     """Its evidence grows with the logarithm of length: from the false start the exchange would come too late."""
     likely = replace(PAPER_MATCHING, objective="likelihood", pair_sigmas=10.0, exchange=True)
-    assert numbered(solved(settings=likely, first_pairs=None)) == BELONGS
+    assert number_pairs(solve(settings=likely, first_pairs=None)) == BELONGS
 
 
 def test_the_trace_prints_as_a_table() -> None:
-    match = solved()
+    match = solve()
     lines = format_trace(match).splitlines()
     assert len(lines) == len(match.trace) + 1
     assert lines[1].split()[0] == "initial" and lines[-1].split()[0] == "final"

@@ -1,4 +1,4 @@
-"""What the 2D matcher keeps to (§6.1), with brute force and the library's minimiser as oracles."""
+"""Laws of the 2D matcher (§6.1), with brute force and scipy's minimiser as oracles."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def search_with(objective: str, **more: Any) -> MatchingSettings:
     return replace(steepest, objective=objective, **more)
 
 
-def model_of(rng: np.random.Generator, count: int) -> Array:
+def draw_model(rng: np.random.Generator, count: int) -> Array:
     """Lines of all directions, spread over the image (m, 2, 2)."""
     middles = rng.uniform(120.0, 390.0, (count, 2))
     angles = np.linspace(0.0, np.pi, count, endpoint=False) + rng.uniform(-0.1, 0.1, count)
@@ -39,7 +39,7 @@ def model_of(rng: np.random.Generator, count: int) -> Array:
     return np.stack([middles - half, middles + half], axis=1)
 
 
-def data_of(model: Array, move: Similarity2, rng: np.random.Generator, clutter: int, noise_px: float = 0.3) -> Array:
+def draw_data(model: Array, move: Similarity2, rng: np.random.Generator, clutter: int, noise_px: float = 0.3) -> Array:
     """The moved model in two fragments a line, and clutter, shuffled (k, 2, 2)."""
     moved = move.apply(model)
     cuts = rng.uniform(0.45, 0.55, len(model))[:, None]
@@ -55,7 +55,7 @@ def data_of(model: Array, move: Similarity2, rng: np.random.Generator, clutter: 
     return rng.permutation(data + rng.normal(0.0, noise_px, data.shape))
 
 
-def a_move(rng: np.random.Generator, model: Array, shift_px: float = 20.0, turn_rad: float = 0.15) -> Similarity2:
+def draw_motion(rng: np.random.Generator, model: Array, shift_px: float = 20.0, turn_rad: float = 0.15) -> Similarity2:
     centre = model.reshape(-1, 2).mean(axis=0)
     shift = rng.uniform(-shift_px, shift_px, 2)
     return Similarity2(rng.uniform(-turn_rad, turn_rad), (shift[0], shift[1]), 1.0, (centre[0], centre[1]))
@@ -63,12 +63,12 @@ def a_move(rng: np.random.Generator, model: Array, shift_px: float = 20.0, turn_
 
 def scene(seed: int, lines: int = 10, clutter: int = 40) -> tuple[Array, Array, Similarity2, np.random.Generator]:
     rng = np.random.default_rng(seed)
-    model = model_of(rng, lines)
-    move = a_move(rng, model)
-    return model, data_of(model, move, rng, clutter), move, rng
+    model = draw_model(rng, lines)
+    move = draw_motion(rng, model)
+    return model, draw_data(model, move, rng, clutter), move, rng
 
 
-def apart_px(found: Match, move: Similarity2, model: Array) -> float:
+def measure_error_px(found: Match, move: Similarity2, model: Array) -> float:
     return float(np.abs(found.transform.apply(model) - move.apply(model)).max())
 
 
@@ -77,7 +77,7 @@ def apart_px(found: Match, move: Similarity2, model: Array) -> float:
 def test_a_moved_model_is_found(seed: int, objective: Any, with_scale: bool) -> None:
     model, data, move, _ = scene(seed)
     found = match_lines(model, data, search_with(objective, with_scale=with_scale))
-    assert apart_px(found, move, model) < 2.0
+    assert measure_error_px(found, move, model) < 2.0
     assert found.coverage.mean() > 0.8 and abs(found.transform.scale - 1.0) < 0.02
 
 
@@ -136,7 +136,7 @@ def test_moving_model_and_data_together_changes_nothing(seed: int, objective: An
     """From one placement: the accumulator's axes are the image's, so it alone may prefer another peak."""
     model, data, move, rng = scene(seed)
     still = Peak(0.0, (0.0, 0.0), 1.0)
-    data = data_of(model, Similarity2(0.0, (0.0, 0.0), 1.0, move.centre_px), rng, 40)
+    data = draw_data(model, Similarity2(0.0, (0.0, 0.0), 1.0, move.centre_px), rng, 40)
     common = Similarity2(angle, (37.0, -80.0), 1.0, (256.0, 256.0))
     first = match_lines(model, data, search_with(objective), start=still)
     second = match_lines(common.apply(model), common.apply(data), search_with(objective), start=still)
@@ -146,16 +146,16 @@ def test_moving_model_and_data_together_changes_nothing(seed: int, objective: An
 
 @given(seed=seeds, objective=objectives)
 @settings(max_examples=5, deadline=None)
-def test_no_state_of_a_small_problem_is_better_than_brute_force_s_best(seed: int, objective: Any) -> None:
-    """Every state of a small space, each fitted by the library: the search ends at a local minimum, never below."""
+def test_a_small_problem_ends_at_a_local_minimum_of_all_its_states(seed: int, objective: Any) -> None:
+    """Brute force over every state of a small space: the search ends at a local minimum, never below the best."""
     rng = np.random.default_rng(seed)
-    model = model_of(rng, 2)
-    data = data_of(model, Similarity2(0.0, (1.0, -0.5), 1.0, (256.0, 256.0)), rng, 0)
+    model = draw_model(rng, 2)
+    data = draw_data(model, Similarity2(0.0, (1.0, -0.5), 1.0, (256.0, 256.0)), rng, 0)
     data = np.concatenate([data, data[:1] + 2.0, data[-1:] - 2.0])
     arguments = {"settings": search_with(objective), "start": Peak(0.0, (0.0, 0.0), 1.0), "pair_px": 4.0}
     found = match_lines(model, data, **arguments)
     errors: dict[frozenset[tuple[int, int]], float] = {}
-    nearest = [int(np.argmin([_distance(line, segment) for line in model])) for segment in data]
+    nearest = [int(np.argmin([_measure_distance(line, segment) for line in model])) for segment in data]
     for take in product([False, True], repeat=len(data)):
         pairs = frozenset((nearest[k], k) for k in range(len(data)) if take[k])
         errors[pairs] = _evaluate(model, data, pairs, arguments)
@@ -165,7 +165,7 @@ def test_no_state_of_a_small_problem_is_better_than_brute_force_s_best(seed: int
     assert all(errors[other] >= found.e_match - 1e-9 for other in errors if len(other ^ state) == 1)
 
 
-def _distance(line: Array, segment: Array) -> float:
+def _measure_distance(line: Array, segment: Array) -> float:
     unit = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
     across = (segment - line[0]) @ np.array([-unit[1], unit[0]])
     beyond = (segment - line[0]) @ unit
@@ -180,7 +180,7 @@ def _evaluate(model: Array, data: Array, pairs: frozenset[tuple[int, int]], argu
 
 @given(seed=seeds, with_scale=st.booleans())
 @settings(max_examples=25, deadline=None)
-def test_the_closed_fit_is_the_library_s_minimum(seed: int, with_scale: bool) -> None:
+def test_the_closed_fit_is_scipy_s_minimum(seed: int, with_scale: bool) -> None:
     """E_fit of random pairs over turn, shift and scale, near no motion."""
     rng = np.random.default_rng(seed)
     angles = rng.uniform(0.0, np.pi, 8)
@@ -211,7 +211,7 @@ def test_the_closed_fit_is_the_library_s_minimum(seed: int, with_scale: bool) ->
 
 
 @pytest.mark.parametrize("objective", ["paper", "likelihood"])
-def test_nothing_matches_nothing(objective: Any) -> None:
+def test_without_lines_there_are_no_pairs(objective: Any) -> None:
     empty, line = np.zeros((0, 2, 2)), np.array([[[10.0, 10.0], [10.0, 90.0]]])
     for model, data in ((line, empty), (empty, line), (empty, empty)):
         found = match_lines(model, data, search_with(objective))

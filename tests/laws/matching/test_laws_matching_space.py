@@ -1,4 +1,4 @@
-"""What matching in six unknowns, and locating with it, keep to."""
+"""Laws of matching with six unknowns, and of locating a camera with it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ seeds = st.integers(0, 2**32 - 1)
 few = settings(max_examples=8, deadline=None, derandomize=True)
 
 
-def hall() -> Array:
+def build_hall() -> Array:
     """Long edges and unevenly spaced doors ahead of the camera, its own axes (n, 2, 3)."""
     lines = [[[x, y, 2.0], [x, y, 18.0]] for x in (-1.2, 1.2) for y in (-1.4, 1.0)]
     for z, x in ((3.6, -1.2), (4.3, 1.2), (6.3, -1.2), (7.4, 1.2), (10.2, -1.2), (12.9, 1.2)):
@@ -34,7 +34,7 @@ def scene(seed: int, clutter: int = 60) -> tuple[Array, Pose, Pose, np.random.Ge
     """Data lines (k, 2, 2), the true pose, a prior off by up to 2 deviations, and the generator."""
     rng = np.random.default_rng(seed)
     truth = Pose.from_rotation_vector(rng.uniform(-0.05, 0.05, 3), rng.uniform(-0.3, 0.3, 3))
-    seen, visible = CAMERA.project_segments(hall(), truth)
+    seen, visible = CAMERA.project_segments(build_hall(), truth)
     seen = seen[visible]
     span = seen[:, 1] - seen[:, 0]
     parts = [np.stack([seen[:, 0] + a * span, seen[:, 0] + b * span], axis=1) for a, b in ((0.02, 0.45), (0.55, 0.98))]
@@ -46,13 +46,13 @@ def scene(seed: int, clutter: int = 60) -> tuple[Array, Pose, Pose, np.random.Ge
     return data + rng.normal(0.0, 0.2, data.shape), truth, truth.perturbed(off[:3], off[3:]), rng
 
 
-def apart(found: Pose, other: Pose) -> float:
+def measure_distance(found: Pose, other: Pose) -> float:
     """The larger of the distance between the cameras [m] and 10 times the turn [rad]."""
     shift = np.linalg.norm(found.inverse().translation - other.inverse().translation)
     return max(float(shift), 10.0 * found.angle_to(other))
 
 
-def matched(lines: Array, data: Array, prior: Pose) -> PoseMatch:
+def match(lines: Array, data: Array, prior: Pose) -> PoseMatch:
     return match_in_space(lines, data, CAMERA, prior, SPREAD)
 
 
@@ -60,8 +60,8 @@ def matched(lines: Array, data: Array, prior: Pose) -> PoseMatch:
 @few
 def test_a_disturbed_pose_is_found_again(seed: int) -> None:
     data, truth, prior, _ = scene(seed)
-    found = matched(hall(), data, prior)
-    assert apart(found.camera_from_world, truth) < 0.06
+    found = match(build_hall(), data, prior)
+    assert measure_distance(found.camera_from_world, truth) < 0.06
     assert len(np.unique(found.pairs[:, 1])) == len(found.pairs)
     assert [tuple(p) for p in found.pairs] == sorted(tuple(p) for p in found.pairs)
 
@@ -70,9 +70,9 @@ def test_a_disturbed_pose_is_found_again(seed: int) -> None:
 @few
 def test_the_order_of_lines_and_ends_does_not_matter(seed: int) -> None:
     data, _, prior, rng = scene(seed)
-    rows, columns = rng.permutation(len(hall())), rng.permutation(len(data))
-    first = matched(hall(), data, prior)
-    second = matched(hall()[rows][:, ::-1], data[columns][:, ::-1], prior)
+    rows, columns = rng.permutation(len(build_hall())), rng.permutation(len(data))
+    first = match(build_hall(), data, prior)
+    second = match(build_hall()[rows][:, ::-1], data[columns][:, ::-1], prior)
     assert {(int(rows[m]), int(columns[d])) for m, d in second.pairs} == {(int(m), int(d)) for m, d in first.pairs}
     assert second.e_match == pytest.approx(first.e_match, rel=1e-6)
 
@@ -83,30 +83,30 @@ def test_moving_the_world_changes_nothing(seed: int) -> None:
     """Model and pose together: what the camera sees is the same."""
     data, _, prior, rng = scene(seed)
     move = Pose.from_rotation_vector(rng.uniform(-2.0, 2.0, 3), rng.uniform(-20.0, 20.0, 3))
-    first = matched(hall(), data, prior)
-    second = matched(move.apply(hall()), data, prior @ move.inverse())
+    first = match(build_hall(), data, prior)
+    second = match(move.apply(build_hall()), data, prior @ move.inverse())
     assert np.array_equal(first.pairs, second.pairs)
-    assert apart(second.camera_from_world @ move, first.camera_from_world) < 1e-6
+    assert measure_distance(second.camera_from_world @ move, first.camera_from_world) < 1e-6
 
 
 def test_nothing_seen_leaves_the_prior() -> None:
-    found = matched(hall(), np.zeros((0, 2, 2)), Pose.identity())
+    found = match(build_hall(), np.zeros((0, 2, 2)), Pose.identity())
     assert found.pairs.shape == (0, 2) and not found.coverage.any()
-    assert apart(found.camera_from_world, Pose.identity()) < 1e-9
+    assert measure_distance(found.camera_from_world, Pose.identity()) < 1e-9
 
 
-def test_nothing_predicted_is_the_caller_s_mistake() -> None:
+def test_no_model_line_is_refused() -> None:
     with pytest.raises(ValueError, match="at least one model line"):
-        matched(np.zeros((0, 2, 3)), np.zeros((0, 2, 2)), Pose.identity())
+        match(np.zeros((0, 2, 3)), np.zeros((0, 2, 2)), Pose.identity())
     with pytest.raises(ValueError, match=r"shape \(6, 6\)"):
-        match_in_space(hall(), np.zeros((0, 2, 2)), CAMERA, Pose.identity(), np.eye(3))
+        match_in_space(build_hall(), np.zeros((0, 2, 2)), CAMERA, Pose.identity(), np.eye(3))
 
 
-def located(image: NDArray[np.uint8], prior: Pose, rng: np.random.Generator) -> CameraFix | None:
-    return locate_camera(hall(), image, CAMERA, prior, SPREAD, tolerance_m=0.05, tolerance_rad=0.005, rng=rng)
+def locate(image: NDArray[np.uint8], prior: Pose, rng: np.random.Generator) -> CameraFix | None:
+    return locate_camera(build_hall(), image, CAMERA, prior, SPREAD, tolerance_m=0.05, tolerance_rad=0.005, rng=rng)
 
 
-def drawn(segments: Array) -> NDArray[np.uint8]:
+def draw_edges(segments: Array) -> NDArray[np.uint8]:
     """A picture in which each segment is the edge of a bright band."""
     v, u = np.mgrid[0:512, 0:512]
     image = np.full((512, 512), 60.0)
@@ -123,15 +123,15 @@ def drawn(segments: Array) -> NDArray[np.uint8]:
 @settings(max_examples=3, deadline=None, derandomize=True)
 def test_what_is_verified_is_right_and_another_picture_is_not_verified(seed: int) -> None:
     _, truth, prior, rng = scene(seed)
-    seen, visible = CAMERA.project_segments(hall(), truth)
-    here = located(drawn(seen[visible]), prior, rng)
+    seen, visible = CAMERA.project_segments(build_hall(), truth)
+    here = locate(draw_edges(seen[visible]), prior, rng)
     assert here is not None and here.verdict is PoseVerdict.VERIFIED
-    assert apart(here.camera_from_world, truth) < 0.05
+    assert measure_distance(here.camera_from_world, truth) < 0.05
     lines = rng.uniform(30.0, 480.0, (30, 2, 2))
-    elsewhere = located(drawn(lines), prior, rng)
+    elsewhere = locate(draw_edges(lines), prior, rng)
     assert elsewhere is None or elsewhere.verdict is not PoseVerdict.VERIFIED
 
 
-def test_an_empty_picture_tells_nothing() -> None:
+def test_an_empty_picture_gives_no_pose() -> None:
     image = np.full((512, 512), 90, np.uint8)
-    assert located(image, Pose.identity(), np.random.default_rng(0)) is None
+    assert locate(image, Pose.identity(), np.random.default_rng(0)) is None

@@ -39,7 +39,7 @@ def parametrise(rng: np.random.Generator) -> tuple[PoseParameters, PoseParameter
     return floor, build_camera_parameters(floor.prior, np.diag(rng.uniform(0.02, 0.2, 6) ** 2)), robot
 
 
-def apart(a: Pose, b: Pose) -> float:
+def measure_difference(a: Pose, b: Pose) -> float:
     return float(max(np.abs(a.rotation - b.rotation).max(), np.abs(a.translation - b.translation).max()))
 
 
@@ -53,7 +53,7 @@ def test_the_step_to_a_moved_pose_is_the_step_that_moved_it(seed: int) -> None:
         np.testing.assert_allclose(parameters.compute_step(parameters.prior), 0.0, atol=1e-12)
         np.testing.assert_allclose(parameters.compute_step(there)[:3], step[:3], atol=1e-9)
         if len(step) == 3:
-            assert apart(parameters.move(parameters.prior, parameters.compute_step(there)), there) < 1e-9
+            assert measure_difference(parameters.move(parameters.prior, parameters.compute_step(there)), there) < 1e-9
 
 
 @some
@@ -77,7 +77,7 @@ def test_a_robot_on_the_floor_stays_on_it(seed: int) -> None:
     step = rng.uniform(-1.0, 1.0, 3)
     seen = floor.move(floor.prior, step).inverse() @ MOUNT
     expected = Pose2(robot.x_m + step[0], robot.y_m + step[1], robot.heading_rad + step[2]).lifted()
-    assert apart(seen, expected) < 1e-9
+    assert measure_difference(seen, expected) < 1e-9
 
 
 @some

@@ -1,4 +1,4 @@
-"""What every pose solver keeps to, whatever the scene (§6.2)."""
+"""Laws of every pose solver, on any scene (§6.2)."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ def solve(solver: Solver, scene: PoseScene, segments: Any, prior: Pose, **more: 
     return solver(scene.lines_world, segments, scene.camera, prior, sigma_px=SIGMA_PX, **more)
 
 
-def away(found: Pose, truth: Pose) -> tuple[float, float]:
+def measure_error(found: Pose, truth: Pose) -> tuple[float, float]:
     """Rotation [rad] and translation [m] between two poses."""
     apart = found @ truth.inverse()
     return float(np.linalg.norm(apart.rotation_vector)), float(np.linalg.norm(apart.translation))
 
 
-def same(found: Pose, other: Pose) -> bool:
-    turn, shift = away(found, other)
+def is_same(found: Pose, other: Pose) -> bool:
+    turn, shift = measure_error(found, other)
     return turn < 1e-6 and shift < 1e-4
 
 
-def some(scene: PoseScene, rng: np.random.Generator, count: int = 14) -> PoseScene:
+def take_some(scene: PoseScene, rng: np.random.Generator, count: int = 14) -> PoseScene:
     return scene.take(np.sort(rng.permutation(len(scene))[:count]))
 
 
@@ -62,7 +62,7 @@ def test_exact_lines_give_the_truth(solver: Solver, scene: PoseScene, seed: int)
     rng = np.random.default_rng(seed)
     prior = drawn_prior(scene.camera_from_world, 0.5, 0.05, rng)
     found = solve(solver, scene, scene.segments_px, prior)
-    assert found.ok and same(found.camera_from_world, scene.camera_from_world)
+    assert found.ok and is_same(found.camera_from_world, scene.camera_from_world)
     assert found.inliers.all() and np.abs(found.residuals_px).max() < 1e-3
 
 
@@ -71,13 +71,13 @@ def test_exact_lines_give_the_truth(solver: Solver, scene: PoseScene, seed: int)
 @quick
 def test_the_order_of_the_lines_does_not_matter(solver: Solver, scene: PoseScene, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    scene = some(scene, rng)
+    scene = take_some(scene, rng)
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
     prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
     order = rng.permutation(len(scene))
     first = solve(solver, scene, segments, prior)
     second = solve(solver, scene.take(order), segments[order], prior)
-    assert same(second.camera_from_world, first.camera_from_world)
+    assert is_same(second.camera_from_world, first.camera_from_world)
     assert np.array_equal(second.inliers, first.inliers[order])
 
 
@@ -85,9 +85,9 @@ def test_the_order_of_the_lines_does_not_matter(solver: Solver, scene: PoseScene
 @given(scene=scenes, seed=seeds)
 @quick
 def test_which_end_comes_first_does_not_matter(solver: Solver, scene: PoseScene, seed: int) -> None:
-    """Swapping the ends turns the sign of a normal, or of a direction: neither has a meaning."""
+    """Swapping the ends changes the sign of a normal or of a direction; neither sign has a meaning."""
     rng = np.random.default_rng(seed)
-    scene = some(scene, rng)
+    scene = take_some(scene, rng)
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
     prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
     first = solve(solver, scene, segments, prior)
@@ -96,7 +96,7 @@ def test_which_end_comes_first_does_not_matter(solver: Solver, scene: PoseScene,
     lines[a], flipped[b] = lines[a][:, ::-1], flipped[b][:, ::-1]
     other = PoseScene(lines, flipped, scene.landmark_ids, scene.camera, scene.camera_from_world)
     second = solve(solver, other, flipped, prior)
-    assert same(second.camera_from_world, first.camera_from_world)
+    assert is_same(second.camera_from_world, first.camera_from_world)
 
 
 @by_solver
@@ -104,7 +104,7 @@ def test_which_end_comes_first_does_not_matter(solver: Solver, scene: PoseScene,
 @quick
 def test_moving_the_world_moves_the_pose_with_it(solver: Solver, scene: PoseScene, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    scene = some(scene, rng)
+    scene = take_some(scene, rng)
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
     prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
     moved_from_world = Pose.from_rotation_vector(rng.normal(0.0, 1.0, 3), rng.uniform(-30.0, 30.0, 3))
@@ -112,7 +112,7 @@ def test_moving_the_world_moves_the_pose_with_it(solver: Solver, scene: PoseScen
     moved = PoseScene(lines, segments, scene.landmark_ids, scene.camera, scene.camera_from_world)
     first = solve(solver, scene, segments, prior)
     second = solve(solver, moved, segments, prior @ moved_from_world.inverse())
-    assert same(second.camera_from_world @ moved_from_world, first.camera_from_world)
+    assert is_same(second.camera_from_world @ moved_from_world, first.camera_from_world)
 
 
 @pytest.mark.parametrize("solver", [med_r_and_t, trunc_r_and_t], ids=lambda f: f.__name__)
@@ -122,7 +122,7 @@ def test_moving_the_world_moves_the_pose_with_it(solver: Solver, scene: PoseScen
 def test_gross_outliers_do_not_move_a_robust_pose(
     solver: Solver, version: str, scene: PoseScene, seed: int
 ) -> None:
-    """40 % of the lines wrong, each by itself or by landmarks: the pose is as good as Table 3's, and they are named."""
+    """40 % of the lines wrong, each by itself or by landmarks: a pose as good as Table 3's, and they are rejected."""
     rng = np.random.default_rng(seed)
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
     count = int(0.4 * len(scene))
@@ -133,7 +133,7 @@ def test_gross_outliers_do_not_move_a_robust_pose(
     else:
         segments, _ = wrong_landmarks(scene, segments, count, rng)
     found = solve(solver, scene, segments, drawn_prior(scene.camera_from_world, 0.3, 0.03, rng), **more)
-    turn, shift = away(found.camera_from_world, scene.camera_from_world)
+    turn, shift = measure_error(found.camera_from_world, scene.camera_from_world)
     assert turn < 0.01 and shift < 0.33
     gross = np.abs(found.residuals_px).max(axis=1) > 25.0 * SIGMA_PX
     assert not np.any(found.inliers & gross)
@@ -144,9 +144,9 @@ def test_gross_outliers_do_not_move_a_robust_pose(
 @given(scene=scenes, seed=seeds)
 @quick
 def test_a_pose_behind_the_camera_is_never_returned(solver: Solver, scene: PoseScene, seed: int) -> None:
-    """From priors that look anywhere: what counts as found has its lines in front."""
+    """From priors with any orientation: a pose that is ok has most of its lines in front."""
     rng = np.random.default_rng(seed)
-    scene = some(scene, rng)
+    scene = take_some(scene, rng)
     prior = scene.camera_from_world.perturbed(rng.uniform(-3.1, 3.1, 3), rng.uniform(-5.0, 5.0, 3))
     found = solve(solver, scene, scene.segments_px, prior)
     lines = build_line_set(scene.lines_world, scene.segments_px, scene.camera, SIGMA_PX)
@@ -160,44 +160,44 @@ def test_a_pose_behind_the_camera_is_never_returned(solver: Solver, scene: PoseS
 @given(scene=scenes, count=st.integers(0, 3), seed=seeds)
 @settings(max_examples=25, deadline=None)
 def test_few_lines_never_make_a_prior_worse(scene: PoseScene, count: int, seed: int) -> None:
-    """Measured as a weak prior weighs errors; exact lines."""
+    """Errors are measured by the information of a weak prior; the lines are exact."""
     rng = np.random.default_rng(seed)
-    scene = some(scene, rng, count)
+    scene = take_some(scene, rng, count)
     truth = scene.camera_from_world
     prior = drawn_prior(truth, 0.1, 0.01, rng)
     for solver in (r_and_t_ml, med_r_and_t, trunc_r_and_t):
         found = solve(solver, scene, scene.segments_px, prior)
-        assert weighed(found.camera_from_world, truth) <= weighed(prior, truth) * 1.02 + 1e-6
+        assert weigh_error(found.camera_from_world, truth) <= weigh_error(prior, truth) * 1.02 + 1e-6
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 @given(scene=scenes, seed=seeds)
 @settings(max_examples=25, deadline=None, derandomize=True)
-def test_nor_do_few_noisy_lines(count: int, scene: PoseScene, seed: int) -> None:
-    """In directions of which they say little, their noise does not carry the pose away."""
+def test_few_noisy_lines_never_make_a_prior_worse(count: int, scene: PoseScene, seed: int) -> None:
+    """Their noise does not move the pose far in directions of which they say little."""
     rng = np.random.default_rng(seed)
-    scene = some(scene, rng, count)
+    scene = take_some(scene, rng, count)
     truth, segments = scene.camera_from_world, end_noise(scene.segments_px, SIGMA_PX, rng)
     prior = drawn_prior(truth, 0.1, 0.01, rng)
     for solver in (r_and_t_ml, med_r_and_t, trunc_r_and_t):
         found = solve(solver, scene, segments, prior)
-        assert weighed(found.camera_from_world, truth) <= weighed(prior, truth) * 1.02 + 1e-6
+        assert weigh_error(found.camera_from_world, truth) <= weigh_error(prior, truth) * 1.02 + 1e-6
 
 
 @pytest.mark.parametrize("solver", [r_then_t, r_and_t], ids=lambda f: f.__name__)
 @given(scene=scenes, count=st.integers(0, 2), seed=seeds)
 @quick
-def test_the_paper_s_two_hand_back_the_prior_below_three_lines(
+def test_r_then_t_and_r_and_t_return_the_prior_below_three_lines(
     solver: Solver, scene: PoseScene, count: int, seed: int
 ) -> None:
     rng = np.random.default_rng(seed)
-    scene = some(scene, rng, count)
+    scene = take_some(scene, rng, count)
     prior = drawn_prior(scene.camera_from_world, 0.1, 0.01, rng)
     found = solve(solver, scene, scene.segments_px, prior)
-    assert same(found.camera_from_world, prior) and not found.ok
+    assert is_same(found.camera_from_world, prior) and not found.ok
 
 
-def weighed(found: Pose, truth: Pose) -> float:
+def weigh_error(found: Pose, truth: Pose) -> float:
     apart = found @ truth.inverse()
     move = np.concatenate([apart.rotation_vector, apart.translation])
     return float(np.sqrt(move @ compute_weak_information(DEFAULT.pose) @ move))
@@ -233,4 +233,4 @@ def test_lens_distortion_is_undone(solver: Solver, seed: int) -> None:
     through = bent.project(plain.rays(scene.segments_px))
     seen = PoseScene(scene.lines_world, through, scene.landmark_ids, bent, scene.camera_from_world)
     found = solve(solver, seen, through, drawn_prior(scene.camera_from_world, 0.3, 0.03, rng))
-    assert same(found.camera_from_world, scene.camera_from_world)
+    assert is_same(found.camera_from_world, scene.camera_from_world)

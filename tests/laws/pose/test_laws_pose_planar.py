@@ -1,4 +1,4 @@
-"""What the floor solvers keep to, and the library's least squares as an oracle."""
+"""Laws of the pose solvers on the floor, with scipy's least squares as an oracle."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ quick = settings(max_examples=15, deadline=None)
 Array = NDArray[np.float64]
 
 
-def hall(truth: Pose2) -> Array:
+def build_hall(truth: Pose2) -> Array:
     """Door posts, lintels and long edges ahead of the robot (n, 2, 3)."""
     lines = [[[1.5, y, z], [15.0, y, z]] for y in (-1.2, 1.2) for z in (0.0, 2.4)]
     for x in (3.0, 5.5, 8.0, 11.0):
@@ -39,35 +39,35 @@ def hall(truth: Pose2) -> Array:
     return truth.lifted().apply(np.array(lines))
 
 
-def seen(truth: Pose2, seed: int) -> tuple[Array, Array, np.random.Generator]:
+def observe(truth: Pose2, seed: int) -> tuple[Array, Array, np.random.Generator]:
     """Lines and noisy segments of what is in view."""
     rng = np.random.default_rng(seed)
-    lines = hall(truth)
+    lines = build_hall(truth)
     segments, visible = CAMERA.project_segments(lines, MOUNT @ truth.lifted().inverse())
     lines, segments = lines[visible], segments[visible]
     return lines, segments + rng.normal(0.0, SIGMA_PX, segments.shape), rng
 
 
-def distances_at(lines: LineSet, state: Array) -> Array:
+def compute_distances(lines: LineSet, state: Array) -> Array:
     return compute_image_distances(lines, *compute_camera_poses(state, MOUNT))
 
 
-def off(found: Pose2, truth: Pose2) -> Array:
+def compute_error(found: Pose2, truth: Pose2) -> Array:
     turn = wrap_angle(found.heading_rad - truth.heading_rad)
     return np.array([found.x_m - truth.x_m, found.y_m - truth.y_m, turn])
 
 
-def near(truth: Pose2, rng: np.random.Generator, share: float = 1.0) -> Pose2:
+def draw_prior(truth: Pose2, rng: np.random.Generator, share: float = 1.0) -> Pose2:
     dx, dy, turn = share * rng.uniform(-1.0, 1.0, 3) * (0.3, 0.3, 0.1)
     return Pose2(truth.x_m + dx, truth.y_m + dy, truth.heading_rad + turn)
 
 
 @given(heading=headings, seed=seeds)
 @quick
-def test_lines_agree_with_the_library_s_least_squares(heading: float, seed: int) -> None:
+def test_lines_agree_with_scipy_s_least_squares(heading: float, seed: int) -> None:
     truth = Pose2(4.0, -2.0, heading)
-    lines, segments, rng = seen(truth, seed)
-    prior = near(truth, rng)
+    lines, segments, rng = observe(truth, seed)
+    prior = draw_prior(truth, rng)
     found = planar_from_lines(
         lines, segments, CAMERA, MOUNT, prior, prior_covariance=PRIOR, sigma_px=SIGMA_PX, robust=False
     )
@@ -76,39 +76,39 @@ def test_lines_agree_with_the_library_s_least_squares(heading: float, seed: int)
 
     def residuals(state: Any) -> Array:
         image = compute_image_distances(prepared, *compute_camera_poses(np.asarray(state), MOUNT)) / SIGMA_PX
-        belief = root @ off(Pose2(*state), prior)
+        belief = root @ compute_error(Pose2(*state), prior)
         return np.concatenate([image.ravel(), belief])
 
     start = (truth.x_m, truth.y_m, truth.heading_rad)
     oracle = least_squares(residuals, start, x_scale=(1.0, 1.0, 0.1), xtol=1e-12, ftol=1e-12, gtol=1e-12)
-    assert np.abs(off(found.world_from_robot, Pose2(*oracle.x))).max() < 1e-5
+    assert np.abs(compute_error(found.world_from_robot, Pose2(*oracle.x))).max() < 1e-5
 
 
 @given(heading=headings, seed=seeds)
 @quick
 def test_derivatives_are_those_of_the_residuals(heading: float, seed: int) -> None:
     truth = Pose2(4.0, -2.0, heading)
-    lines, segments, rng = seen(truth, seed)
+    lines, segments, rng = observe(truth, seed)
     prepared = build_line_set(lines, segments, CAMERA, 1.0)
     state = np.array([truth.x_m, truth.y_m, truth.heading_rad]) + rng.normal(0.0, 0.02, 3)
     distances, slopes = compute_line_jacobian(prepared.points[:, 0], prepared.directions, prepared, state, MOUNT)
-    np.testing.assert_allclose(distances, distances_at(prepared, state), atol=1e-6)
+    np.testing.assert_allclose(distances, compute_distances(prepared, state), atol=1e-6)
     for k, step in enumerate(np.eye(3) * 1e-6):
-        sides = [distances_at(prepared, state + sign * step) for sign in (1.0, -1.0)]
+        sides = [compute_distances(prepared, state + sign * step) for sign in (1.0, -1.0)]
         np.testing.assert_allclose((sides[0] - sides[1]) / 2e-6, slopes[..., k], rtol=1e-3, atol=1e-2)
 
 
 @given(heading=headings, seed=seeds)
 @settings(max_examples=15, deadline=None, derandomize=True)
 def test_gross_outliers_do_not_move_the_robot(heading: float, seed: int) -> None:
-    """40 % of the lines anywhere: millimetres and a tenth of a degree remain, and each is named."""
+    """40 % of the lines anywhere: an error of millimetres and a tenth of a degree, and each of them is rejected."""
     truth = Pose2(4.0, -2.0, heading)
-    lines, segments, rng = seen(truth, seed)
+    lines, segments, rng = observe(truth, seed)
     wrong = rng.permutation(len(lines))[: int(0.4 * len(lines))]
     segments[wrong] = rng.uniform(0.0, 511.0, (len(wrong), 2, 2))
-    prior = near(truth, rng)
+    prior = draw_prior(truth, rng)
     found = planar_from_lines(lines, segments, CAMERA, MOUNT, prior, prior_covariance=PRIOR, sigma_px=SIGMA_PX)
-    error = np.abs(off(found.world_from_robot, truth))
+    error = np.abs(compute_error(found.world_from_robot, truth))
     assert error[:2].max() < 0.02 and error[2] < 0.002
     gross = np.abs(found.residuals_px).max(axis=1) > 10.0 * SIGMA_PX
     assert not np.any(found.inliers & gross) and all(found.rejected[i] for i in np.flatnonzero(gross))
@@ -118,13 +118,13 @@ def test_gross_outliers_do_not_move_the_robot(heading: float, seed: int) -> None
 @quick
 def test_order_and_ends_of_the_lines_do_not_matter(heading: float, seed: int) -> None:
     truth = Pose2(4.0, -2.0, heading)
-    lines, segments, rng = seen(truth, seed)
-    prior, order = near(truth, rng), rng.permutation(len(lines))
+    lines, segments, rng = observe(truth, seed)
+    prior, order = draw_prior(truth, rng), rng.permutation(len(lines))
     first = planar_from_lines(lines, segments, CAMERA, MOUNT, prior, prior_covariance=PRIOR, sigma_px=SIGMA_PX)
     second = planar_from_lines(
         lines[order][:, ::-1], segments[order], CAMERA, MOUNT, prior, prior_covariance=PRIOR, sigma_px=SIGMA_PX
     )
-    assert np.abs(off(first.world_from_robot, second.world_from_robot)).max() < 1e-6
+    assert np.abs(compute_error(first.world_from_robot, second.world_from_robot)).max() < 1e-6
     assert np.array_equal(first.inliers[order], second.inliers)
 
 
@@ -132,46 +132,46 @@ def test_order_and_ends_of_the_lines_do_not_matter(heading: float, seed: int) ->
 @quick
 def test_moving_the_world_moves_the_robot_with_it(heading: float, turn: float, seed: int) -> None:
     truth = Pose2(4.0, -2.0, heading)
-    lines, segments, rng = seen(truth, seed)
-    prior, moved = near(truth, rng), Pose2(3.0, 5.0, turn)
+    lines, segments, rng = observe(truth, seed)
+    prior, moved = draw_prior(truth, rng), Pose2(3.0, 5.0, turn)
     first = planar_from_lines(lines, segments, CAMERA, MOUNT, prior, sigma_px=SIGMA_PX)
     second = planar_from_lines(
         moved.lifted().apply(lines), segments, CAMERA, MOUNT, moved @ prior, sigma_px=SIGMA_PX
     )
-    assert np.abs(off(moved @ first.world_from_robot, second.world_from_robot)).max() < 1e-6
+    assert np.abs(compute_error(moved @ first.world_from_robot, second.world_from_robot)).max() < 1e-6
 
 
 @given(heading=headings, count=st.integers(0, 2), seed=seeds)
 @settings(max_examples=40, deadline=None)
 def test_few_lines_never_make_a_prior_worse(heading: float, count: int, seed: int) -> None:
-    """Exact lines, small errors, measured as the prior weighs them."""
+    """Exact lines, small errors, measured by the prior's information."""
     truth = Pose2(4.0, -2.0, heading)
     rng = np.random.default_rng(seed)
-    lines = hall(truth)
+    lines = build_hall(truth)
     segments, visible = CAMERA.project_segments(lines, MOUNT @ truth.lifted().inverse())
     rows = rng.permutation(np.flatnonzero(visible))[:count]
-    prior = near(truth, rng, 0.1)
+    prior = draw_prior(truth, rng, 0.1)
     for covariance in (PRIOR, None):
         information = build_planar_prior(prior, covariance).information
         found = planar_from_lines(
             lines[rows], segments[rows], CAMERA, MOUNT, prior, prior_covariance=covariance, sigma_px=SIGMA_PX
         )
-        before, after = off(prior, truth), off(found.world_from_robot, truth)
+        before, after = compute_error(prior, truth), compute_error(found.world_from_robot, truth)
         assert after @ information @ after <= before @ information @ before * 1.05 + 1e-9
 
 
 @pytest.mark.parametrize("count", [1, 3])
 @given(heading=headings, seed=seeds)
 @settings(max_examples=15, deadline=None, derandomize=True)
-def test_nor_do_few_noisy_lines_of_a_prior_that_nobody_weighed(count: int, heading: float, seed: int) -> None:
-    """Measured as a weak prior weighs errors."""
+def test_few_noisy_lines_never_make_a_prior_without_covariance_worse(count: int, heading: float, seed: int) -> None:
+    """Measured by the information of a weak prior."""
     truth = Pose2(4.0, -2.0, heading)
-    lines, segments, rng = seen(truth, seed)
+    lines, segments, rng = observe(truth, seed)
     rows = rng.permutation(len(lines))[:count]
-    prior = near(truth, rng)
+    prior = draw_prior(truth, rng)
     found = planar_from_lines(lines[rows], segments[rows], CAMERA, MOUNT, prior, sigma_px=SIGMA_PX)
     information = build_planar_prior(prior, None).information
-    before, after = off(prior, truth), off(found.world_from_robot, truth)
+    before, after = compute_error(prior, truth), compute_error(found.world_from_robot, truth)
     assert after @ information @ after <= before @ information @ before * 1.05 + 1e-9
 
 
@@ -179,9 +179,9 @@ def test_nor_do_few_noisy_lines_of_a_prior_that_nobody_weighed(count: int, headi
 @quick
 def test_the_covariance_says_how_far_off_the_pose_is(heading: float, seed: int) -> None:
     truth = Pose2(4.0, -2.0, heading)
-    lines, segments, rng = seen(truth, seed)
-    found = planar_from_lines(lines, segments, CAMERA, MOUNT, near(truth, rng), sigma_px=SIGMA_PX)
-    error = off(found.world_from_robot, truth)
+    lines, segments, rng = observe(truth, seed)
+    found = planar_from_lines(lines, segments, CAMERA, MOUNT, draw_prior(truth, rng), sigma_px=SIGMA_PX)
+    error = compute_error(found.world_from_robot, truth)
     assert error @ np.linalg.solve(found.covariance, error) < 40.0
 
 
@@ -194,8 +194,8 @@ def test_points_with_outliers(heading: float, seed: int) -> None:
     camera_from_world = MOUNT @ truth.lifted().inverse()
     pixels = CAMERA.project(camera_from_world.apply(world)) + rng.normal(0.0, SIGMA_PX, (24, 2))
     pixels[:6] += rng.uniform(20.0, 60.0, (6, 2)) * rng.choice([-1.0, 1.0], (6, 2))
-    found = planar_from_points(world, pixels, CAMERA, MOUNT, near(truth, rng, 0.5), PRIOR, sigma_px=SIGMA_PX)
-    error = off(found.world_from_robot, truth)
+    found = planar_from_points(world, pixels, CAMERA, MOUNT, draw_prior(truth, rng, 0.5), PRIOR, sigma_px=SIGMA_PX)
+    error = compute_error(found.world_from_robot, truth)
     assert error @ np.linalg.solve(found.covariance, error) < 40.0
     assert not found.inliers[:6].any() and found.inliers[6:].sum() >= 15
     assert all(found.rejected[:6])
@@ -203,7 +203,7 @@ def test_points_with_outliers(heading: float, seed: int) -> None:
 
 @given(heading=headings, seed=seeds)
 @quick
-def test_the_camera_s_rotation_convention_is_pose2_s(heading: float, seed: int) -> None:
+def test_camera_poses_of_states_are_those_of_pose2(heading: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     state = np.array([*rng.normal(0.0, 3.0, 2), heading])
     rotation, translation = compute_camera_poses(state, MOUNT)

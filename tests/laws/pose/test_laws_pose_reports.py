@@ -1,4 +1,4 @@
-"""What every solver says of its pose: residuals, reasons and a covariance, each of them true."""
+"""Laws of what every solver reports: residuals, reasons and a covariance, each of them true."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ scenes = st.sampled_from([0, 1]).map(SCENES.__getitem__)
 quick = settings(max_examples=8, deadline=None, derandomize=True)
 
 
-def named(solvers: list[Any]) -> Any:
+def by_solver(solvers: list[Any]) -> Any:
     return pytest.mark.parametrize("solver", solvers, ids=lambda f: f.__name__)
 
 
@@ -39,7 +39,7 @@ def solve(solver: Solver, scene: PoseScene, segments: Any, rng: np.random.Genera
     )
 
 
-@named(SOLVERS)
+@by_solver(SOLVERS)
 @given(scene=scenes, seed=seeds)
 @quick
 def test_residuals_are_those_of_the_pose(solver: Solver, scene: PoseScene, seed: int) -> None:
@@ -51,7 +51,7 @@ def test_residuals_are_those_of_the_pose(solver: Solver, scene: PoseScene, seed:
     np.testing.assert_allclose(np.abs(found.residuals_px), np.abs(expected), atol=1e-6, rtol=1e-6)
 
 
-@named(ROBUST)
+@by_solver(ROBUST)
 @given(scene=scenes, seed=seeds)
 @quick
 def test_each_rejected_line_has_a_reason_that_is_true(solver: Solver, scene: PoseScene, seed: int) -> None:
@@ -79,7 +79,7 @@ def test_each_rejected_line_has_a_reason_that_is_true(solver: Solver, scene: Pos
             assert reason == NO_LENGTH and np.ptp(segments[i], axis=0).max() == 0.0
 
 
-@named(SOLVERS)
+@by_solver(SOLVERS)
 @given(scene=scenes, seed=seeds)
 @quick
 def test_the_covariance_says_how_far_off_the_pose_is(solver: Solver, scene: PoseScene, seed: int) -> None:
@@ -93,10 +93,12 @@ def test_the_covariance_says_how_far_off_the_pose_is(solver: Solver, scene: Pose
     assert error @ np.linalg.solve(found.covariance, error) < 40.0
 
 
-@named(SOLVERS)
+@by_solver(SOLVERS)
 @given(scene=scenes, seed=seeds, factor=st.floats(1.5, 4.0))
 @quick
-def test_doubt_in_the_lines_is_doubt_in_the_pose(solver: Solver, scene: PoseScene, seed: int, factor: float) -> None:
+def test_the_covariance_scales_with_the_variance_of_the_lines(
+    solver: Solver, scene: PoseScene, seed: int, factor: float
+) -> None:
     """With exact lines and ``factor`` times the deviation, the covariance is ``factor`` squared times as large."""
     rng = np.random.default_rng(seed)
     prior = drawn_prior(scene.camera_from_world, 0.1, 0.01, rng)

@@ -1,4 +1,4 @@
-"""Matching with the floor's own three unknowns, where perspective bends the prediction."""
+"""Matching with the three unknowns of a robot on the floor, where perspective bends the prediction."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PRIOR = np.diag([0.15, 0.15, 0.05]) ** 2
 Array = NDArray[np.float64]
 
 
-def hall() -> Array:
+def build_hall() -> Array:
     """Long edges and unevenly spaced doors (n, 2, 3)."""
     lines = [[[1.5, y, z], [18.0, y, z]] for y in (-1.2, 1.2) for z in (0.0, 2.4)]
     for x, y in ((2.6, -1.2), (4.1, 1.2), (6.3, -1.2), (7.0, 1.2), (10.2, -1.2), (12.9, 1.2)):
@@ -25,10 +25,10 @@ def hall() -> Array:
     return np.array([*lines, [[18.0, -1.2, 0.0], [18.0, 1.2, 0.0]], [[18.0, -1.2, 2.4], [18.0, 1.2, 2.4]]])
 
 
-def picture(truth: Pose2, seed: int, clutter: int = 80) -> Array:
+def draw_picture(truth: Pose2, seed: int, clutter: int = 80) -> Array:
     """Two fragments of each visible line, and clutter (k, 2, 2)."""
     rng = np.random.default_rng(seed)
-    segments, visible = CAMERA.project_segments(hall(), MOUNT @ truth.lifted().inverse())
+    segments, visible = CAMERA.project_segments(build_hall(), MOUNT @ truth.lifted().inverse())
     seen = segments[visible]
     span = seen[:, 1] - seen[:, 0]
     halves = [np.stack([seen[:, 0] + a * span, seen[:, 0] + b * span], axis=1) for a, b in ((0.02, 0.45), (0.55, 0.98))]
@@ -39,20 +39,20 @@ def picture(truth: Pose2, seed: int, clutter: int = 80) -> Array:
     return rng.permutation(data + rng.normal(0.0, 0.3, data.shape))
 
 
-def predicted(prior: Pose2) -> Array:
-    lines = hall()
+def predict_lines(prior: Pose2) -> Array:
+    lines = build_hall()
     _, visible = CAMERA.project_segments(lines, MOUNT @ prior.lifted().inverse())
     return lines[visible]
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_match_and_pose_come_back_from_a_third_of_a_metre(seed: int) -> None:
+def test_match_and_pose_are_found_from_a_prior_a_third_of_a_metre_off(seed: int) -> None:
     rng = np.random.default_rng(100 + seed)
     truth = Pose2(rng.uniform(0.0, 1.5), rng.uniform(-0.4, 0.4), rng.uniform(-0.15, 0.15))
     dx, dy, turn = rng.uniform(-1.0, 1.0, 3) * (0.3, 0.3, 0.1)
     prior = Pose2(truth.x_m + dx, truth.y_m + dy, truth.heading_rad + turn)
-    data = picture(truth, seed)
-    lines = predicted(prior)
+    data = draw_picture(truth, seed)
+    lines = predict_lines(prior)
     match = match_on_floor(lines, data, CAMERA, MOUNT, prior, PRIOR)
     found = planar_from_lines(
         lines[match.pairs[:, 0]], data[match.pairs[:, 1]], CAMERA, MOUNT, match.world_from_robot, sigma_px=0.5
@@ -64,12 +64,12 @@ def test_match_and_pose_come_back_from_a_third_of_a_metre(seed: int) -> None:
 
 def test_nothing_seen_leaves_the_prior() -> None:
     prior = Pose2(0.2, 0.1, 0.05)
-    match = match_on_floor(hall(), np.zeros((0, 2, 2)), CAMERA, MOUNT, prior, PRIOR)
+    match = match_on_floor(build_hall(), np.zeros((0, 2, 2)), CAMERA, MOUNT, prior, PRIOR)
     assert match.pairs.shape == (0, 2)
     assert match.world_from_robot.distance_to(prior) < 1e-9
     assert not match.coverage.any()
 
 
-def test_nothing_predicted_is_the_caller_s_mistake() -> None:
+def test_no_model_line_is_refused() -> None:
     with pytest.raises(ValueError, match="at least one model line"):
         match_on_floor(np.zeros((0, 2, 3)), np.zeros((0, 2, 2)), CAMERA, MOUNT, Pose2(0.0, 0.0, 0.0), PRIOR)

@@ -1,4 +1,4 @@
-"""How near the pose solvers come to the physical limit, and whether their covariances are honest."""
+"""Efficiency of the pose solvers: their errors against the Cramér-Rao bound and against their own covariances."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ TRIALS = 150
 Array = NDArray[np.float64]
 
 
-def scene_of(name: str, whole: bool) -> PoseScene:
+def build_scene(name: str, whole: bool) -> PoseScene:
     scene = campus() if name == "campus" else corridor()
     scene = scene.take(np.sort(np.random.default_rng(3).permutation(len(scene))[:12]))
     return scene if whole else fragment(scene, np.random.default_rng(7))
 
 
-def bound_of(scene: PoseScene) -> Array:
+def compute_bound(scene: PoseScene) -> Array:
     """(6, 6) the Cramér-Rao bound: no unbiased estimate has a smaller covariance."""
     lines = build_line_set(scene.lines_world, scene.segments_px, scene.camera, SIGMA_PX)
     pose = scene.camera_from_world
@@ -35,7 +35,7 @@ def bound_of(scene: PoseScene) -> Array:
     return np.asarray(np.linalg.inv(slopes.T @ slopes))
 
 
-def trials(solver: Callable[..., PoseEstimate], scene: PoseScene) -> tuple[Array, Array]:
+def run_trials(solver: Callable[..., PoseEstimate], scene: PoseScene) -> tuple[Array, Array]:
     """Errors (t, 6), and each one's squared size by its own covariance (t,)."""
     rng = np.random.default_rng(11)
     errors, sizes = [], []
@@ -50,44 +50,44 @@ def trials(solver: Callable[..., PoseEstimate], scene: PoseScene) -> tuple[Array
     return np.array(errors), np.array(sizes)
 
 
-def over_bound(errors: Array, bound: Array) -> float:
-    """RMS error over the bound, all six directions weighed alike."""
+def compute_ratio(errors: Array, bound: Array) -> float:
+    """RMS error over the bound, all six directions with equal weight."""
     return float(np.sqrt(np.mean(np.sum(errors * np.linalg.solve(bound, errors.T).T, axis=1)) / 6.0))
 
 
 @pytest.mark.parametrize("whole", [True, False], ids=["whole", "fragments"])
 @pytest.mark.parametrize("name", ["campus", "corridor"])
-def test_the_likelihood_s_finish_reaches_the_bound(name: str, whole: bool) -> None:
+def test_maximum_likelihood_reaches_the_bound(name: str, whole: bool) -> None:
     """One standard deviation of the ratio over 150 trials is 0.024."""
-    scene = scene_of(name, whole)
-    errors, sizes = trials(r_and_t_ml, scene)
-    assert 0.92 < over_bound(errors, bound_of(scene)) < 1.08
+    scene = build_scene(name, whole)
+    errors, sizes = run_trials(r_and_t_ml, scene)
+    assert 0.92 < compute_ratio(errors, compute_bound(scene)) < 1.08
     assert 0.89 < np.mean(sizes < chi2.ppf(0.95, 6)) < 0.995
 
 
 @pytest.mark.parametrize("name", ["campus", "corridor"])
 def test_the_order_of_the_methods_is_the_paper_s(name: str) -> None:
-    """R then T is far off, R and T near, the likelihood nearest; E1's own covariance knows it is no likelihood."""
-    scene = scene_of(name, False)
-    bound = bound_of(scene)
-    first, _ = trials(r_then_t, scene)
-    second, sizes = trials(r_and_t, scene)
-    third, _ = trials(r_and_t_ml, scene)
-    ratios = [over_bound(errors, bound) for errors in (first, second, third)]
+    """R then T is far off, R and T near, the likelihood nearest; E1's covariance is right, though no likelihood's."""
+    scene = build_scene(name, False)
+    bound = compute_bound(scene)
+    first, _ = run_trials(r_then_t, scene)
+    second, sizes = run_trials(r_and_t, scene)
+    third, _ = run_trials(r_and_t_ml, scene)
+    ratios = [compute_ratio(errors, bound) for errors in (first, second, third)]
     assert ratios[0] > 3.0 * ratios[1] and ratios[1] > 1.05 * ratios[2]
     assert 0.89 < np.mean(sizes < chi2.ppf(0.95, 6)) < 0.995
 
 
 def test_e2_lies_between_e1_and_the_likelihood() -> None:
-    scene = scene_of("campus", True)
-    bound = bound_of(scene)
-    e1, _ = trials(r_and_t, scene)
-    e2, _ = trials(lambda *a, **k: r_and_t(*a, objective="E2", **k), scene)
-    assert 0.92 < over_bound(e2, bound) < over_bound(e1, bound)
+    scene = build_scene("campus", True)
+    bound = compute_bound(scene)
+    e1, _ = run_trials(r_and_t, scene)
+    e2, _ = run_trials(lambda *a, **k: r_and_t(*a, objective="E2", **k), scene)
+    assert 0.92 < compute_ratio(e2, bound) < compute_ratio(e1, bound)
 
 
-def test_the_likelihood_agrees_with_the_library_s_least_squares() -> None:
-    scene = scene_of("corridor", True)
+def test_maximum_likelihood_agrees_with_scipy_s_least_squares() -> None:
+    scene = build_scene("corridor", True)
     rng = np.random.default_rng(5)
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
     prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)

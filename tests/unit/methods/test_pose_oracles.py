@@ -1,4 +1,4 @@
-"""The library's least squares as an oracle of each solver's objective, and brute force of Med R and T's."""
+"""scipy's least squares as an oracle of each solver's objective, and brute force for Med R and T's."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ Array = NDArray[np.float64]
 Residuals = Callable[[Pose], Array]
 
 
-def problem(scene: PoseScene, seed: int) -> tuple[Array, Pose, LineSet]:
+def build_problem(scene: PoseScene, seed: int) -> tuple[Array, Pose, LineSet]:
     rng = np.random.default_rng(seed)
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
     lines = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
     return segments, drawn_prior(scene.camera_from_world, 0.3, 0.03, rng), lines
 
 
-def least(residuals: Residuals, start: Pose) -> Pose:
-    """The library's minimum over the left perturbation."""
+def minimise(residuals: Residuals, start: Pose) -> Pose:
+    """scipy's minimum over the left perturbation."""
     found = least_squares(
         lambda step: residuals(start.perturbed(step[:3], step[3:])), np.zeros(6), xtol=1e-14, ftol=1e-14, gtol=1e-14
     )
@@ -61,18 +61,18 @@ def e2(lines: LineSet) -> Residuals:
 
 
 @pytest.mark.parametrize("scene", [campus(), corridor()], ids=["campus", "corridor"])
-def test_e1_and_e2_are_at_the_library_s_minimum(scene: PoseScene) -> None:
-    segments, prior, lines = problem(scene, 1)
+def test_e1_and_e2_are_at_scipy_s_minimum(scene: PoseScene) -> None:
+    segments, prior, lines = build_problem(scene, 1)
     for objective, residuals in (("E1", e1(lines)), ("E2", e2(lines))):
         found = r_and_t(scene.lines_world, segments, scene.camera, prior, sigma_px=SIGMA_PX, objective=objective)
-        expected = least(residuals, scene.camera_from_world)
+        expected = minimise(residuals, scene.camera_from_world)
         assert_same(found.camera_from_world, expected)
         assert found.cost == pytest.approx(float(np.sum(residuals(expected) ** 2)), rel=1e-6)
 
 
 @pytest.mark.parametrize("scene", [campus(), corridor()], ids=["campus", "corridor"])
-def test_r_then_t_is_the_rotation_s_minimum_and_then_the_translation_s(scene: PoseScene) -> None:
-    segments, prior, lines = problem(scene, 2)
+def test_r_then_t_minimises_over_the_rotation_and_then_over_the_translation(scene: PoseScene) -> None:
+    segments, prior, lines = build_problem(scene, 2)
     found = r_then_t(scene.lines_world, segments, scene.camera, prior, sigma_px=SIGMA_PX).camera_from_world
     truth = scene.camera_from_world
 
@@ -88,9 +88,9 @@ def test_r_then_t_is_the_rotation_s_minimum_and_then_the_translation_s(scene: Po
 
 
 def test_no_triple_of_landmarks_has_a_much_smaller_median() -> None:
-    """Brute force: E1 by the library for every triple; Med's pose is as good, by the median, as noise can tell."""
+    """Brute force: E1 by scipy for every triple; no median is smaller by more than noise explains."""
     scene = corridor(doors=5)
-    segments, prior, _ = problem(scene, 3)
+    segments, prior, _ = build_problem(scene, 3)
     segments, _ = wrong_landmarks(scene, segments, 7, np.random.default_rng(3))
     lines = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
 
@@ -98,7 +98,7 @@ def test_no_triple_of_landmarks_has_a_much_smaller_median() -> None:
         return float(np.median(compute_squared_distances(lines, pose.rotation, pose.translation)))
 
     medians = [
-        median(least(e1(lines.take(np.flatnonzero(np.isin(scene.landmark_ids, triple)))), prior))
+        median(minimise(e1(lines.take(np.flatnonzero(np.isin(scene.landmark_ids, triple)))), prior))
         for triple in combinations(np.unique(scene.landmark_ids), 3)
     ]
     found = med_r_and_t(
@@ -107,8 +107,8 @@ def test_no_triple_of_landmarks_has_a_much_smaller_median() -> None:
     assert median(found.camera_from_world) <= max(min(medians), 5.0)
 
 
-def test_so_many_subsets_are_drawn_that_one_is_clean() -> None:
-    """The stated probability against the share of clean draws, by trying."""
+def test_enough_subsets_are_drawn_for_one_without_outliers() -> None:
+    """The stated probability against the probability that all draws have outliers."""
     for outliers, probability in ((0.3, 0.9), (0.5, 0.99), (0.7, 0.9)):
         needed = count_subsets(3, outliers, probability)
         missed = [(1.0 - (1.0 - outliers) ** 3) ** n for n in (needed, needed - 1)]
@@ -134,7 +134,7 @@ def test_the_truncated_loss_holds_beyond_half() -> None:
     assert np.sum(np.array(off) < 0.33) >= 9
 
 
-def test_points_agree_with_the_library_s_least_squares() -> None:
+def test_points_agree_with_scipy_s_least_squares() -> None:
     """Huber's loss within its quadratic part, with the prior as one more measurement."""
     rng, camera = np.random.default_rng(6), Camera.from_field_of_view(np.radians(65.0))
     mount, truth = CameraMount(1.0, 0.1, 0.05).camera_from_robot, Pose2(4.0, -2.0, 0.7)
