@@ -1,7 +1,7 @@
-"""Rehearsal: the mission in thought, before it is driven: which milestones it will have, and what each can tell.
+"""Dry run: a mission before it is driven: which milestones it will have, and how well each fixes the pose.
 
-The experts themselves plan, select and drive; but wheels do exactly what they are told, and every milestone is taken
-for seen. So the rehearsal has the plan that the mission will have, as long as nothing goes wrong.
+The real knowledge sources plan, select and drive, but odometry is ideal and every expected milestone is verified. So
+the dry run has the plan that the mission will have, as long as nothing goes wrong.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.task import Command, Milestone, Outcome, PlanSketch
 from world_models.robot import RobotModel
 
-TAKING_PART = ("interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "elevator_rider",
+PLANNING_SOURCES = ("interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "elevator_rider",
                "mission_monitor")
-MOST_CYCLES = 20_000
-SEEN_M, SEEN_RAD = 0.003, 0.001
-"""How well a milestone is taken to tell the place, in thought."""
+MAX_CYCLES = 20_000
+FIX_SIGMA_M, FIX_SIGMA_RAD = 0.003, 0.001
+"""Standard deviations of the pose after a milestone is verified in the dry run [m, rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +44,11 @@ class MilestonePreview:
         locale, x_m, y_m: where it will be looked for, in the locale's frame.
         look_heading_rad: in which direction [rad, world].
         landmarks: how many; lines: how many of their lines.
-        sigma_m, sigma_rad: how well they will tell the place.
-        p_false: probability of a wrong place that would be stated if all were seen where it is expected.
+        sigma_m, sigma_rad: predicted standard deviations of the pose that they fix.
+        p_false: probability of a false pose that the judge would state if all lines were seen where expected.
         alike: another place of the same locale that looks like it, in words, or "".
-        verdict: clear; weak (it would not tell the place well, or not surely); ambiguous (another place looks like
-            it); or not testable (hardly anything of it is seen from the path).
+        verdict: clear; weak (the pose would be uncertain, or p_false too high); ambiguous (another place looks like
+            it); or not testable (too few lines are visible from the path).
     """
 
     what: str
@@ -66,7 +66,7 @@ class MilestonePreview:
 
 
 class AcceptEveryMilestone(KnowledgeSource):
-    """Takes every milestone that is expected for verified."""
+    """Verifies every expected milestone."""
 
     level = Level.PLAN
     watches = (Watch(Milestone, (Posted, Revised), lambda m: m.status == "expected"),)
@@ -75,13 +75,13 @@ class AcceptEveryMilestone(KnowledgeSource):
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, milestone = find_belief(view), trigger.entry
         if belief is not None:
-            sure = replace(belief.value, covariance=diagonal(SEEN_M, SEEN_RAD), basis="milestone")
+            sure = replace(belief.value, covariance=diagonal(FIX_SIGMA_M, FIX_SIGMA_RAD), basis="milestone")
             yield Revise(belief, sure, (milestone,))
             yield Revise(milestone, replace(milestone.value, status="verified"), (milestone,))
 
 
 class IdealBodyPort:
-    """A port that claims to have done exactly what was asked."""
+    """Answers every command as if it had been carried out exactly."""
 
     name = "body"
 
@@ -98,11 +98,11 @@ def dry_run(
 ) -> tuple[tuple[MilestonePreview, ...], Outcome]:
     """The milestones in the order in which they will come, and how the dry run of the mission ends."""
     robot = replace(robot, continuous=False)
-    sources = [source for source in knowledge_sources(robot, settings) if source.name in TAKING_PART]
+    sources = [source for source in knowledge_sources(robot, settings) if source.name in PLANNING_SOURCES]
     scheduler = Scheduler([*sources, AcceptEveryMilestone()], ports=(IdealBodyPort(),))
-    scheduler.tell([Post(replace(task, start_covariance=diagonal(SEEN_M, SEEN_RAD)))], "user")
+    scheduler.tell([Post(replace(task, start_covariance=diagonal(FIX_SIGMA_M, FIX_SIGMA_RAD)))], "user")
     previews: list[MilestonePreview] = []
-    while scheduler.view.latest(Outcome) is None and scheduler.cycle < MOST_CYCLES:
+    while scheduler.view.latest(Outcome) is None and scheduler.cycle < MAX_CYCLES:
         decision = scheduler.step()
         if decision is None:
             scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
@@ -111,13 +111,13 @@ def dry_run(
         else:
             previews += _previews(robot, scheduler.view, decision.made, settings)
     outcome = scheduler.view.latest(Outcome)
-    return tuple(previews), outcome.value if outcome else Outcome("failed", f"not there after {MOST_CYCLES} cycles")
+    return tuple(previews), outcome.value if outcome else Outcome("failed", f"not there after {MAX_CYCLES} cycles")
 
 
 def _previews(
     robot: RobotModel, view: View, made: Sequence[Change], settings: Settings
 ) -> list[MilestonePreview]:
-    """Those of the milestones that were just taken for verified."""
+    """Previews of the milestones that were just verified."""
     belief = find_belief(view)
     if belief is None:
         return []
@@ -138,7 +138,7 @@ def _preview(
     sharp = quality.sigma_m <= most_m and quality.sigma_rad <= s.max_sigma_rad
     standing = robot.on_floor_of(belief.locale)
     seen = len(lines) >= v.min_matched_lines
-    p_false = predict_p_false(standing, pose, lines, np.array(diagonal(SEEN_M, SEEN_RAD)), v) if seen else 1.0
+    p_false = predict_p_false(standing, pose, lines, np.array(diagonal(FIX_SIGMA_M, FIX_SIGMA_RAD)), v) if seen else 1.0
     other = find_alias(standing, belief.locale, pose, lines, v) if seen else None
     clear = sharp and len(lines) >= s.min_lines and p_false <= POSE_CONFIDENCE.accept
     return MilestonePreview(
@@ -150,7 +150,7 @@ def _preview(
 
 
 def _tolerance_m(view: View, milestone: Milestone) -> float | None:
-    """Of the subgoal that the milestone ends; None where it ends none."""
+    """Tolerance of the subgoal that the milestone ends [m]; None where it ends none."""
     sketch = view.get(milestone.sketch)
     if sketch is None or not isinstance(sketch.value, PlanSketch) or milestone.index < 1:
         return None

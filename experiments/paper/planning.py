@@ -18,7 +18,7 @@ from blackboard.effect import Post
 from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from experiments.report import Report
-from harvey.dry_run import AcceptEveryMilestone, IdealBodyPort
+from harvey.dry_run import PLANNING_SOURCES, AcceptEveryMilestone, IdealBodyPort
 from harvey.simulation.run import build_robot_model
 from harvey.wiring import knowledge_sources
 from sim.scenario import Scenario, load_scenario
@@ -30,7 +30,6 @@ PAPER_MS = 5 * 60 * 1000.0
 MAX_MS = 100.0
 REPETITIONS, QUICK_REPETITIONS = 40, 10
 PLANNERS = ("interpreter", "sketcher", "milestone_selector")
-SOURCES = (*PLANNERS, "motor", "dead_reckoner", "elevator_rider", "mission_monitor")
 
 
 class Clock:
@@ -113,7 +112,7 @@ class DryMission:
     """
 
     def __init__(self, robot: RobotModel, scenario: Scenario) -> None:
-        sources = [source for source in knowledge_sources(robot) if source.name in SOURCES]
+        sources = [source for source in knowledge_sources(robot) if source.name in PLANNING_SOURCES]
         self.clock = Clock()
         self._scheduler = Scheduler([*sources, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(self.clock,))
         self._scheduler.tell([Post(scenario.command)], "user")

@@ -72,9 +72,9 @@ def format_previews(ahead: Sequence[MilestonePreview]) -> str:
 
 
 def summarize_dry_run(ahead: Sequence[MilestonePreview], outcome: Outcome) -> tuple[str, bool]:
-    """How a mission ends in thought, and whether nothing speaks against driving it.
+    """How the dry run of a mission ends, and whether nothing speaks against driving it.
 
-    In thought every milestone is taken for verified, so that the goal is reached says little where one could not be.
+    A dry run verifies every milestone, so reaching the goal says little where one is not testable or ambiguous.
     """
     doubtful = [(verdict, sum(1 for p in ahead if p.verdict == verdict)) for verdict in ("not testable", "ambiguous")]
     doubts = [f"{count(number, 'milestone')} {verdict}" for verdict, number in doubtful if number]

@@ -68,7 +68,7 @@ def _check(task: Task) -> int:
     ahead, outcome = dry_run(build_robot_model(scenario), scenario.command, build_settings(task.agent_settings))
     print(format_previews(ahead))
     told, bodes_well = summarize_dry_run(ahead, outcome)
-    print(f"\nin thought, {scenario.name} {told}")
+    print(f"\nthe dry run of {scenario.name} {told}")
     return 0 if bodes_well else 1
 
 
@@ -116,6 +116,6 @@ COMMAND = Command(
     ),
     _arguments, _run,
     "Exit code 0: the goal was reached; 1: it was not; 2: the input cannot be used.\n"
-    "With --check, 0: in thought the goal is reached, and no milestone is worse than weak; 1: it is not reached, or a\n"
+    "With --check, 0: the dry run reaches the goal, and no milestone is worse than weak; 1: it is not reached, or a\n"
     "milestone is ambiguous (another place looks like it) or not testable (hardly anything of it would be seen).",
 )

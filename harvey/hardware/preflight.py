@@ -103,6 +103,8 @@ class Preflight:
             m = self._mission
             self.robot = RobotModel(world, *seen, m.actuator, m.base.radius_m)
             yield from self._plan(self.robot)
+        if self._mission.motion.continuous:
+            yield Check("motion", "these bases cannot be steered on the move", "motion.continuous = false")
         yield from self._base()
         yield from self._camera(None if seen is None else seen[0])
         yield self._room()
@@ -152,6 +154,7 @@ class Preflight:
             yield Check("plan", outcome.reason, "another start or goal, or a world with a way between them")
             return
         said, can_be = summarize_dry_run(self.previews, outcome)
+        said = f"{count(len(self.previews), 'milestone')}, {said}"
         yield Check("plan", said, "" if can_be else "put into the world what hangs on the walls there")
 
     def _base(self) -> Iterator[Check]:

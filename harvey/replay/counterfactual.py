@@ -19,7 +19,6 @@ from blackboard.kinds import Registry, Role, is_request
 from blackboard.scheduler import Scheduler
 from harvey.agent import build_agent
 from harvey.campaign.campaign import make_room
-from harvey.replay.hidden_segments import check_segments
 from harvey.run_files.observations import effect_of
 from harvey.run_files.records import DecisionRecord, EntryRecord, as_line, decision_of, read_records
 from harvey.run_files.run_directory import RunDirectory
@@ -31,6 +30,7 @@ from harvey.runner.result import UNFINISHED, MissionResult
 from harvey.runner.resume import RESUME
 from harvey.runner.run import Over, run_to_outcome
 from harvey.simulation.run import SimulatedRun, rebuild_stage
+from harvey.without import check_segments
 from world_models.entries.task import Outcome
 
 

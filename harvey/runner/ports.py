@@ -23,18 +23,18 @@ from world_models.entries.body import (
 
 
 class Body(Protocol):
-    """A robot, simulated or of metal. What goes wrong is a value too, never an exception; the robot stands then."""
+    """A robot, simulated or hardware. A fault is a value too, never an exception; the robot stands then."""
 
     def execute(self, command: MotorCommand, /) -> MotionReport | BodyFault:
         """Carry out a command and report what the wheels claim."""
         ...
 
     def steer(self, course: Course, /) -> tuple[MotionReport, Frame] | BodyFault:
-        """Roll on by a course until the next picture, or come to a stand, and report what the wheels claim since."""
+        """Follow a course until the next picture, or stop, and report what the wheels claim since the last."""
         ...
 
     def claim(self) -> MotionReport | BodyFault:
-        """What the wheels claim of the last command, asked anew after a fault broke it off."""
+        """What the wheels claim of the last command, after a fault broke it off."""
         ...
 
     def look(self, purpose: str, /) -> Frame | BodyFault:
@@ -42,7 +42,7 @@ class Body(Protocol):
         ...
 
     def ride(self, ride: Ride, /) -> RideReport | BodyFault:
-        """Be carried by an elevator whose button somebody presses, or hear that nobody does."""
+        """Ride an elevator whose button somebody presses; a fault where nobody does."""
         ...
 
     def wait(self, duration_s: float, /) -> float:
@@ -50,15 +50,15 @@ class Body(Protocol):
         ...
 
     def stop(self) -> None:
-        """Stand still, at once and for good."""
+        """Stop at once and for good."""
         ...
 
 
 class BodyPort:
     """Carries out motor commands and takes pictures.
 
-    A request that a fault keeps from being answered stays open here until somebody on the board asks for a recovery
-    and that succeeds; then it is answered as if nothing had been, only later.
+    A request that a fault keeps from being answered stays open here until a recovery is asked for and succeeds. Then
+    it is answered as it would have been before.
     """
 
     name = "body"
@@ -70,32 +70,32 @@ class BodyPort:
         self._unanswered: dict[str, Entry[Any]] = {}
 
     def remember(self, request: Entry[Any]) -> None:
-        """A request that another process was asked, and did not answer: a recovery will ask for it here."""
+        """Keep a request that another process did not answer: a recovery will ask for it here."""
         self._unanswered[request.id] = request
 
     def answer(self, change: Change) -> Iterable[Effect]:
         """A motion report for a command, a frame for a look, the answer to an older request for a recovery."""
         entry = change.entry
         if isinstance(entry.value, Recovery) and entry.value.status == "asked":
-            yield from self._tried_again(entry)
+            yield from self._try_again(entry)
         elif isinstance(change, Posted) and isinstance(entry.value, MotorCommand):
-            yield self._told(entry, self._body.execute(entry.value))
+            yield self._post(entry, self._body.execute(entry.value))
         elif not isinstance(change, Retracted) and isinstance(entry.value, Course):
             found = self._body.steer(entry.value)
             for answer in (found,) if isinstance(found, BodyFault) else found:
-                yield self._told(entry, answer)
+                yield self._post(entry, answer)
         elif isinstance(change, Posted) and isinstance(entry.value, Look):
-            yield self._told(entry, self._body.look(entry.value.purpose))
+            yield self._post(entry, self._body.look(entry.value.purpose))
         elif isinstance(change, Posted) and isinstance(entry.value, Ride):
-            yield self._told(entry, self._body.ride(entry.value))
+            yield self._post(entry, self._body.ride(entry.value))
 
-    def _told(self, request: Entry[Any], found: MotionReport | Frame | RideReport | BodyFault) -> Effect:
+    def _post(self, request: Entry[Any], found: MotionReport | Frame | RideReport | BodyFault) -> Effect:
         if isinstance(found, BodyFault):
             self._unanswered[request.id] = request
             return Post(replace(found, request=request.id), (request,))
         return Post(found, (request,))
 
-    def _tried_again(self, recovery: Entry[Recovery]) -> Iterable[Effect]:
+    def _try_again(self, recovery: Entry[Recovery]) -> Iterable[Effect]:
         asked = recovery.value
         now_s = self._body.wait(asked.wait_s)
         tried = replace(asked, tries=asked.tries + 1, waited_s=now_s - asked.since_s)
@@ -104,7 +104,7 @@ class BodyPort:
             yield Revise(recovery, replace(tried, status="in vain", what="the request is gone"), (recovery,))
             return
         wanted = request.value
-        found = self._again(wanted)
+        found = self._answer_again(wanted)
         if isinstance(found, BodyFault):
             vain = replace(tried, status="in vain", what=found.what, detail=found.detail)
             yield Revise(recovery, vain, (recovery,))
@@ -113,8 +113,10 @@ class BodyPort:
         yield Revise(recovery, replace(tried, status="over", what="", detail=""), (recovery,))
         yield Post(found, (request,))
 
-    def _again(self, wanted: MotorCommand | Course | Look | Ride) -> MotionReport | Frame | RideReport | BodyFault:
-        """What a request is answered with now; a command is not carried out once more."""
+    def _answer_again(
+        self, wanted: MotorCommand | Course | Look | Ride
+    ) -> MotionReport | Frame | RideReport | BodyFault:
+        """The answer to a request now; a command is not carried out once more."""
         if isinstance(wanted, Ride):
             return self._body.ride(wanted)
         return self._body.claim() if isinstance(wanted, MotorCommand | Course) else self._body.look(wanted.purpose)

@@ -12,9 +12,8 @@ from blackboard.change import Quiescence
 from blackboard.effect import Post
 from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
-from experiments.paper.planning import SOURCES
 from experiments.perception.visibility import CAMERA, MOUNT
-from harvey.dry_run import AcceptEveryMilestone, IdealBodyPort
+from harvey.dry_run import PLANNING_SOURCES, AcceptEveryMilestone, IdealBodyPort
 from harvey.wiring import knowledge_sources
 from towers import tower
 from world_models.actuator import ActuatorModel
@@ -42,14 +41,14 @@ def towers(draw: st.DrawFn) -> World:
 
 
 def driven(world: World, origin: str, destination: str) -> tuple[list[object], Outcome]:
-    """What is put on the board in thought, from hall to hall, and how it ends."""
+    """What is put on the board in a dry run, from hall to hall, and how it ends."""
     made: list[object] = []
 
     def note(decision: Decision) -> None:
         made.extend(change.entry.value for change in decision.made)
 
     robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel())
-    experts = [source for source in knowledge_sources(robot) if source.name in SOURCES]
+    experts = [source for source in knowledge_sources(robot) if source.name in PLANNING_SOURCES]
     scheduler = Scheduler([*experts, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(note,))
     goal = f"(ptrans ({origin} (12,4.5,0)) ({destination} (14,4.2,0)))"
     scheduler.tell([Post(Command(goal, 0.5, None, diagonal(0.003, 0.001)))], "user")

@@ -11,9 +11,8 @@ from blackboard.change import Quiescence
 from blackboard.effect import Post
 from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
-from experiments.paper.planning import SOURCES
 from experiments.perception.visibility import CAMERA, MOUNT
-from harvey.dry_run import AcceptEveryMilestone, IdealBodyPort
+from harvey.dry_run import PLANNING_SOURCES, AcceptEveryMilestone, IdealBodyPort
 from harvey.wiring import knowledge_sources
 from sim.made_up.generated_house import generate_house
 from world_models.actuator import ActuatorModel
@@ -34,7 +33,7 @@ def planned(world: World) -> tuple[list[PlanSketch], Outcome]:
         sketches.extend(c.entry.value for c in decision.made if isinstance(c.entry.value, PlanSketch))
 
     robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel())
-    experts = [source for source in knowledge_sources(robot) if source.name in SOURCES]
+    experts = [source for source in knowledge_sources(robot) if source.name in PLANNING_SOURCES]
     scheduler = Scheduler([*experts, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(note,))
     ends = [world.locale(name).outline.mean(axis=0) / FOOT_M * part
             for name, part in ((world.rooms[0], 0.35), (world.rooms[-1], 0.35))]

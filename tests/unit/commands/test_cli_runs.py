@@ -309,7 +309,7 @@ def test_the_check_foresees_the_milestones_that_come(run: Path, capsys: pytest.C
 
 def test_a_plan_whose_milestones_show_nothing_fails_the_check(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "lab-to-allens-office", "--check", "--set", "camera.mount_tilt_deg=85"]) == 1
-    table, _, summary = capsys.readouterr().out.partition("in thought, lab-to-allens-office ")
+    table, _, summary = capsys.readouterr().out.partition("the dry run of lab-to-allens-office ")
     unseen = table.count("not testable")
     assert unseen > 0
     assert summary.startswith("may not reach its goal: of ") and f"{unseen} milestones not testable" in summary

@@ -109,6 +109,16 @@ def test_everything_that_is_not_ready_is_told_at_once_with_what_to_do(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.parametrize("continuous", ["on", "off"])
+def test_that_a_base_cannot_be_steered_on_the_move_is_found_out_before_anything_moves(
+    continuous: str, tmp_path: Path
+) -> None:
+    mission = load_mission(FLAT / "mission.toml", {"motion.continuous": continuous})
+    with Preflight(mission, tmp_path / "run", lambda: 0.0) as dry:
+        found = [check for check in dry.run() if check.what == "motion"]
+    assert [check.todo for check in found] == ["motion.continuous = false"] * (continuous == "on")
+
+
 @pytest.mark.parametrize("port", ["", "denning", "denning:", "roomba:/dev/ttyUSB0", "/dev/ttyUSB0"])
 def test_a_base_is_named_by_its_protocol_and_its_port(port: str) -> None:
     with pytest.raises(BadInput, match="expected denning:PORT or p2os:PORT or create2:PORT"):

@@ -1,0 +1,157 @@
+"""Without: landmarks and faces removed from a model, and segments from pictures, to see what a run would have done."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import replace
+from difflib import get_close_matches
+from typing import Any, cast
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change
+from blackboard.effect import Effect, Post
+from harvey.errors import BadInput
+from harvey.run_files.records import DecisionRecord
+from knowledge_sources.plan.line_finder import LineFinder
+from knowledge_sources.settings import Settings
+from world_models.building.landmarks import Edges
+from world_models.building.locale_source import LocaleGeometry, LocaleSource
+from world_models.building.world import World
+from world_models.entries.percepts import Segments
+from world_models.frames import frozen
+from world_models.robot import RobotModel
+from world_models.words import listed
+
+SEGMENT = re.compile(r"frame[- ](\d{1,9})[ ,-]+segment[- ](\d{1,9})", re.IGNORECASE | re.ASCII)
+MAX_SUGGESTED, MIN_SIMILARITY = 6, 0.5
+MAX_LISTED = 12
+"""So many frames are listed."""
+
+
+def is_segment(name: str) -> bool:
+    """Whether a name is of a segment, as ``frame 88 segment 12``."""
+    return SEGMENT.fullmatch(name) is not None
+
+
+def parse_segments(names: Iterable[str]) -> tuple[tuple[int, int], ...]:
+    """(frame, segment) of the names that are of segments."""
+    return tuple((int(m[1]), int(m[2])) for name in names if (m := SEGMENT.fullmatch(name)))
+
+
+def remove_from_world(world: World, names: Sequence[str], sources: Sequence[str]) -> World:
+    """The model without some of its landmarks and faces; the building itself stays as it is.
+
+    Raises:
+        BadInput: the model has none of a name; near names are listed, those of knowledge sources too.
+    """
+    if not names:
+        return world
+    geometry = list(world.locale_source.all_geometry())
+    known = {mark.name for g in geometry for _, mark in g.landmarks} | {f.name for g in geometry for _, f in g.faces}
+    for name in names:
+        if name not in known:
+            raise BadInput(f"--without {name}: expected {_suggest(name, sources, known)}, got {name!r}")
+    return World(cast(LocaleSource, _ReducedSource(world.locale_source, frozenset(names))))
+
+
+class SegmentHider(LineFinder):
+    """The line finder, with some segments of some pictures left out."""
+
+    def __init__(self, robot: RobotModel, settings: Settings, segments: Sequence[tuple[int, int]]) -> None:
+        """``segments``: (frame, segment) to be left out."""
+        super().__init__(robot, settings)
+        self._segments = tuple(segments)
+
+    @property
+    def name(self) -> str:
+        return "line_finder"
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        hidden = [segment for frame, segment in self._segments if frame == trigger.entry.value.number]
+        for effect in super().act(view, trigger):
+            if isinstance(effect, Post) and isinstance(effect.value, Segments) and hidden:
+                yield Post(_hide(effect.value, hidden), effect.because)
+            else:
+                yield effect
+
+
+def check_segments(records: Sequence[DecisionRecord], names: Sequence[str], hidden: Sequence[str]) -> None:
+    """Validate the names of segments against a run. Raises BadInput where it has no such frame or segment.
+
+    Args:
+        names: as ``frame 88 segment 12``; other names are passed over.
+        hidden: what was taken from the run itself: segments keep the numbers that they have without that.
+    """
+    wanted = parse_segments(names)
+    if not wanted:
+        return
+    frames, counts, already = _number_frames(records), _count_segments(records), parse_segments(hidden)
+    for frame, segment in wanted:
+        where = f"--without frame {frame} segment {segment}: expected"
+        if frame not in frames.values():
+            raise BadInput(f"{where} a frame of the run, {_range(frames.values())}, got {frame}")
+        found = [n for ref, n in counts.items() if frames.get(ref) == frame]
+        if not found:
+            looked = listed([number for ref, number in frames.items() if ref in counts], MAX_LISTED)
+            raise BadInput(
+                f"{where} a frame in which segments were looked for, {looked or 'which none was'}, got {frame}")
+        total = max(found) + len({pair for pair in already if pair[0] == frame})
+        if segment >= total:
+            raise BadInput(f"{where} a segment of frame {frame}, {_range(range(total))}, got {segment}")
+
+
+def _suggest(name: str, sources: Sequence[str], elements: Set[str]) -> str:
+    """The names that the user may have meant."""
+    known = sorted({*sources, *elements}, key=lambda known: (known.count("/"), known))
+    meant = [text for text in known if name.lower() in text.lower()]
+    meant = meant or get_close_matches(name, known, MAX_SUGGESTED, MIN_SIMILARITY)
+    names = ", ".join(meant[:MAX_SUGGESTED]) or f"a knowledge source ({', '.join(sources)}), a landmark or a face"
+    return f"{names}, or as 'frame 88 segment 12'"
+
+
+class _ReducedSource:
+    """Locales without some of their faces. A landmark that is removed keeps its number, but has no lines any more."""
+
+    def __init__(self, source: LocaleSource, names: frozenset[str]) -> None:
+        self._source, self._names = source, names
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._source, name)
+
+    def geometry(self, locale: str) -> tuple[LocaleGeometry, ...]:
+        return tuple(self._reduce(geometry) for geometry in self._source.geometry(locale))
+
+    def all_geometry(self) -> Iterator[LocaleGeometry]:
+        return (self._reduce(geometry) for geometry in self._source.all_geometry())
+
+    def _reduce(self, geometry: LocaleGeometry) -> LocaleGeometry:
+        no_edges = Edges.from_rows(())
+        landmarks = ((n, replace(m, edges=no_edges) if m.name in self._names else m) for n, m in geometry.landmarks)
+        faces = (pair for pair in geometry.faces if pair[1].name not in self._names)
+        return replace(geometry, faces=tuple(faces), landmarks=tuple(landmarks))
+
+
+def _hide(found: Segments, hidden: Sequence[int]) -> Segments:
+    kept = np.setdiff1d(np.arange(len(found.segments_px)), hidden)
+    return replace(found, segments_px=frozen(found.segments_px[kept]), sigma_px=frozen(found.sigma_px[kept]))
+
+
+def _number_frames(records: Sequence[DecisionRecord]) -> Mapping[str, int]:
+    """Frame by id -> its number."""
+    seen = (entry for decision in records for entry in decision.observed if entry.type == "Frame")
+    return {entry.id: int(entry.value["number"]) for entry in seen}
+
+
+def _count_segments(records: Sequence[DecisionRecord]) -> Mapping[str, int]:
+    """Frame by id -> how many segments were found in it."""
+    made = (entry.value for decision in records for entry in decision.made if entry.type == "Segments")
+    whole = (v for v in made if isinstance(v, dict) and isinstance(v.get("segments_px"), list))
+    return {str(v.get("frame")): len(v["segments_px"]) for v in whole}
+
+
+def _range(numbers: Iterable[int]) -> str:
+    have = sorted(numbers)
+    return f"{have[0]} to {have[-1]}" if have else "which has none"
