@@ -1,7 +1,7 @@
 """Run many trials on all cores and keep each result, so that an interrupted campaign continues where it was.
 
 A result depends on its trial alone, so neither the number of workers nor an interruption changes what a campaign
-finds. Results of other code than today's, or of another kind of processor, are computed anew.
+finds. Results of other code than today's, or of another kind of processor, are computed again.
 """
 
 from __future__ import annotations

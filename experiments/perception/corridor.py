@@ -95,15 +95,15 @@ def _measure_coverage(data: Corridor) -> dict[str, float]:
         across = np.stack([-span[:, 1], span[:, 0]], axis=1) / np.linalg.norm(span, axis=1, keepdims=True)
         beside = model + OFFSET_PX * across[:, None]
         focused = find_lines(frame.image, model).segments_px
-        shares["focused"].append(_covered(model, focused))
-        shares["whole"].append(_covered(model, find_lines(frame.image).segments_px))
-        shares["beside"].append(_covered(beside, focused))
-        shares["given"].append(_covered(model, frame.segments_px))
-        shares["given beside"].append(_covered(beside, frame.segments_px))
+        shares["focused"].append(_compute_coverage(model, focused))
+        shares["whole"].append(_compute_coverage(model, find_lines(frame.image).segments_px))
+        shares["beside"].append(_compute_coverage(beside, focused))
+        shares["given"].append(_compute_coverage(model, frame.segments_px))
+        shares["given beside"].append(_compute_coverage(beside, frame.segments_px))
     return {name: float(np.mean(values)) for name, values in shares.items()}
 
 
-def _covered(model: Array, segments: Array) -> float:
+def _compute_coverage(model: Array, segments: Array) -> float:
     lengths = np.linalg.norm(model[:, 1] - model[:, 0], axis=1)
     return float(np.sum(compute_coverage(model, segments, COVER_PX, COVER_RAD) * lengths) / np.sum(lengths))
 

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from experiments.wrapped_body import WrappedBody
+from experiments.wrappers import WrappedBody
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task
 from harvey.run_files.run_directory import RunDirectory

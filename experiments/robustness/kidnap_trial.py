@@ -162,7 +162,7 @@ def _build_lost_agent(robot: RobotModel, body: FaultyBody, belief: Place) -> Sch
     held = Hypothesis(belief.locale, Pose2(belief.x_m, belief.y_m, belief.heading_rad or 0.0), diagonal(0.05, 0.02),
                       "milestone")
     bound_px = DEFAULT.plan.max_deviation_px
-    doubt = Discrepancy(Level.GOAL, "somebody carried the robot off", None, (bound_px, bound_px), "px")
+    doubt = Discrepancy(Level.GOAL, "the robot was kidnapped", None, (bound_px, bound_px), "px")
     scheduler.tell([Post(held), Post(doubt)], "user")
     return scheduler
 

@@ -54,8 +54,8 @@ def run(quick: bool, seed: int) -> Report:
     results = list(_judge_files(files, chunk, seed))
     tally: dict[str, Counter[str]] = {}
     for result in results:
-        tally.setdefault(result.spoiler, Counter())[result.verdict.split(":")[0]] += 1
-    wrong = [f"file {number} ({result.spoiler}): {result.verdict}" for number, result in enumerate(results)
+        tally.setdefault(result.corruption, Counter())[result.verdict.split(":")[0]] += 1
+    wrong = [f"file {number} ({result.corruption}): {result.verdict}" for number, result in enumerate(results)
              if result.verdict.startswith(("traceback", "hang", "unclear"))]
     rows = tuple((name, sum(seen.values()), seen["error"], seen["sound"], seen["faults"], seen["traceback"],
                   seen["hang"], seen["unclear"]) for name, seen in tally.items())
@@ -78,7 +78,7 @@ def run(quick: bool, seed: int) -> Report:
 class FileResult:
     """Result of one file: how it was corrupted, its verdict, and the time taken [s]."""
 
-    spoiler: str
+    corruption: str
     verdict: str
     seconds: float
 
@@ -88,23 +88,23 @@ def _judge_files(files: int, chunk: int, seed: int) -> Iterator[FileResult]:
     parts = [range(first, min(first + chunk, files)) for first in range(0, files, chunk)]
     known: dict[int, list[FileResult]] = {}
     with tqdm(total=files, unit="file", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
-        for place, found in map_over_workers(partial(judged_all, seed=seed), parts):
+        for place, found in map_over_workers(partial(judge_files, seed=seed), parts):
             known[place] = found
             bar.update(len(found))
     for place in range(len(parts)):
         yield from known[place]
 
 
-def judged_all(numbers: Sequence[int], seed: int) -> list[FileResult]:
+def judge_files(numbers: Sequence[int], seed: int) -> list[FileResult]:
     """Judge the files with these numbers."""
     found = []
     with tempfile.TemporaryDirectory() as folder:
-        sound = _compiled(Path(folder))
+        sound = _compile_world(Path(folder))
         for number in numbers:
-            name, suffix, spoil = spoiler_of(number)
-            content = spoil(np.random.default_rng([seed, number]), sound)
+            name, suffix, corrupt = choose_corruption(number)
+            content = corrupt(np.random.default_rng([seed, number]), sound)
             began = time.perf_counter()
-            verdict = judged(content, Path(folder), suffix)
+            verdict = judge_file(content, Path(folder), suffix)
             found.append(FileResult(name, verdict, time.perf_counter() - began))
     return found
 
@@ -113,14 +113,14 @@ def _with_ifc() -> bool:
     return find_spec("ifcopenshell") is not None
 
 
-Spoiler = Callable[[np.random.Generator, bytes], str | bytes]
+Corruption = Callable[[np.random.Generator, bytes], str | bytes]
 
 
-def spoiler_of(number: int) -> tuple[str, str, Spoiler]:
+def choose_corruption(number: int) -> tuple[str, str, Corruption]:
     """Choose how the file of this number is corrupted: name, file ending, and function."""
     if number % IFC_EVERY == IFC_EVERY - 1 and _with_ifc():
-        return SPOILERS[-1]
-    return SPOILERS[number % (len(SPOILERS) - 1)]
+        return CORRUPTIONS[-1]
+    return CORRUPTIONS[number % (len(CORRUPTIONS) - 1)]
 
 
 class _TooLongError(BaseException):
@@ -128,7 +128,7 @@ class _TooLongError(BaseException):
 
 
 @contextmanager
-def _limited(seconds: float) -> Iterator[None]:
+def _time_limit(seconds: float) -> Iterator[None]:
     """Raise _TooLongError after a time; works in the main thread only."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -146,10 +146,10 @@ def _limited(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def judged(content: str | bytes, folder: Path, suffix: str = ".toml") -> str:
+def judge_file(content: str | bytes, folder: Path, suffix: str = ".toml") -> str:
     """Read a file: ``error``, ``sound``, ``faults``; or a failure: ``traceback: ...``, ``hang``, ``unclear: ...``."""
     try:
-        with _limited(LIMIT_S):
+        with _time_limit(LIMIT_S):
             return _read(content, folder / f"world{suffix}")
     except (WorldError, BuildingError) as error:
         text = str(error)
@@ -179,15 +179,15 @@ def _read(content: str | bytes, path: Path) -> str:
     return "faults" if faults else "sound"
 
 
-def _compiled(folder: Path) -> bytes:
+def _compile_world(folder: Path) -> bytes:
     (folder / "sound.toml").write_text(SMALL, encoding="utf-8")
     compile_file(folder / "sound.toml", folder / "sound.world")
     return (folder / "sound.world").read_bytes()
 
 
-def _words(text: str) -> Spoiler:
+def _words(text: str) -> Corruption:
     """Replace, delete, insert or swap words and signs."""
-    def spoil(rng: np.random.Generator, _sound: bytes) -> str:
+    def corrupt(rng: np.random.Generator, _sound: bytes) -> str:
         tokens = TOKEN.findall(text)
         for _ in range(int(rng.integers(1, 5))):
             at, other = (int(i) for i in rng.integers(len(tokens), size=2))
@@ -204,12 +204,12 @@ def _words(text: str) -> Spoiler:
                     tokens[at] = tokens[other]
         return "".join(tokens)
 
-    return spoil
+    return corrupt
 
 
-def _lines(text: str) -> Spoiler:
+def _lines(text: str) -> Corruption:
     """Delete, double or move lines, or cut off the end."""
-    def spoil(rng: np.random.Generator, _sound: bytes) -> str:
+    def corrupt(rng: np.random.Generator, _sound: bytes) -> str:
         lines = text.splitlines(keepends=True)
         for _ in range(int(rng.integers(1, 4))):
             at, other = (int(i) for i in rng.integers(len(lines), size=2))
@@ -224,10 +224,10 @@ def _lines(text: str) -> Spoiler:
                     lines = lines[: max(2, at)]
         return "".join(lines)
 
-    return spoil
+    return corrupt
 
 
-def _either(one: Spoiler, other: Spoiler) -> Spoiler:
+def _either(one: Corruption, other: Corruption) -> Corruption:
     return lambda rng, sound: (one if rng.random() < 0.7 else other)(rng, sound)
 
 
@@ -267,12 +267,12 @@ def _bytes(rng: np.random.Generator, sound: bytes) -> bytes:
     return bytes(content)
 
 
-def _building(text: str) -> Spoiler:
+def _building(text: str) -> Corruption:
     """Corrupt a building file in its words or its lines, one line per element."""
     return _either(_words(text), _lines(text.replace("><", ">\n<")))
 
 
-SPOILERS: tuple[tuple[str, str, Spoiler], ...] = (
+CORRUPTIONS: tuple[tuple[str, str, Corruption], ...] = (
     ("words", ".toml", _words(SMALL)), ("lines", ".toml", _lines(SMALL)), ("values", ".toml", _values),
     ("characters", ".toml", _characters), ("bytes", ".world", _bytes), ("IndoorGML", ".gml", _building(GML)),
     ("IFC", ".ifc", _building(IFC)))

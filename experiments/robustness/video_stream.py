@@ -14,7 +14,7 @@ from pathlib import Path
 
 from blackboard.journal import Decision
 from experiments.report import Cell, Report
-from experiments.wrapped_body import WrappedBody
+from experiments.wrappers import WrappedBody
 from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
 from harvey.hardware.drivers.cameras.video_file import write_video
 from harvey.runner.ports import Body

@@ -13,6 +13,7 @@ from blackboard.effect import Effect, Post
 from blackboard.journal import Decision, decision_line
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Scheduler
+from experiments.wrappers import WrappedSource
 from harvey.simulation.run import build_robot_model, run_mission
 from harvey.wiring import knowledge_sources, servoing
 from sim.scenario import Scenario, load_scenario
@@ -48,28 +49,22 @@ class Cost:
         return (self.scheduler_s + self.lines_s) / (self.scheduler_s + self.lines_s + self.sources_s)
 
 
-class _Timed(KnowledgeSource):
+class _Timed(WrappedSource):
     """A knowledge source with a stopwatch."""
 
     def __init__(self, inner: KnowledgeSource) -> None:
-        self._inner = inner
-        for name in ("level", "closes", "watches", "writes"):
-            setattr(self, name, getattr(inner, name))
+        super().__init__(inner)
         self.spent_s = 0.0
-
-    @property
-    def name(self) -> str:
-        return self._inner.name
 
     def rate(self, view: View, trigger: Change) -> float | None:
         began_s = time.process_time()
-        rating = self._inner.rate(view, trigger)
+        rating = super().rate(view, trigger)
         self.spent_s += time.process_time() - began_s
         return rating
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         began_s = time.process_time()
-        effects = tuple(self._inner.act(view, trigger))
+        effects = tuple(super().act(view, trigger))
         self.spent_s += time.process_time() - began_s
         return effects
 

@@ -12,6 +12,7 @@ from blackboard.change import Change
 from blackboard.effect import Effect
 from blackboard.knowledge_source import KnowledgeSource
 from experiments.report import Cell, Report
+from experiments.wrappers import WrappedSource
 from harvey.simulation.run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.settings import Settings
@@ -37,27 +38,16 @@ NOTES = (
 Times = dict[str, list[float]]
 
 
-class _Timed(KnowledgeSource):
+class _Timed(WrappedSource):
     """A knowledge source whose acts are timed."""
 
     def __init__(self, inner: KnowledgeSource, times: Times) -> None:
-        self._inner, self._times = inner, times
-        for name in ("level", "closes", "watches", "writes"):
-            setattr(self, name, getattr(inner, name))
-
-    @property
-    def name(self) -> str:
-        return self._inner.name
-
-    def rate(self, view: View, trigger: Change) -> float | None:
-        return self._inner.rate(view, trigger)
-
-    def still_valid(self, view: View, trigger: Change) -> bool:
-        return self._inner.still_valid(view, trigger)
+        super().__init__(inner)
+        self._times = times
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         began_s = time.thread_time()
-        effects = tuple(self._inner.act(view, trigger))
+        effects = tuple(super().act(view, trigger))
         self._times.setdefault(_act(self.name, trigger), []).append(1000.0 * (time.thread_time() - began_s))
         return effects
 

@@ -53,7 +53,7 @@ def run(quick: bool, seed: int) -> Report:
         "The same mission in worlds of different size", COLUMNS, rows,
         notes=(
             f"Mission: {goal}, seed {seed}. Times are of the processor. In one process the agents in all worlds decide"
-            f" in turn, each with the file opened anew: {repetitions[0]} times to the first motor command and"
+            f" in turn, each with the file opened again: {repetitions[0]} times to the first motor command and"
             f" {repetitions[1]} times a dry run of the whole mission. Compared are the times of one repetition, taken"
             " within moments of each other; the claims are on the median of these ratios, so that other load on the"
             " machine counts less. The table has the least time of each decision.",

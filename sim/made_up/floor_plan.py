@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.made_up.generated_floors_text import Table, as_toml, scaled, tinted
+from sim.made_up.generated_floors_text import Table, as_toml, replace_finishes, scale_colour
 from sim.render.renderer import illumination
 from world_models.files.world_files import WORLDS
 
@@ -218,7 +218,7 @@ class FloorPlan:
         if name not in self.finishes:
             gain = EVEN_LIGHT / float(illumination(np.array([INWARD[wall]]))[0])
             base = self.finishes[finish] if finish in self.finishes else self._known["finishes"][finish]
-            self.finishes[name] = scaled(base, gain)
+            self.finishes[name] = scale_colour(base, gain)
         return name
 
     def _balance_look(self, look: Table, wall: str) -> Table:
@@ -281,7 +281,7 @@ class FloorPlan:
             for wall in INWARD:
                 for part in sorted({*FLAT, *(panel for panel in PANELS if panel)}):
                     balance = partial(self._add_balanced_finish, wall=wall)
-                    parts[f"{part}-{wall}"] = tinted(self._known["parts"][part], balance)
+                    parts[f"{part}-{wall}"] = replace_finishes(self._known["parts"][part], balance)
         locales = {"floor": {"kind": "floor"}}
         for name, locale in (*self.corridors.items(), *self.rooms.items()):
             locales[name] = {"in": "floor", **{key: value for key, value in locale.items() if key != "of"}}

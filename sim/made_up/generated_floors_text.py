@@ -30,11 +30,11 @@ def _value(value: Any) -> str:
     return json.dumps(value)
 
 
-def scaled(finish: Mapping[str, Any], gain: float) -> Table:
+def scale_colour(finish: Mapping[str, Any], gain: float) -> Table:
     """Scale the colour of a finish."""
     return {**finish, "colour": [round(min(1.0, gain * channel), 4) for channel in finish["colour"]]}
 
 
-def tinted(boxes: Sequence[Mapping[str, Any]], finish: Callable[[str], str]) -> list[Table]:
+def replace_finishes(boxes: Sequence[Mapping[str, Any]], finish: Callable[[str], str]) -> list[Table]:
     """Replace the finishes of a part's boxes."""
     return [{key: finish(value) if key in ("finish", "rim") else value for key, value in box.items()} for box in boxes]
