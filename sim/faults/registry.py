@@ -36,8 +36,8 @@ def find_fault_class(kind: str) -> type[Fault]:
         if fault_class.kind == kind:
             return fault_class
     found = load_plugin_classes(GROUP, Fault, kind)[kind]
-    if found.kind != kind:
-        raise PluginError(f"entry point {GROUP}, {kind}: expected a class with kind = {kind!r}, got {found.kind!r}")
+    if (own := getattr(found, "kind", None)) != kind:
+        raise PluginError(f"entry point {GROUP}, {kind}: expected a class with kind = {kind!r}, got {own!r}")
     return found
 
 

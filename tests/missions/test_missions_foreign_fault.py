@@ -49,6 +49,13 @@ class Landslide(Earthquake):
     swing_rad: float = 2.0
 
 
+class Unnamed(Fault):
+    """It has no kind."""
+
+    def apply(self, body: FaultTarget) -> None:
+        """Nothing happens."""
+
+
 class NoFault:
     """Not a fault."""
 '''
@@ -57,6 +64,8 @@ earthquake = tremors:Earthquake
 landslide = tremors:Landslide
 flood = tremors:NoFault
 drought = tremors:Drought
+tremor = tremors:Earthquake
+unnamed = tremors:Unnamed
 """
 QUAKE = fault("earthquake", "allens-office", 1.5, swing_deg=3.0)
 
@@ -109,8 +118,10 @@ def test_a_saved_run_reads_it_from_its_tables() -> None:
     (fault("earthquake", "", 1.0, duration_s=9.0), r"faults\.0\.duration_s: expected one of .*, got the key"),
     (fault("earthquak", "", 1.0), r"faults\.0\.kind: expected one of earthquake, got 'earthquak'"),
     (fault("landslide", "", 1.0), r"faults\.0: expected swing_rad from 0 to 1, got 2"),
-    (fault("flood", "", 1.0), r"faults\.0\.kind: expected a subclass of .* with kind = 'flood' at tremors:NoFault"),
-    (fault("drought", "", 1.0), r"faults\.0\.kind: expected a fault class at tremors:Drought, got .*attribute"),
+    (fault("flood", "", 1.0), r"faults\.0\.kind: tremors 1\.0: .* flood = tremors:NoFault: expected a .*Fault, got"),
+    (fault("tremor", "", 1.0), r"faults\.0\.kind: .* expected a class with kind = 'tremor', got 'earthquake'"),
+    (fault("tremor", "", 1.0), r"faults\.0\.kind: .* tremor: .* class with kind = 'tremor', got 'earthquake'"),
+    (fault("unnamed", "", 1.0), r"faults\.0\.kind: .* unnamed: expected a class with kind = 'unnamed', got None"),
 ])
 def test_what_is_wrong_with_it_is_pointed_at(text: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=r"s\.toml:\d+: " + message):
@@ -119,4 +130,4 @@ def test_what_is_wrong_with_it_is_pointed_at(text: str, message: str) -> None:
 
 def test_the_built_in_kinds_come_first() -> None:
     kinds = list_fault_kinds()
-    assert kinds[0] == "bump" and kinds[-4:] == ("drought", "earthquake", "flood", "landslide")
+    assert kinds[0] == "bump" and kinds[-6:] == ("drought", "earthquake", "flood", "landslide", "tremor", "unnamed")
