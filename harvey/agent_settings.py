@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from harvey.errors import BadInput
 from knowledge_sources.settings import DEFAULT, Settings
@@ -35,16 +36,25 @@ def build_settings(pairs: Iterable[tuple[str, str]], others: Sequence[str] = ())
     return settings
 
 
-def split_pairs(pairs: Pairs, mission_keys: Sequence[str]) -> tuple[Pairs, Pairs]:
-    """The pairs that a mission's file understands, and those that are settings of the agent.
+def split_settings(settings: Mapping[str, Any], mission_keys: Sequence[str]) -> tuple[dict[str, Any], Pairs]:
+    """The settings that a mission's file understands, and those of the agent, as ``run.json`` keeps them.
 
     Raises:
-        BadInput: neither does; near names of both are listed.
+        BadInput: a key is unknown (near ones of both are listed), or a value is not of its agent setting's kind.
     """
-    for key, _ in pairs:
+    for key in settings:
         if key not in mission_keys and key not in names():
             raise unknown(key, mission_keys)
-    return tuple(p for p in pairs if p[0] in mission_keys), tuple(p for p in pairs if p[0] not in mission_keys)
+    numbers = tuple((key, _format_value(value)) for key, value in settings.items() if key not in mission_keys)
+    build_settings(numbers)
+    return {key: value for key, value in settings.items() if key in mission_keys}, numbers
+
+
+def _format_value(value: Any) -> str:
+    """A value as after ``--set``."""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return str(list(value)) if isinstance(value, tuple) else str(value)
 
 
 def unknown(key: str, others: Sequence[str] = ()) -> BadInput:

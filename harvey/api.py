@@ -28,6 +28,7 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import registry_of
 from harvey import wiring
 from harvey.agent import Sources, build_agent
+from harvey.agent_settings import split_settings
 from harvey.errors import BadInput
 from harvey.run_files import run_directory
 from harvey.run_files.observations import entry_of
@@ -43,7 +44,7 @@ from harvey.why.story import Story, lines_of, story
 from harvey.why.walk import principal
 from knowledge_sources.settings import Settings
 from logs.reader import read_true_track
-from sim.scenario import Scenario, ScenarioError, load_scenario, with_settings
+from sim.scenario import FORMAT, Scenario, ScenarioError, load_scenario, with_settings
 from sim.stage import build_stage
 from world_models.building.world import World
 from world_models.entries.body import Frame
@@ -74,7 +75,8 @@ def run(
     Args:
         scenario: a name from ``harvey list``, a TOML file, or a scenario that was loaded already.
         seed: of all chance; the same scenario and seed give the same decisions.
-        settings: as after ``--set``, for example ``{"servo.action": False, "start.heading_deg": 80}``.
+        settings: as after ``--set``: keys of the scenario and names of ``harvey settings``, for example
+            ``{"servo.action": False, "start.heading_deg": 80, "plan.max_leg_m": 2.0}``.
         out: the run directory; an older run of the same scenario and seed there is replaced, another one moved aside.
             None keeps nothing.
         knowledge_sources: classes that sit round the board beside the project's; what they decide can be replayed by
@@ -87,11 +89,12 @@ def run(
     """
     try:
         mission = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
-        stage = build_stage(with_settings(mission, settings or {}))
+        of_mission, numbers = split_settings(settings or {}, FORMAT.keys())
+        stage = build_stage(with_settings(mission, of_mission))
     except (ScenarioError, WorldError) as error:
         raise BadInput(str(error)) from None
     folder = None if out is None else run_directory.prepare_directory(Path(out), mission.name, seed)[0]
-    head = build_head(stage, seed)
+    head = build_head(stage, seed, settings=numbers)
     given = {source.called(): GIVEN for source in knowledge_sources}
     return run_mission(stage, seed, out=folder, sinks=() if on_decision is None else (on_decision,), live=live,
                        head=replace(head, plugins={**head.plugins, **given}), sources=with_sources(knowledge_sources))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from blackboard.journal import Sink
 from harvey.campaign.worker_pool import map_over_workers
@@ -50,20 +50,16 @@ class Task:
     go_on: bool = False
 
     @property
-    def mission_settings(self) -> Pairs:
-        """Those of the settings that the scenario's file understands. Raises BadInput for what nobody understands."""
-        return self._split()[0]
-
-    @property
     def agent_settings(self) -> Pairs:
         """Those of the settings that are numbers of the knowledge sources. Raises BadInput."""
         return self._split()[1]
 
-    def _split(self) -> tuple[Pairs, Pairs]:
-        from harvey.agent_settings import split_pairs
+    def _split(self) -> tuple[dict[str, Any], Pairs]:
+        """The settings of the scenario, and those of the agent. Raises BadInput for what neither knows."""
+        from harvey.agent_settings import split_settings
         from sim.scenario import FORMAT
 
-        return split_pairs(self.settings, FORMAT.keys())
+        return split_settings(dict(self.settings), FORMAT.keys())
 
     @property
     def named(self) -> str:
@@ -72,12 +68,10 @@ class Task:
 
     def load(self) -> Scenario:
         """The scenario with its settings. Raises BadInput where it or a setting cannot be used."""
-        from harvey.agent_settings import build_settings
         from sim.scenario import ScenarioError, load_scenario, with_settings
 
         try:
-            build_settings(self.agent_settings)
-            return with_settings(load_scenario(self.scenario), dict(self.mission_settings))
+            return with_settings(load_scenario(self.scenario), self._split()[0])
         except ScenarioError as error:
             raise BadInput(str(error)) from None
 
@@ -92,7 +86,8 @@ class Task:
                 files = tuple(fingerprint(path) for path in (scenario.world, *scenario.details))
             except (OSError, WorldError):
                 files = ()  # whoever reads them says what is wrong
-            return _stage(_Staged((scenario.source.text, str(scenario.folder), self.mission_settings, files), scenario))
+            settings = tuple(self._split()[0].items())
+            return _stage(_Staged((scenario.source.text, str(scenario.folder), settings, files), scenario))
         except ScenarioError as error:
             raise BadInput(str(error)) from None
 

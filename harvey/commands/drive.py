@@ -46,13 +46,13 @@ def _arguments(parser: ArgumentParser) -> None:
 
 def _run(args: Namespace) -> int:
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
-    from harvey.agent_settings import build_settings, split_pairs
+    from harvey.agent_settings import build_settings, split_settings
     from harvey.campaign.campaign import make_room, parse_pairs
     from harvey.hardware.mission import FORMAT
     from harvey.hardware.preflight import Preflight
 
-    pairs, numbers = split_pairs(parse_pairs(args.settings), FORMAT.keys())
-    mission = _mission(args, pairs)
+    settings, numbers = split_settings(dict(parse_pairs(args.settings)), FORMAT.keys())
+    mission = _mission(args, settings)
     out = check_vacant(Path(args.out) if args.out else RUNS / f"{mission.name}-drive")
     began = time.monotonic()
 
@@ -78,12 +78,12 @@ def checked(dry: Preflight) -> bool:
     return dry.ok
 
 
-def _mission(args: Namespace, pairs: Pairs) -> HardwareMission:
+def _mission(args: Namespace, more: dict[str, Any]) -> HardwareMission:
     from harvey.hardware.mission import load_mission
     from world_models.files.compiled.schema import SUFFIXES
 
     given = {OPTIONS[name][0]: value for name in OPTIONS if (value := getattr(args, name)) is not None}
-    settings: dict[str, Any] = {**dict(pairs), **given}
+    settings: dict[str, Any] = {**more, **given}
     for key in ("world", "camera.calibration"):  # named on the command line: relative to where we are
         if str(settings.get(key, "")).endswith((".toml", *SUFFIXES)):
             settings[key] = str(Path(settings[key]).resolve())

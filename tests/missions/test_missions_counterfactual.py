@@ -13,7 +13,8 @@ from harvey.errors import BadInput
 from harvey.replay.counterfactual import what_if
 from harvey.run_files.records import DecisionRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
-from harvey.simulation.run import run_mission
+from harvey.simulation.run import build_head, run_mission
+from knowledge_sources.settings.table import list_rows
 from sim.stage import Stage
 
 SEEN, BEHIND, FAR = "allens-office/desk", "allens-office/bookshelf-1", "robot-laboratory/long-bench"
@@ -54,6 +55,35 @@ def test_one_landmark_is_rested_on_and_two_are_not(run: RunDirectory) -> None:
 def test_nothing_changed_means_nothing_differs(run: RunDirectory, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(run.path), "--set", "servo.plan=on"]) == 0
     assert "nothing would have changed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", [
+    "action.lookahead_m", "plan.look_turns_rad", "matching.objective", "features.sigma_across_px"])
+def test_a_setting_set_to_its_default_changes_nothing(run: RunDirectory, name: str) -> None:
+    value = next(row.value for row in list_rows() if row.name == name)
+    answer = what_if(run, (), [(name, str(list(value) if isinstance(value, tuple) else value))], go_on=False)
+    assert (answer.then, answer.now, answer.outcome.kind) == (None, None, "reached")
+
+
+@pytest.mark.parametrize(("name", "value"), [
+    ("plan.max_leg_m", "1.5"), ("features.sigma_across_px", "1.4"), ("verification.line_tolerance_px", "4.0"),
+    ("tracking.max_tracks", "8"), ("matching.objective", "paper"), ("pose.floor_widenings", "[1.0]"),
+])
+def test_a_setting_of_any_room_changes_decisions(run: RunDirectory, name: str, value: str) -> None:
+    answer = what_if(run, (), [(name, value)], go_on=False)
+    assert answer.now is not None and answer.agreed < len(list(read_records(run.journal)))
+
+
+def test_a_run_with_other_settings_is_decided_again_with_them(
+    short_stage: Stage, run: RunDirectory, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They are kept in run.json, so that replay, resume and why use them."""
+    other = RunDirectory(tmp_path / "other")
+    run_mission(short_stage, 3, out=other.path, head=build_head(short_stage, 3, settings=(("plan.max_leg_m", "1.5"),)))
+    assert json.loads((other.path / "run.json").read_text("utf-8"))["constants"] == [["plan.max_leg_m", "1.5"]]
+    assert other.journal.read_bytes() != run.journal.read_bytes()
+    assert main(["replay", str(other.path)]) == 0
+    assert "all the same, byte for byte" in capsys.readouterr().out
 
 
 def test_without_an_expert_the_simulated_robot_goes_on_by_itself(

@@ -24,9 +24,6 @@ from knowledge_sources.methods.features.line_regions import find_line_regions
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.features import FeaturesSettings
 
-SIGMA_ACROSS_PX = DEFAULT.features.sigma_across_px
-"""As ``sigma_across_px`` of the settings, for who does not yet take it from there."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineSegments:
