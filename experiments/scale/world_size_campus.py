@@ -26,7 +26,7 @@ from world_models.building.locale_source import LocaleGeometry
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.regions import Finish, expected_brightness
 from world_models.building.world import World
-from world_models.files.compiled.packing import pack_array, pack_geometry
+from world_models.files.compiled.serialization import pack_array, pack_geometry
 from world_models.files.compiled.writer import WorldWriter
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose
@@ -118,7 +118,7 @@ class _CampusWriter:
                 kept = packet if layer == 0 else replace(
                     packet, faces=tuple(p for p in packet.faces if p[0] >= faces),
                     landmarks=tuple(p for p in packet.landmarks if p[0] >= marks))
-                self._writer.add_packet(kept, layer)
+                self._writer.add_geometry(kept, layer)
             for thing in world.things[len(model.things) if layer else 0 :]:
                 self._writer.add_thing(thing, layer)
         for key in ("open doorway", "thing", "face", "landmark"):
@@ -155,8 +155,9 @@ class _CampusWriter:
     def _geometry(self, template: _Template, prefix: str, x: float, y: float, building: int) -> None:
         first = 10_000 + building * (template.faces + template.landmarks)
         for packet in template.packets:
-            self._writer.add_packed(f"{prefix}-{packet.locale}", packet.neighbour and f"{prefix}-{packet.neighbour}",
-                                    packet.words_for(prefix, first), packet.numbers_at(x, y))
+            neighbour = packet.neighbour and f"{prefix}-{packet.neighbour}"
+            self._writer.add_packed_geometry(f"{prefix}-{packet.locale}", neighbour,
+                                             packet.words_for(prefix, first), packet.numbers_at(x, y))
         self._counts["face"] += template.faces
         self._counts["landmark"] += template.landmarks
 

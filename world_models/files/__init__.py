@@ -1,1 +1,10 @@
-"""Building models as files: read, compiled and imported."""
+"""How does a building get into the robot? World files are read, compiled and imported here, and nothing else parses.
+
+In reading order:
+
+* :mod:`.world_files`: load a world from TOML or a compiled file, compile one, compute its digest.
+* :mod:`.toml`: TOML with file and line for every error: worlds, missions, cameras, settings.
+* :mod:`.construction`: from a description to faces and model lines.
+* :mod:`.compiled`: worlds in one SQLite file, read one locale at a time.
+* :mod:`.importers`: IFC and IndoorGML files made into world files.
+"""

@@ -1,11 +1,14 @@
-"""The tables of a compiled world: one SQLite file, found by locale, by place (R*Tree) and by word."""
+"""The tables of a compiled world: one SQLite file, indexed by locale, by place (R*-tree) and by word.
+
+Table ``packet`` holds the geometry of locales, ``arc`` the edges of passage graphs; ``layer`` counts files of details.
+"""
 
 from __future__ import annotations
 
 FORMAT = "harvey world 1"
 
 SUFFIXES = (".world", ".sqlite")
-"""Names of compiled worlds end so."""
+"""Suffixes of compiled worlds."""
 
 SCHEMA = """
 create table meta (key text primary key, value text not null) without rowid;

@@ -1,4 +1,4 @@
-"""Frames in a compiled world: one SQLite file, read a locale at a time, each when it is first asked for."""
+"""Locale data from a compiled world: one SQLite file, read one locale at a time when first asked for."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from world_models.building.locale_source import LocaleGeometry, PassageEdge
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.memory_locales import words_of
 from world_models.building.things import Finding, Thing
-from world_models.files.compiled.packing import unpack_array, unpack_geometry
 from world_models.files.compiled.schema import FORMAT
+from world_models.files.compiled.serialization import unpack_array, unpack_geometry
 from world_models.files.toml.source import WorldError
 from world_models.frames import Pose
 
@@ -32,18 +32,18 @@ THING = "select t.name, la.name, t.kind, footprint, low_m, high_m, proud_m, t.so
 
 
 class SqliteLocales:
-    """The frames of a compiled world; see :class:`world_models.building.locale_source.LocaleSource` for the questions.
+    """A :class:`world_models.building.locale_source.LocaleSource` that reads a compiled world.
 
     Attributes:
         name: of the world.
-        touched: what was loaded so far, (kind, name of the locale), in that order.
+        touched: what was loaded so far, as (kind, name of the locale), in order.
     """
 
     def __init__(self, path: Path, details: Sequence[str] = ()) -> None:
-        """Raises WorldError where this is no compiled world, or one without these details."""
+        """Open a compiled world. Raises WorldError where it is none, or was compiled with other details."""
         self._path = path
         self.touched: list[tuple[str, str]] = []
-        self._kept: dict[tuple[str, Any], Any] = {}
+        self._cache: dict[tuple[str, Any], Any] = {}
         try:
             path.stat()
             self._file = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, check_same_thread=False)
@@ -54,7 +54,7 @@ class SqliteLocales:
             raise WorldError(f"{path.name}: expected a compiled world, got: {error}") from None
         if meta.get("format") != FORMAT:
             raise WorldError(f"{path.name}: expected {FORMAT!r}, got {meta.get('format')!r}: compile it anew")
-        with self._sound():
+        with self._world_errors():
             self.name = str(meta["name"])
             known = json.loads(meta["details"])
             if details and list(details) != known:
@@ -64,8 +64,8 @@ class SqliteLocales:
             self._counts: Mapping[str, int] = json.loads(meta[f"counts {self._layer}"])
 
     @contextmanager
-    def _sound(self) -> Iterator[None]:
-        """Whatever is wrong with the file is told as a WorldError."""
+    def _world_errors(self) -> Iterator[None]:
+        """Turn every error of a broken file into a WorldError."""
         try:
             yield
         except WorldError:
@@ -76,28 +76,28 @@ class SqliteLocales:
     def _rows(self, query: str, *values: Any) -> list[tuple[Any, ...]]:
         return self._file.execute(query, values).fetchall()
 
-    def _once(self, kind: str, name: Any, load: Callable[[], T]) -> T:
-        """What was loaded before, or what is loaded now and noted."""
+    def _load_once(self, kind: str, name: Any, load: Callable[[], T]) -> T:
+        """A cached value; loaded, and noted in ``touched``, the first time."""
         key = kind, name
-        if key not in self._kept:
-            with self._sound():
-                self._kept[key] = load()
+        if key not in self._cache:
+            with self._world_errors():
+                self._cache[key] = load()
             self.touched.append((kind, str(name)))
-        found: T = self._kept[key]
+        found: T = self._cache[key]
         return found
 
-    # -- questions ---------------------------------------------------------------------------------------------------
+    # -- locale source -----------------------------------------------------------------------------------------------
 
     def names(self) -> Sequence[str]:
-        return self._every_name
+        return self._names
 
     @cached_property
-    def _every_name(self) -> tuple[str, ...]:
-        with self._sound():
+    def _names(self) -> tuple[str, ...]:
+        with self._world_errors():
             return tuple(str(row[0]) for row in self._rows("select name from locale order by id"))
 
     def locale(self, name: str) -> Locale | None:
-        return self._once("locale", name, lambda: self._locale(name))
+        return self._load_once("locale", name, lambda: self._locale(name))
 
     def _locale(self, name: str) -> Locale | None:
         rows = self._rows(
@@ -105,7 +105,7 @@ class SqliteLocales:
             " l.survey_m, l.survey_rad from locale l"
             " left join locale p on p.id = l.parent where l.name = ?", name)
         if not rows:
-            if name in self._every_name:
+            if name in self._names:
                 raise WorldError(f"{self._path.name}: expected a sound world, got one whose index lacks {name!r}")
             return None
         kind, parent, frame, outline, height_m, floor_m, properties, source, survey_m, survey_rad = rows[0]
@@ -114,32 +114,32 @@ class SqliteLocales:
                       height_m, json.loads(properties), source, floor_m, survey_m, survey_rad)
 
     def children(self, name: str) -> tuple[str, ...]:
-        return self._once("children", name, lambda: tuple(row[0] for row in self._rows(
+        return self._load_once("children", name, lambda: tuple(row[0] for row in self._rows(
             "select c.name from locale c join locale p on c.parent = p.id where p.name = ? order by c.id", name)))
 
     def is_room(self, name: str) -> bool:
-        return self._once("is room", name, lambda: bool(self._rows(
+        return self._load_once("is room", name, lambda: bool(self._rows(
             "select 1 from locale where name = ? and leaf", name)))
 
     def near(self, x_m: float, y_m: float, margin_m: float) -> Sequence[str]:
-        with self._sound():
+        with self._world_errors():
             return [row[0] for row in self._rows(
                 "select l.name from extent e join locale l on l.id = e.id"
                 " where x0 <= ? and x1 >= ? and y0 <= ? and y1 >= ? order by e.id",
                 x_m + margin_m, x_m - margin_m, y_m + margin_m, y_m - margin_m)]
 
     def doorways(self, locale: str) -> tuple[Doorway, ...]:
-        return self._once("doorways", locale, lambda: tuple(_doorway(row) for row in self._rows(
+        return self._load_once("doorways", locale, lambda: tuple(_build_doorway(row) for row in self._rows(
             f"{DOORWAY} where d.a = (select id from locale where name = ?1)"
             " or d.b = (select id from locale where name = ?1) order by d.id", locale)))
 
     def links(self, locale: str) -> tuple[Link, ...]:
-        return self._once("links", locale, lambda: tuple(_link(row) for row in self._rows(
+        return self._load_once("links", locale, lambda: tuple(_build_link(row) for row in self._rows(
             f"{LINK} where k.a = (select id from locale where name = ?1)"
             " or k.b = (select id from locale where name = ?1) order by k.id", locale)))
 
     def geometry(self, locale: str) -> tuple[LocaleGeometry, ...]:
-        return self._once("faces", locale, lambda: self._geometry(
+        return self._load_once("faces", locale, lambda: self._geometry(
             f"{PACKET} where (p.locale = (select id from locale where name = ?1)"
             " or p.neighbour = (select id from locale where name = ?1)) and layer <= ?2 order by p.id",
             locale, self._layer))
@@ -151,12 +151,12 @@ class SqliteLocales:
         return tuple(unpack_geometry(*key, several) for key, several in rows.items())
 
     def things(self, locale: str) -> tuple[Thing, ...]:
-        return self._once("things", locale, lambda: tuple(_thing(row) for row in self._rows(
+        return self._load_once("things", locale, lambda: tuple(_build_thing(row) for row in self._rows(
             f"{THING} where t.locale = (select id from locale where name = ?) and layer <= ? order by t.id",
             locale, self._layer)))
 
     def passage_edges(self, container: str) -> tuple[PassageEdge, ...]:
-        return self._once("passages", container, lambda: tuple(
+        return self._load_once("passages", container, lambda: tuple(
             PassageEdge(passage, ((a, a_part), (b, b_part))) for passage, a, a_part, b, b_part in self._rows(
                 "select passage, la.name, a_part, lb.name, b_part from arc join locale la on la.id = a"
                 " join locale lb on lb.id = b where container = (select id from locale where name = ?) order by arc.id",
@@ -168,71 +168,72 @@ class SqliteLocales:
                               " locale = (select id from locale where name = ?)", component, locale)
             return int(rows[0][0]) if rows else 0
 
-        return self._once("component", (locale, component), load)
+        return self._load_once("component", (locale, component), load)
 
     def passage(self, name: str) -> Doorway | Link | None:
         def load() -> Doorway | Link | None:
             rows = self._rows(f"{DOORWAY} where d.name = ?", name)
             links = self._rows(f"{LINK} where k.name = ?", name) if not rows else []
-            return _doorway(rows[0]) if rows else _link(links[0]) if links else None
+            return _build_doorway(rows[0]) if rows else _build_link(links[0]) if links else None
 
-        return self._once("passage", name, load)
+        return self._load_once("passage", name, load)
 
     def named(self, words: str) -> Sequence[str]:
         wanted = sorted(words_of(words))
         if not wanted:
             return []
-        with self._sound():
+        with self._world_errors():
             marks = ", ".join("?" * len(wanted))
             return [row[0] for row in self._rows(
                 f"select l.name from locale l join word w on w.locale = l.id where word in ({marks})"
                 " group by l.id having count(*) = ? order by l.id", *wanted, len(wanted))]
 
     def all_doorways(self) -> tuple[Doorway, ...]:
-        with self._sound():
-            return tuple(_doorway(row) for row in self._rows(f"{DOORWAY} order by d.id"))
+        with self._world_errors():
+            return tuple(_build_doorway(row) for row in self._rows(f"{DOORWAY} order by d.id"))
 
     def all_links(self) -> tuple[Link, ...]:
-        with self._sound():
-            return tuple(_link(row) for row in self._rows(f"{LINK} order by k.id"))
+        with self._world_errors():
+            return tuple(_build_link(row) for row in self._rows(f"{LINK} order by k.id"))
 
     def all_geometry(self) -> tuple[LocaleGeometry, ...]:
-        with self._sound():
+        with self._world_errors():
             return self._geometry(f"{PACKET} where layer <= ? order by p.id", self._layer)
 
     def all_things(self) -> tuple[Thing, ...]:
-        with self._sound():
-            return tuple(_thing(row) for row in self._rows(f"{THING} where layer <= ? order by t.id", self._layer))
+        with self._world_errors():
+            rows = self._rows(f"{THING} where layer <= ? order by t.id", self._layer)
+            return tuple(_build_thing(row) for row in rows)
 
     def counts(self) -> Mapping[str, int]:
         return self._counts
 
     def last_room(self) -> str:
-        """The room that was written last."""
-        with self._sound():
+        """Name of the room that was written last."""
+        with self._world_errors():
             return str(self._rows("select name from locale where leaf order by id desc limit 1")[0][0])
 
     @property
     def sha256(self) -> str:
-        """Of what was compiled; it stands in the file, so that a large one need not be read for it."""
-        with self._sound():
+        """Digest of the contents; stored in the file, so that a large one need not be read for it."""
+        with self._world_errors():
             return str(self._rows("select value from meta where key = 'sha256'")[0][0])
 
     def faults(self) -> tuple[Finding, ...]:
-        with self._sound():
+        with self._world_errors():
             return tuple(Finding(source, what) for source, what in self._rows("select source, what from fault"))
 
 
-def _doorway(row: tuple[Any, ...]) -> Doorway:
+def _build_doorway(row: tuple[Any, ...]) -> Doorway:
     name, a, b, thresholds, height_m, source = row
     return Doorway(name, (a, b), unpack_array(thresholds, (2, 2, 2)), height_m, source)
 
 
-def _link(row: tuple[Any, ...]) -> Link:
+def _build_link(row: tuple[Any, ...]) -> Link:
     name, kind, a, b, stops, source = row
     return Link(name, kind, (a, b), unpack_array(stops, (2, 3)), source)
 
 
-def _thing(row: tuple[Any, ...]) -> Thing:
+def _build_thing(row: tuple[Any, ...]) -> Thing:
     name, locale, kind, footprint, low_m, high_m, proud_m, source = row
     return Thing(name, locale, kind, unpack_array(footprint, (-1, 2)), low_m, high_m, proud_m, source)

@@ -1,4 +1,4 @@
-"""Compiling a world: frames go into one SQLite file, from which they are loaded one locale at a time."""
+"""Compiling a world into one SQLite file, from which locale data are read one locale at a time."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from world_models.building.memory_locales import bounding_rectangle, words_about
 from world_models.building.passages import build_passage_graphs, drivable_passages
 from world_models.building.things import Finding, Thing
 from world_models.building.world import World
-from world_models.files.compiled.packing import pack_array, pack_geometry
 from world_models.files.compiled.schema import FORMAT, INDICES, SCHEMA
+from world_models.files.compiled.serialization import pack_array, pack_geometry
 from world_models.files.toml.source import WorldError
 from world_models.frames import Pose
 
 
 def compile_world(layers: Sequence[World], out: Path, details: Sequence[str] = ()) -> None:
-    """Write a world to a file.
+    """Write a world to a compiled file.
 
     Args:
-        layers: the world as the robot knows it, then with one file of details after the other.
-        out: written anew.
+        layers: the world as the robot knows it, then with each file of details added.
+        out: the file; replaced.
         details: names of the files of details, in that order.
 
     Raises:
@@ -59,8 +59,8 @@ def _write(writer: WorldWriter, layers: Sequence[World]) -> None:
         writer.add_link(link)
     known = 0, 0, 0
     for layer, built in enumerate(layers):
-        for packet in built.locale_source.all_geometry():
-            writer.add_packet(_beyond(packet, known[0], known[1]), layer)
+        for geometry in built.locale_source.all_geometry():
+            writer.add_geometry(_new_in_layer(geometry, known[0], known[1]), layer)
         for thing in built.things[known[2] :]:
             writer.add_thing(thing, layer)
         counts = built.counts()
@@ -69,14 +69,15 @@ def _write(writer: WorldWriter, layers: Sequence[World]) -> None:
     writer.finish(layers[-1].building_faults)
 
 
-def _beyond(packet: LocaleGeometry, faces: int, landmarks: int) -> LocaleGeometry:
-    """What a packet has that is not in an earlier layer."""
-    return LocaleGeometry(packet.locale, packet.neighbour, tuple(pair for pair in packet.faces if pair[0] >= faces),
-                  tuple(pair for pair in packet.landmarks if pair[0] >= landmarks))
+def _new_in_layer(geometry: LocaleGeometry, faces: int, landmarks: int) -> LocaleGeometry:
+    """The faces and landmarks that are not in an earlier layer."""
+    return LocaleGeometry(
+        geometry.locale, geometry.neighbour, tuple(pair for pair in geometry.faces if pair[0] >= faces),
+        tuple(pair for pair in geometry.landmarks if pair[0] >= landmarks))
 
 
 class WorldWriter:
-    """Writes frames as they come; containers before what they contain."""
+    """Writes locale data as they come; containers before what they contain."""
 
     def __init__(self, file: sqlite3.Connection, name: str, details: Sequence[str] = ()) -> None:
         self._file = file
@@ -99,7 +100,7 @@ class WorldWriter:
         self._file.execute("insert into meta values (?, ?)", (key, value))
 
     def add_locale(self, locale: Locale) -> None:
-        """A locale whose container was added before."""
+        """Add a locale; its container must have been added before."""
         number = self._ids[locale.name] = len(self._ids)
         parent = locale.parent
         pose = locale.frame if parent is None else self._poses[parent] @ locale.frame
@@ -114,26 +115,28 @@ class WorldWriter:
         self._words += [(word, number) for word in sorted(words_about(locale))]
 
     def add_doorway(self, doorway: Doorway) -> None:
-        """An open doorway between locales that were added before."""
+        """Add an open doorway between locales that were added before."""
         a, b = (self._ids[name] for name in doorway.between)
         self._passages += drivable_passages([doorway])
         self._insert("insert into doorway (name, a, b, thresholds, height_m, source) values (?, ?, ?, ?, ?, ?)", (
             doorway.name, a, b, pack_array(doorway.thresholds_world), doorway.height_m, doorway.source))
 
     def add_link(self, link: Link) -> None:
-        """An elevator or a flight of stairs between locales that were added before."""
+        """Add an elevator or a flight of stairs between locales that were added before."""
         a, b = (self._ids[name] for name in link.between)
         self._passages += drivable_passages([link])
         self._insert("insert into link (name, kind, a, b, stops, source) values (?, ?, ?, ?, ?, ?)", (
             link.name, link.kind, a, b, pack_array(link.stops_world), link.source))
 
-    def add_packet(self, packet: LocaleGeometry, layer: int = 0) -> None:
-        """Faces and landmarks; empty ones are left out."""
-        if packet.faces or packet.landmarks:
-            self.add_packed(packet.locale, packet.neighbour, *pack_geometry(packet), layer)
+    def add_geometry(self, geometry: LocaleGeometry, layer: int = 0) -> None:
+        """Add faces and landmarks; empty geometry is left out."""
+        if geometry.faces or geometry.landmarks:
+            self.add_packed_geometry(geometry.locale, geometry.neighbour, *pack_geometry(geometry), layer)
 
-    def add_packed(self, locale: str, neighbour: str | None, words: str, numbers: bytes, layer: int = 0) -> None:
-        """A packet that is packed already."""
+    def add_packed_geometry(
+        self, locale: str, neighbour: str | None, words: str, numbers: bytes, layer: int = 0
+    ) -> None:
+        """Add geometry that is packed already."""
         self._insert("insert into packet (locale, neighbour, layer, words, numbers) values (?, ?, ?, ?, ?)", (
             self._ids[locale], None if neighbour is None else self._ids.get(neighbour), layer, words, numbers))
 
@@ -145,11 +148,11 @@ class WorldWriter:
              thing.high_m, thing.protrusion_m, thing.source))
 
     def count(self, layer: int, counts: object) -> None:
-        """How many of everything there are with so many layers."""
+        """Store the numbers of rooms, doorways and so on, with layers up to this one."""
         self._meta(f"counts {layer}", json.dumps(counts))
 
     def finish(self, faults: Iterable[Finding] = ()) -> None:
-        """Find the passages of every container, index everything and write it out."""
+        """Build the passage graphs, index everything and commit."""
         ids = self._ids
         graphs = build_passage_graphs(self._parents, self._passages)
         edges = [(ids[container], edge.passage, ids[a], a_part, ids[b], b_part)

@@ -1,4 +1,4 @@
-"""The camera file: what ``harvey calibrate`` found out about a camera, as TOML that people may edit."""
+"""The camera file: intrinsics, lens and mounting from ``harvey calibrate``, as TOML that people may edit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SIZE = ("width_px", "height_px")
 
 
 class CameraFileError(WorldError):
-    """A camera file that cannot be read: names the file, the line, what was expected and what came."""
+    """A camera file that cannot be read: names file, line, what was expected and what was got."""
 
 
 def load_camera(path: Path) -> tuple[Camera, CameraMount | None]:
@@ -25,7 +25,7 @@ def load_camera(path: Path) -> tuple[Camera, CameraMount | None]:
     try:
         root = Source.read(path).root.table(("camera",), ("mount", "deviation"))
         mount = root.get("mount")
-        return _camera(root["camera"]), None if mount is None else _mount(mount)
+        return _read_camera(root["camera"]), None if mount is None else _read_mount(mount)
     except WorldError as error:
         raise CameraFileError(str(error)) from None
 
@@ -46,9 +46,9 @@ def camera_text(camera: Camera, mount: CameraMount | None, notes: tuple[str, ...
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def _camera(node: Node) -> Camera:
+def _read_camera(node: Node) -> Camera:
     node.table((*SIZE, *PINHOLE), ("distortion",))
-    width, height = (_whole(node[key]) for key in SIZE)
+    width, height = (_read_pixels(node[key]) for key in SIZE)
     fx, fy = (node[key].number(1.0, 1e6) for key in PINHOLE[:2])
     cx, cy = (node[key].number(-1e5, 1e5) for key in PINHOLE[2:])
     distortion = node.get("distortion")
@@ -56,14 +56,14 @@ def _camera(node: Node) -> Camera:
     return Camera(fx, fy, cx, cy, width, height, terms)
 
 
-def _mount(node: Node) -> CameraMount:
+def _read_mount(node: Node) -> CameraMount:
     node.table(("height_m",), ("forward_m", "tilt_deg"))
     forward = node["forward_m"].number(-10.0, 10.0) if "forward_m" in node else 0.0
     tilt = node["tilt_deg"].number(-89.0, 89.0) if "tilt_deg" in node else 0.0
     return CameraMount(node["height_m"].number(0.01, 10.0), forward, math.radians(tilt))
 
 
-def _whole(node: Node) -> int:
+def _read_pixels(node: Node) -> int:
     value = node.number(2, 16384)
     if value != int(value):
         raise node.fail("a whole number of pixels")

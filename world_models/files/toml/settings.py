@@ -18,11 +18,11 @@ from world_models.units import FOOT_M, INCH_M
 
 T = TypeVar("T")
 MAX_NUMBER = 10**9
-"""No setting is larger."""
+"""Largest absolute value of a setting."""
 
 
 def spellings(field: str) -> dict[str, float]:
-    """The keys under which a field may be written, each with the factor to SI."""
+    """The keys under which a field may be written, each with its factor to SI."""
     out = {field: 1.0}
     if "_rad" in field:
         out[field.replace("_rad", "_deg")] = math.pi / 180.0
@@ -37,7 +37,7 @@ def known_keys(kind: type[Any]) -> dict[str, tuple[str, float]]:
 
 
 def read_settings(node: Node, kind: type[T]) -> T:
-    """A table as a settings object; what is not written keeps its default.
+    """A table as an object of a settings class; absent keys keep their defaults.
 
     Raises:
         WorldError: unknown key, wrong type, or values that do not go together.
@@ -83,19 +83,19 @@ def _value(item: Node, hint: Any, factor: float) -> Any:
     return item.number(-MAX_NUMBER, MAX_NUMBER) * factor
 
 
-FEW = 12
-"""So many keys are named where none is similar."""
+MAX_NAMED = 12
+"""Number of keys named where none is similar."""
 
 
 def suggest_keys(key: str, known: Iterable[str]) -> str:
-    """What to say was expected instead of an unknown key: the most similar ones, or all, or how many there are."""
+    """What to expect instead of an unknown key, for an error: the most similar keys, or all, or the first few."""
     names = list(known)
-    alike = difflib.get_close_matches(key, names, n=4, cutoff=0.5) or names[:FEW]
-    return "one of " + ", ".join(alike) + (f" ... ({len(names)} in all)" if len(names) > len(alike) == FEW else "")
+    alike = difflib.get_close_matches(key, names, n=4, cutoff=0.5) or names[:MAX_NAMED]
+    return "one of " + ", ".join(alike) + (f" ... ({len(names)} in all)" if len(names) > len(alike) == MAX_NAMED else "")
 
 
 def parse_value(text: str) -> Any:
-    """The value of a ``--set key=value``: on/off, a TOML value, or else the text itself."""
+    """The value of a ``--set key=value``: on or off, a TOML value, or else the text itself."""
     if text.lower() in ("on", "off"):
         return text.lower() == "on"
     try:
