@@ -14,7 +14,7 @@ MARKS: Mapping[str, str] = {
 
 
 def check_packages() -> None:
-    """Raises ImportError where a package of somebody else is found in place of one of ours; names its folder."""
+    """Raises ImportError where another package is found in place of one of ours; names its folder."""
     for name, module in MARKS.items():
         spec = find_spec(name)
         folders = list(spec.submodule_search_locations or ()) if spec is not None else []

@@ -8,7 +8,7 @@ from pathlib import Path
 from world_models.building.plan_view import GROUND, Shape, build_drawing
 from world_models.building.world import World
 
-DOTS_A_METRE, MOST_DOTS = 30.0, 6000.0
+PIXELS_PER_M, MAX_PIXELS = 30.0, 6000.0
 LOOKS: Mapping[str, tuple[str, str]] = {
     "room": ("#f7f4ea", "#222222"), "outdoors": ("#b9cf9d", "#3c5a2c"), "obstacle": ("#c9a676", "#5b4327"),
     "board": ("#6d8fb3", "#34516f"), "paving": ("#e3ded0", "#8a8678"), "doorway": ("#bfe3b4", "#3c7a2c"),
@@ -22,7 +22,7 @@ def draw_plan(world: World, out: Path) -> None:
     from matplotlib.figure import Figure
 
     plan = build_drawing(world)
-    scale = min(DOTS_A_METRE, MOST_DOTS / float(plan.size.max()))
+    scale = min(PIXELS_PER_M, MAX_PIXELS / float(plan.size.max()))
     figure = Figure(figsize=(plan.size[0] * scale / 100.0, plan.size[1] * scale / 100.0), dpi=100, facecolor=GROUND)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_xlim(0.0, plan.size[0])

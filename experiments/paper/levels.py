@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from experiments.report import Cell, Report, count_kinds
 from harvey.campaign.campaign import Task, run_tasks
-from harvey.campaign.progress import counted
+from harvey.campaign.progress import count_missions
 from world_models.units import INCH_M
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def run(quick: bool, seed: int) -> Report:
         for scenario in SCENARIOS for name, off in LEVELS_OFF.items() if not (quick and (scenario, name) in NOT_QUICK)
     }
     everything = [task for row in tasks.values() for task in row]
-    done = dict(counted(run_tasks(everything), len(everything), sys.stderr))
+    done = dict(count_missions(run_tasks(everything), len(everything), sys.stderr))
     results = {key: [done[task] for task in row] for key, row in tasks.items()}
     return Report(
         "Missions with levels of perceptual servoing switched off", COLUMNS,

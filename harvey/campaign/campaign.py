@@ -26,7 +26,7 @@ Follow = Callable[["Tally"], Sink]
 """Makes the sink that shows what a tally counts; it is called after the tally."""
 
 WORKERS = 2
-MOST_SEEDS = 10_000
+MAX_SEEDS = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class Task:
             try:
                 files = tuple(fingerprint(path) for path in (scenario.world, *scenario.details))
             except (OSError, WorldError):
-                files = ()  # whoever reads them says what is wrong
+                files = ()  # the error is reported where they are read
             settings = tuple(self._split()[0].items())
             return _stage(_Staged((scenario.source.text, str(scenario.folder), settings, files), scenario))
         except ScenarioError as error:
@@ -114,9 +114,9 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     for part in text.split(","):
         match = re.fullmatch(r"(\d{1,9})(?:\.\.(\d{1,9}))?", part.strip(), re.ASCII)
         first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
-        if last < first or last - first >= MOST_SEEDS:
+        if last < first or last - first >= MAX_SEEDS:
             raise BadInput("--seed: expected a number from 0 to 999999999, a range as 0..19 or a list as 1,4,9,"
-                           f" of {MOST_SEEDS} at most, got {text!r}")
+                           f" of {MAX_SEEDS} at most, got {text!r}")
         seeds += range(first, last + 1)
     return tuple(dict.fromkeys(seeds))
 
@@ -141,7 +141,7 @@ def run_task(
     tally = Tally(stage)
     shown = (tally, follow(tally)) if follow else ()
     if task.go_on and task.out is not None and (task.out / "run.json").exists():
-        return _kept_or_resumed(RunDirectory(task.out), task, stage, (*shown, *sinks), live)
+        return _keep_or_resume(RunDirectory(task.out), task, stage, (*shown, *sinks), live)
     out = None if task.out is None else make_room(task.out, stage.scenario.name, task.seed)
     head = build_head(stage, task.seed, task.body, task.agent_settings)
     return run_mission(stage, task.seed, out=out, sinks=(*shown, *sinks), live=live, head=head)
@@ -156,7 +156,7 @@ def make_room(out: Path, name: str, seed: int) -> Path:
     return path
 
 
-def _kept_or_resumed(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence[Sink], live: bool) -> MissionResult:
+def _keep_or_resume(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence[Sink], live: bool) -> MissionResult:
     """What an earlier campaign did of this mission. Raises BadInput where another mission is there."""
     from harvey.run_files.run_head import RunHead
     from harvey.runner.result import MissionResult

@@ -91,7 +91,7 @@ def stages(total: int, out: TextIO) -> Iterator[Callable[[str], None]]:
         yield begin
 
 
-def counted(
+def count_missions(
     done: Iterable[tuple[Task, MissionResult]], total: int, out: TextIO
 ) -> Iterator[tuple[Task, MissionResult]]:
     """Missions as they are done, with a bar on a terminal and a line for each elsewhere."""

@@ -27,7 +27,7 @@ TOLD_TO_STOP = 143
 def map_over_workers(work: Callable[[T], R], items: Sequence[T], workers: int | None = None) -> Iterator[tuple[int, R]]:
     """(place in ``items``, what ``work`` gives for it) as they are done, in whatever order.
 
-    Whoever stops asking, or is interrupted, stops the workers; each may close its files first.
+    When the caller stops, or is interrupted, the workers stop; each may close its files first.
 
     Args:
         work: a function of a module, so that another process finds it.
@@ -45,13 +45,13 @@ def map_over_workers(work: Callable[[T], R], items: Sequence[T], workers: int | 
         waiting = iter(enumerate(items))
         under_way: dict[Future[R], int] = {}
         for number, item in islice(waiting, AHEAD * most):
-            under_way[pool.submit(_worked, work, item)] = number
+            under_way[pool.submit(_work_in_worker, work, item)] = number
         while under_way:
             ready, _ = wait(under_way, return_when=FIRST_COMPLETED)
             for future in ready:
                 yield under_way.pop(future), future.result()
             for number, item in islice(waiting, len(ready)):
-                under_way[pool.submit(_worked, work, item)] = number
+                under_way[pool.submit(_work_in_worker, work, item)] = number
     except BrokenProcessPool:
         raise BadInput("a worker process was killed from outside, as when memory runs out") from None
     except BaseException:
@@ -69,7 +69,7 @@ def _become_worker() -> None:
     signal.signal(signal.SIGTERM, _exit)
 
 
-def _worked(work: Callable[[T], R], item: T) -> R:
+def _work_in_worker(work: Callable[[T], R], item: T) -> R:
     """In a worker: one that is told to stop closes its files, and then takes nothing else."""
     try:
         return work(item)

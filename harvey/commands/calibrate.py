@@ -63,7 +63,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.hardware.calibration import boards_in, calibrated, grey_of, mounted, report
+    from harvey.hardware.calibration import boards_in, calibrate_camera, find_mounting, grey_of, report
     from knowledge_sources.methods.calibration.chessboard import Pattern
     from knowledge_sources.methods.calibration.picture import draw_calibration
     from world_models.files.toml.camera_file import camera_text
@@ -76,11 +76,11 @@ def _run(args: Namespace) -> int:
         raise BadInput(f"--pattern, --square-mm: {error}") from None
     place = None if args.mount_image is None else grey_of(Path(args.mount_image))
     boards = boards_in(_pictures(args, pattern), pattern, _tell)
-    calibration = calibrated(boards, pattern, with_k3=args.k3)
+    calibration = calibrate_camera(boards, pattern, with_k3=args.k3)
     found, mount = None, None
     if board is not None:
         place = _live_place(args) if place is None else place
-        found, mount = mounted(calibration, place, pattern, board)
+        found, mount = find_mounting(calibration, place, pattern, board)
     lines = report(calibration, boards, found, board)
     _write(args.out, camera_text(calibration.camera, mount, _notes(calibration, args)), lines,
            draw_calibration(calibration, boards.shown))

@@ -23,8 +23,8 @@ def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN", help="a run directory")
     what_if = parser.add_argument_group("what would it have done")
     what_if.add_argument("--without", metavar="NAME", action="append", default=[],
-                         help="without an expert, a landmark or face of its model, or one segment, as 'frame 8 segment"
-                              " 12'; may be repeated")
+                         help="without a knowledge source, a landmark or face of its model, or one segment, as 'frame 8"
+                              " segment 12'; may be repeated")
     what_if.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
                          help="with a servo level off, as servo.plan=off, or another number of harvey settings, as"
                               " action.min_tolerance_px=8; may be repeated")
@@ -45,7 +45,7 @@ def _run(args: Namespace) -> int:
 def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, str], ...]) -> int:
     """Decide it again with a changed agent."""
     from harvey.replay.counterfactual import what_if
-    from harvey.replay.counterfactual_words import told
+    from harvey.replay.counterfactual_words import describe_answer
     from harvey.run_files.run_head import RunHead
 
     out = RunDirectory(check_vacant(Path(args.out))) if args.out else None
@@ -53,7 +53,7 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
         raise BadInput(f"--out {args.out}: expected another directory than that of the run, got the same")
     elsewhere = RunHead.read(run.path).decided_elsewhere()
     answer = what_if(run, args.without, settings, out=out, go_on=not args.record_only)
-    print("\n".join(told(answer, run, [*(f"without {name}" for name in args.without),
+    print("\n".join(describe_answer(answer, run, [*(f"without {name}" for name in args.without),
                                        *(f"with {key} = {value}" for key, value in settings)])))
     if elsewhere:
         print(f"\nnote: the run {elsewhere}, so what differs may come of that as well: harvey replay {run.path} tells")
@@ -99,13 +99,13 @@ def _perhaps(head: RunHead, elsewhere: str) -> str:
     return "The run was decided by the same code as this, so its files were changed since, or the libraries are others."
 
 
-def _difference(agreed: int, told: ReplayedDecision) -> str:
+def _difference(agreed: int, decision: ReplayedDecision) -> str:
     from blackboard.journal import decision_record
     from harvey.diff.first_difference import describe
     from harvey.run_files.records import decision_of
 
-    now = None if told.now is None else decision_of(decision_record(told.now))
-    return "\n".join(["first: as recorded; second: as decided now", *describe(agreed, told.recorded, now)])
+    now = None if decision.now is None else decision_of(decision_record(decision.now))
+    return "\n".join(["first: as recorded; second: as decided now", *describe(agreed, decision.recorded, now)])
 
 
 def shown(decisions: Iterable[ReplayedDecision]) -> Iterator[ReplayedDecision]:
@@ -119,7 +119,7 @@ COMMAND = Command(
     "replay", "decide a recorded run again and compare, byte for byte",
     (
         ("harvey replay runs/lab-to-allens-office-0", "from its camera frames and odometry"),
-        ("harvey replay runs/bump-0 --without plan_adjuster", "what it would have done without an expert"),
+        ("harvey replay runs/bump-0 --without plan_adjuster", "what it would have done without a knowledge source"),
         ("harvey replay runs/bump-0 --without fire-door", "without a landmark of its model"),
         ("harvey replay runs/bump-0 --without 'frame 8 segment 12'", "had it not found one segment"),
         ("harvey replay runs/bump-0 --set servo.plan=off --out runs/bump-no-plan", "and keep it as a run"),
@@ -127,7 +127,7 @@ COMMAND = Command(
     ),
     _arguments, _run,
     "Neither simulator nor robot takes part. Exit code 0 where every decision is the same, 1 where one is not.\n\n"
-    "With --without or --set it tells what would have been: a changed agent is told what was observed, as long as it\n"
-    "asks its body for the same. From the first motion or picture that differs the record no longer answers; a run of\n"
-    "the simulator then goes on by itself, in the same world with the same chance.",
+    "With --without or --set it tells what would have been: a changed agent gets what was observed, as long as it\n"
+    "requests the same of its body. From the first motion or picture that differs the record no longer answers; a\n"
+    "run of the simulator then goes on by itself, in the same world with the same random numbers.",
 )

@@ -95,7 +95,7 @@ COMMAND = Command(
         ("harvey resume runs/mission-drive --base create2:/dev/ttyUSB1", "on hardware, the base on another port now"),
     ),
     _arguments, _run,
-    "Its decisions are told again from what was observed, the simulated robot lives through them, and it goes on\n"
+    "Its decisions are replayed from what was observed, the simulated robot does the same again, and it goes on\n"
     "from the last one. A motor command of which nobody heard how far it was carried out is not carried out again:\n"
     "the robot was stopped in it, and the wheels are asked. On hardware everything is checked as harvey drive does,\n"
     "and a milestone has to hold before the robot moves on. Exit code 0: the goal was reached; 1: it was not; 2: the\n"

@@ -87,12 +87,12 @@ def _one(task: Task, args: Namespace) -> int:
 
 
 def _several(tasks: tuple[Task, ...]) -> int:
-    from harvey.campaign.progress import counted
+    from harvey.campaign.progress import count_missions
     from harvey.campaign.summary import several
 
     tasks[0].stage()
     try:
-        results = {task.seed: result for task, result in counted(run_tasks(tasks), len(tasks), sys.stderr)}
+        results = {task.seed: result for task, result in count_missions(run_tasks(tasks), len(tasks), sys.stderr)}
     except (KeyboardInterrupt, Terminated) as stop:
         stop.add_note("what was recorded is kept; the same command with --go-on goes on")
         raise

@@ -105,7 +105,7 @@ def _viewer() -> str:
 COMMAND = Command(
     "view", "open the recording of a run, or an overview of several, in the rerun viewer",
     (
-        ("harvey view runs/lab-to-allens-office-0", "building, camera, plan, experts and why"),
+        ("harvey view runs/lab-to-allens-office-0", "building, camera, plan, knowledge sources and why"),
         ("harvey view runs/lab-to-allens-office", "all runs of a campaign, one row each"),
         ("harvey view runs/bump-0 runs/hallway-kidnap-0 --save both.rrd", "two runs side by side, kept in a file"),
     ),

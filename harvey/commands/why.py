@@ -25,8 +25,8 @@ def _arguments(parser: ArgumentParser) -> None:
                         help="as MotorCommand-12 (its last revision) or Leg-3.2; without one: how the mission ended")
     parser.add_argument("--at", metavar="CYCLE", type=whole, help="explain what this cycle did")
     parser.add_argument("--milestone", metavar="NAME", help="tell a milestone's story: Milestone-3, or M1 of hallway")
-    parser.add_argument("--not", metavar="KS|ENTRY", dest="not_", help="why this expert did not act (--at CYCLE: then),"
-                        " or why this entry did not stay")
+    parser.add_argument("--not", metavar="KS|ENTRY", dest="not_",
+                        help="why this knowledge source did not act (--at CYCLE: then), or why this entry did not stay")
     parser.add_argument("--check", action="store_true",
                         help="walk every decision of the run, and name those that rest on nothing")
     parser.add_argument("--depth", metavar="N", type=whole,
@@ -137,7 +137,7 @@ COMMAND = Command(
         ("harvey why runs/lab-to-allens-office-0 MotorCommand-12", "why it turned there"),
         ("harvey why runs/lab-to-allens-office-0 --at 88", "what cycle 88 did, and why"),
         ("harvey why runs/lab-to-allens-office-0 --milestone 'M1 of hallway'", "what was expected, seen and judged"),
-        ("harvey why runs/lab-to-allens-office-0 --not relocalizer --at 88", "why another expert did not act then"),
+        ("harvey why runs/lab-to-allens-office-0 --not relocalizer --at 88", "why a knowledge source did not act then"),
         ("harvey why runs/lab-to-allens-office-0 --not Hypothesis-1.20", "what came of an entry, and what instead"),
         ("harvey why runs/lab-to-allens-office-0 --check", "whether every decision rests on something"),
         ("harvey why runs/lab-to-allens-office-0 --depth 12", "the whole web of reasons, twelve steps down"),

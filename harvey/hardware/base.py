@@ -1,4 +1,4 @@
-"""Bases by the name of their protocol and the port that they hang on: ``denning:/dev/ttyUSB0``."""
+"""Bases by the name of their protocol and the port that they are connected to: ``denning:/dev/ttyUSB0``."""
 
 from __future__ import annotations
 
@@ -59,13 +59,13 @@ def open_base(port: str) -> Base:
 
 
 def _number(error: OSError) -> int:
-    """The system's error number; pyserial tells some of them only in words, as ``... (25, 'Inappropriate ioctl')``."""
-    told = re.search(r"\((\d+), ", str(error))
-    return error.errno or (int(told[1]) if told else 0)
+    """The system's error number; pyserial gives some of them only as text, as ``... (25, 'Inappropriate ioctl')``."""
+    match = re.search(r"\((\d+), ", str(error))
+    return error.errno or (int(match[1]) if match else 0)
 
 
 def _others(url: str) -> str:
-    """Ports that are there."""
+    """The serial ports of this machine, for the message."""
     found = sorted(str(p) for pattern in ("ttyUSB*", "ttyACM*", "rfcomm*") for p in Path("/dev").glob(pattern))
     there = [p for p in found if p != url]
     return f"; there are {', '.join(there)}" if there else "; no USB serial port is there at all"

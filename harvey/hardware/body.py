@@ -1,4 +1,4 @@
-"""A body of metal: a base and a camera put together. What goes wrong with either becomes a value for the board."""
+"""The body of a real robot: a base and a camera. A fault of either becomes a value for the board."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ BASE_WORDS: Mapping[str, str] = {
     "refused": "base refuses",
     "stopped": "stopped",
 }
-"""What a base's kinds of fault are called on the board."""
+"""A base's kinds of fault, as the board names them."""
 CAMERA_WORDS: Mapping[str, str] = {
     "unplugged": "camera unplugged",
     "late": "frame late",
@@ -39,12 +39,12 @@ CAMERA_WORDS: Mapping[str, str] = {
     "dark": "picture is black",
     "wrong size": "picture of the wrong size",
 }
-"""And a camera's."""
-FASTEST_M_PER_S, FASTEST_RAD_PER_S = 0.8, 1.6
+"""A camera's kinds of fault, as the board names them."""
+MAX_SPEED_M_PER_S, MAX_SPEED_RAD_PER_S = 0.8, 1.6
 """A base that claims to have gone faster than this, since it was last counted, has lost count."""
 
-AGAIN_S, MOST_STOPS = 0.05, 200
-"""A stop is said again so often, until it is heeded."""
+STOP_PERIOD_S, MAX_STOPS = 0.05, 200
+"""A stop is sent again at this period, and at most so often, until it is heeded."""
 
 
 class Eye(Protocol):
@@ -56,10 +56,10 @@ class Eye(Protocol):
 
 
 class Watching:
-    """A camera of metal, whose faults are values.
+    """A camera whose faults are values.
 
-    Fewer pictures a second than are needed make looks slower, and nothing worse, as the robot stands while it looks:
-    that is told once, whenever it begins.
+    A frame rate below what the mission needs is reported once, when it begins: the robot stands while it looks, so
+    looks only take longer.
     """
 
     def __init__(self, camera: VideoCamera, clock: Callable[[], float], rate_hz: float = 0.0) -> None:
@@ -85,12 +85,12 @@ class Watching:
 
 
 class HardwareBody:
-    """A robot by its drivers (:class:`harvey.runner.ports.Body`).
+    """A real robot by its drivers: a :class:`harvey.runner.ports.Body`.
 
     Args:
-        clock: the time that claims and faults are dated by [s].
-        pause: waits so long [s]; None: on the wall clock, or until the robot is stopped for good.
-        carried: somebody who sees to a ride in an elevator; None: nobody does.
+        clock: the time of reports and faults [s].
+        pause: waits so long [s]; None: by the wall clock, or until the robot is stopped for good.
+        carried: carries out a ride in an elevator; None: there is no ride.
     """
 
     def __init__(
@@ -107,40 +107,40 @@ class HardwareBody:
         self._done: MotionReport | None = None
 
     def execute(self, command: MotorCommand) -> MotionReport | BodyFault:
-        """Carry it out, if the base answers before: the link is known to be alive when the wheels begin to turn."""
+        """Carry out a command, if the base answers before: the link is alive when the wheels begin to turn."""
         self._began_s, self._before, self._done = self._clock(), None, None
         if self._stopped.is_set():
-            return self._stop_fault()
+            return self._to_stop_fault()
         try:
             self._before = self._base.odometry()
-            return self._dated(self._base.execute(command))
+            return self._with_own_time(self._base.execute(command))
         except BaseFault as fault:
             self._done = fault.done
-            return self._base_fault(fault)
+            return self._to_base_fault(fault)
 
     def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
-        """These bases are told how far to go before they set off, and by nobody on the way."""
+        """A fault: these bases take the whole motion as one command."""
         detail = "it cannot be steered on the move: drive it with motion.continuous=off"
         return BodyFault("base", "base refuses", detail, "", self._clock(), 0.0, 0.0)
 
     def claim(self) -> MotionReport | BodyFault:
-        """What the wheels count since before the last command, once the base says that it stands."""
+        """What the wheels counted since the last command began, once the base has stopped."""
         if self._stopped.is_set():
-            return self._stop_fault()
+            return self._to_stop_fault()
         try:
             self._base.stop()
-            return self._counted(self._base.odometry())
+            return self._measure_motion(self._base.odometry())
         except BaseFault as fault:
-            return self._base_fault(fault)
+            return self._to_base_fault(fault)
 
     def look(self, purpose: str) -> Frame | BodyFault:
         """A picture."""
-        return self._stop_fault() if self._stopped.is_set() else self._eye.look(purpose)
+        return self._to_stop_fault() if self._stopped.is_set() else self._eye.look(purpose)
 
     def ride(self, ride: Ride) -> RideReport | BodyFault:
-        """Stand in the car while somebody sees to the ride."""
+        """Wait in the car until the ride is over."""
         if self._stopped.is_set():
-            return self._stop_fault()
+            return self._to_stop_fault()
         if self._carried is None:
             return BodyFault("elevator", "no ride", "nobody is told to press the button", "", self._clock())
         return self._carried(ride)
@@ -151,33 +151,33 @@ class HardwareBody:
         return self._clock()
 
     def stop(self) -> None:
-        """Stand still at once; where the base does not confirm it, its watchdog has to."""
+        """Stop at once; where the base does not confirm it, its watchdog stops it."""
         self._heeded.set()
-        self._told_to_stop()
+        self._send_stop()
 
     def stop_for_good(self, why: str) -> None:
-        """Somebody wants the robot to stand: at once, from another thread; nothing is carried out any more.
+        """Stop at once, from another thread; nothing is carried out any more.
 
-        It is said again until the mission has heeded it: a command may have been on its way when it was said first.
+        The stop is sent again until the mission has heeded it: a command may have been on its way at the first.
         """
         self._why = self._why or why
         self._stopped.set()
-        for _ in range(MOST_STOPS):
-            self._told_to_stop()
-            if self._heeded.wait(AGAIN_S):
+        for _ in range(MAX_STOPS):
+            self._send_stop()
+            if self._heeded.wait(STOP_PERIOD_S):
                 return
 
-    def _told_to_stop(self) -> None:
+    def _send_stop(self) -> None:
         try:
             self._base.stop()
         except BaseFault:
             return
 
-    def _dated(self, report: MotionReport) -> MotionReport:
-        """By our clock: a base has its own, or none."""
+    def _with_own_time(self, report: MotionReport) -> MotionReport:
+        """The report by our clock: a base has its own, or none."""
         return replace(report, sim_time_s=self._clock())
 
-    def _counted(self, now: Odometry) -> MotionReport:
+    def _measure_motion(self, now: Odometry) -> MotionReport:
         before = self._before
         if before is None:
             return MotionReport(0.0, 0.0, 0.0, self._clock())
@@ -185,13 +185,13 @@ class HardwareBody:
         took_s = self._clock() - self._began_s
         dx, dy = now.x_m - before.x_m, now.y_m - before.y_m
         gone = dx * math.cos(now.heading_rad) + dy * math.sin(now.heading_rad)
-        if abs(turn) > FASTEST_RAD_PER_S * took_s or math.hypot(dx, dy) > FASTEST_M_PER_S * took_s:
-            return self._dated(self._done or MotionReport(0.0, 0.0, 0.0, 0.0))
+        if abs(turn) > MAX_SPEED_RAD_PER_S * took_s or math.hypot(dx, dy) > MAX_SPEED_M_PER_S * took_s:
+            return self._with_own_time(self._done or MotionReport(0.0, 0.0, 0.0, 0.0))
         return MotionReport(turn, gone, took_s, self._clock())
 
-    def _base_fault(self, fault: BaseFault) -> BodyFault:
+    def _to_base_fault(self, fault: BaseFault) -> BodyFault:
         if self._stopped.is_set():
-            return self._stop_fault()
+            return self._to_stop_fault()
         done = fault.done
         stands = "; it stands" if fault.stopped else ""
         return BodyFault(
@@ -199,6 +199,6 @@ class HardwareBody:
             None if done is None else done.turn_rad, None if done is None else done.move_m,
         )
 
-    def _stop_fault(self) -> BodyFault:
+    def _to_stop_fault(self) -> BodyFault:
         self._heeded.set()
         return BodyFault("user", STOP_KEY, self._why, "", self._clock())

@@ -115,7 +115,7 @@ def live_pictures(
             yield f"view {len(kept)} of {wanted}", grey
 
 
-def calibrated(boards: Boards, pattern: Pattern, *, with_k3: bool) -> Calibration:
+def calibrate_camera(boards: Boards, pattern: Pattern, *, with_k3: bool) -> Calibration:
     """Raises BadInput where the views do not do."""
     try:
         return calibrate(boards.views, pattern, boards.size, with_k3=with_k3)
@@ -123,7 +123,9 @@ def calibrated(boards: Boards, pattern: Pattern, *, with_k3: bool) -> Calibratio
         raise BadInput(f"calibration: {error}") from None
 
 
-def mounted(calibration: Calibration, grey: Grey, pattern: Pattern, board: Mounted) -> tuple[Mounting, CameraMount]:
+def find_mounting(
+    calibration: Calibration, grey: Grey, pattern: Pattern, board: Mounted
+) -> tuple[Mounting, CameraMount]:
     """The mounting by one picture. Raises BadInput."""
     corners = find_corners(grey, pattern)
     camera = calibration.camera
@@ -156,7 +158,7 @@ def report(
     lines += [f"  {rms:.3f}  {view.name}" for view, rms in zip(calibration.views, calibration.view_rms_px, strict=True)]
     out = (*boards.useless, *sorted(calibration.rejected.items()))
     lines += ["", f"left out: {'nothing' if not out else ''}".rstrip(), *(f"  {name}: {why}" for name, why in out)]
-    missing = _uncovered(calibration)
+    missing = _count_uncovered(calibration)
     if missing:
         lines += ["", f"no corner was seen in {missing} of 16 parts of the picture: the distortion is a guess there; "
                       "hold the board into the corners too"]
@@ -181,7 +183,7 @@ def _mounting_lines(found: Mounting, board: Mounted) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _uncovered(calibration: Calibration) -> int:
+def _count_uncovered(calibration: Calibration) -> int:
     """How many of 4 x 4 parts of the picture no corner was seen in."""
     corners = np.concatenate([view.corners_px for view in calibration.views])
     size = np.array([calibration.camera.width, calibration.camera.height])

@@ -1,4 +1,4 @@
-"""The heart: tells the base that somebody is there, but only while the mission goes on thinking."""
+"""Heartbeat: keeps the base's watchdog quiet, but only while the mission's loop goes on."""
 
 from __future__ import annotations
 
@@ -10,36 +10,36 @@ from types import TracebackType
 from harvey.hardware.drivers.bases.base import Base, BaseFault
 
 BEAT_S = 0.2
-"""How often it beats [s]."""
-HANGS_S = 10.0
-"""A mission that has not said for so long that it goes on is taken to hang: the heart stops, and so does the base."""
+"""Period of the beats [s]."""
+MAX_SILENCE_S = 10.0
+"""A mission whose loop did not tick for so long hangs: the base is told to stop, and no beat is sent [s]."""
 
 
 class Heartbeat:
-    """A thread that beats as long as it is told often enough that the mission goes on.
+    """A thread that sends heartbeats as long as :meth:`tick` is called often enough.
 
     While a motion is under way the driver itself talks to the base, and a beat waits its turn. When the mission hangs,
-    the heart tells the base to stop and beats no more, until the mission goes on.
+    the base is told to stop and gets no more beats, until the mission goes on.
     """
 
     def __init__(
-        self, base: Base, *, beat_s: float = BEAT_S, hangs_s: float = HANGS_S,
+        self, base: Base, *, beat_s: float = BEAT_S, max_silence_s: float = MAX_SILENCE_S,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._base, self._beat_s, self._hangs_s, self._clock = base, beat_s, hangs_s, clock
-        self._told_s = clock()
+        self._base, self._beat_s, self._max_silence_s, self._clock = base, beat_s, max_silence_s, clock
+        self._ticked_s = clock()
         self._over = threading.Event()
-        self._thread = threading.Thread(target=self._live, name="heart", daemon=True)
+        self._thread = threading.Thread(target=self._live, name="heartbeat", daemon=True)
         self.beats = 0
 
     def tick(self) -> None:
         """The mission goes on."""
-        self._told_s = self._clock()
+        self._ticked_s = self._clock()
 
     @property
     def beating(self) -> bool:
-        """Whether the mission is taken to go on."""
-        return self._clock() - self._told_s <= self._hangs_s
+        """Whether the last tick is recent enough."""
+        return self._clock() - self._ticked_s <= self._max_silence_s
 
     def __enter__(self) -> Heartbeat:
         self.tick()
@@ -63,4 +63,4 @@ class Heartbeat:
                     self._base.stop()
                     stopped = True
             except BaseFault:
-                continue  # the mission hears of it when it next asks something of the base
+                continue  # the mission meets the same fault at its next request

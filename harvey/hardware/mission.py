@@ -1,4 +1,4 @@
-"""A mission on hardware, as its file tells it: world, goal, start, base, camera and wheels.
+"""A mission on hardware, read from its file: world, goal, start, base, camera and wheels.
 
 ``docs/flat/mission.toml`` is an example.
 """
@@ -64,7 +64,7 @@ FORMAT = MissionFormat({**TABLES, "base": BaseSettings, "camera": EyeSettings, "
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HardwareMission(Mission):
-    """What to drive, and with what; the tables of the file are the attributes of the same name."""
+    """A mission and the robot that drives it; the tables of the file are the attributes of the same name."""
 
     base: BaseSettings
     camera: EyeSettings

@@ -1,4 +1,4 @@
-"""Before the first move: everything that a mission on hardware needs is tried, and the robot does not move for it."""
+"""Preflight: before the first move, everything that a mission on hardware needs is checked. Nothing moves."""
 
 from __future__ import annotations
 
@@ -30,19 +30,21 @@ from world_models.files.world_files import load_world
 from world_models.robot import RobotModel
 from world_models.words import count
 
-ROOM_BYTES = 500_000_000
+MIN_FREE_BYTES = 500_000_000
 """Free space that a long run's pictures may need."""
 BEATS = 5
-LEAST_PICTURES = 8
+MIN_PICTURES = 8
+MAX_CREEP_M, MAX_CREEP_RAD = 0.005, 0.01
+"""Wheels that count more than this while they should stand are moving."""
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing that was tried.
+    """One thing that was checked.
 
     Attributes:
         what: in a word or two.
-        found: what came of it.
+        found: the finding.
         todo: what to do where it failed; "" where it did not.
     """
 
@@ -56,7 +58,7 @@ class Check:
 
 
 class Preflight:
-    """The robot as far as it could be put together, and what came of each step; closes what it opened.
+    """The robot as far as it could be put together, and the finding of each check; closes what it opened.
 
     Attributes:
         checks: in the order in which they were made.
@@ -179,7 +181,7 @@ class Preflight:
         yield Check("base", f"answers in {beat_s * 1000.0:.0f} ms")
         crept_m = max(abs(after.x_m - before.x_m), abs(after.y_m - before.y_m))
         crept_rad = abs(after.heading_rad - before.heading_rad)
-        yield (Check("standing", "its wheels stand") if crept_m < 0.005 and crept_rad < 0.01 else
+        yield (Check("standing", "its wheels stand") if crept_m < MAX_CREEP_M and crept_rad < MAX_CREEP_RAD else
                Check("standing", f"its wheels count {crept_m * 1000.0:.0f} mm while it should stand", "hold it still"))
         yield Check("watchdog", kind.watchdog)
 
@@ -193,7 +195,7 @@ class Preflight:
             camera = self.camera = VideoCamera(
                 eye.source, size, clock=self._clock, late_s=eye.late_s, lag_s=eye.lag_s)
             self._open.callback(camera.close)
-            pictures = [camera.look("dry run") for _ in range(LEAST_PICTURES)]
+            pictures = [camera.look("dry run") for _ in range(MIN_PICTURES)]
         except CameraFault as fault:
             yield Check("camera", str(fault).removeprefix("the camera: "), _camera_todo(fault))
             return
@@ -212,7 +214,7 @@ class Preflight:
         there = next(p for p in (self._out.resolve(), *self._out.resolve().parents) if p.exists())
         free = shutil.disk_usage(there).free
         return Check("disk", f"{free / 1e9:.1f} GB free for {self._out}",
-                     "" if free >= ROOM_BYTES else f"make room: {ROOM_BYTES / 1e9:.1f} GB, or another --out")
+                     "" if free >= MIN_FREE_BYTES else f"make room: {MIN_FREE_BYTES / 1e9:.1f} GB, or another --out")
 
 
 def _is_inside(world: World, place: Place) -> bool:
@@ -224,4 +226,4 @@ def _camera_todo(fault: CameraFault) -> str:
         "unplugged": "plug it in; which number it has: ls /dev/video*",
         "wrong size": "calibrate at the size that the camera delivers",
         "dark": "switch the light on, take the cap off",
-    }.get(fault.kind, "a quicker camera, less on the bus, or a greater [camera] late_s")
+    }.get(fault.kind, "a faster camera, less on the bus, or a larger [camera] late_s")

@@ -19,10 +19,10 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @contextmanager
 def stop_key(stop: Callable[[str], None], terminal: int | None = None) -> Iterator[None]:
-    """Calls ``stop`` with the reason, from a thread of its own, as soon as somebody wants the robot to stand.
+    """Calls ``stop`` with the reason, from a thread of its own, at a key or a signal.
 
-    The terminal gives single keys meanwhile, and is as before afterwards. A signal that comes a second time does what
-    it does elsewhere. To be entered by the main thread where signals are to be heard.
+    The terminal gives single keys meanwhile, and is restored afterwards. A signal that comes a second time has its
+    usual effect. Only the main thread can receive signals.
 
     Args:
         terminal: file descriptor of the terminal; None for standard input.
@@ -66,12 +66,12 @@ def _signals(wake: int) -> Iterator[None]:
         return
     before = {int(number): signal.getsignal(number) for number in SIGNALS}
 
-    def heard(number: int, _frame: FrameType | None) -> None:
+    def forward(number: int, _frame: FrameType | None) -> None:
         os.write(wake, bytes([number]))
         signal.signal(number, before[number])
 
     for number in before:
-        signal.signal(number, heard)
+        signal.signal(number, forward)
     try:
         yield
     finally:

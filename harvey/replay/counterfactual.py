@@ -1,9 +1,8 @@
-"""Counterfactuals: what a run would have done without an expert, a landmark or a segment, or with another constant.
+"""Counterfactuals: what a run would have done without a knowledge source, a landmark or a segment, or set otherwise.
 
-The changed agent is told what the recorded run observed, for as long as it asks its body for the same: then what was
-observed is what it would have observed. From the first motion or picture that differs, the recorded observations no
-longer hold. In the simulator the robot is there by then, as it has lived through the same up to here, and goes on by
-itself; a run on hardware ends there.
+The changed agent gets the recorded observations as long as it requests the same of its body: until then they are what
+it would have observed. From the first motion or picture that differs they no longer hold. A simulated body was replayed
+up to there and goes on by itself; a run on hardware ends there.
 """
 
 from __future__ import annotations
@@ -79,7 +78,7 @@ def what_if(
     """Decide a run again with a changed agent.
 
     Args:
-        without: experts, landmarks, faces, or ``frame 88 segment 12``, to be taken away.
+        without: knowledge sources, landmarks, faces, or ``frame 88 segment 12``, to be taken away.
         constants: (key, value) of servo levels and constants to be set.
         out: where what would have been is kept, as a run; an older one there goes once it is clear what is asked.
         go_on: in the simulator: go on where the record no longer answers.
@@ -96,12 +95,12 @@ def what_if(
         make_room(out.path, head.name, head.seed)
     recorder = RunRecorder(out, head, agent.robot)
     if head.kind != SIMULATOR:
-        scheduler = agent.scheduler(sinks=(*recorder.sinks, player.heard))
+        scheduler = agent.scheduler(sinks=(*recorder.sinks, player.compare))
         try:
-            return player.answer(player.played(scheduler, head, recorder), None)
+            return player.answer(player.play(scheduler, head, recorder), None)
         finally:
             recorder.close()
-    with SimulatedRun(rebuild_stage(head), head, agent, recorder, (player.heard,)) as simulated:
+    with SimulatedRun(rebuild_stage(head), head, agent, recorder, (player.compare,)) as simulated:
         result = simulated.drive(out, lambda: _drive_changed(simulated, player, go_on))
     return player.answer(Outcome(result.outcome, result.reason), result)
 
@@ -110,7 +109,7 @@ def _drive_changed(run: SimulatedRun, player: _Player, go_on: bool) -> Outcome:
     """By the record as far as it answers; then by the simulated robot, if it is to go on."""
     run.recorded_port.closed = True
     with run.body_replay.replay(player.pictures) as live:
-        outcome = player.played(
+        outcome = player.play(
             run.scheduler, run.head, run.recorder, live=live, before=run.before_cycle, over=run.over)
     if player.parting is None or not go_on:
         return outcome
@@ -130,7 +129,7 @@ class _Step:
 
 
 class _Player:
-    """Answers a agent by the record of a run, as long as it asks for the same."""
+    """Answers an agent by the record of a run, as long as it requests the same."""
 
     def __init__(self, run: RunDirectory, kinds: Registry) -> None:
         self.pictures = open_pictures(run)
@@ -144,7 +143,7 @@ class _Player:
         self.open: tuple[Change, ...] = ()
         self.parting: Parting | None = None
 
-    def heard(self, decision: Decision) -> None:
+    def compare(self, decision: Decision) -> None:
         """Sink: compares with the record until the first difference."""
         self.last, self.open = decision, tuple(change for change in decision.made if is_asked(change))
         if self._first is None:
@@ -154,19 +153,19 @@ class _Player:
             else:
                 self._first = recorded, decision_of(decision_record(decision))
 
-    def played(
+    def play(
         self, scheduler: Scheduler, head: RunHead, recorder: RunRecorder, *, live: Live = ignore,
         before: Callable[[], None] = lambda: None, over: Over = lambda _scheduler: None,
     ) -> Outcome:
         """Decide until the end, or until the record no longer answers."""
         scheduler.tell([Post(head.task())], "user")
 
-        def told() -> None:
-            self._tell(scheduler, recorder, live)
+        def observe() -> None:
+            self._answer(scheduler, recorder, live)
             before()
 
         try:
-            return run_to_outcome(scheduler, over=over, before=told)
+            return run_to_outcome(scheduler, over=over, before=observe)
         except _PartedError:
             return Outcome(UNFINISHED, "from here the recorded observations no longer hold")
 
@@ -177,7 +176,7 @@ class _Player:
             then = self.records[self._agreed]
         return Answer(self._agreed, then, now, self._answered, self.parting, outcome, result)
 
-    def _tell(self, scheduler: Scheduler, recorder: RunRecorder, live: Live) -> None:
+    def _answer(self, scheduler: Scheduler, recorder: RunRecorder, live: Live) -> None:
         """What the record observed, if the last decision asked for what it asked for; ends the run if not."""
         if not self.open:
             return

@@ -14,7 +14,7 @@ from harvey.why.sentences import sentence
 from world_models.words import count
 
 
-def told(answer: Answer, run: RunDirectory, changes: Sequence[str]) -> Iterator[str]:
+def describe_answer(answer: Answer, run: RunDirectory, changes: Sequence[str]) -> Iterator[str]:
     """The first decision that differs, what changed, and how it ends; ``changes`` as ``without line_finder``."""
     yield f"{run.path}, {' and '.join(changes)}:"
     if answer.then is None and answer.now is None:

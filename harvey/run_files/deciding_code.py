@@ -1,7 +1,8 @@
 """Deciding code: a name for the program that decides, so that a run can say by which one it was decided.
 
 The version stays the same while a program is worked on; what the files say does not. Counted are the mechanism, the
-beliefs and the experts, and who of them sits round the board: a run is its observations and what these make of them.
+models and the knowledge sources, and the wiring that chooses them: a run is its observations and what these do
+with them.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ DECIDING: Mapping[str, tuple[str, ...]] = {
 }
 """The packages that decide, with the endings of their files; a run names its world's bytes itself."""
 WIRING = "harvey/wiring.py"
-"""The file that seats the experts."""
+"""The file that lists the knowledge sources."""
 
 DIGITS = 16
 

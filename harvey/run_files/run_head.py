@@ -47,7 +47,7 @@ class RunHead:
         robot: what the robot knows of itself beside the world, as JSON types.
         servo: which levels of perceptual servoing are on.
         command: what the user asked for, as JSON types.
-        without, constants: what was taken from the experts' agents, for a run that tells what would have been.
+        without, constants: what was taken from the agent or set otherwise, in a counterfactual run.
         scenario: simulator: the scenario's tables as read, with ``--set`` applied; hardware: what the driver needs.
         folder: simulator: where the scenario's file was.
         body: simulator: how the body is reached, as :func:`harvey.simulation.serial_body.open_body` knows it.

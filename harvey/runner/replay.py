@@ -57,7 +57,7 @@ def replay(
         before: called before each decision.
 
     Raises:
-        BadInput: the journal cannot be read, or an observation cannot be told again.
+        BadInput: the journal cannot be read, or an observation cannot be decoded.
     """
     made: Sequence[Change] = ()
     for recorded, line in zip(read_records(run.journal), _lines(run), strict=False):

@@ -180,7 +180,7 @@ def run_to_outcome(
 
 def _why_over(decision: Decision, scheduler: Scheduler, over: Over) -> str | None:
     if decision.refused.startswith(RAISED):
-        who = decision.chosen.source.name if decision.chosen else "an expert that was asked"
+        who = decision.chosen.source.name if decision.chosen else "a knowledge source that was asked"
         return f"{who} raised {decision.refused.strip().splitlines()[-1]}"
     return over(scheduler)
 

@@ -1,1 +1,1 @@
-"""Drivers: the metal that Harvey moves and sees with, each behind a small interface. They know no board."""
+"""Drivers of bases and cameras, each behind a small interface. They know no blackboard."""

@@ -204,7 +204,7 @@ class Counted(FakeBase):
 def test_the_heart_beats_while_the_mission_goes_on_and_stops_the_base_once_it_hangs() -> None:
     clock, beaten, stopped = Clock(), threading.Event(), threading.Event()
     base = Counted(clock, lambda what: beaten.set() if what == "heartbeat" else stopped.set())
-    with Heartbeat(base, beat_s=0.001, hangs_s=5.0, clock=clock) as heart:
+    with Heartbeat(base, beat_s=0.001, max_silence_s=5.0, clock=clock) as heart:
         assert beaten.wait(10.0) and heart.beating and not stopped.is_set()
         clock.pass_(6.0)
         assert stopped.wait(10.0) and not heart.beating

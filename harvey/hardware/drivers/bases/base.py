@@ -18,7 +18,7 @@ FaultKind = Literal["silent", "nonsense", "disconnected", "stalled", "watchdog",
 silent: no answer that could be read, though the line is there. nonsense: what arrives is not the protocol, or tells of
 a motion that was not asked for. disconnected: the line is gone. stalled: the wheels do not turn as they were told to.
 watchdog: the base heard too little of us and stopped by itself. refused: the base understood and would not.
-stopped: somebody called :meth:`Base.stop` while it moved.
+stopped: :meth:`Base.stop` was called while it moved.
 """
 
 
@@ -51,7 +51,7 @@ class Base(Protocol):
         ...
 
     def heartbeat(self) -> None:
-        """Tell the base that somebody is there, and find out whether it is. Raises BaseFault."""
+        """Keep the base's watchdog quiet, and find out whether the base answers. Raises BaseFault."""
         ...
 
     def close(self) -> None:

@@ -93,7 +93,7 @@ class Create2Base(Driver):
         self._heard_s = since_s
         while self._link.now() < ends_s:
             if not (still and safe_mode) and self._link.now() - self._said_s >= REPEAT_S:
-                self._tell(safe() + drive(0, 0))  # not to a base that stands: a garbled one could set it going
+                self._send(safe() + drive(0, 0))  # not to a base that stands: a garbled one could set it going
             for report in self._read(REPEAT_S):
                 before = self._last
                 if self._take(report):
@@ -105,12 +105,12 @@ class Create2Base(Driver):
                 self.guard.disarm()
                 return
             if self._link.now() - self._heard_s > 0.2:
-                self._tell(wake() if self._link.now() - since_s > 0.5 or self._last is None else stream())
+                self._send(wake() if self._link.now() - since_s > 0.5 or self._last is None else stream())
         if self._link.now() - self._heard_s > PATIENCE_S:
             raise self._fault("silent", "no stream" + self._noise())
         raise self._fault("nonsense", "told to stop, it goes on")
 
-    def _counted(self) -> Odometry:
+    def _read_odometry(self) -> Odometry:
         if self._last is None:
             self._halt()
         for report in self._reports(self._link.now() + 2.0 * PATIENCE_S):
@@ -122,7 +122,7 @@ class Create2Base(Driver):
             return Odometry(self._pose.x_m, self._pose.y_m, wrap_angle(self._pose.heading_rad), self._link.now())
         raise self._fault("silent", "no stream" + self._noise())
 
-    def _reopened(self) -> None:
+    def _after_reopening(self) -> None:
         self._decoder.clear()
 
     def _go(self, way: _Way, goal_m: float, sign: float, *, turning: bool) -> None:
@@ -151,7 +151,7 @@ class Create2Base(Driver):
         wanted = (speed, -speed if turning else speed)
         if wanted != self._wanted:
             self._wanted = wanted
-            self._tell(drive(*wanted))
+            self._send(drive(*wanted))
 
     def _check(self, way: _Way, report: Report, goal_m: float) -> None:
         """See that the base does what it was told to, and can."""
@@ -185,11 +185,11 @@ class Create2Base(Driver):
                 if (report.right_wanted, report.left_wanted) == self._wanted:
                     agreed_s = now_s
                 elif now_s - self._said_s > REPEAT_S:
-                    self._tell(drive(*self._wanted))
+                    self._send(drive(*self._wanted))
                 yield report
-            self._still_wanted(agreed_s)
+            self._check_still_wanted(agreed_s)
 
-    def _still_wanted(self, agreed_s: float) -> None:
+    def _check_still_wanted(self, agreed_s: float) -> None:
         now_s = self._link.now()
         if self._stop_asked.is_set():
             self._halt()
@@ -203,7 +203,7 @@ class Create2Base(Driver):
     def _read(self, timeout_s: float) -> Iterator[Report]:
         return self._decoder.feed(self._link.read(timeout_s))
 
-    def _tell(self, data: bytes) -> None:
+    def _send(self, data: bytes) -> None:
         self._link.write(data)
         self._said_s = self._link.now()
 

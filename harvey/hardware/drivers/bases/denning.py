@@ -57,7 +57,7 @@ class DenningBase(Driver):
             self._greet()
         self._cancel()
 
-    def _counted(self) -> Odometry:
+    def _read_odometry(self) -> Odometry:
         self._ready()
         self._asked += 1
         frame = Frame(self._token, self._seq, "BEAT", (str(self._asked),))
@@ -67,7 +67,7 @@ class DenningBase(Driver):
                 return Odometry(*values)
         raise self._fault("silent", "no answer to a heartbeat")
 
-    def _reopened(self) -> None:
+    def _after_reopening(self) -> None:
         self._decoder.clear()
 
     def _ready(self) -> None:
@@ -107,7 +107,7 @@ class DenningBase(Driver):
             while (left := again_s - self._link.now()) > 0:
                 for answer in self._decoder.feed(self._link.read(min(LOOK_S, left))):
                     if answer.verb == "NO" and answer.token == frame.token and answer.seq == frame.seq:
-                        self._refused(answer)
+                        self._raise_refusal(answer)
                     if answer.verb == "HI" if frame.verb == "HELLO" else self._is_about(answer, frame):
                         heard_s = self._link.now()
                         self._note(answer)
@@ -125,7 +125,7 @@ class DenningBase(Driver):
         noise = f", only noise ({self._decoder.rejected} lines so far)" if self._decoder.rejected else ""
         raise self._fault("silent", f"nothing heard for {PATIENCE_S:g} s{noise}")
 
-    def _refused(self, answer: Frame) -> None:
+    def _raise_refusal(self, answer: Frame) -> None:
         why = " ".join(answer.words)
         if answer.words[:1] == ("session",):
             self._token, self._unresolved = NOBODY, False

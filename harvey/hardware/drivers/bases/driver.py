@@ -56,10 +56,10 @@ class Driver(ABC):
         """Where the wheels count that the robot is. Raises BaseFault."""
         with self._call():
             self._so_far = None
-            return self._counted()
+            return self._read_odometry()
 
     def heartbeat(self) -> None:
-        """Tell the base that somebody is there, and hear from it. Raises BaseFault."""
+        """Keep the base's watchdog quiet, and hear from it. Raises BaseFault."""
         self.odometry()
 
     def close(self) -> None:
@@ -80,11 +80,11 @@ class Driver(ABC):
         """Make it stand, and have that confirmed. Raises BaseFault and OSError."""
 
     @abstractmethod
-    def _counted(self) -> Odometry:
+    def _read_odometry(self) -> Odometry:
         """Ask the base where it is. Raises BaseFault and OSError."""
 
     @abstractmethod
-    def _reopened(self) -> None:
+    def _after_reopening(self) -> None:
         """The line is new: nothing that was half read or half said counts any more."""
 
     def _fault(self, kind: FaultKind, detail: str, *, stopped: bool = False) -> BaseFault:
@@ -99,7 +99,7 @@ class Driver(ABC):
                 if self._gone:
                     self._link.reopen()
                     self._gone = False
-                    self._reopened()
+                    self._after_reopening()
                 yield
             except OSError as error:
                 self._gone = True

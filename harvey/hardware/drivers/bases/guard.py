@@ -1,4 +1,4 @@
-"""A watchdog for bases that have none: it says stop when whoever drives does not give a sign of life any more.
+"""A watchdog for bases that have none: it stops the base when the program gives no sign of life any more.
 
 It lives in our process and speaks over our line. It helps when the driving thread hangs; where the whole process dies
 or the cable is cut, nothing of ours can stop a base without a watchdog of its own.
@@ -40,7 +40,7 @@ class Guard:
             try:
                 self._stop()
             except OSError:
-                return  # the line is gone; whoever drives will find that out too
+                return  # the line is gone; the program meets the same fault
 
     def start(self) -> None:
         """Check from a thread of its own, until :meth:`close`."""

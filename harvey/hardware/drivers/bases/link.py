@@ -38,7 +38,7 @@ class SerialLink:
     def __init__(self, url: str, baud: int) -> None:
         """Open it. Raises OSError."""
         self._url, self._baud = url, baud
-        self._port = self._opened()
+        self._port = self._open()
 
     def write(self, data: bytes) -> None:
         self._port.write(data)
@@ -53,7 +53,7 @@ class SerialLink:
 
     def reopen(self) -> None:
         self.close()
-        self._port = self._opened()
+        self._port = self._open()
 
     def close(self) -> None:
         try:
@@ -61,7 +61,7 @@ class SerialLink:
         except OSError:
             return
 
-    def _opened(self) -> serial.SerialBase:
+    def _open(self) -> serial.SerialBase:
         """The write timeout keeps a dead line from holding us."""
         try:
             return serial.serial_for_url(self._url, baudrate=self._baud, timeout=0.1, write_timeout=0.5)

@@ -58,7 +58,7 @@ MOVE_PART_M = 4.0
 STRAY_M, STRAY_RAD = 0.04, math.radians(6.0)
 """A motion that leaves what was asked for by more is none of ours."""
 
-NEAR_M, NEAR_RAD = 0.01, math.radians(0.9)
+MAX_OFF_M, MAX_OFF_RAD = 0.01, math.radians(0.9)
 """Good enough: what was really done is reported anyway. Headings are whole degrees."""
 
 
@@ -104,7 +104,7 @@ class P2osBase(Driver):
                 return
         raise self._fault("nonsense", "told to stop, it goes on")
 
-    def _counted(self) -> Odometry:
+    def _read_odometry(self) -> Odometry:
         self._open()
         for status in self._statuses(encode(PULSE), PULSE_S, self._link.now() + 2.0 * PATIENCE_S):
             if status.moving:
@@ -113,7 +113,7 @@ class P2osBase(Driver):
             return self._place()
         raise self._fault("silent", "no status")
 
-    def _reopened(self) -> None:
+    def _after_reopening(self) -> None:
         self._decoder.clear()
         self._heard_s = -math.inf
 
@@ -142,7 +142,7 @@ class P2osBase(Driver):
         idle, ends_s = 0, self._link.now() + 2.0 * abs(turn_rad) / self._turn_speed + 4.0
         for status in self._statuses(encode(HEAD, degrees % 360), PULSE_S, ends_s):
             way.watch(status, turning=turn_rad)
-            there = abs(goal_rad - self._heading_rad) <= NEAR_RAD
+            there = abs(goal_rad - self._heading_rad) <= MAX_OFF_RAD
             idle = idle + 1 if there and not status.moving else 0
             if idle >= 2:
                 return
@@ -152,7 +152,7 @@ class P2osBase(Driver):
         """What is left of the move is asked for again whenever the base stands short of its end."""
         goal_m, before_m, tries = way.gone_m + move_m, way.gone_m, 0
         ends_s = self._link.now() + 2.0 * move_m / self._speed + 6.0
-        while (left_m := goal_m - way.gone_m) > NEAR_M or tries == 0:
+        while (left_m := goal_m - way.gone_m) > MAX_OFF_M or tries == 0:
             tries = tries + 1 if way.gone_m - before_m < 0.005 else 1
             if tries > 5 or self._link.now() > ends_s:
                 self._gave_up("move")
@@ -164,7 +164,7 @@ class P2osBase(Driver):
             for status in self._statuses(encode(PULSE), PULSE_S, ends_s):
                 way.watch(status, moving=goal_m)
                 idle = idle + 1 if not status.moving else 0
-                if idle >= (2 if goal_m - way.gone_m <= NEAR_M else 4):
+                if idle >= (2 if goal_m - way.gone_m <= MAX_OFF_M else 4):
                     break
 
     def _gave_up(self, what: str) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 HEADER = b"\xfa\xfb"
-MOST = 200
+MAX_LENGTH = 200
 """The largest COUNT that either side may send."""
 
 SYNC0, SYNC1, SYNC2 = 0, 1, 2
@@ -117,7 +117,7 @@ class Decoder:
             if len(rest) < 3:
                 return None
             end = 3 + rest[2]
-            if 3 <= rest[2] <= MOST:
+            if 3 <= rest[2] <= MAX_LENGTH:
                 if len(rest) < end:
                     return None
                 if checksum(rest[3:end - 2]) == int.from_bytes(rest[end - 2:end], "big"):

@@ -129,7 +129,7 @@ def is_file(source: str) -> bool:
     return not (source.isdecimal() or special) or path.is_file()
 
 
-def prepared(capture: Capture, source: str, size: tuple[int, int] | None) -> Capture:
+def prepare(capture: Capture, source: str, size: tuple[int, int] | None) -> Capture:
     """An opened capture, set to hand over JPEGs as they come and, a device, to the size wanted. Raises CameraFault."""
     if not capture.isOpened():
         raise CameraFault("unplugged", f"expected a device's number, a video file or a URL that opens, got {source!r}")

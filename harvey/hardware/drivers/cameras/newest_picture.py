@@ -17,7 +17,7 @@ REOPEN_S = 0.5
 """An unplugged camera is looked for so often [s]."""
 INTERVALS = 31
 """The rate is the median over so many intervals between pictures."""
-ENOUGH = 5
+MIN_INTERVALS = 5
 """With fewer intervals than this a rate says nothing."""
 TURN_S = 0.02
 """Who waits for a picture looks at the clock this often [s]."""
@@ -54,7 +54,7 @@ class _Pace:
     @property
     def rate_hz(self) -> float | None:
         """Pictures a second; None until enough have come."""
-        return 1.0 / statistics.median(self._intervals) if len(self._intervals) >= ENOUGH else None
+        return 1.0 / statistics.median(self._intervals) if len(self._intervals) >= MIN_INTERVALS else None
 
     def missing(self, now_s: float, stream_s: float) -> int:
         """How many pictures are missing before one that came ``now_s`` and by its stream was taken ``stream_s``."""
@@ -66,7 +66,7 @@ class _Pace:
             self._least_s = min(self._least_s, now_s - stream_s)
             self.lag_s = now_s - stream_s - self._least_s
         interval_s = stream_s - last[1] if has_time else now_s - last[0]
-        usual_s = statistics.median(self._intervals) if len(self._intervals) >= ENOUGH else interval_s
+        usual_s = statistics.median(self._intervals) if len(self._intervals) >= MIN_INTERVALS else interval_s
         if interval_s <= 0.0:
             return 0
         self._intervals.append(interval_s)

@@ -18,7 +18,7 @@ from harvey.hardware.drivers.cameras.capture import (
     open_capture,
     open_in_time,
     picture_of,
-    prepared,
+    prepare,
 )
 from harvey.hardware.drivers.cameras.newest_picture import Health, Newest
 from world_models.entries.body import Frame
@@ -70,10 +70,11 @@ class VideoCamera:
         self._late_s, self._rate_hz, self._lag_s = late_s, rate_hz, lag_s
         self._frames = 0
 
-        def opened() -> Capture:
-            return prepared(open_in_time(capture, source), source, size)
+        def open_source() -> Capture:
+            return prepare(open_in_time(capture, source), source, size)
 
-        self._source: _Source = _Video(opened(), source) if is_file(source) else Newest(opened(), opened, clock)
+        opened = open_source()
+        self._source: _Source = _Video(opened, source) if is_file(source) else Newest(opened, open_source, clock)
 
     def __enter__(self) -> VideoCamera:
         return self
