@@ -1,1 +1,5 @@
-"""Many missions: worker processes, progress and the table of results."""
+"""Many missions.
+
+In reading order: ``campaign`` (one mission as a task, and several), ``worker_pool`` (over several processes),
+``tally`` and ``progress`` (what is shown meanwhile), ``summary`` (what is printed at the end).
+"""

@@ -1,1 +1,5 @@
-"""Once more: a run decided again from what it observed, gone on with after a crash, drawn anew, or told otherwise."""
+"""What is done with a recorded run: what it would have done otherwise, and its recording drawn anew.
+
+In reading order: ``counterfactual`` (a changed agent on the same observations), ``counterfactual_words`` (its answer in
+sentences), ``repair``. The replay itself is :mod:`harvey.runner.replay`.
+"""

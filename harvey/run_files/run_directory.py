@@ -102,13 +102,13 @@ def check_vacant(path: Path) -> Path:
 def prepare_directory(path: Path, name: str, seed: int) -> tuple[Path, Path | None]:
     """Make room for a run of a scenario and seed.
 
-    An older run of the same goes; one of another scenario or seed is moved aside, since nobody asked to do that again.
+    An older run of the same is deleted; one of another scenario or seed is moved aside.
 
     Returns:
         where the run may be written, and where the older one is now, if it is kept.
 
     Raises:
-        BadInput: that cannot be.
+        BadInput: the directory cannot be used.
     """
     try:
         check_vacant(path).mkdir(parents=True, exist_ok=True)
@@ -124,7 +124,7 @@ def prepare_directory(path: Path, name: str, seed: int) -> tuple[Path, Path | No
 
 
 def _is_of(path: Path, name: str, seed: int) -> bool:
-    """Whether what is there may go: an older run of this scenario and seed, or nothing that tells of a run."""
+    """Whether what is there may be deleted: an older run of this scenario and seed, or no run at all."""
     try:
         head = json.loads((path / "run.json").read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):

@@ -1,1 +1,5 @@
-"""Runs in the simulator: agent and simulated body put together, and scored against the truth."""
+"""Runs in the simulator, scored against the truth.
+
+In reading order: ``run`` (drive and resume a scenario's mission), ``referee`` (who knows the truth), ``serial_body``
+(the body behind an emulated base's line), ``body_replay`` (the body does again what a journal says).
+"""

@@ -1,7 +1,7 @@
 """BodyReplay: a simulated body does again what the journal of its run says that it did.
 
-The same calls give the same answers, so that the simulated world comes to where it was when the run was cut off;
-pictures that are known are not made once more. Where the body answers otherwise than the journal says, that is told.
+The same calls give the same answers, so the simulated world comes to where it was when the run was cut off. Recorded
+pictures are not rendered again. An answer that is not the journal's is an error.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from world_models.entries.task import Resumed
 
 
 class BodyReplay:
-    """Asks a port of a simulated body again, and compares its answers with what was observed.
+    """Asks the port of a simulated body again, and compares its answers with what was observed.
 
-    It is a :class:`harvey.runner.resume.ResumedBody`.
+    A :class:`harvey.runner.resume.ResumedBody`.
     """
 
     def __init__(self, port: Port, body: SimulatedBody, seed: int, actuator: ActuatorParameters) -> None:
@@ -38,7 +38,7 @@ class BodyReplay:
 
     @contextmanager
     def replay(self, pictures: Mapping[int, bytes]) -> Iterator[Live]:
-        """A while in which the body takes none of the pictures that are known."""
+        """A while in which the body renders none of the recorded pictures."""
         self._body.use_recorded(pictures)
         yield self
         self._body.use_recorded({})
