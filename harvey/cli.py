@@ -85,6 +85,7 @@ def _answer(args: Namespace) -> int:
     from harvey.errors import BadInput
     from logs.errors import RecordingError
     from world_models.files.toml.source import WorldError
+    from world_models.plugins import PluginError
 
     try:
         code: int = args.command.run(args)
@@ -102,7 +103,7 @@ def _answer(args: Namespace) -> int:
             _discard_output()
         _print_error(f"{name}: {error.strerror}" if name else str(error), error)
         return 2
-    except (BadInput, WorldError, RecordingError) as error:
+    except (BadInput, WorldError, RecordingError, PluginError) as error:
         _print_error(str(error), error)
         return 2
 

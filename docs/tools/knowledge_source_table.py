@@ -8,17 +8,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from blackboard.change import Watch
-from harvey.wiring import KNOWLEDGE_SOURCES
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from blackboard.knowledge_source import KnowledgeSource
+from harvey.wiring import KNOWLEDGE_SOURCES, foreign_sources
 
 
-def rows(sources: Iterable[type[RobotKnowledgeSource]]) -> list[str]:
+def rows(sources: Iterable[type[KnowledgeSource]]) -> list[str]:
     """The table in markdown, a line an element."""
     head = ["| knowledge source | level | closes | wakes on | writes | what it does |", "|---|---|---|---|---|---|"]
     return head + [_row(source) for source in sources]
 
 
-def _row(source: type[RobotKnowledgeSource]) -> str:
+def _row(source: type[KnowledgeSource]) -> str:
     what = (source.__doc__ or "").strip().split("\n\n")[0]
     wakes = ", ".join(dict.fromkeys(_watch(watch) for watch in source.watches))
     writes = ", ".join(kind.__name__ for kind in source.writes)
@@ -33,4 +33,4 @@ def _watch(watch: Watch) -> str:
 
 
 if __name__ == "__main__":
-    print("\n".join(rows(KNOWLEDGE_SOURCES)))
+    print("\n".join(rows((*KNOWLEDGE_SOURCES, *foreign_sources().values()))))

@@ -13,7 +13,7 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from world_models.entries.body import MotionReport
 
-BATTERY_S = 60.0
+BATTERY_S = 20.0
 """What the battery lasts; the warning comes when half of it is left."""
 
 
@@ -35,13 +35,13 @@ class RunningShort:
 class Timekeeper(KnowledgeSource):
     """Warns once when half of the battery is used up, by the time that the wheels report (§3.2)."""
 
-    level = Level.GOAL
+    level = Level.ACTION
     watches = (Watch(MotionReport, (Posted,)),)
     writes = (RunningShort,)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         is_due = trigger.entry.value.sim_time_s > BATTERY_S / 2.0
-        return 0.1 if is_due and view.latest(RunningShort) is None else None
+        return 0.9 if is_due and view.latest(RunningShort) is None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         yield Post(RunningShort(BATTERY_S - trigger.entry.value.sim_time_s), (trigger.entry,))
