@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-import harvey
 import matplotlib
+
+import harvey
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
@@ -17,7 +18,8 @@ for name, settings in (("servoed", {}), ("unservoed", {"servo.action": False})):
         out = Path("runs") / f"{name}-{seed}"
         result = harvey.run("forty-foot-hallway", seed=seed, settings=settings, out=out)
         tracks[name, seed] = [point.pose for point in harvey.open_run(out).true_track()]
-        print(f"{name}, seed {seed}: {result.outcome}, strayed {1000 * (result.max_cross_track_m or 0.0):.0f} mm at most")
+        strayed_mm = 1000 * (result.max_cross_track_m or 0.0)
+        print(f"{name}, seed {seed}: {result.outcome}, strayed {strayed_mm:.0f} mm at most")
 
 figure, axes = plt.subplots(figsize=(8, 3), layout="constrained")
 for (name, _seed), poses in tracks.items():

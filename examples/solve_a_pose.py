@@ -2,8 +2,9 @@
 
 import math
 
-import harvey  # before numpy: it settles how the libraries calculate
 import numpy as np
+
+import harvey  # before numpy: it settles how the libraries calculate
 
 rng = np.random.default_rng(7)
 camera = harvey.Camera.from_field_of_view(math.radians(65.0))

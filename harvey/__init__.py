@@ -8,8 +8,8 @@ The Python interface. Everything below is loaded when it is first used:
   (``knowledge_sources.methods.pose`` says which to use when), :class:`Camera`, :class:`Pose`, :class:`Pose2`
 - the blackboard by itself: :class:`Scheduler`, :class:`KnowledgeSource`, :class:`Watch`, :class:`Posted`,
   :class:`Revised`, :class:`Retracted`, :class:`Post`, :class:`Revise`, :class:`Retract`, :class:`View`,
-  :class:`Change`, :class:`Decision`, :class:`Effect`, :class:`Level`, and the marks :func:`request`, :func:`observation`,
-  :func:`inference`
+  :class:`Change`, :class:`Decision`, :class:`Effect`, :class:`Level`, and the marks :func:`request`,
+  :func:`observation`, :func:`inference`
 - errors: :class:`BadInput`
 
 Importing it sets environment variables that are not set yet, because the libraries read them when they are first
@@ -79,11 +79,11 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
 _MODULE_OF: Mapping[str, str] = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
-    "BadInput", "Camera", "CameraMount", "Change", "Decision", "Effect", "KnowledgeSource", "Level", "MissionResult", "Picture",
-    "PlanarEstimate", "Pose", "Pose2", "PoseEstimate", "Post", "Posted", "RecordedRun", "Retract", "Retracted",
-    "Revise", "Revised", "Scheduler", "TrackPoint", "View", "Watch", "World", "build_world", "inference",
-    "load_scenario", "load_world", "med_r_and_t", "observation", "open_run", "planar_from_lines", "r_and_t_ml",
-    "request", "run", "trunc_r_and_t",
+    "BadInput", "Camera", "CameraMount", "Change", "Decision", "Effect", "KnowledgeSource", "Level",
+    "MissionResult", "Picture", "PlanarEstimate", "Pose", "Pose2", "PoseEstimate", "Post", "Posted", "RecordedRun",
+    "Retract", "Retracted", "Revise", "Revised", "Scheduler", "TrackPoint", "View", "Watch", "World", "build_world",
+    "inference", "load_scenario", "load_world", "med_r_and_t", "observation", "open_run", "planar_from_lines",
+    "r_and_t_ml", "request", "run", "trunc_r_and_t",
 ]
 
 
