@@ -32,7 +32,7 @@ MAX_LISTED = 12
 
 
 def is_segment(name: str) -> bool:
-    """Whether a name is of a segment, as ``frame 88 segment 12``."""
+    """Whether a name is of a segment, as ``Frame-88 segment 12``."""
     return SEGMENT.fullmatch(name) is not None
 
 
@@ -61,7 +61,7 @@ class SegmentHider(LineFinder):
     """The line finder, with some segments of some pictures left out."""
 
     def __init__(self, robot: RobotModel, settings: Settings, segments: Sequence[tuple[int, int]]) -> None:
-        """``segments``: (frame, segment) to be left out."""
+        """``segments``: (number of the Frame entry, segment) to be left out."""
         super().__init__(robot, settings)
         self._segments = tuple(segments)
 
@@ -70,7 +70,7 @@ class SegmentHider(LineFinder):
         return "line_finder"
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        hidden = [segment for frame, segment in self._segments if frame == trigger.entry.value.number]
+        hidden = [segment for frame, segment in self._segments if trigger.entry.id == f"Frame-{frame}"]
         for effect in super().act(view, trigger):
             if isinstance(effect, Post) and isinstance(effect.value, Segments) and hidden:
                 yield Post(_hide(effect.value, hidden), effect.because)
@@ -82,25 +82,26 @@ def check_segments(records: Sequence[DecisionRecord], names: Sequence[str], hidd
     """Validate the names of segments against a run. Raises BadInput where it has no such frame or segment.
 
     Args:
-        names: as ``frame 88 segment 12``; other names are passed over.
+        names: as ``Frame-88 segment 12``; other names are passed over.
         hidden: what was taken from the run itself: segments keep the numbers that they have without that.
     """
     wanted = parse_segments(names)
     if not wanted:
         return
-    frames, counts, already = _number_frames(records), _count_segments(records), parse_segments(hidden)
+    frames = [entry.id for decision in records for entry in decision.observed if entry.type == "Frame"]
+    counts, already = _count_segments(records), parse_segments(hidden)
     for frame, segment in wanted:
-        where = f"--without frame {frame} segment {segment}: expected"
-        if frame not in frames.values():
-            raise BadInput(f"{where} a frame of the run, {_range(frames.values())}, got {frame}")
-        found = [n for ref, n in counts.items() if frames.get(ref) == frame]
-        if not found:
-            looked = listed([number for ref, number in frames.items() if ref in counts], MAX_LISTED)
+        name = f"Frame-{frame}"
+        where = f"--without {name} segment {segment}: expected"
+        if name not in frames:
+            raise BadInput(f"{where} a frame of the run, {_ends(frames)}, got {name}")
+        if name not in counts:
+            looked = listed([one for one in frames if one in counts], MAX_LISTED)
             raise BadInput(
-                f"{where} a frame in which segments were looked for, {looked or 'which none was'}, got {frame}")
-        total = max(found) + len({pair for pair in already if pair[0] == frame})
+                f"{where} a frame in which segments were looked for, {looked or 'which none was'}, got {name}")
+        total = counts[name] + len({pair for pair in already if pair[0] == frame})
         if segment >= total:
-            raise BadInput(f"{where} a segment of frame {frame}, {_range(range(total))}, got {segment}")
+            raise BadInput(f"{where} a segment of {name}, {_ends(range(total))}, got {segment}")
 
 
 def _suggest(name: str, sources: Sequence[str], elements: Set[str]) -> str:
@@ -109,7 +110,7 @@ def _suggest(name: str, sources: Sequence[str], elements: Set[str]) -> str:
     meant = [text for text in known if name.lower() in text.lower()]
     meant = meant or get_close_matches(name, known, MAX_SUGGESTED, MIN_SIMILARITY)
     names = ", ".join(meant[:MAX_SUGGESTED]) or f"a knowledge source ({', '.join(sources)}), a landmark or a face"
-    return f"{names}, or as 'frame 88 segment 12'"
+    return f"{names}, or as 'Frame-88 segment 12'"
 
 
 class _ReducedSource:
@@ -139,12 +140,6 @@ def _hide(found: Segments, hidden: Sequence[int]) -> Segments:
     return replace(found, segments_px=frozen(found.segments_px[kept]), sigma_px=frozen(found.sigma_px[kept]))
 
 
-def _number_frames(records: Sequence[DecisionRecord]) -> Mapping[str, int]:
-    """Frame by id -> its number."""
-    seen = (entry for decision in records for entry in decision.observed if entry.type == "Frame")
-    return {entry.id: int(entry.value["number"]) for entry in seen}
-
-
 def _count_segments(records: Sequence[DecisionRecord]) -> Mapping[str, int]:
     """Frame by id -> how many segments were found in it."""
     made = (entry.value for decision in records for entry in decision.made if entry.type == "Segments")
@@ -152,6 +147,6 @@ def _count_segments(records: Sequence[DecisionRecord]) -> Mapping[str, int]:
     return {str(v.get("frame")): len(v["segments_px"]) for v in whole}
 
 
-def _range(numbers: Iterable[int]) -> str:
-    have = sorted(numbers)
-    return f"{have[0]} to {have[-1]}" if have else "which has none"
+def _ends(names: Sequence[object]) -> str:
+    """The first and the last."""
+    return f"{names[0]} to {names[-1]}" if names else "which has none"

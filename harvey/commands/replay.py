@@ -23,8 +23,8 @@ def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN", help="a run directory")
     what_if = parser.add_argument_group("what would it have done")
     what_if.add_argument("--without", metavar="NAME", action="append", default=[],
-                         help="without a knowledge source, a landmark or face of its model, or one segment, as 'frame 8"
-                              " segment 12'; may be repeated")
+                         help="without a knowledge source, a landmark or face of its model, or one segment, as"
+                              " 'Frame-9 segment 12'; may be repeated")
     what_if.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
                          help="with a servo level off, as servo.plan=off, or another number of harvey settings, as"
                               " action.min_tolerance_px=8; may be repeated")
@@ -121,7 +121,7 @@ COMMAND = Command(
         ("harvey replay runs/lab-to-allens-office-0", "from its camera frames and odometry"),
         ("harvey replay runs/bump-0 --without plan_adjuster", "what it would have done without a knowledge source"),
         ("harvey replay runs/bump-0 --without fire-door", "without a landmark of its model"),
-        ("harvey replay runs/bump-0 --without 'frame 8 segment 12'", "had it not found one segment"),
+        ("harvey replay runs/bump-0 --without 'Frame-9 segment 12'", "had it not found one segment"),
         ("harvey replay runs/bump-0 --set servo.plan=off --out runs/bump-no-plan", "and keep it as a run"),
         ("harvey replay runs/bump-0 --set action.min_tolerance_px=8", "with another number of harvey settings"),
     ),

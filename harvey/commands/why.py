@@ -13,6 +13,7 @@ from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory, open_run
 from harvey.why.history import History
 from harvey.why.journal import JournalHistory
+from harvey.why.on_the_way import on_the_way
 from harvey.why.story import LEGEND, Story, lines_of, story
 from harvey.why.trace import cycle_lines
 from harvey.why.walk import explain, principal
@@ -52,6 +53,8 @@ def _run(args: Namespace) -> int:
     if args.json:
         print(json.dumps([_record(one) for one in _stories(history, args, refs)], indent=2))
     else:
+        if not asked and args.at is None:
+            print("\n".join([*on_the_way(history, run.read_result()), ""]))
         print("\n".join(_paragraphs(history, args, refs)))
     return 0
 
@@ -133,7 +136,7 @@ def _print_not(run: RunDirectory, history: History, args: Namespace) -> None:
 COMMAND = Command(
     "why", "why Harvey did what it did, in sentences; and why not something else",
     (
-        ("harvey why runs/lab-to-allens-office-0", "how the mission ended, and why"),
+        ("harvey why runs/lab-to-allens-office-0", "what happened on the way, how the mission ended, and why"),
         ("harvey why runs/lab-to-allens-office-0 MotorCommand-12", "why it turned there"),
         ("harvey why runs/lab-to-allens-office-0 --at 88", "what cycle 88 did, and why"),
         ("harvey why runs/lab-to-allens-office-0 --milestone 'M1 of hallway'", "what was expected, seen and judged"),

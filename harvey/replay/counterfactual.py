@@ -78,7 +78,7 @@ def what_if(
     """Decide a run again with a changed agent.
 
     Args:
-        without: knowledge sources, landmarks, faces, or ``frame 88 segment 12``, to be taken away.
+        without: knowledge sources, landmarks, faces, or ``Frame-88 segment 12``, to be taken away.
         constants: (key, value) of servo levels and constants to be set.
         out: where what would have been is kept, as a run; an older one there goes once it is clear what is asked.
         go_on: in the simulator: go on where the record no longer answers.

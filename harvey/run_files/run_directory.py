@@ -29,6 +29,7 @@ RESULT: Mapping[str, tuple[Any, str]] = {
     "seed": (int, "a number"),
     "milestones": (dict, "an object"),
     **dict.fromkeys(("decisions", "collisions", "replans", "relocalizations"), (int | None, "a number")),
+    "contacts": (list, "a list"),
     **dict.fromkeys(("final_error_m", "sim_time_s", "path_length_m"), (int | float | None, "a number")),
 }
 """Keys of ``result.json`` that others read, with the JSON types that they have; null is what nobody knows."""

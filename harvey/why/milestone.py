@@ -5,13 +5,16 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator
 
+from blackboard.servoing import Discrepancy
 from harvey.errors import BadInput
 from harvey.run_files.records import EntryRecord
 from harvey.why import facts
 from harvey.why.history import History
 from harvey.why.links import STRANGE, reason, words
-from harvey.why.sentences import sentence
+from harvey.why.sentences import sentence, value_of
 from harvey.why.story import Step, Story, decided
+from world_models.entries.location import Hypothesis
+from world_models.entries.task import Certificate, Milestone, PlanSketch
 
 FOLLOWED = ("Certificate", "Milestone", "Discrepancy")
 """The entries of a verdict; what they wake is what follows."""
@@ -82,7 +85,7 @@ def _story(history: History, id: str, last: EntryRecord) -> Story:
     else:
         steps.append(Step("judged", f"It was never judged: when the run ended it was {last.value['status']}.",
                           (last.ref,)))
-    name = facts.milestone_name(last.value)
+    name = facts.milestone_name(value_of(last, Milestone))
     head = f"{name[0].upper()}{name[1:]}: {last.value['status']}."
     return Story(last.ref, head, decided(history, first), tuple(steps))
 
@@ -90,9 +93,9 @@ def _story(history: History, id: str, last: EntryRecord) -> Story:
 def _wanted(history: History, first: EntryRecord) -> Iterator[Step]:
     doubt, sketch = reason(history, first, "Discrepancy"), reason(history, first, "PlanSketch")
     if doubt is not None:
-        yield Step("wanted", facts.doubt(doubt.value), (doubt.ref,))
+        yield Step("wanted", facts.doubt(value_of(doubt, Discrepancy)), (doubt.ref,))
     if sketch is not None:
-        yield Step("wanted", facts.plan(sketch.value), (sketch.ref,))
+        yield Step("wanted", facts.plan(value_of(sketch, PlanSketch)), (sketch.ref,))
 
 
 def _expected(history: History, last: EntryRecord, certificate: EntryRecord | None) -> Iterator[Step]:
@@ -100,8 +103,9 @@ def _expected(history: History, last: EntryRecord, certificate: EntryRecord | No
     looked = judged or last
     belief = reason(history, looked, "Hypothesis")
     if belief is not None:
-        yield Step("believed", f"It believed that it stood at {facts.pose(belief.value)}.", (belief.ref,))
-    yield Step("expected", facts.expectation(looked.value), (looked.ref,))
+        pose = facts.pose(value_of(belief, Hypothesis))
+        yield Step("believed", f"It believed that it stood at {pose}.", (belief.ref,))
+    yield Step("expected", facts.expectation(value_of(looked, Milestone)), (looked.ref,))
 
 
 def _seen_and_judged(history: History, certificate: EntryRecord) -> Iterator[Step]:
@@ -112,7 +116,8 @@ def _seen_and_judged(history: History, certificate: EntryRecord) -> Iterator[Ste
     if fix is not None:
         refs = tuple(r.ref for r in (fix, match, segments, frame) if r is not None)
         yield Step("seen", facts.matched(history, fix), refs)
-    said = facts.verdict(certificate, milestone)
+    judged = None if milestone is None else value_of(milestone, Milestone)
+    said = facts.verdict(value_of(certificate, Certificate), judged)
     yield Step("judged", said[0].upper() + said[1:], (certificate.ref,))
 
 

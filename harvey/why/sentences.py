@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 from blackboard.change import Quiescence
 from blackboard.kinds import Registry
 from blackboard.servoing import Discrepancy
@@ -11,6 +13,7 @@ from harvey.run_files.records import EntryRecord
 from world_models import words
 from world_models.entries import KINDS
 
+T = TypeVar("T")
 OWN = Registry((*KINDS, Discrepancy, Quiescence))
 """The kinds that come with the project: no knowledge source needs to be loaded to read them."""
 
@@ -22,6 +25,14 @@ def kinds_for(record: EntryRecord) -> Registry:
     from harvey.wiring import known_kinds
 
     return known_kinds()
+
+
+def value_of(record: EntryRecord, kind: type[T]) -> T:
+    """The value that a record tells, of the kind that it must be of. Raises BadInput where it is of another version."""
+    value = entry_of(record, kinds_for(record)).value
+    if not isinstance(value, kind):
+        raise BadInput(f"{record.ref}: expected a {kind.__name__}, got a {type(value).__name__}")
+    return value
 
 
 def sentence(record: EntryRecord) -> str:

@@ -6,10 +6,12 @@ from collections.abc import Iterator
 
 from harvey.run_files.records import EntryRecord
 from harvey.why import facts
-from harvey.why.facts import followed
 from harvey.why.history import History
 from harvey.why.links import anchor_of, reason, tracks_of
-from harvey.why.sentences import sentence
+from harvey.why.sentences import sentence, value_of
+from world_models.entries.location import Hypothesis
+from world_models.entries.percepts import Segments, Tracks
+from world_models.entries.task import Leg, Milestone
 from world_models.words import turn
 
 
@@ -23,13 +25,14 @@ def in_one_sentence(history: History, command: EntryRecord) -> str:
 
 def _because(history: History, command: EntryRecord) -> Iterator[str]:
     leg, milestone, belief = (reason(history, command, type) for type in ("Leg", "Milestone", "Hypothesis"))
-    if leg is not None and leg.value.get("aim_rad") is not None:
-        yield f"because the line to follow lay {turn(leg.value['aim_rad'])} of where it believed that it faced"
+    aim_rad = None if leg is None else value_of(leg, Leg).aim_rad
+    if aim_rad is not None:
+        yield f"because the line to follow lay {turn(aim_rad)} of where it believed that it faced"
     elif milestone is not None:
-        yield f"because it had to face {facts.milestone_name(milestone.value)} to look for it"
+        yield f"because it had to face {facts.milestone_name(value_of(milestone, Milestone))} to look for it"
     elif leg is None and (segments := reason(history, command, "Segments")) is not None:
-        yield "because it did not know where it was"
-        yield f"and {sentence(segments)} did not tell"
+        seen = facts.seen_in(value_of(segments, Segments), reason(history, segments, "Frame"))
+        yield f"because it did not know where it was, and did not find it out from {seen}"
     if belief is not None:
         yield from _seen(history, belief)
         yield from _matched(history, belief)
@@ -38,10 +41,13 @@ def _because(history: History, command: EntryRecord) -> Iterator[str]:
 def _seen(history: History, belief: EntryRecord) -> Iterator[str]:
     """The landmark that was furthest from its prediction, and the pose that the prediction was made from."""
     tracks, before = tracks_of(history, belief), reason(history, belief, "Hypothesis")
-    if belief.value["basis"] != "tracks" or tracks is None or before is None or not followed(tracks.value):
+    if value_of(belief, Hypothesis).basis != "tracks" or tracks is None or before is None:
         return
-    frame = facts.frame_number(reason(history, belief, "Frame"), tracks.value["frame"])
-    yield f"because in {frame} {facts.off(followed(tracks.value)[0])} ({tracks.ref})"
+    value = value_of(tracks, Tracks)
+    if not value.found_again():
+        return
+    frame = facts.picture(reason(history, belief, "Frame"), value.frame)
+    yield f"because in {frame} {facts.off(value.found_again()[0])} ({tracks.ref})"
     yield f"made from pose {before.ref}"
 
 
@@ -50,8 +56,8 @@ def _matched(history: History, belief: EntryRecord) -> Iterator[str]:
     anchor = anchor_of(history, belief)
     fix = None if anchor is None else reason(history, anchor, "PoseFix")
     match = None if fix is None else reason(history, fix, "LineMatch")
-    whose = "" if belief.value["basis"] == "tracks" else "where its pose was "
+    whose = "" if value_of(belief, Hypothesis).basis == "tracks" else "where its pose was "
     if fix is not None and match is not None:
         yield f"{whose}made from match {match.id} of {facts.best_pairs(history, fix, match)}"
     elif anchor is not None:
-        yield f"made from pose {anchor.ref} by {anchor.value['basis']}"
+        yield f"made from pose {anchor.ref} by {value_of(anchor, Hypothesis).basis}"

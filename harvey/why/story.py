@@ -13,13 +13,18 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from textwrap import fill
 
+from blackboard.servoing import Discrepancy
 from harvey.run_files.records import Candidate, EntryRecord
 from harvey.why import facts
 from harvey.why.history import History
 from harvey.why.links import STRANGE, anchor_of, nearest, reason, tracks_of, within, words
-from harvey.why.sentences import sentence
+from harvey.why.sentences import sentence, value_of
 from harvey.why.short import in_one_sentence
-from world_models.words import PURPOSES, number
+from world_models import words as vocabulary
+from world_models.entries.body import Look, MotionReport
+from world_models.entries.location import Hypothesis
+from world_models.entries.percepts import Segments, Tracks
+from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone, PlanSketch
 
 MOST = 24
 """So many things are told at the most."""
@@ -86,14 +91,20 @@ def _plain_steps(history: History, record: EntryRecord) -> Iterator[Step]:
 
 def headline(record: EntryRecord) -> str:
     """What the entry is, as something that Harvey did where it is an act."""
-    v, said = record.value, sentence(record)
+    said = sentence(record)
     if record.type in ("MotorCommand", "Course"):
         return f"Harvey was told to {said}."
     if record.type == "Look":
-        return f"A picture was taken {PURPOSES.get(v.get('purpose'), '')}".rstrip() + "."
-    if record.type == "Hypothesis" and v.get("status") == "held":
-        return f"It believed that it stood at {facts.pose(v)}."
+        return f"A picture was taken {vocabulary.purpose(value_of(record, Look).purpose)}."
+    if record.type == "Hypothesis" and value_of(record, Hypothesis).is_held:
+        return _believed(value_of(record, Hypothesis))
     return f"{said[0].upper()}{said[1:]}." if said else record.ref
+
+
+def _believed(hypothesis: Hypothesis) -> str:
+    if hypothesis.basis == "relocalization":
+        return f"It found out where it is: at {facts.pose(hypothesis)}."
+    return f"It believed that it stood at {facts.pose(hypothesis)}."
 
 
 def decided(history: History, record: EntryRecord) -> str:
@@ -125,7 +136,12 @@ def _time(history: History, record: EntryRecord) -> str:
 
 
 def _time_of(record: EntryRecord) -> float | None:
-    value = record.value.get("sim_time_s") if isinstance(record.value, Mapping) else None
+    if not isinstance(record.value, Mapping):
+        return None
+    value = record.value.get("sim_time_s", record.value.get("when_s"))
+    since, waited = record.value.get("since_s"), record.value.get("waited_s")
+    if isinstance(since, int | float) and isinstance(waited, int | float):
+        value = since + waited
     return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
 
 
@@ -165,22 +181,25 @@ class _Teller:
 
     def _tell(self, record: EntryRecord, above: EntryRecord) -> Iterator[Step]:
         """An entry that something rests on, then what it rests on itself."""
-        perhaps = record.type == "Hypothesis" and record.value["status"] == "candidate"
+        perhaps = record.type == "Hypothesis" and value_of(record, Hypothesis).status == "candidate"
         key = record.id if record.type in SEVERAL or perhaps else record.type
         if key in self.told or record.ref in self.met or len(self.told) > MOST or len(self.met) > MOST_MET:
             return
         self.met.add(record.ref)
         if record.type == "Segments" and above.type in ("MotorCommand", "Look"):
             frame = reason(self.history, record, "Frame")
-            yield from self._one(key, "seen", facts.puzzled(record, frame), record, frame)
+            seen = facts.seen_in(value_of(record, Segments), frame)
+            text = f"It saw {seen}; where it is did not yet follow from them."
+            yield from self._one(key, "seen", text, record, frame)
         elif perhaps:
-            text = f"It may have stood at {facts.pose(record.value)} ({number(record.value['weight']):.0%})."
+            candidate = value_of(record, Hypothesis)
+            text = f"It may have stood at {facts.pose(candidate)} ({candidate.weight:.0%})."
             yield from self._one(key, "thought", text, record)
             for below in self._below(record, "Panorama"):
                 yield from self._tell(below, record)
             return
         elif record.type == "Hypothesis":
-            text = f"It believed that it stood at {facts.pose(record.value)}."
+            text = f"It believed that it stood at {facts.pose(value_of(record, Hypothesis))}."
             yield from self._one(key, "believed", text, record)
         elif record.type not in FOLDED:
             say = SAY.get(record.type, _plainly)
@@ -194,9 +213,10 @@ class _Teller:
 
     def _belief(self, record: EntryRecord) -> Iterator[Step]:
         """What it saw, what it had expected; what it was sure of last."""
-        if record.value["basis"] == "tracks":
+        basis = value_of(record, Hypothesis).basis
+        if basis == "tracks":
             yield from self._tracked(record)
-        elif record.value["basis"] == "odometry":
+        elif basis == "odometry":
             yield from self._rolled(record)
         yield from self._anchored(record)
 
@@ -205,15 +225,18 @@ class _Teller:
         before, frame = reason(history, record, "Hypothesis"), reason(history, record, "Frame")
         tracks = tracks_of(history, record)
         if tracks is not None:
-            moved = facts.moved_belief(record, before) if before is not None else ""
-            yield from self._one("Tracks", "seen", f"{facts.tracking(tracks, frame)} {moved}".strip(), tracks, frame)
-        if before is not None and before.value["basis"] == "odometry":
+            now = value_of(record, Hypothesis)
+            moved = facts.moved_belief(now, value_of(before, Hypothesis)) if before is not None else ""
+            text = f"{facts.tracking(value_of(tracks, Tracks), frame)} {moved}".strip()
+            yield from self._one("Tracks", "seen", text, tracks, frame)
+        if before is not None and value_of(before, Hypothesis).basis == "odometry":
             yield from self._rolled(before)
 
     def _rolled(self, record: EntryRecord) -> Iterator[Step]:
         report = reason(self.history, record, "MotionReport")
         if report is not None:
-            text = f"That was expected because {facts.wheels(report)}, which led to {facts.pose(record.value)}."
+            led_to = facts.pose(value_of(record, Hypothesis))
+            text = f"That was expected because {facts.wheels(value_of(report, MotionReport))}, which led to {led_to}."
             yield from self._one("MotionReport", "expected", text, record, report)
 
     def _anchored(self, record: EntryRecord) -> Iterator[Step]:
@@ -222,21 +245,23 @@ class _Teller:
         if anchor is None:
             return
         command, certificate = (reason(self.history, anchor, type) for type in ("Command", "Certificate"))
-        if anchor.value["basis"] == "relocalization":
+        begun = value_of(anchor, Hypothesis)
+        if begun.basis == "relocalization":
             yield from self._recognized(anchor)
         elif certificate is not None:
             yield from self._certificate(certificate, f"In cycle {certificate.cycle} ")
         elif command is not None:
-            text = f"Where it began it was told by the user: at {facts.pose(anchor.value)}."
+            text = f"Where it began it was told by the user: at {facts.pose(begun)}."
             yield from self._one("told", "told", text, anchor, command)
 
     def _recognized(self, anchor: EntryRecord) -> Iterator[Step]:
         """It was lost, and found where it was."""
         segments, lost = reason(self.history, anchor, "Segments"), reason(self.history, anchor, "Discrepancy")
         frame = None if segments is None else reason(self.history, segments, "Frame")
-        found = f"; {anchor.value['evidence']}" if anchor.value.get("evidence") else ""
-        text = (f"It found out anew where it was, in cycle {anchor.cycle}, from {facts.frame_number(frame)}: at"
-                f" {facts.pose(anchor.value)}{found}.")
+        begun = value_of(anchor, Hypothesis)
+        found = f"; {begun.evidence}" if begun.evidence else ""
+        text = (f"It found out anew where it was, in cycle {anchor.cycle}, from {facts.picture(frame)}: at"
+                f" {facts.pose(begun)}{found}.")
         yield from self._one("recognized", "recognized", text, anchor, segments, frame)
         if lost is not None:
             yield from self._tell(lost, anchor)
@@ -244,7 +269,8 @@ class _Teller:
     def _certificate(self, record: EntryRecord, when: str = "") -> Iterator[Step]:
         history = self.history
         fix, milestone = reason(history, record, "PoseFix"), reason(history, record, "Milestone")
-        said = when + facts.verdict(record, milestone)
+        judged = None if milestone is None else value_of(milestone, Milestone)
+        said = when + facts.verdict(value_of(record, Certificate), judged)
         yield from self._one(record.id, "checked", said[0].upper() + said[1:], record, milestone)
         if fix is not None:
             yield from self._matched(fix)
@@ -263,23 +289,25 @@ def _plainly(_history: History, record: EntryRecord) -> str:
 
 def _line(history: History, record: EntryRecord) -> str:
     sketch = nearest(history, record, ("PlanSketch",))
-    return facts.line(record, sketch if sketch is not None and sketch.id == record.value["sketch"] else None)
+    leg = value_of(record, Leg)
+    return facts.line(leg, value_of(sketch, PlanSketch) if sketch is not None and sketch.id == leg.sketch else None)
 
 
 SAY: Mapping[str, Callable[[History, EntryRecord], str]] = {
     "Leg": _line,
-    "Milestone": lambda _, r: facts.expectation(r.value),
-    "Discrepancy": lambda _, r: facts.doubt(r.value),
-    "PlanSketch": lambda _, r: facts.plan(r.value),
-    "Goal": lambda _, r: facts.goal(r.value),
-    "Command": lambda _, r: f"The user asked for it: {r.value['text']}.",
+    "Milestone": lambda _, r: facts.expectation(value_of(r, Milestone)),
+    "Discrepancy": lambda _, r: facts.doubt(value_of(r, Discrepancy)),
+    "PlanSketch": lambda _, r: facts.plan(value_of(r, PlanSketch)),
+    "Goal": lambda _, r: facts.goal(value_of(r, Goal)),
+    "Command": lambda _, r: f"The user asked for it: {value_of(r, Command).text}.",
 }
 LABELS: Mapping[str, str] = {
     "Leg": "driving", "Milestone": "looked for", "Discrepancy": "doubted", "PlanSketch": "plan", "Goal": "goal",
     "Command": "command", "Tracks": "seen", "Frame": "picture", "MotionReport": "wheels", "MotorCommand": "motion",
     "Course": "motion",
     "Look": "look", "Segments": "seen", "Panorama": "thought", "BodyFault": "fault", "Recovery": "recovery",
-    "Ride": "ride", "RideReport": "ride", "Obstruction": "hidden",
+    "Ride": "ride", "RideReport": "ride", "Obstruction": "hidden", "Quiescence": "stillness", "Outcome": "the end",
+    "Resumed": "resumed", "Drift": "wheels",
 }
 FOLDED = frozenset({"PoseFix", "LineMatch", "Segments", "Certificate"})
 """Told by the sentences of what rests on them."""

@@ -129,9 +129,17 @@ PRINCIPAL = (
 """Of what one act makes, the first of these is what it was done for."""
 
 
+def _rank(record: EntryRecord) -> int:
+    """A smaller number for what an act was rather done for; that it found out where it is comes before its new goal."""
+    value = record.value if isinstance(record.value, dict) else {}
+    if record.type == "Hypothesis" and value.get("basis") == "relocalization" and value.get("status") == "held":
+        return 0
+    return 1 + (PRINCIPAL.index(record.type) if record.type in PRINCIPAL else len(PRINCIPAL))
+
+
 def principal(decision: DecisionRecord) -> list[str]:
     """What to explain of a decision: the chief entry that it made, or what woke those who made nothing."""
-    made = sorted(decision.made, key=lambda r: PRINCIPAL.index(r.type) if r.type in PRINCIPAL else len(PRINCIPAL))
+    made = sorted(decision.made, key=_rank)
     if made:
         return [made[0].ref]
     if decision.chosen is not None:

@@ -35,10 +35,14 @@ class Subject:
 
 
 class Logger(ABC):
-    """Draws one thing."""
+    """Draws one thing.
+
+    Attributes:
+        subject: what the recording is of.
+    """
 
     def __init__(self, subject: Subject) -> None:
-        """``subject``: what the recording is of."""
+        self.subject = subject
 
     def panels(self) -> Sequence[Panel]:
         """The views that show it; none where those of other loggers do."""

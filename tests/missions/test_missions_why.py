@@ -37,8 +37,8 @@ BUMPED = OFFICE + fault("bump", "allens-office", 3.0, left_m=0.3, turn_deg=10.0)
 KNOWN = registry_of((), KINDS)
 MOTION = re.compile(
     r"Harvey was told to .+ because the line to follow lay .+ (left|right) of where it believed that it faced,"
-    r" because in camera frame \d+ .+ px (left|right|above|below).* its prediction at .+ \(Tracks-1\.\d+\),"
-    r" made from pose Hypothesis-1\.\d+, made from match LineMatch-\d+ of segments? [\d, and]+.* in camera frame \d+"
+    r" because in Frame-\d+ .+ px (left|right|above|below).* its prediction at .+ \(Tracks-1\.\d+\),"
+    r" made from pose Hypothesis-1\.\d+, made from match LineMatch-\d+ of segments? [\d, and]+.* in Frame-\d+"
     r" against .+\.$"
 )
 

@@ -165,7 +165,7 @@ class Frame:
     purpose: str = ""
 
     def sentence(self) -> str:
-        return f"camera frame at {self.sim_time_s:.1f} s; {words.purpose(self.purpose)}"
+        return f"picture of {self.sim_time_s:.1f} s into the run; {words.purpose(self.purpose)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +219,8 @@ class BodyFault:
         state = "is at fault" if self.is_open else "was at fault"
         claims = words.motion(self.turn_rad or 0.0, self.move_m or 0.0)
         done = f"; of {self.request} the wheels claim: {claims}" if self.turn_rad or self.move_m else ""
-        return f"the {self.part} {state} since {self.when_s:.1f} s: {self.what} ({self.detail}){done}; {self.status}"
+        since = f"since {self.when_s:.1f} s into the run"
+        return f"the {self.part} {state} {since}: {self.what} ({self.detail}){done}; {self.status}"
 
 
 @request(keep=LAST_REQUESTS, when=is_recovered)

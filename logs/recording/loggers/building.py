@@ -44,6 +44,7 @@ class Building(Logger):
     """Logs the world model once."""
 
     def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
         self._world = subject.world
 
     def panels(self) -> Sequence[Panel]:

@@ -29,6 +29,7 @@ class Chapters(Logger):
     """Logs a line when something turns."""
 
     def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
         self._belief = subject.belief
         self._finder = TurningPointFinder()
         self._truth: Pose2 | None = None

@@ -58,6 +58,7 @@ class Decisions(Logger):
     """Logs every decision in three forms."""
 
     def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
         self._line_of = subject.line_of
         self._messages = Messages()
 

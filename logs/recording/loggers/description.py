@@ -29,6 +29,7 @@ class Description(Logger):
     """Logs the text once."""
 
     def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
         self._title = subject.title
 
     def panels(self) -> Sequence[Panel]:

@@ -41,6 +41,7 @@ class Errors(Logger):
     """
 
     def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
         self._belief = subject.belief
         self._truth: Pose2 | None = None
 

@@ -35,6 +35,7 @@ class Frames(Logger):
     """Logs each picture as it is delivered."""
 
     def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
         self._camera = subject.camera
 
     def panels(self) -> Sequence[Panel]:

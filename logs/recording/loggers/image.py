@@ -49,6 +49,7 @@ class Image(Logger):
     """Logs the overlays of the newest frame, and takes them away when the next one comes."""
 
     def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
         camera = subject.camera
         self._size = camera.width, camera.height
         self._lens, self._pinhole = camera, camera.pinhole

@@ -25,6 +25,7 @@ class Lanes(Logger):
     """Logs a lane only when its state changes."""
 
     def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
         self._known: dict[str, None] = {}
         self._states: dict[str, str] = {}
         self._acting = ""

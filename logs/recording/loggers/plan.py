@@ -22,6 +22,7 @@ class Plan(Logger):
     """Logs goal, sketches, leg and milestone when they change."""
 
     def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
         self._world = subject.world
         self._last: dict[str, object] = {}
 

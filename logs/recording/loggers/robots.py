@@ -53,6 +53,7 @@ class Robots(Logger):
     """Logs both robots when they move."""
 
     def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
         self._world, self._belief = subject.world, subject.belief
         self._camera, self._mount = subject.camera, subject.mount
         self._last: dict[str, Pose2] = {}

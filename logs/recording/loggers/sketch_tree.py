@@ -55,6 +55,7 @@ class SketchTree(Logger):
     """Logs the whole tree when any of it changes."""
 
     def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
         self._last: list[Node] = []
 
     def panels(self) -> Sequence[Panel]:

@@ -35,6 +35,7 @@ class Why(Logger):
     """Logs the text when something in it changed; only what rests on a change is worded anew."""
 
     def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
         self._belief = subject.belief
         self._truth: Pose2 | None = None
         self._told: dict[str, str] = {}

@@ -72,7 +72,7 @@ def test_why_goes_down_to_the_command(run: Path, capsys: pytest.CaptureFixture[s
     assert "made from match LineMatch-" in out
     assert "MotorCommand-1.0: turn" in out
     assert "the user asked for (ptrans (robot-laboratory (16,2,0))" in out
-    assert "Frame-1.0: camera frame at 0.1 s; to verify a milestone" in out
+    assert "Frame-1.0: picture of 0.1 s into the run; to verify a milestone" in out
 
 
 def test_why_without_an_entry_tells_the_outcome(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
