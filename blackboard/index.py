@@ -19,7 +19,9 @@ class Index(Generic[T_contra]):
     Attributes:
         kind: the class of the values.
         key: what they are found by, a pure function of the value; None leaves an entry out.
+        word: what the entries are that are not left out, for people: "open".
     """
 
     kind: type[Any]
     key: Callable[[T_contra], Hashable | None]
+    word: str = ""

@@ -92,8 +92,9 @@ class Discrepancy:
             size = "not yet measured there"
         else:
             size = f"{self.magnitude:.2f} {self.unit}" if math.isfinite(self.magnitude) else "too large to be measured"
+        head = "" if self.is_open else f"{self.status}: "
         bound = "" if self.level is Level.GOAL else f", where up to {self.bound:.2f} {self.unit} may be corrected"
-        return f"{self.level}-level discrepancy, {self.what}: {size}{bound}; {self.status}"
+        return f"{head}{self.what}: {size}; discrepancy at the {self.level} level{bound}; {self.status}"
 
 
 def last_escalated(view: View, level: Level) -> Entry[Discrepancy] | None:
@@ -101,7 +102,7 @@ def last_escalated(view: View, level: Level) -> Entry[Discrepancy] | None:
     return view.latest(Discrepancy, lambda found: found.level is level and found.status == "escalated")
 
 
-OPEN: Index[Discrepancy] = Index(Discrepancy, lambda found: found.level if found.is_open else None)
+OPEN: Index[Discrepancy] = Index(Discrepancy, lambda found: found.level if found.is_open else None, "open")
 """Open discrepancies by their level."""
 
 

@@ -15,11 +15,11 @@ from world_models.entries.percepts import Tracks
 from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch
 from world_models.robot import RobotModel
 
-HELD: Index[Hypothesis] = Index(Hypothesis, lambda h: h.is_held or None)
-ACTIVE_GOAL: Index[Goal] = Index(Goal, lambda g: g.is_active or None)
-OPEN_MILESTONE: Index[Milestone] = Index(Milestone, lambda m: m.is_open or None)
-ACTIVE_SKETCH: Index[PlanSketch] = Index(PlanSketch, lambda s: s.goal if s.is_active else None)
-OPEN_FAULT: Index[BodyFault] = Index(BodyFault, lambda f: f.is_open or None)
+HELD: Index[Hypothesis] = Index(Hypothesis, lambda h: h.is_held or None, "held")
+ACTIVE_GOAL: Index[Goal] = Index(Goal, lambda g: g.is_active or None, "active")
+OPEN_MILESTONE: Index[Milestone] = Index(Milestone, lambda m: m.is_open or None, "open")
+ACTIVE_SKETCH: Index[PlanSketch] = Index(PlanSketch, lambda s: s.goal if s.is_active else None, "active")
+OPEN_FAULT: Index[BodyFault] = Index(BodyFault, lambda f: f.is_open or None, "open")
 
 
 def find_belief(view: View) -> Entry[Hypothesis] | None:

@@ -86,7 +86,7 @@ def turning_points(change: Change, cycle: int, get: Get, belief: Entry[Hypothesi
     elif isinstance(value, Discrepancy) and value.status == "escalated":
         yield _escalated(value, cycle, belief)
     elif isinstance(value, Hypothesis) and value.is_held and value.basis == "relocalization":
-        yield TurningPoint(cycle, "found", f"it knows again where it is: {value.place()}")
+        yield TurningPoint(cycle, "found", f"{value.place()}; it knows again where it is")
     elif isinstance(value, BodyFault):
         yield TurningPoint(cycle, "fault", f"{value.part}: {value.what}{'' if value.is_open else ', over'}")
     elif isinstance(value, Resumed):
@@ -98,8 +98,8 @@ def turning_points(change: Change, cycle: int, get: Get, belief: Entry[Hypothesi
 def _escalated(discrepancy: Discrepancy, cycle: int, belief: Entry[Hypothesis] | None) -> TurningPoint:
     if discrepancy.level.above is not Level.GOAL:
         return TurningPoint(cycle, "doubt", discrepancy.what)
-    where = f", where it believed to be: {belief.value.place()}" if belief is not None else ""
-    return TurningPoint(cycle, "lost", f"nothing fits{where}")
+    where = f"{belief.value.place()} by its belief; " if belief is not None else ""
+    return TurningPoint(cycle, "lost", f"{where}nothing fits")
 
 
 def _verdict(certificate: Certificate, get: Get) -> str:

@@ -13,7 +13,7 @@ from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory, open_run
 from harvey.why.history import History
 from harvey.why.journal import JournalHistory
-from harvey.why.on_the_way import on_the_way
+from harvey.why.on_the_way import levels_off, on_the_way
 from harvey.why.story import LEGEND, Story, lines_of, story
 from harvey.why.trace import cycle_lines
 from harvey.why.walk import explain, principal
@@ -54,7 +54,7 @@ def _run(args: Namespace) -> int:
         print(json.dumps([_record(one) for one in _stories(history, args, refs)], indent=2))
     else:
         if not asked and args.at is None:
-            print("\n".join([*on_the_way(history, run.read_result()), ""]))
+            print("\n".join([*levels_off(run), *on_the_way(history, run.read_result()), ""]))
         print("\n".join(_paragraphs(history, args, refs)))
     return 0
 

@@ -6,7 +6,6 @@ as far as ``rate`` is what it has to be, a pure function of the board; no act is
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -15,9 +14,9 @@ from blackboard.change import Change, Posted, Retracted, Revised
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry
 from blackboard.index import Index
-from blackboard.kinds import Registry
+from blackboard.kinds import Registry, always
 from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import WORDS, Level
+from blackboard.level import Level
 from harvey.errors import BadInput
 from harvey.run_files.observations import entry_of, refs_of, written_in
 from harvey.run_files.records import EntryRecord
@@ -82,7 +81,7 @@ def _kinds(kinds: Iterable[type[Change]]) -> str:
 
 
 class AskedView(View):
-    """A view that remembers what was asked of it, in the words of knowledge_sources.questions, and the answers."""
+    """A view that remembers what was asked of it, in words, and the answers."""
 
     __slots__ = ("asked",)
 
@@ -90,47 +89,44 @@ class AskedView(View):
         super().__init__(board)
         self.asked: list[tuple[str, list[str]]] = []
 
-    def _note(self, what: str, found: Iterable[Entry[Any] | None]) -> None:
-        question = _question() or what
+    def _note(self, question: str, found: Iterable[Entry[Any] | None]) -> None:
         if not self.asked or self.asked[-1][0] != question:
             self.asked.append((question, []))
         self.asked[-1][1].extend(str(e.ref) for e in found if e is not None)
 
     def get(self, id: str) -> Entry[Any] | None:
         found = super().get(id)
-        self._note(id, (found,))
+        self._note(f"what {id} is now", (found,))
         return found
 
-    def latest(self, kind: type[Any], where: Callable[[Any], bool] = lambda _: True) -> Entry[Any] | None:
+    def latest(self, kind: type[Any], where: Callable[[Any], bool] = always) -> Entry[Any] | None:
         found = super().latest(kind, where)
-        self._note(f"the newest {kind.__name__} of some kind", (found,))
+        condition = "" if where is always else " that meets a condition"
+        self._note(f"the newest {kind.__name__}{condition}", (found,))
         return found
 
     def where(self, kind: type[Any], predicate: Callable[[Any], bool]) -> tuple[Entry[Any], ...]:
         found = super().where(kind, predicate)
-        self._note(f"every {kind.__name__} of some kind", found)
+        self._note(f"every {kind.__name__} that meets a condition", found)
         return found
 
     def newest(self, index: Index[Any], key: Any) -> Entry[Any] | None:
         found = super().newest(index, key)
-        self._note(f"the newest {index.kind.__name__} with {key}", (found,))
+        self._note(f"the newest {_by(index, key)}", (found,))
         return found
 
     def having(self, index: Index[Any], key: Any) -> tuple[Entry[Any], ...]:
         found = super().having(index, key)
-        self._note(f"every {index.kind.__name__} with {key}", found)
+        self._note(f"every {_by(index, key)}", found)
         return found
 
 
-def _question() -> str:
-    """The name of the outermost question that is being asked, with its level if it has one; "" for a plain read."""
-    frame, found = inspect.currentframe(), ""
-    while frame is not None:
-        if frame.f_globals.get("__name__") == "knowledge_sources.questions":
-            level = frame.f_locals.get("level")
-            found = words(frame.f_code.co_name) + (f" ({WORDS[level]} level)" if isinstance(level, Level) else "")
-        frame = frame.f_back
-    return found
+def _by(index: Index[Any], key: Any) -> str:
+    """``open Discrepancy (plan level)``: what an index finds by a key."""
+    what = f"{index.word} {index.kind.__name__}".lstrip()
+    if key is True:
+        return what
+    return f"{what} ({key} level)" if isinstance(key, Level) else f"{what} ({key})"
 
 
 def changes(history: History, cycle: int, kinds: Registry) -> tuple[Change, ...]:

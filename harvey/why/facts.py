@@ -152,11 +152,9 @@ def verdict(certificate: Certificate, milestone: Milestone | None) -> str:
     chance = f"the probability that so much agrees at a wrong place is {certificate.p_false:.2g}"
     away = (f"the pose is {metres(certificate.deviation_m)} and {degrees(abs(certificate.deviation_rad))} from what was"
             " believed")
-    counted = "" if milestone is None else (
-        f"; of the {count(certificate.expected, 'line')} that were expected from the belief, those count that should be"
-        " seen from the pose that was found")
     if certificate.verdict != "verified":
-        return f"{what} was judged {certificate.verdict}: {certificate.reason}{counted}; {chance}."
+        judged = f"(at the pose that was found; from the belief it expected {count(certificate.expected, 'line')})"
+        return f"{what} was judged {certificate.verdict}: {certificate.reason} {judged}; {chance}."
     return (f"{what} was verified: {certificate.reason} (up to {certificate.tolerance_px:.0f} px may be corrected);"
             f" {away}; {chance}.")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from textwrap import fill
 from typing import Any
@@ -11,6 +12,7 @@ from blackboard.entry import Entry
 from harvey.errors import BadInput
 from harvey.run_files.observations import entry_of
 from harvey.run_files.records import EntryRecord
+from harvey.run_files.run_directory import RunDirectory
 from harvey.why.history import History
 from harvey.why.links import nearest
 from harvey.why.sentences import kinds_for
@@ -22,6 +24,25 @@ MARKS = ("escalated", "refuted", "relocalization")
 """A turning point that must be told has one of these words in its line of the journal, or is of one of these kinds."""
 KINDS = ("BodyFault-", "Resumed-")
 WIDTH = 120
+WITHOUT: Mapping[str, str] = {
+    "action": "no landmark was followed, and it drove by dead reckoning between milestones",
+    "plan": "no pose was taken over from a milestone",
+    "goal": "a robot that is lost does not look for where it is",
+}
+"""What it means that a level is off."""
+
+
+def levels_off(run: RunDirectory) -> Iterator[str]:
+    """Which servo levels were switched off, as run.json says; nothing where it does not."""
+    try:
+        head = json.loads((run.path / "run.json").read_text(encoding="utf-8"))
+        servo = {**head["servo"], **{key.removeprefix("servo."): value == "on" for key, value in head["constants"]
+                                     if key.startswith("servo.")}}
+    except (OSError, ValueError, KeyError, TypeError):
+        return
+    for level, is_on in servo.items():
+        if is_on is False:
+            yield f"The {level} level of servoing was off in this run: {WITHOUT.get(level, 'nobody closed it')}."
 
 
 def on_the_way(history: History, result: Mapping[str, Any]) -> Iterator[str]:
@@ -81,5 +102,5 @@ def _entry(record: EntryRecord) -> Entry[Any] | None:
 def _collisions(result: Mapping[str, Any]) -> Iterator[TurningPoint]:
     for contact in result.get("contacts") or ():
         place = Place(contact["locale"], contact["x_m"], contact["y_m"])
-        text = f"it touched something at {place.words()}, as only the simulator knows"
+        text = f"{place.words()}, as only the simulator knows"
         yield TurningPoint(contact["cycle"], "collision", text)

@@ -13,7 +13,7 @@ from world_models.entries.body import BodyFault
 from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch
 
 ACTIVITY_KINDS = (Outcome, BodyFault, Discrepancy, Milestone, Leg, PlanSketch, Goal)
-"""What a activity follows from."""
+"""What an activity follows from."""
 
 ACTIVITIES: Mapping[str, Colour] = {
     "waits": DONE, "plans": PLANNED, "drives": BELIEVED, "looks": EXPECTED, "doubts": NOT_TESTABLE, "is lost": REJECTED,
@@ -36,7 +36,7 @@ def activity(mirror: Mirror) -> Activity:
         return Activity(end.value.kind, f"The end: {end.value.kind}")
     if (fault := mirror.latest(BodyFault, lambda f: f.is_open)) is not None:
         return Activity("is in trouble", f"Trouble: {fault.value.what}")
-    doubts = [e.value for e in mirror.all(Discrepancy) if e.value.is_open and _is_doubt(e.value)]
+    doubts = [e.value for e in mirror.all(Discrepancy) if e.value.is_open and is_doubt(e.value)]
     if any(d.level is Level.GOAL for d in doubts):
         return Activity("is lost", "Lost: nothing fits; finding out where it is")
     if doubts:
@@ -46,7 +46,8 @@ def activity(mirror: Mirror) -> Activity:
     return _under_way(mirror)
 
 
-def _is_doubt(found: Discrepancy) -> bool:
+def is_doubt(found: Discrepancy) -> bool:
+    """Whether its level has not measured it, or may not correct it."""
     return found.magnitude is None or found.exceeds
 
 

@@ -14,7 +14,7 @@ from logs.recording.panel import Area, Panel
 PLAYED_PER_S = 10.0
 """Cycles, when the recording plays."""
 
-SHARES = (10, 30, 8)
+SHARES = (11, 29, 8)
 """Of the window's width: words to the left, world and decisions in the middle, measurements to the right."""
 MIDDLE_SHARES = (11, 10)
 """Of the window's height: the world above, decisions below."""
@@ -37,7 +37,7 @@ def blueprint(loggers: Sequence[Logger]) -> Any:
 
 def _area(panels: Sequence[Panel], area: Area, container: Any) -> Any:
     """The panels of an area in their order, those of equal order as tabs; None where there are none."""
-    inside = sorted((panel for panel in panels if panel.area == area), key=lambda panel: panel.order)
+    inside = sorted((panel for panel in panels if panel.area == area), key=lambda panel: (panel.order, -panel.share))
     groups = [list(group) for _, group in groupby(inside, key=lambda panel: panel.order)]
     parts = [group[0].view if len(group) == 1 else rrb.Tabs(*(panel.view for panel in group)) for group in groups]
     shares = [max(panel.share for panel in group) for group in groups]

@@ -27,7 +27,8 @@ class Panel:
     Attributes:
         view: a view of rerun's blueprint.
         area: the part of the window.
-        order: the place in its area, counted from the top or from the left; panels of the same order are tabs.
+        order: the place in its area, counted from the top or from the left; panels of the same order are tabs,
+            that of the largest share in front.
         share: of the area's length.
     """
 

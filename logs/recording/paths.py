@@ -23,8 +23,8 @@ WAITING = f"{CAMERA}/waiting"
 
 SKETCH = "sketch"
 
-HARVEY, FOCUS, FAULTS, WHO = "harvey", "level", "robot", "who"
-"""Lanes are labelled with their whole path and sorted by it: so these are short, and who acts comes last."""
+HARVEY, FOCUS, FAULTS = "Activity", "Active_level", "Alarm"
+"""Lanes are labelled with their whole path and sorted by it: these come before most of who acts, by level."""
 
 WHY = "why"
 CHAPTERS = "chapters"

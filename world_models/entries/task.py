@@ -275,10 +275,10 @@ class Certificate:
 
     def sentence(self) -> str:
         agree = (f"{words.count(self.inliers, 'segment')} agree to {words.quantity(self.residual_px, 'px')} with"
-                 f" {words.count(self.matched, 'matched line')} of {self.expected} expected")
+                 f" {self.matched} of the {words.count(self.expected, 'line')} that were expected from the belief")
         shift = (f"{words.quantity(self.deviation_px, 'px')} of the {words.quantity(self.tolerance_px, 'px')} that may"
                  " be corrected")
-        return (f"{self.milestone} is {self.verdict}: {self.reason}; {agree}; {words.metres(self.deviation_m)} and"
+        return (f"{self.verdict}: {self.reason}; {self.milestone}; {agree}; {words.metres(self.deviation_m)} and"
                 f" {words.degrees(self.deviation_rad)} from the belief, {shift}; probability of a wrong pose"
                 f" {self.p_false:.2g}")
 

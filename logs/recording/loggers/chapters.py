@@ -48,7 +48,7 @@ class Chapters(Logger):
         """What the robot cannot know: that it touched something, that its belief went wrong, or is right again."""
         cycle = moment.decision.cycle
         for place in moment.contacts:
-            yield TurningPoint(cycle, "collision", f"it touches something at {place.words()}")
+            yield TurningPoint(cycle, "collision", f"{place.words()}, as only the simulator knows")
         for pose in moment.truth[-1:]:
             self._truth = pose
         held = self._belief.now(moment.mirror) if self._truth is not None and moment.changes else None
@@ -57,11 +57,11 @@ class Chapters(Logger):
         off_m = self._truth.distance_to(held.world_from_robot)
         if off_m > (BACK_M if self._is_astray else ASTRAY_M):
             if not self._is_astray:
-                yield TurningPoint(cycle, "in truth", f"it is {words.metres(off_m)} from where it believes to be")
+                yield TurningPoint(cycle, "in truth", f"{words.metres(off_m)} from where it believes to be")
             self._is_astray = True
         elif self._is_astray:
             self._is_astray = False
-            yield TurningPoint(cycle, "in truth", f"it is right again, to {words.metres(off_m)}")
+            yield TurningPoint(cycle, "in truth", f"right again, to {words.metres(off_m)}")
 
 
 def _colour(point: TurningPoint) -> Colour:

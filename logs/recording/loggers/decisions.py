@@ -67,8 +67,8 @@ class Decisions(Logger):
         columns = [f"/{TABLE}:{name}" for name in COLUMNS]
         query = rrb.archetypes.DataframeQuery(timeline="cycle", select=["cycle", *columns])
         table = rrb.DataframeView(origin=TABLE, name="Decision table", query=query)
-        return (Panel(log_view(TABLE, "What is decided: one decision a cycle", "body"), "decisions", 1, 12),
-                Panel(table, "decisions", 1, 12))
+        return (Panel(log_view(TABLE, "What is decided: one decision a cycle", "body"), "decisions", 1, 13),
+                Panel(table, "decisions", 1, 13))
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         decision = moment.decision

@@ -33,7 +33,7 @@ class Description(Logger):
         self._title = subject.title
 
     def panels(self) -> Sequence[Panel]:
-        return (Panel(rrb.TextDocumentView(origin=DESCRIPTION, name="How to read this"), "words", 3, 5),)
+        return (Panel(rrb.TextDocumentView(origin=DESCRIPTION, name="How to read this"), "words", 1, 11),)
 
     def begin(self, stream: RecordingStream) -> None:
         text = f"**{viewable(self._title)}**. {TEXT}"

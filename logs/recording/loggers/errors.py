@@ -1,6 +1,6 @@
 """Error plots: belief minus truth with the belief's own bands, and discrepancies against their bounds.
 
-Where nobody knows the truth, the bands lie round nought.
+Where nobody knows the truth, the bands lie round zero.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ OFF_SCALE = 2.0
 """What could not be measured at all is drawn so many times its bound high."""
 
 
-MAX_SHOWN_MM, MAX_SHOWN_DEG, MAX_SHOWN_PX = 60.0, 2.0, 40.0
+MAX_SHOWN_MM, MAX_SHOWN_DEG, MAX_SHOWN_PX = 25.0, 2.0, 40.0
 """Reach of the plots; what is beyond it is off the scale, and meant to look so."""
 
 
 class Errors(Logger):
     """Logs how far the belief is from the truth, where that is known, and what differs from what was expected.
 
-    One standard deviation of the belief lies to either side of an error: a band far from nought is too sure of itself.
+    One standard deviation of the belief lies to either side of an error: a band far from zero is too sure of itself.
     """
 
     def __init__(self, subject: Subject) -> None:
@@ -46,11 +46,11 @@ class Errors(Logger):
         self._truth: Pose2 | None = None
 
     def panels(self) -> Sequence[Panel]:
-        """Place and, behind it, heading; below them the discrepancies."""
-        place = _plot(POSITION, "Position error of the belief [mm]", -MAX_SHOWN_MM, MAX_SHOWN_MM)
-        heading = _plot(HEADING, "Heading error of the belief [degrees]", -MAX_SHOWN_DEG, MAX_SHOWN_DEG)
+        """Place and, behind it, heading to the left, where a scale has room; discrepancies to the right."""
+        place = _plot(POSITION, "Position error [mm]: ahead orange, left blue", -MAX_SHOWN_MM, MAX_SHOWN_MM)
+        heading = _plot(HEADING, "Heading error [degrees]", -MAX_SHOWN_DEG, MAX_SHOWN_DEG)
         surprise = _plot(DEVIATION, "Surprise, and what is allowed [px]", 0.0, MAX_SHOWN_PX)
-        return Panel(place, order=2), Panel(heading, order=2), Panel(surprise, order=3)
+        return Panel(place, "words", 3, 6), Panel(heading, "words", 3, 6), Panel(surprise, order=2, share=6)
 
     def begin(self, stream: RecordingStream) -> None:
         stream.fix(POSITION, _style(["ahead ±1 sigma", "left ±1 sigma"], "mm"))
@@ -93,7 +93,7 @@ def _deviation(stream: RecordingStream, found: Discrepancy) -> None:
 
 
 def _plot(origin: str, name: str, low: float, high: float) -> rrb.TimeSeriesView:
-    legend = rrb.PlotLegend(rrb.Corner2D.LeftBottom if low < 0 else rrb.Corner2D.LeftTop)
+    legend = rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=low >= 0.0)
     return rrb.TimeSeriesView(
         origin=origin, name=name, plot_legend=legend, axis_x=NEAR, axis_y=rrb.ScalarAxis(range=(low, high)))
 

@@ -13,7 +13,7 @@ from logs.recording.board_mirror import Moment
 from logs.recording.logger import Logger, Subject
 from logs.recording.palette import LEVELS, REJECTED, Colour
 from logs.recording.panel import NEAR, Panel
-from logs.recording.paths import FAULTS, FOCUS, HARVEY, WHO
+from logs.recording.paths import FAULTS, FOCUS, HARVEY
 from logs.recording.signs import viewable
 from logs.recording.stream import RecordingStream
 from world_models.entries.body import BodyFault
@@ -32,7 +32,7 @@ class Lanes(Logger):
 
     def panels(self) -> Sequence[Panel]:
         view = rrb.StateTimelineView(origin="/", contents=contents(), name="Who acts when, by level", time_view=NEAR)
-        return (Panel(view, order=1, share=19),)
+        return (Panel(view, order=1, share=24),)
 
     def begin(self, stream: RecordingStream) -> None:
         stream.fix(HARVEY, style(ACTIVITIES))
@@ -76,12 +76,12 @@ class Lanes(Logger):
 
 def lane(activation: Activation) -> str:
     """Entity path of a knowledge source's lane; sources of one level lie together."""
-    return f"{WHO}/{activation.source.level}/{activation.source.name}"
+    return f"{activation.source.level}/{viewable(activation.source.name)}"
 
 
 def contents() -> list[str]:
     """Where the lanes are, for the view."""
-    return [f"+ /{path}" for path in (HARVEY, FOCUS, FAULTS, f"{WHO}/**")]
+    return [f"+ /{path}" for path in (HARVEY, FOCUS, FAULTS, *(f"{level}/**" for level in LEVELS))]
 
 
 def style(states: Mapping[str, Colour]) -> rr.StateConfiguration:

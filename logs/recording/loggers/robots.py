@@ -36,6 +36,9 @@ RADIUS_M = 0.35
 SIGMA_SCALE = 20.0
 """A few centimetres would not show in a building: the ellipse is drawn larger, and its label says so."""
 
+RING_HEIGHT_M = 1.5
+"""Above the robot, which would hide a small ring."""
+
 STILL_M = 1e-3
 TRAIL_HEIGHT_M = 0.2
 
@@ -75,7 +78,7 @@ class Robots(Logger):
         label = f"1 sigma, drawn {SIGMA_SCALE:.0f} times as large"
         stream.fix(BELIEVED_ROBOT, rr.LineStrips3D.from_fields(
             colors=[BELIEVED], radii=0.025, labels=[label], show_labels=False))
-        stream.fix(CANDIDATES, rr.Arrows3D.from_fields(colors=[CANDIDATE], radii=0.05))
+        stream.fix(CANDIDATES, rr.Arrows3D.from_fields(colors=[CANDIDATE], radii=0.05, show_labels=True))
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         for pose in moment.truth[-1:]:
@@ -91,7 +94,7 @@ class Robots(Logger):
         if held is not None:
             pose = held.world_from_robot
             points = ring(pose, held.value.covariance_world(self._world))
-            strip = np.column_stack([points, np.full(len(points), 0.06)])
+            strip = np.column_stack([points, np.full(len(points), RING_HEIGHT_M)])
             stream.log(BELIEVED_ROBOT, rr.LineStrips3D, strips=strip[None].astype(np.float32))
             self._move(stream, BELIEVED_ROBOT, BELIEVED_TRAIL, pose)
 
@@ -104,7 +107,8 @@ class Robots(Logger):
         poses = [h.world_from_robot(self._world) for h in others]
         vectors = [((0.5 + h.weight) * math.cos(p.heading_rad), (0.5 + h.weight) * math.sin(p.heading_rad), 0.0)
                    for h, p in zip(others, poses, strict=True)]
-        stream.log(CANDIDATES, rr.Arrows3D, origins=[(p.x_m, p.y_m, 0.1) for p in poses], vectors=vectors)
+        stream.log(CANDIDATES, rr.Arrows3D, origins=[(p.x_m, p.y_m, RING_HEIGHT_M) for p in poses], vectors=vectors,
+                   labels=[f"{h.weight:.0%}" for h in others])
 
     def _move(self, stream: RecordingStream, robot: str, trail: str, pose: Pose2) -> None:
         before = self._last.get(robot)

@@ -66,7 +66,7 @@ class SketchTree(Logger):
             force_position=rrb.archetypes.ForcePosition(enabled=False),
             force_collision_radius=rrb.archetypes.ForceCollisionRadius(enabled=False),
             force_center=rrb.archetypes.ForceCenter(enabled=False))
-        return (Panel(view, "decisions", 2, 6),)
+        return (Panel(view, "decisions", 2, 5),)
 
     def begin(self, stream: RecordingStream) -> None:
         stream.fix(SKETCH, rr.GraphNodes.from_fields(show_labels=True),

@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 
 from blackboard.entry import Entry
 from blackboard.servoing import Discrepancy
-from logs.recording.activity import ACTIVITY_KINDS, activity, leg_under_way
+from logs.recording.activity import ACTIVITY_KINDS, activity, is_doubt, leg_under_way
 from logs.recording.belief import Held, believed, sigma_m
 from logs.recording.board_mirror import Mirror, Moment
 from logs.recording.logger import Logger, Subject
@@ -20,13 +20,14 @@ from logs.recording.panel import Panel
 from logs.recording.paths import WHY
 from logs.recording.stream import RecordingStream
 from world_models import words
-from world_models.entries.body import BodyFault, Frame, Look, MotorCommand, Recovery
+from world_models.entries.body import BodyFault, MotorCommand, Recovery
 from world_models.entries.location import Hypothesis
-from world_models.entries.percepts import LineMatch, PoseFix, Segments, Tracks
+from world_models.entries.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
 from world_models.entries.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch
 from world_models.frames import Pose2
 
 MOST_REASONS = 5
+MAX_RIVALS = 4
 
 Tell = Callable[[Mirror], str]
 
@@ -42,7 +43,7 @@ class Why(Logger):
         self._last = ""
 
     def panels(self) -> Sequence[Panel]:
-        return (Panel(rrb.TextDocumentView(origin=WHY, name="What Harvey thinks now"), "words", 1, 11),)
+        return (Panel(rrb.TextDocumentView(origin=WHY, name="What Harvey thinks now"), "words", 1, 12),)
 
     def begin(self, stream: RecordingStream) -> None:
         stream.fix(WHY, rr.TextDocument.from_fields(media_type="text/markdown"))
@@ -100,7 +101,7 @@ def _ails(mirror: Mirror) -> str:
     if fault is None:
         return ""
     trying = mirror.latest(Recovery, lambda r: r.fault == fault.id)
-    tries = f"; {words.count(trying.value.tries, 'try').replace('trys', 'tries')} so far" if trying else ""
+    tries = f"; {words.count(trying.value.tries, 'try', 'tries')} so far" if trying else ""
     return f"{fault.value.part}: {fault.value.what}. {fault.value.detail}{tries}."
 
 
@@ -119,6 +120,12 @@ def _believes(mirror: Mirror) -> str:
     sure = f"{1e3 * sigma_m(held):.0f} mm and {math.degrees(held.sigma_rad):.2f} degrees"
     return (f"it is in {held.locale} at {words.point(pose.x_m, pose.y_m)}, heading {words.degrees(pose.heading_rad)}, "
             f"give or take {sure} (from {held.basis}).")
+
+
+def _may_be(mirror: Mirror) -> str:
+    """The rival places while it is lost, the likeliest first."""
+    rivals = sorted((e.value for e in mirror.all(Hypothesis) if e.value.status == "candidate"), key=lambda h: -h.weight)
+    return words.listed([f"{h.place()} ({h.weight:.0%})" for h in rivals], MAX_RIVALS) + "." if rivals else ""
 
 
 def _does(mirror: Mirror) -> str:
@@ -187,20 +194,18 @@ def _concludes(mirror: Mirror) -> str:
         return ""
     c = entry.value
     known = mirror.get(c.milestone)
-    what = known.value.what if known and isinstance(known.value, Milestone) else c.milestone
+    what = known.value.name() if known and isinstance(known.value, Milestone) else c.milestone
     off = f"{words.metres(c.deviation_m)} and {words.degrees(abs(c.deviation_rad))} from what it believed"
     return f"{what}: **{c.verdict}**. {c.reason}; {off}. A wrong place would look so with probability {c.p_false:.1g}."
 
 
 def _doubts(mirror: Mirror) -> str:
-    open_ones = [e.value for e in mirror.all(Discrepancy) if e.value.is_open]
+    open_ones = [e.value for e in mirror.all(Discrepancy) if e.value.is_open and is_doubt(e.value)]
     return " ".join(map(_discrepancy, open_ones)) or "nothing at the moment."
 
 
 def _discrepancy(d: Discrepancy) -> str:
-    size = "not yet measured" if d.magnitude is None else words.pixels(d.magnitude) if d.unit == "px" else (
-        f"{d.magnitude:.1f} {d.unit}")
-    size = size if d.magnitude != math.inf else "too large to be measured"
+    size = "not yet measured" if d.magnitude is None else words.size(d.magnitude, d.unit)
     bound = f", may correct up to {d.bound:.1f} {d.unit}" if math.isfinite(d.bound) else ""
     return f"{d.what}: {size} (at the {d.level} level{bound})."
 
@@ -215,17 +220,26 @@ def _because(mirror: Mirror) -> str:
 
 
 def _chain(mirror: Mirror, entry: Entry[Any]) -> list[str]:
-    """What an entry rests on, what that rests on, and so on: always the first reason, each entry once."""
+    """What an entry rests on, what that rests on, and so on, each entry and each reason once."""
     parts: list[str] = []
     met = {entry.id}
-    while entry.because and len(parts) < MOST_REASONS:
-        known = mirror.get(entry.because[0].id)
-        if known is None or known.id in met:
+    while len(parts) < MOST_REASONS:
+        below = [known for ref in entry.because if (known := mirror.get(ref.id)) is not None and known.id not in met]
+        if not below:
             break
-        entry = known
+        entry = min(below, key=_rank)
         met.add(entry.id)
-        parts += [reason] if (reason := _reason(entry)) else []
+        reason = _reason(entry)
+        parts += [reason] if reason and reason not in parts else []
+        if isinstance(entry.value, Discrepancy | Panorama):
+            break
     return parts
+
+
+def _rank(entry: Entry[Any]) -> int:
+    """A smaller number for what says more to a person."""
+    kinds = [type(entry.value) is kind for kind in SAYING]
+    return kinds.index(True) if any(kinds) else len(SAYING)
 
 
 def _reason(entry: Entry[Any]) -> str:
@@ -237,12 +251,14 @@ def _reason(entry: Entry[Any]) -> str:
     if isinstance(value, Goal):
         return f"on the way to {value.destination.locale}"
     if isinstance(value, Discrepancy):
-        return f"because of {value.what}"
-    return "" if isinstance(value, UNSAID) else f"because of {entry.ref}"
+        return f"because {value.what}"
+    if isinstance(value, Milestone):
+        return f"to look for {value.name()}"
+    return words.sentence(value) if isinstance(value, Panorama) else ""
 
 
-UNSAID = (Look, Frame, Segments)
-"""What stands between an order and its reason, and says nothing to a person."""
+SAYING = (Panorama, Milestone, Leg, PlanSketch, Goal, Discrepancy)
+"""What says to a person why something was ordered, the nearest first; other entries are passed over."""
 
 BELIEVES, TRULY = "It believes", "In truth"
 
@@ -252,6 +268,7 @@ CHAPTERS: tuple[tuple[str, Tell, tuple[type[Any], ...]], ...] = (
     ("Trouble:", _ails, (BodyFault, Recovery)),
     ("Harvey wants", _wants, (Goal,)),
     (BELIEVES, _believes, (Hypothesis,)),
+    ("It may be at", _may_be, (Hypothesis,)),
     ("It does:", _does, (*ACTIVITY_KINDS,)),
     ("It expects", _expects, (Milestone,)),
     ("It sees", _sees, (Tracks, Milestone, Segments, LineMatch, PoseFix)),

@@ -56,9 +56,9 @@ def say(value: Any) -> str:
     (Hypothesis("hallway", Pose2(1.0, 2.0, math.pi / 2), diagonal(0.02, 0.01), "tracks"),
      "held: in hallway at (1.00, 2.00) m, heading 90.0 degrees; sigma 20 mm, 0.6 degrees, by tracks"),
     (Discrepancy(Level.ACTION, "a bump", 5.0, (3.0, 9.0), "px"),
-     "action-level discrepancy, a bump: 5.00 px, where up to 3.00 px may be corrected; open"),
+     "a bump: 5.00 px; discrepancy at the action level, where up to 3.00 px may be corrected; open"),
     (Discrepancy(Level.GOAL, "lost", math.inf, (3.0, 9.0), "px"),
-     "goal-level discrepancy, lost: too large to be measured; open"),
+     "lost: too large to be measured; discrepancy at the goal level; open"),
     (Leg("PlanSketch-2", 1, 0.0, 0.0, 3.0, 4.0, 0.1, increments=2),
      "straight leg of 5.00 m, moving after 2 increments; from (0.00, 0.00) m to (3.00, 4.00) m in the world (subgoal 1"
      " of PlanSketch-2, near enough within 100 mm)"),

@@ -41,7 +41,7 @@ def test_a_decision_is_told_in_a_sentence() -> None:
             "turn 22.9 degrees left and move 0.60 m ahead") in told
     assert "tracker: the belief moves by 0.58 m and 22.9 degrees, by tracks; " in told
     assert "[the wheels claim: turn 22.9 degrees left and move 0.60 m ahead; picture of" in told
-    assert "judge: Milestone-1 is verified: 2 of 2 lines; " in told
+    assert "judge: verified: 2 of 2 lines; " in told
     assert "clumsy: refused, RuntimeError: fell over its own feet" in told
     assert "nobody had anything to do" in told
 
