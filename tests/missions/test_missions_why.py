@@ -172,6 +172,32 @@ def test_why_not_is_answered_on_the_command_line(
     assert "Goal-1" in capsys.readouterr().err
 
 
+def test_a_watch_whose_condition_did_not_hold_is_told_as_that(
+    runs: tuple[Path, Path], history: History, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The relocalizer watches for beliefs moved by odometry; one that rests on landmarks does not wake it."""
+    cycle, ref = next((d.cycle, ref) for d in history.decisions() for ref in d.seen if ref.startswith("Hypothesis-1.")
+                      if (r := history.entry(ref)) is not None and r.change == "Revised" and r.value["basis"] == "tracks")
+    assert main(["why", str(runs[0]), "--not", "relocalizer", "--at", str(cycle)]) == 0
+    told = capsys.readouterr().out
+    assert f"came what the relocalizer watches for, {ref} revised, but its watch has a condition" in told
+    assert "Nothing that" not in told
+
+
+def test_the_first_lines_tell_the_turning_points_that_the_result_keeps(
+    runs: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for run in runs:
+        assert main(["why", str(run)]) == 0
+        told = capsys.readouterr().out
+        kept = json.loads((run / "result.json").read_text(encoding="utf-8"))
+        assert {point["kind"] for point in kept["turning_points"]} >= {"lost", "found"}
+        assert told.startswith("On the way:")
+        for point in (*kept["turning_points"], *({**c, "kind": "collision"} for c in kept["contacts"])):
+            assert re.search(rf"^  cycle {point['cycle']} +{point['kind']} ", told, re.MULTILINE)
+        assert len(kept["contacts"]) == kept["collisions"]
+
+
 def test_two_seeds_part_at_an_observation_and_each_later_difference_goes_back_to_one(
     runs: tuple[Path, Path], history: History, capsys: pytest.CaptureFixture[str]
 ) -> None:

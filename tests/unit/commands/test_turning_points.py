@@ -1,0 +1,165 @@
+"""Turning points: lost and found, faults and collisions with cycle and place, in summary, progress and ``why``."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from blackboard.board import Blackboard
+from blackboard.effect import Effect, Post, Revise
+from blackboard.journal import Decision, decision_line
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from harvey.campaign.progress import Lines
+from harvey.campaign.summary import one
+from harvey.campaign.tally import Tally
+from harvey.run_files.records import DecisionRecord, decision_of
+from harvey.run_files.run_directory import RunDirectory
+from harvey.runner.result import Contact, MissionResult
+from harvey.simulation.contacts import ContactWatch
+from harvey.why.history import Told
+from harvey.why.on_the_way import levels_off, on_the_way
+from harvey.why.story import decided, headline, story
+from logs.turning_points import TurningPoint, TurningPointFinder
+from rehearsal import house
+from sim.body.simulated_body import SimulatedBody
+from sim.truth import Truth
+from world_models.entries.body import BodyFault, Recovery
+from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.task import Certificate, Milestone, Outcome
+from world_models.frames import Pose2
+
+CERTIFICATE = Certificate("Milestone-1", "", "refuted", "1 of 9 lines", 9, 3, 1, 0.1, 1.0, 0.1, 0.0, 9.0, 30.0, 1.0)
+HELD = Hypothesis("kitchen", Pose2(1.0, 2.0, 0.0), diagonal(0.01, 0.01), "odometry")
+
+
+def decisions() -> list[Decision]:
+    """Refuted, lost, found, a fault, the end: one a cycle."""
+    board, made = Blackboard(), list[Decision]()
+
+    def act(*effects: Effect) -> None:
+        cycle = len(made) + 1
+        changes = board.apply(list(effects), author="expert", cycle=cycle)
+        made.append(Decision(cycle, (), (), Level.ACTION, (), (), None, None, 0, changes, ""))
+
+    act(Post(HELD), Post(Milestone("PlanSketch-1", 2, "M2 of the route", 0.0)))
+    act(Post(CERTIFICATE))
+    doubt = Discrepancy(Level.PLAN, "M2 is refuted", 99.0, (9.0, 30.0), "px")
+    act(Post(doubt, (board.view["Hypothesis-1"],)))
+    act(Revise(board.view["Discrepancy-1"], replace(doubt, status="escalated"), (board.view["Hypothesis-1"],)))
+    there = replace(HELD, basis="relocalization", locale_from_robot=Pose2(3.0, 1.0, 0.0))
+    act(Revise(board.view["Hypothesis-1"], there))
+    fault = BodyFault("camera", "camera unplugged", "no such device", "Look-1", 7.0)
+    act(Post(fault))
+    act(Post(Recovery("BodyFault-1", "Look-1", 7.0, 2.0, tries=9, waited_s=30.0, status="in vain")))
+    act(Post(Outcome("failed", "camera unplugged")))
+    return made
+
+
+def records() -> list[DecisionRecord]:
+    return [decision_of(json.loads(decision_line(decision))) for decision in decisions()]
+
+
+def test_what_must_be_told_is_found_with_cycle_and_place() -> None:
+    finder = TurningPointFinder()
+    points = [point for decision in decisions() for point in finder.find(decision) if point.is_told]
+    assert [(point.cycle, point.kind, point.text) for point in points] == [
+        (2, "refuted", "M2 of the route: 1 of 9 lines"),
+        (4, "lost", "kitchen (1.00, 2.00) m by its belief; nothing fits"),
+        (5, "found", "kitchen (3.00, 1.00) m; it knows again where it is"),
+        (6, "fault", "camera: camera unplugged"),
+    ]
+
+
+def test_why_tells_them_first_with_the_collisions_that_the_simulator_knows_of() -> None:
+    contact = {"cycle": 3, "locale": "kitchen", "x_m": 1.5, "y_m": 2.0}
+    told = list(on_the_way(Told(records()), {"collisions": 1, "contacts": [contact]}))
+    assert told == [
+        "On the way:",
+        "  cycle 2  refuted    M2 of the route: 1 of 9 lines",
+        "  cycle 3  collision  kitchen (1.50, 2.00) m, as only the simulator knows",
+        "  cycle 4  lost       kitchen (1.00, 2.00) m by its belief; nothing fits",
+        "  cycle 5  found      kitchen (3.00, 1.00) m; it knows again where it is",
+        "  cycle 6  fault      camera: camera unplugged",
+    ]
+    assert list(on_the_way(Told(records()[:1]), {"collisions": 2}))[-1] == "  2 collisions; this run does not say where"
+    assert "Nothing went wrong on the way" in next(on_the_way(Told(records()[:1]), {}))
+
+
+def test_the_time_of_a_decision_is_in_the_clock_of_the_run_also_while_a_fault_lasts() -> None:
+    fault = BodyFault("camera", "camera unplugged", "no such device", "Look-1", 7.0)
+    recovery = Recovery("BodyFault-1", "Look-1", 7.0, 2.0, tries=9, waited_s=31.8, status="in vain")
+    board = Blackboard()
+    seen = board.apply([Post(fault), Post(recovery)], author="body", cycle=1)
+    made = board.apply([Post(Outcome("failed", "camera unplugged"))], author="fault_handler", cycle=1)
+    line = decision_line(Decision(1, seen, seen, Level.ACTION, (), (), None, None, 0, made, ""))
+    history = Told([decision_of(json.loads(line))])
+    outcome = history.entry("Outcome-1.0")
+    assert outcome is not None
+    assert decided(history, outcome) == "Decided in cycle 1, 38.8 s into the run, by the fault handler."
+    assert "since 7.0 s into the run" in fault.sentence()
+
+
+def test_finding_itself_is_headed_as_that() -> None:
+    history = Told(records())
+    found = history.entry("Hypothesis-1.1")
+    assert found is not None
+    assert headline(found).startswith("It found out where it is: at (3.00, 1.00) m of kitchen")
+    assert story(history, found).headline == headline(found)
+
+
+def test_a_level_that_was_off_is_said(tmp_path: Path) -> None:
+    head: dict[str, Any] = {"servo": {"action": True, "plan": True, "goal": False}, "constants": []}
+    (tmp_path / "run.json").write_text(json.dumps(head))
+    assert list(levels_off(RunDirectory(tmp_path))) == [
+        "The goal level of servoing was off in this run: a robot that is lost does not look for where it is."]
+    head["constants"] = [["servo.goal", "on"], ["servo.plan", "off"]]
+    (tmp_path / "run.json").write_text(json.dumps(head))
+    assert [line.split()[1] for line in levels_off(RunDirectory(tmp_path))] == ["plan"]
+    (tmp_path / "run.json").unlink()
+    assert list(levels_off(RunDirectory(tmp_path))) == []
+
+
+def test_the_summary_tells_them_and_the_result_keeps_them() -> None:
+    contacts, points = (Contact(3, "kitchen", 1.5, 2.0),), (TurningPoint(4, "lost", "here; nothing fits"),)
+    known = MissionResult(
+        scenario="s", seed=0, outcome="reached", reason="so it was", goal="(ptrans)", final_error_m=0.01,
+        final_heading_error_rad=0.0, path_length_m=20.0, sim_time_s=90.0, wall_time_s=10.0, frames=9, decisions=400,
+        milestones={"verified": 5, "refuted": 1, "not_testable": 0, "false_accepts": 0}, replans=2, relocalizations=0,
+        sketches=3, collisions=1, max_cross_track_m=1.0, contacts=contacts, turning_points=points)
+    text = one(known, None)
+    assert "collisions    1: in cycle 3 at kitchen (1.50, 2.00) m" in text
+    assert "lost          cycle 4: here; nothing fits" in text
+    assert MissionResult.of_record(json.loads(json.dumps(known.record()))) == replace(known, amiss=[])
+
+
+def test_progress_says_that_it_is_lost_and_found() -> None:
+    stage = SimpleNamespace(world=house(), goal_world=Pose2(0.0, 0.0, 0.0), start_world=Pose2(4.0, 0.0, 0.0))
+    tally, out = Tally(cast(Any, stage)), io.StringIO()
+    lines, lost = Lines(tally, out), list[bool]()
+    for decision in decisions():
+        tally(decision)
+        lines(decision)
+        lost.append(tally.is_lost)
+    assert lost == [False, False, False, True, False, False, False, False]
+    assert "cycle 4: lost: kitchen (1.00, 2.00) m by its belief; nothing fits\n" in out.getvalue()
+    assert "cycle 5: found: kitchen (3.00, 1.00) m; it knows again where it is\n" in out.getvalue()
+
+
+@pytest.mark.parametrize("locale", ["kitchen", ""])
+def test_a_contact_is_found_once_where_the_robot_truly_was(locale: str) -> None:
+    moments = [Truth(Pose2(x, 1.0, 0.0), collisions=n, locale=locale) for x, n in ((1.0, 0), (2.0, 1), (3.0, 1))]
+    body = SimpleNamespace(truth=moments[0], track=tuple(moments[:1]))
+    watch = ContactWatch(house(), cast(SimulatedBody, body))
+    assert watch.new_contacts() == ()
+    body.truth, body.track = moments[2], tuple(moments)
+    (place,) = watch.new_contacts()
+    assert (place.locale, place.x_m) == (locale, 2.0) and watch.new_contacts() == ()
+    body.truth = replace(moments[2], collisions=2)
+    assert [place.x_m for place in watch.new_contacts()] == [3.0]

@@ -1,0 +1,116 @@
+"""A logger of another installed package: found by its entry point, its panel is in the window, its data in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rerun.blueprint as rrb
+
+from blackboard.board import Blackboard
+from blackboard.effect import Post
+from blackboard.journal import Decision
+from blackboard.level import Level
+from logs.errors import RecordingError
+from logs.reader import read_series
+from logs.recording.belief import Belief
+from logs.recording.blueprint import blueprint
+from logs.recording.logger import Subject
+from logs.recording.paths import TABLE
+from logs.recording.writer import RecordingWriter, logger_classes
+from rehearsal import CAMERA, MOUNT, house, play
+
+MODULE = '''
+from dataclasses import dataclass
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from blackboard.kinds import inference
+from logs.recording.logger import Logger
+from logs.recording.panel import Panel
+
+
+@inference()
+@dataclass(frozen=True)
+class BatteryRunsShort:
+    left_s: float
+
+    def sentence(self):
+        return f"the battery lasts for {self.left_s:.0f} s; then the robot stands"
+
+
+class Changes(Logger):
+    """How much changes on the board in a cycle."""
+
+    def panels(self):
+        return (Panel(rrb.TimeSeriesView(origin="changes", name="Changes a cycle")),)
+
+    def log(self, stream, moment):
+        stream.log("changes", rr.Scalars, scalars=[float(len(moment.changes))])
+
+
+class NoLogger:
+    """Not a logger."""
+'''
+
+
+def install(folder: Path, monkeypatch: pytest.MonkeyPatch, entry_point: str) -> None:
+    """As pip leaves a package: its module, and its metadata beside it."""
+    (folder / "accounts.py").write_text(MODULE)
+    metadata = folder / "accounts-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: accounts\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text(f"[harvey.loggers]\n{entry_point}\n")
+    monkeypatch.syspath_prepend(folder)
+
+
+def views(part: Any) -> Iterator[Any]:
+    """All views in a container."""
+    if isinstance(part, rrb.View):
+        yield part
+    else:
+        for inner in part.contents:
+            yield from views(inner)
+
+
+def test_its_panel_is_in_the_window_and_its_data_in_the_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path, monkeypatch, "changes = accounts:Changes")
+    subject = Subject("house", house(), CAMERA, MOUNT, Belief(house()))
+    window = blueprint([logger(subject) for logger in logger_classes()]).root_container
+    assert "Changes a cycle" in [view.name for view in views(window)]
+    decisions: list[Decision] = []
+    path = tmp_path / "recording.rrd"
+    recorder = RecordingWriter(path, world=house(), camera=CAMERA, mount=MOUNT, title="house", recording_id="foreign")
+    play([recorder, decisions.append])
+    recorder.close()
+    assert read_series(path, "changes", "Scalars:scalars") == [
+        (d.cycle, float(len(d.observed) + len(d.made))) for d in decisions]
+
+
+def test_a_kind_of_another_package_shows_in_the_decisions_by_its_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path, monkeypatch, "changes = accounts:Changes")
+    from accounts import BatteryRunsShort  # type: ignore[import-not-found]
+
+    path = tmp_path / "recording.rrd"
+    recorder = RecordingWriter(path, world=house(), camera=CAMERA, mount=MOUNT, title="house", recording_id="kind")
+    made = Blackboard().apply([Post(BatteryRunsShort(90.0))], author="timekeeper", cycle=1)
+    recorder(Decision(1, (), made, Level.ACTION, (), (), None, None, 0, (), ""))
+    recorder.close()
+    (_, text), = read_series(path, TABLE, "TextLog:text")
+    assert text == "nobody had anything to do [the battery lasts for 90 s]"
+
+
+@pytest.mark.parametrize("entry_point", ["changes = accounts:NoLogger", "changes = accounts:Missing"])
+def test_what_is_no_logger_is_told_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, entry_point: str
+) -> None:
+    install(tmp_path, monkeypatch, entry_point)
+    with pytest.raises(RecordingError, match=r"accounts 1\.0: entry point harvey\.loggers, changes = accounts:"):
+        logger_classes()
