@@ -48,6 +48,11 @@ class Report:
         """Whether every claim holds."""
         return all(held for _, held in self.claims)
 
+    @property
+    def failing(self) -> tuple[str, ...]:
+        """The claims that do not hold."""
+        return tuple(claim for claim, held in self.claims if not held)
+
     def text(self) -> str:
         """The report as text for a terminal."""
         shown = table(self.columns, [[_format_cell(cell) for cell in row] for row in self.rows])
@@ -79,6 +84,11 @@ def count_kinds(kinds: Iterable[str]) -> str | None:
     """Count equal words for a cell: ``"2 lost, 1 blocked"``; None if there are none."""
     counts = sorted(Counter(kinds).items())
     return ", ".join(f"{number} {kind}" for kind, number in counts) or None
+
+
+def format_triple(values: Iterable[float]) -> str:
+    """Format three figures for one cell: ``"0.80  -0.23  0.20"``."""
+    return "  ".join(f"{value:.2f}" for value in values)
 
 
 def _side_of(column: str) -> str:

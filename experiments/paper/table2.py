@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,7 @@ from experiments.paper.pose_scenes import (
     fragment,
     rho_theta_noise,
 )
-from experiments.report import Cell, Report
+from experiments.report import Cell, Report, format_triple
 from knowledge_sources.methods.pose import PoseEstimate, r_and_t, r_and_t_ml, r_then_t
 from world_models.frames import Pose
 
@@ -94,8 +93,9 @@ def run(quick: bool, seed: int, samples: int | None = None) -> Report:
 def _rows(label: str, paper: Triples, errors: Mapping[str, Array], peer: Peer | None) -> list[tuple[Cell, ...]]:
     """Mean absolute errors by method; ``errors`` (samples, 3) each."""
     theirs = _mean(errors["peer"]) if peer else NOT_INSTALLED
-    methods = (("R then T", "r_then_t", _triple(paper[0]), None), ("R and T", "r_and_t", _triple(paper[1]), None),
-             ("R and T, likelihood", "r_and_t_ml", None, theirs))
+    methods = (("R then T", "r_then_t", format_triple(paper[0]), None),
+               ("R and T", "r_and_t", format_triple(paper[1]), None),
+               ("R and T, likelihood", "r_and_t_ml", None, theirs))
     return [
         (f"{label}: {name}", paper_cell, peer_cell, _mean(errors[key][:QUICK_SAMPLES]), _mean(errors[key]))
         for name, key, paper_cell, peer_cell in methods
@@ -157,8 +157,4 @@ def _compare_to_bound(scene: PoseScene, whole: bool, count: int, rng: np.random.
 
 
 def _mean(errors: Array) -> str:
-    return _triple(np.mean(errors, axis=0))
-
-
-def _triple(values: Any) -> str:
-    return "  ".join(f"{v:.2f}" for v in values)
+    return format_triple(np.mean(errors, axis=0))

@@ -23,7 +23,7 @@ from experiments.paper.table3_trials import (
     compute_errors,
     get_scene,
 )
-from experiments.report import Cell, Report
+from experiments.report import Cell, Report, format_triple
 from experiments.trials import campaign_folder, run_trials
 
 Array = NDArray[np.float64]
@@ -110,7 +110,7 @@ def _join(parts: Sequence[TrialErrors]) -> FrameResult:
 
 def _rows(frame: Frame, found: FrameResult) -> list[tuple[Cell, ...]]:
     errors = found.errors
-    med, plain = (_triple(paper) for paper in PAPER[frame]) if frame in PAPER else (None, None)
+    med, plain = (format_triple(paper) for paper in PAPER[frame]) if frame in PAPER else (None, None)
     label = _label(frame)
     bounds = f"{np.median(found.bounds_ft):.2f}  {found.bounds_ft.max():.2f}"
     rates = f"{_rate(errors, 'ransac')} / {_rate(errors, 'cauchy')}" if "ransac" in errors else NOT_INSTALLED
@@ -171,8 +171,4 @@ def _rate(errors: Errors, name: str) -> str:
 
 
 def _median(errors: Errors, name: str) -> str:
-    return _triple(np.median(errors[name], axis=0)) if name in errors else NOT_INSTALLED
-
-
-def _triple(values: Sequence[float] | Array) -> str:
-    return "  ".join(f"{v:.2f}" for v in values)
+    return format_triple(np.median(errors[name], axis=0)) if name in errors else NOT_INSTALLED

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.paper.pose_peer import NOT_INSTALLED, Peer
-from experiments.perception.corridor_data import Corridor, load_corridor
-from experiments.perception.corridor_pictures import draw_attempt
-from experiments.perception.corridor_trials import (
+from experiments.perception.photographs.data import Corridor, load_corridor
+from experiments.perception.photographs.pictures import draw_attempt
+from experiments.perception.photographs.trials import (
     MAX_ERROR_RAD,
     MAX_ERROR_STEPS,
     Attempt,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from experiments.report import Cell, Report
-from experiments.scale.world_size_campus import Campus, write_campus
+from experiments.scale.worlds.campus import Campus, write_campus
 
 SIZES, QUICK_SIZES = (12, 1_000, 100_000), (12, 1_000)
 OPENINGS, QUICK_OPENINGS = 20, 3
@@ -113,8 +113,8 @@ def _ratio(mine: NDArray[np.float64], theirs: NDArray[np.float64]) -> float:
 
 
 def _time_in_lockstep(worlds: Sequence[Campus], goal: str, seed: int, repetitions: tuple[int, int]) -> list[_Times]:
-    """Measure the times of all repetitions in each world; see :mod:`experiments.scale.world_size_lockstep`."""
-    command = [sys.executable, "-m", "experiments.scale.world_size_lockstep", goal, str(seed),
+    """Measure the times of all repetitions in each world; see :mod:`experiments.scale.worlds.lockstep`."""
+    command = [sys.executable, "-m", "experiments.scale.worlds.lockstep", goal, str(seed),
                *map(str, repetitions), *(str(world.path) for world in worlds)]
     measured: dict[str, list[list[list[float]]]] = {"start": [], "plan": []}
     with (tqdm(total=sum(repetitions), file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar,
@@ -134,7 +134,7 @@ class _Probe:
     """A process that runs missions in one world on request."""
 
     def __init__(self, world: Campus, goal: str, seed: int) -> None:
-        self._command = [sys.executable, "-m", "experiments.scale.world_size_probe", str(world.path), goal, str(seed)]
+        self._command = [sys.executable, "-m", "experiments.scale.worlds.probe", str(world.path), goal, str(seed)]
 
     def __enter__(self) -> _Probe:
         self._process = subprocess.Popen(self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
@@ -168,7 +168,7 @@ def _ask_interleaved(probes: Sequence[_Probe], requests: Sequence[str]) -> list[
 
 
 def _measure_networkx(world: Campus) -> dict[str, Any]:
-    command = [sys.executable, "-m", "experiments.scale.world_size_flat", str(world.path)]
+    command = [sys.executable, "-m", "experiments.scale.worlds.flat", str(world.path)]
     answer: dict[str, Any] = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
     return answer
 

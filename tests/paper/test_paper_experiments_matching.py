@@ -12,8 +12,7 @@ import pytest
 from experiments import trials
 from experiments.paper import figure12
 from experiments.perception import corridor, matcher
-from experiments.perception.corridor_data import load_corridor
-from experiments.report import Report
+from experiments.perception.photographs.data import load_corridor
 from experiments.shared_data import CORRIDOR, data_path
 
 PNG = b"\x89PNG"
@@ -33,23 +32,19 @@ def here(work: Callable[[Any], Any], jobs: Sequence[Any], *_: Any) -> list[Any]:
     return [work(job) for job in jobs]
 
 
-def failing(report: Report) -> list[str]:
-    return [claim for claim, held in report.claims if not held]
-
-
 def test_figure_12_falls_at_each_step_and_ends_where_the_figure_does() -> None:
     report = figure12.run(quick=True, seed=0)
     ours = [row[-1] for row in report.rows if row[-1] is not None]
     assert all(float(after) < float(before) for before, after in pairwise(ours))
     assert report.rows[-1][1] == "A1 A2 B3 C4 D5 D6" and report.rows[0][4] == "C8 D7"
-    assert failing(report) == []
+    assert report.failing == ()
 
 
 def test_the_matcher_finds_the_truth_as_problems_grow(tmp_path: Path) -> None:
     """Times depend on what else the machine does, so they are not asserted."""
     report = matcher.run(quick=True, seed=0, trials=3)
     assert [row[0] for row in report.rows] == [f"{m} model x {k} data lines" for m, k in matcher.SIZES]
-    assert [claim for claim in failing(report) if "median" not in claim] == []
+    assert [claim for claim in report.failing if "median" not in claim] == []
     assert (tmp_path / "experiments" / "matcher" / "quick-0" / "growth.png").read_bytes().startswith(PNG)
 
 
@@ -65,7 +60,7 @@ def test_the_matcher_s_figures_depend_on_the_seed_only() -> None:
 @needs_photographs
 def test_poses_in_the_photographs_come_back(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(corridor, "run_trials", here)
-    assert failing(corridor.run(quick=True, seed=0, seeds=1)) == []
+    assert corridor.run(quick=True, seed=0, seeds=1).failing == ()
     pictures = sorted((tmp_path / "experiments" / "corridor" / "quick-0").glob("frame-*.png"))
     assert len(pictures) == 6 and all(picture.read_bytes().startswith(PNG) for picture in pictures)
 

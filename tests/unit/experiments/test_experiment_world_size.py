@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from experiments.scale.world_size import MIN_STEP_MS, _Times
-from experiments.scale.world_size_lockstep import decide_in_turn
+from experiments.scale.worlds.lockstep import decide_in_turn
 
 
 def times(factor: float, delays: NDArray[np.float64]) -> _Times:

@@ -9,8 +9,8 @@ from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
 from experiments.chart import OURS, PEER, chart
-from experiments.perception.corridor_data import Corridor
-from experiments.perception.corridor_trials import Attempt, locate_from, perturb_reference, select_visible
+from experiments.perception.photographs.data import Corridor
+from experiments.perception.photographs.trials import Attempt, locate_from, perturb_reference, select_visible
 
 Array = NDArray[np.float64]
 SIZE_IN = (7.0, 7.3)

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from blackboard.effect import Post
 from blackboard.scheduler import Scheduler
 from experiments.paper.planning import DryMission
-from experiments.scale.world_size_probe import build_probe_stage
+from experiments.scale.worlds.probe import build_probe_stage
 from harvey.runner.ports import BodyPort
 from harvey.simulation.run import build_robot_model
 from harvey.wiring import knowledge_sources, servoing

@@ -31,7 +31,7 @@ from world_models.files.compiled.writer import WorldWriter
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose
 
-DETAILS = Path(__file__).parents[2] / "sim" / "buildings" / "research_center_details.toml"
+DETAILS = Path(__file__).parents[3] / "sim" / "buildings" / "research_center_details.toml"
 FLOORS, ROOMS = 4, 24
 ROOM_M, CORRIDOR_M, HEIGHT_M, WALL_M, DOOR_M, DOOR_HEIGHT_M = 4.0, 2.4, 2.7, 0.15, 0.9, 2.1
 FLOOR_PITCH_M = 16.0

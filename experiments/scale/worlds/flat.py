@@ -10,7 +10,7 @@ from pathlib import Path
 
 import networkx as nx
 
-from experiments.scale.world_size_probe import peak_mb
+from experiments.scale.worlds.probe import peak_mb
 
 
 def main(path: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.paper.pose_peer import Peer
-from experiments.perception.corridor_data import Corridor, CorridorFrame, load_corridor
+from experiments.perception.photographs.data import Corridor, CorridorFrame, load_corridor
 from experiments.shared_data import CORRIDOR, describe_absence
 from harvey.errors import BadInput
 from knowledge_sources.methods.features.lines import LineSegments, find_lines

@@ -1,0 +1,1 @@
+"""The corridor photographs: data, trials and pictures, for ``corridor``."""
