@@ -21,7 +21,7 @@ SPOILT = ("0", "-1.0", "nan", "inf", "1e300", "1e-300", "#1", "#nothing", "", "'
           "&b;", "3.5")
 
 
-def _judged(path: Path, text: str) -> str:
+def _judge(path: Path, text: str) -> str:
     path.write_text(text, encoding="utf-8")
     try:
         made = import_building(path)
@@ -45,7 +45,7 @@ LAW = settings(max_examples=60, deadline=None, derandomize=True,
 
 
 def test_the_gml_text_is_sound_before_it_is_spoilt(tmp_path: Path) -> None:
-    assert _judged(tmp_path / "a.gml", GML) == "sound"
+    assert _judge(tmp_path / "a.gml", GML) == "sound"
     assert "open = true" in import_building(tmp_path / "a.gml").text
     assert 'kind = "elevator"' in import_building(tmp_path / "a.gml").text
 
@@ -53,12 +53,12 @@ def test_the_gml_text_is_sound_before_it_is_spoilt(tmp_path: Path) -> None:
 @LAW
 @given(changes=CHANGES)
 def test_spoilt_gml_is_an_error_or_a_world(tmp_path: Path, changes: list[tuple[int, int]]) -> None:
-    assert _judged(tmp_path / "a.gml", _spoil(GML, changes)) in ("error", "sound", "faults")
+    assert _judge(tmp_path / "a.gml", _spoil(GML, changes)) in ("error", "sound", "faults")
 
 
 @pytest.mark.skipif(find_spec("ifcopenshell") is None, reason="needs ifcopenshell (the extra ifc)")
 def test_the_ifc_text_is_sound_before_it_is_spoilt(tmp_path: Path) -> None:
-    assert _judged(tmp_path / "a.ifc", IFC) == "sound"
+    assert _judge(tmp_path / "a.ifc", IFC) == "sound"
     assert "open = true" in import_building(tmp_path / "a.ifc").text
 
 
@@ -66,17 +66,17 @@ def test_the_ifc_text_is_sound_before_it_is_spoilt(tmp_path: Path) -> None:
 @settings(LAW, max_examples=8)
 @given(changes=CHANGES)
 def test_spoilt_ifc_is_an_error_or_a_world(tmp_path: Path, changes: list[tuple[int, int]]) -> None:
-    assert _judged(tmp_path / "a.ifc", _spoil(IFC, changes)) in ("error", "sound", "faults")
+    assert _judge(tmp_path / "a.ifc", _spoil(IFC, changes)) in ("error", "sound", "faults")
 
 
 def test_deep_xml_is_refused(tmp_path: Path) -> None:
     deep = sys.getrecursionlimit() * 10
-    assert _judged(tmp_path / "a.gml", "<a>" * deep + "</a>" * deep) == "error"
+    assert _judge(tmp_path / "a.gml", "<a>" * deep + "</a>" * deep) == "error"
 
 
 @pytest.mark.skipif(find_spec("ifcopenshell") is None, reason="needs ifcopenshell (the extra ifc)")
 def test_a_file_that_ends_the_library_is_an_error(tmp_path: Path) -> None:
-    assert _judged(tmp_path / "a.ifc", IFC.replace("('IFC2X3')", "(3.5)")) == "error"
+    assert _judge(tmp_path / "a.ifc", IFC.replace("('IFC2X3')", "(3.5)")) == "error"
 
 
 def test_a_file_that_the_library_does_not_get_done_with_is_given_up() -> None:

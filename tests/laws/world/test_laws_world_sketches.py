@@ -25,7 +25,7 @@ from world_models.robot import RobotModel
 from world_models.units import FOOT_M
 
 
-def planned(world: World) -> tuple[list[PlanSketch], Outcome]:
+def plan_sketches(world: World) -> tuple[list[PlanSketch], Outcome]:
     """Every revision of every sketch of a mission from the first room to the last, in order, and how it ended."""
     sketches: list[PlanSketch] = []
 
@@ -55,7 +55,7 @@ def barriers(world: World) -> shapely.Geometry:
     return shapely.union_all([outlines.difference(shapely.union_all(openings)), *solid])
 
 
-def way(world: World, subgoal: Subgoal) -> shapely.LineString:
+def way_of(world: World, subgoal: Subgoal) -> shapely.LineString:
     ends = [place.in_world(world).position for place in (subgoal.origin, subgoal.destination)]
     return shapely.LineString(ends)
 
@@ -64,23 +64,23 @@ def way(world: World, subgoal: Subgoal) -> shapely.LineString:
 @given(st.integers(0, 100_000))
 def test_sketches_keep_clear_of_barriers_and_keep_what_is_verified(seed: int) -> None:
     world = read_world(Source.parse(generate_house(np.random.default_rng(seed)), "house.toml"))
-    sketches, outcome = planned(world)
+    sketches, outcome = plan_sketches(world)
     assert outcome.kind in ("reached", "blocked"), outcome
     solid = barriers(world)
     for sketch in sketches:
         for subgoal in sketch.subgoals:
             if subgoal.primitive:
-                assert not way(world, subgoal).intersects(solid), f"{subgoal} passes a barrier"
+                assert not way_of(world, subgoal).intersects(solid), f"{subgoal} passes a barrier"
         for one, other in pairwise(sketch.subgoals):
             assert one.destination.locale == other.origin.locale
-    for before, after in pairwise_of_same(sketches):
+    for before, after in consecutive_revisions(sketches):
         done = min(before.at, after.at)
         assert before.subgoals[:done] == after.subgoals[:done]
         assert after.at >= before.at or after.adjustments == before.adjustments + 1
         assert before.status == "active"
 
 
-def pairwise_of_same(sketches: list[PlanSketch]) -> list[tuple[PlanSketch, PlanSketch]]:
+def consecutive_revisions(sketches: list[PlanSketch]) -> list[tuple[PlanSketch, PlanSketch]]:
     """Successive revisions of the same sketch: the same place in the tree and the same number of subgoals."""
     latest: dict[tuple[object, ...], PlanSketch] = {}
     pairs = []

@@ -33,7 +33,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def same(one: World, other: World) -> None:
+def check_same(one: World, other: World) -> None:
     assert tuple(one.locales) == tuple(other.locales) and one.rooms == other.rooms and one.counts() == other.counts()
     assert [f.name for f in one.faces] == [f.name for f in other.faces]
     assert [m.name for m in one.landmarks] == [m.name for m in other.landmarks]
@@ -49,7 +49,7 @@ def same(one: World, other: World) -> None:
 
 @pytest.mark.parametrize("details", [[], [DETAILS]])
 def test_a_compiled_world_answers_as_its_text(compiled: Path, details: list[Path]) -> None:
-    same(load_world(WORLDS / "research_center.toml", details=details), load_world(compiled, details=details))
+    check_same(load_world(WORLDS / "research_center.toml", details=details), load_world(compiled, details=details))
 
 
 def test_a_robot_in_a_room_touches_the_room(compiled: Path) -> None:
@@ -72,10 +72,10 @@ def test_what_is_no_compiled_world_is_told(compiled: Path, tmp_path: Path) -> No
     for text in (b"", b"name = 'x'", compiled.read_bytes()[:5000]):
         (tmp_path / "bad.world").write_bytes(text)
         with pytest.raises(WorldError, match=r"bad\.world: expected"):
-            everything(load_world(tmp_path / "bad.world"))
+            load_everything(load_world(tmp_path / "bad.world"))
 
 
-def everything(world: World) -> list[LocaleGeometry]:
+def load_everything(world: World) -> list[LocaleGeometry]:
     check_world(world)
     return list(world.locale_source.all_geometry())
 
@@ -90,7 +90,7 @@ def test_a_damaged_compiled_world_is_told_or_read(compiled: Path, tmp_path: Path
     bad = tmp_path / "bad.world"
     bad.write_bytes(content)
     try:
-        everything(load_world(bad))
+        load_everything(load_world(bad))
     except WorldError as error:
         assert str(error).startswith("bad.world: expected")
 
@@ -114,20 +114,20 @@ def networks(draw: st.DrawFn) -> World:
     return read_world(Source.parse("\n".join(text)))
 
 
-def walked(world: World, origin: str, destination: str, depth: int = 0) -> list[str] | None:
+def refine_route(world: World, origin: str, destination: str, depth: int = 0) -> list[str] | None:
     """The rooms of a route, refined until nothing is left to refine."""
     route = find_route(world.locale_source, origin, destination)
     if route is None or depth > 20:
         return None
     rooms, here = [origin], origin
     for step in route.steps:
-        part = walked(world, here, step.origin, depth + 1) if here != step.origin else [here]
+        part = refine_route(world, here, step.origin, depth + 1) if here != step.origin else [here]
         if part is None:
             return None
         rooms += [*part[1:], step.destination]
         here = step.destination
     if here != destination:
-        rest = walked(world, here, destination, depth + 1)
+        rest = refine_route(world, here, destination, depth + 1)
         if rest is None:
             return None
         rooms += rest[1:]
@@ -138,7 +138,7 @@ def walked(world: World, origin: str, destination: str, depth: int = 0) -> list[
 @given(networks(), st.data())
 def test_a_route_leads_there_whenever_any_chain_of_doorways_does(world: World, data: st.DataObject) -> None:
     a, b = data.draw(st.sampled_from(world.rooms)), data.draw(st.sampled_from(world.rooms))
-    rooms = walked(world, a, b)
+    rooms = refine_route(world, a, b)
     assert (rooms is not None) == nx.has_path(world.passages, a, b)
     if rooms is not None:
         assert rooms[0] == a and rooms[-1] == b
@@ -149,4 +149,4 @@ def test_a_route_leads_there_whenever_any_chain_of_doorways_does(world: World, d
 @given(world=networks())
 def test_any_world_survives_compiling(world: World, tmp_path: Path) -> None:
     compile_world([world], tmp_path / "w.world")
-    same(world, load_world(tmp_path / "w.world"))
+    check_same(world, load_world(tmp_path / "w.world"))

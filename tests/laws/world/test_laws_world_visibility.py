@@ -44,7 +44,7 @@ def views(draw: st.DrawFn) -> Pose:
     return mount.camera_from_robot @ Pose2(x, y, heading).lifted().inverse()
 
 
-def hidden_by(centre: NDArray[np.float64], point: NDArray[np.float64]) -> tuple[bool, bool]:
+def is_hidden(centre: NDArray[np.float64], point: NDArray[np.float64]) -> tuple[bool, bool]:
     """(surely hidden, hidden or nearly so) by the front of any triangle: Moeller and Trumbore's test."""
     a, b, c = TRIANGLES[:, 0], TRIANGLES[:, 1], TRIANGLES[:, 2]
     ray, e1, e2 = point - centre, b - a, c - a
@@ -67,7 +67,7 @@ def hidden_by(centre: NDArray[np.float64], point: NDArray[np.float64]) -> tuple[
     return any_hit(-1e-6, CONTACT_M + 1e-6), any_hit(1e-6, CONTACT_M - 1e-6)
 
 
-def covered(found: VisibleLines, landmark: int, line: int, point: NDArray[np.float64]) -> bool:
+def is_covered(found: VisibleLines, landmark: int, line: int, point: NDArray[np.float64]) -> bool:
     """Whether one of the visible pieces of a model line holds this point."""
     mine = np.flatnonzero((found.landmark == landmark) & (found.line == line))
     for a, b in found.lines_world[mine]:
@@ -96,10 +96,10 @@ def test_lines_are_seen_where_no_single_ray_is_stopped(camera_from_world: Pose, 
         in_camera = camera_from_world.apply(point)
         if in_camera[2] < 0.1 or not CAMERA.inside(CAMERA.project(in_camera), 0.01):
             continue
-        surely, nearly = hidden_by(centre, point)
+        surely, nearly = is_hidden(centre, point)
         if surely == nearly:
             where = (int(scene.line_landmark[number]), int(scene.line_index[number]))
-            assert covered(found, *where, point) != surely
+            assert is_covered(found, *where, point) != surely
 
 
 @settings(deadline=None, max_examples=25)
@@ -108,7 +108,7 @@ def test_corners_are_seen_where_no_single_ray_is_stopped(camera_from_world: Pose
     centre = camera_from_world.inverse().translation
     found = visible_points(WORLD, CAMERA, camera_from_world)
     for point in found.points_world[:: max(1, len(found) // 20)]:
-        surely, _ = hidden_by(centre, point)
+        surely, _ = is_hidden(centre, point)
         assert not surely
     assert CAMERA.inside(found.points_px).all()
 

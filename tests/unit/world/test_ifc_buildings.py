@@ -25,7 +25,7 @@ from world_models.files.world_files import read_world
 pytestmark = pytest.mark.skipif(find_spec("ifcopenshell") is None, reason="needs ifcopenshell (the extra ifc)")
 
 
-def imported(house: House, folder: Path) -> tuple[World, str]:
+def import_house(house: House, folder: Path) -> tuple[World, str]:
     """The world of a house, which must be without faults, and what the import tells."""
     made = import_building(house.write(folder / "house.ifc"))
     world = read_world(Source.parse(made.text))
@@ -56,10 +56,10 @@ def row(house: House, gap_m: float, *, wall_m: float | None = None) -> House:
 @pytest.mark.parametrize("schema", ["IFC2X3", "IFC4", "IFC4X3"])
 @pytest.mark.parametrize("unit", ["metre", "millimetre", "foot", "none"])
 def test_rooms_are_as_large_in_any_unit(tmp_path: Path, schema: str, unit: str) -> None:
-    world, told = imported(flat(House(schema, unit)), tmp_path)
+    world, report = import_house(flat(House(schema, unit)), tmp_path)
     assert areas(world) == {"1-living": pytest.approx(12.0, abs=0.01), "2-bath": pytest.approx(6.0, abs=0.01)}
     assert doors(world) == {("1-living", "2-bath")} and world.doorways[0].width_m == pytest.approx(0.9, abs=1e-3)
-    assert ("says nothing of its unit" in told) == (unit == "none")
+    assert ("says nothing of its unit" in report) == (unit == "none")
 
 
 @pytest.mark.parametrize(("at", "words"), [
@@ -70,11 +70,11 @@ def test_rooms_are_as_large_in_any_unit(tmp_path: Path, schema: str, unit: str) 
 def test_a_house_is_the_same_wherever_it_stands(tmp_path: Path, at: tuple[float, ...], words: str) -> None:
     house = flat(House("IFC4", "millimetre", (at[0], at[1], at[2], at[3])))
     house.element("IfcFurniture", box(-0.8, -0.4, 0.8, 0.4), 0.0, 0.7, at=(2.0, 1.5, 0.0), name="Table")
-    world, told = imported(house, tmp_path)
+    world, report = import_house(house, tmp_path)
     outline = world.locale("1-living").outline
     assert outline.max(axis=0) - outline.min(axis=0) == pytest.approx([4.0, 3.0], abs=1e-3)
     assert len(world.doorways) == 1 and [t.name for t in world.things] == ["1-living/table-163"]
-    assert words in told
+    assert words in report
 
 
 def test_shapes_of_spaces(tmp_path: Path) -> None:
@@ -92,10 +92,10 @@ def test_shapes_of_spaces(tmp_path: Path) -> None:
     for x in (4.0, 8.2, 12.4):
         house.door(x, 1.0, x + 0.2, 1.9)
     house.door(1.0, 3.0, 1.9, 3.2)
-    world, told = imported(house, tmp_path)
+    world, report = import_house(house, tmp_path)
     assert areas(world) == dict.fromkeys(("brep", "mapped", "box", "lines", "l"), pytest.approx(12.0, abs=0.01))
     assert doors(world) == {("brep", "mapped"), ("box", "mapped"), ("box", "lines"), ("brep", "l")}
-    assert "nothing: the file gives it no shape" in told and "lines: drawn as lines only" in told
+    assert "nothing: the file gives it no shape" in report and "lines: drawn as lines only" in report
 
 
 def test_doors_by_boundary_of_their_opening_without_a_leaf_and_across_their_frame(tmp_path: Path) -> None:
@@ -106,7 +106,7 @@ def test_doors_by_boundary_of_their_opening_without_a_leaf_and_across_their_fram
     for space in (a, b):
         house.bound(space, door.FillsVoids[0].RelatingOpeningElement)
     house.door(6.2, 1.0, 6.4, 1.9, wall=second, own_frame=False, told=False)
-    world, _ = imported(house, tmp_path)
+    world, _ = import_house(house, tmp_path)
     assert doors(world) == {("a", "b"), ("b", "c")}
     assert [d.width_m for d in world.doorways] == pytest.approx([0.9, 0.9], abs=1e-3)
 
@@ -114,14 +114,14 @@ def test_doors_by_boundary_of_their_opening_without_a_leaf_and_across_their_fram
 def test_a_thin_wall_is_a_wall_though_the_file_has_no_boundaries(tmp_path: Path) -> None:
     house = row(House(), 0.1)
     house.door(3.0, 1.0, 3.1, 1.9)
-    world, _ = imported(house, tmp_path)
+    world, _ = import_house(house, tmp_path)
     assert doors(world) == {("a", "b")}
 
 
 def test_a_wall_on_the_border_of_spaces_that_touch_is_a_wall(tmp_path: Path) -> None:
     house = row(House(), 0.0, wall_m=0.2)
     house.door(2.9, 1.0, 3.1, 1.9)
-    world, _ = imported(house, tmp_path)
+    world, _ = import_house(house, tmp_path)
     assert doors(world) == {("a", "b")}
 
 
@@ -134,7 +134,7 @@ def test_where_a_wall_ends_the_rest_is_open_and_no_railing_is(tmp_path: Path) ->
     house.space("stairwell", box(9.0, 0.0, 12.0, 6.0))
     house.element("IfcRailing", box(5.97, 0.0, 6.03, 6.0), 0.0, 0.9)
     house.element("IfcRailing", box(8.97, 0.0, 9.03, 6.0), 0.0, 4.0)
-    world, _ = imported(house, tmp_path)
+    world, _ = import_house(house, tmp_path)
     assert doors(world) == {("a", "b"), ("c", "stairwell")}, "the railing of stairs leads up them"
     assert 2.0 < min(doorway.width_m for doorway in world.doorways) < 2.5
 
@@ -149,23 +149,23 @@ def test_openings_without_doors_and_virtual_boundaries_are_ways_through(tmp_path
     house.bound(c, wall)
     house.opening(wall, 6.0, 1.0, 6.2, 2.0)
     house.opening(wall, 6.0, 2.2, 6.2, 2.8, 1.2, 0.6)
-    world, told = imported(house, tmp_path)
+    world, report = import_house(house, tmp_path)
     assert doors(world) == {("a", "b"), ("b", "c")}
-    assert "1 openings without a door" in told, "one cannot walk through a hatch"
+    assert "1 openings without a door" in report, "one cannot walk through a hatch"
 
 
 def test_walls_of_old_houses(tmp_path: Path) -> None:
     house = row(House(), 0.8)
     for x in (3.0, 6.8):
         house.door(x, 1.0, x + 0.8, 1.9)
-    assert doors(imported(house, tmp_path)[0]) == {("a", "b"), ("b", "c")}
+    assert doors(import_house(house, tmp_path)[0]) == {("a", "b"), ("b", "c")}
 
 
 def test_a_step_between_rooms_is_told(tmp_path: Path) -> None:
     house = row(House(), 0.2)
     house.file.by_type("IfcSpace")[1].ObjectPlacement = house.place((0.0, 0.0, 0.4), above=house.storeys[0])
     house.door(3.0, 1.0, 3.2, 1.9)
-    assert "from a to b the floor goes up by 0.40 m in the file; drawn level" in imported(house, tmp_path)[1]
+    assert "from a to b the floor goes up by 0.40 m in the file; drawn level" in import_house(house, tmp_path)[1]
 
 
 def test_a_door_in_a_curved_wall(tmp_path: Path) -> None:
@@ -176,8 +176,8 @@ def test_a_door_in_a_curved_wall(tmp_path: Path) -> None:
     inner, outer = ([(3 + r * math.cos(t), 3 + r * math.sin(t)) for t in bends] for r in (3.2, 5.0))
     house.space("hall", outer + inner[::-1])
     house.door(6.0, 2.5, 6.2, 3.4, wall=house.wall(6.0, 2.0, 6.2, 4.0))
-    world, told = imported(house, tmp_path)
-    assert doors(world) == {("hall", "round")} and "curved wall is straight" in told
+    world, report = import_house(house, tmp_path)
+    assert doors(world) == {("hall", "round")} and "curved wall is straight" in report
     assert areas(world)["round"] == pytest.approx(9 * math.pi, rel=0.02)
     assert len(world.locale("round").outline) < 40
 
@@ -189,10 +189,10 @@ def test_a_corridor_round_a_core_and_a_column(tmp_path: Path) -> None:
     house.space("hall", (), shape=house.shape(house.extruded(hall, 0.0, 2.5)))
     house.space("core", box(3.2, 3.2, 8.8, 6.8))
     house.door(5.0, 3.0, 5.9, 3.2)
-    world, told = imported(house, tmp_path)
+    world, report = import_house(house, tmp_path)
     assert areas(world)["hall"] == pytest.approx(96.0, abs=0.5) and doors(world) == {("core", "hall")}
     assert [thing.name for thing in world.things] == ["hall/column-1"]
-    assert "goes round what is no part of it" in told
+    assert "goes round what is no part of it" in report
 
 
 def test_areas_over_rooms_and_rooms_told_twice_are_no_rooms(tmp_path: Path) -> None:
@@ -203,13 +203,13 @@ def test_areas_over_rooms_and_rooms_told_twice_are_no_rooms(tmp_path: Path) -> N
     house.space("2", box(3.2, 0.0, 6.2, 3.0))
     house.space("2", box(3.2, 0.0, 6.2, 3.0), long_name="again")
     house.door(3.0, 1.0, 3.2, 1.9)
-    world, told = imported(house, tmp_path)
+    world, report = import_house(house, tmp_path)
     assert set(world.rooms) == {"1", "2"} and doors(world) == {("1", "2")}
-    assert "space gross: other spaces of ground cover it" in told
+    assert "space gross: other spaces of ground cover it" in report
 
 
 def test_storeys_by_height_where_the_file_does_not_say(tmp_path: Path) -> None:
-    """The site is at 100 m, elevations are told from the building's zero, and all is contained in the building."""
+    """The site is at 100 m, elevations count from the building's zero, and all is contained in the building."""
     house = House("IFC4", "metre", (0.0, 0.0, 100.0, 0.0))
     for height in (0.0, 3.0):
         house.storey(None, height)
@@ -221,7 +221,7 @@ def test_storeys_by_height_where_the_file_does_not_say(tmp_path: Path) -> None:
             relation.RelatingObject = house.building
     for relation in house.file.by_type("IfcRelContainedInSpatialStructure"):
         relation.RelatingStructure = house.building
-    world, _ = imported(house, tmp_path)
+    world, _ = import_house(house, tmp_path)
     assert doors(world) == {("a", "b"), ("a-2", "b-2")}
     assert world.locale("a").parent != world.locale("a-2").parent == world.locale("b-2").parent
 
@@ -234,14 +234,14 @@ def test_rooms_over_each_other_in_one_storey(tmp_path: Path) -> None:
             solid = house.extruded(house.profile(box(x, 0.0, x + 3.0, 3.0)), low, 2.5)
             house.space(None, (), shape=house.shape(solid))
         house.door(3.0, 1.0, 3.2, 1.9, low=low)
-    world, told = imported(house, tmp_path)
-    assert len(world.rooms) == 4 and len(doors(world)) == 2 and "in a storey of their own" in told
+    world, report = import_house(house, tmp_path)
+    assert len(world.rooms) == 4 and len(doors(world)) == 2 and "in a storey of their own" in report
 
 
 def test_doors_of_a_storey_that_has_no_rooms(tmp_path: Path) -> None:
     house = row(House(), 0.2)
     house.door(3.0, 1.0, 3.2, 1.9, storey=house.storey("Slab", -0.1))
-    assert doors(imported(house, tmp_path)[0]) == {("a", "b")}
+    assert doors(import_house(house, tmp_path)[0]) == {("a", "b")}
 
 
 @pytest.mark.parametrize("how", ["a flight alone", "a stair with its railing", "parts"])
@@ -262,8 +262,8 @@ def test_stairs_join_storeys(tmp_path: Path, how: str) -> None:
         house.aggregate(stair, steps)
         steps = stair
     house.contain(below, steps)
-    world, told = imported(house, tmp_path)
-    assert [link.between for link in world.links] == [("hall", "landing")] and "1 of 1 stairs" in told
+    world, report = import_house(house, tmp_path)
+    assert [link.between for link in world.links] == [("hall", "landing")] and "1 of 1 stairs" in report
 
 
 def test_a_lift_joins_the_shafts_over_each_other(tmp_path: Path) -> None:
@@ -275,10 +275,10 @@ def test_a_lift_joins_the_shafts_over_each_other(tmp_path: Path) -> None:
         house.door(5.0, 0.5, 5.2, 1.5)
     house.element("IfcTransportElement", box(5.4, 0.2, 7.0, 1.8), 0.0, 2.2, storey=house.storeys[0],
                   PredefinedType="ELEVATOR")
-    world, told = imported(house, tmp_path)
+    world, report = import_house(house, tmp_path)
     assert [(link.kind, link.between) for link in world.links] == [
         ("elevator", ("shaft-0", "shaft-1")), ("elevator", ("shaft-1", "shaft-2"))]
-    assert world.route("hall-0", "hall-2") is not None and "1 lifts: 2 rides" in told
+    assert world.route("hall-0", "hall-2") is not None and "1 lifts: 2 rides" in report
 
 
 def test_stairs_over_three_storeys_pass_the_one_between() -> None:
@@ -296,9 +296,9 @@ def test_furniture_of_a_storey_stands_in_the_room_round_it_but_in_no_doorway(tmp
     house.element("IfcFurniture", box(-0.4, -0.3, 0.4, 0.3), 0.0, 0.75, at=(1.0, 1.0, 0.0), turn_deg=20.0, name="Tisch")
     house.element("IfcSanitaryTerminal", box(-0.2, -0.3, 0.2, 0.3), 0.0, 0.4, at=(5.9, 2.5, 0.0), name="WC")
     house.element("IfcFurniture", box(-0.4, -0.3, 0.4, 0.3), 0.0, 0.05, at=(3.8, 1.4, 0.0), name="Mat")
-    world, told = imported(house, tmp_path)
+    world, report = import_house(house, tmp_path)
     assert {thing.name.rpartition("-")[0] for thing in world.things} == {"1-living/tisch", "2-bath/wc"}
-    assert "it stands in the doorway" in told
+    assert "it stands in the doorway" in report
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
@@ -330,7 +330,7 @@ def test_what_cannot_be_a_world_is_told_in_a_paragraph(tmp_path: Path, capsys: p
         assert main(["world", "import", str(path), "--out", str(tmp_path / "out.toml")]) == 2
         assert expected in capsys.readouterr().err, path
     with pytest.raises(BuildingError, match=r"house\.ifc"):
-        imported(House(), tmp_path)
+        import_house(House(), tmp_path)
 
 
 def test_a_straight_wall_stays_as_it_is() -> None:

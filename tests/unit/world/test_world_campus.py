@@ -25,7 +25,7 @@ def campus() -> World:
     return load_world(WORLDS / "campus.toml")
 
 
-def described(world: World, names: dict[str, str], up_m: float = 0.0) -> Iterator[object]:
+def describe(world: World, names: dict[str, str], up_m: float = 0.0) -> Iterator[object]:
     """All that is seen of some rooms, to a nanometre, as it would be on the ground."""
     up = np.array([0.0, 0.0, up_m])
     for face in world.faces:
@@ -45,7 +45,7 @@ def test_the_research_centers_floor_is_what_it_was_before_it_was_written_shorter
     assert len(path.read_text().splitlines()) < 100
     world = load_world(path)
     digest = hashlib.sha256()
-    for item in described(world, dict.fromkeys(world.rooms, "")):
+    for item in describe(world, dict.fromkeys(world.rooms, "")):
         digest.update(repr(item).encode())
     assert (len(world.faces), len(world.landmarks)) == (2194, 141)
     assert digest.hexdigest() == SHA256
@@ -65,7 +65,7 @@ def test_the_second_floor_is_the_research_centers(campus: World) -> None:
     alone = load_world(WORLDS / "research_center.toml")
     rooms = dict.fromkeys(room for room in alone.rooms if room != "hallway")
     up_m = campus.floor_m("second-floor")
-    ours, theirs = ([repr(item) for item in described(world, rooms, up)] for world, up in ((campus, up_m), (alone, 0)))
+    ours, theirs = ([repr(item) for item in describe(world, rooms, up)] for world, up in ((campus, up_m), (alone, 0)))
     assert ours == theirs
 
 

@@ -30,13 +30,13 @@ def place(world: World, locale: str, x_ft: float, y_ft: float) -> NDArray[np.flo
     return np.asarray(world.world_from_locale(locale).apply([x_ft * FT, y_ft * FT, 0.0])[:2])
 
 
-def room_to_move(world: World, locale: str, point: NDArray[np.float64]) -> float:
+def clearance_m(world: World, locale: str, point: NDArray[np.float64]) -> float:
     """Distance [m] from walls and obstacles."""
     return min([distance_to_border(point, world.outline(locale))]
                + [distance_to_border(point, footprint) for footprint in world.obstacles(locale)])
 
 
-def reachable(world: World, locale: str, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
+def is_reachable(world: World, locale: str, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
     """Whether a robot with 10 cm to spare gets from one place in a room to another, on a grid of 15 cm."""
     outline, step = world.outline(locale), 0.15
     low, high = outline.min(axis=0), outline.max(axis=0)
@@ -45,7 +45,7 @@ def reachable(world: World, locale: str, start: NDArray[np.float64], end: NDArra
 
     def bad(cell: tuple[int, int]) -> bool:
         p = low + step * np.array([cell[1], cell[0]])
-        return not inside_polygon(p, outline) or room_to_move(world, locale, p) < ROBOT_M + 0.1
+        return not inside_polygon(p, outline) or clearance_m(world, locale, p) < ROBOT_M + 0.1
 
     def cell_of(point: NDArray[np.float64]) -> tuple[int, int]:
         column, row = np.round((point - low) / step).astype(int)
@@ -71,23 +71,23 @@ def test_there_are_enough_rooms_in_the_hierarchy(world: World) -> None:
 def test_start_and_goal_are_free(world: World) -> None:
     start, goal = place(world, "robot-laboratory", 16, 2), place(world, "allens-office", 13, 12)
     assert world.locale_at(start) == "robot-laboratory" and world.locale_at(goal) == "allens-office"
-    assert room_to_move(world, "robot-laboratory", start) >= 1.6 * FT
+    assert clearance_m(world, "robot-laboratory", start) >= 1.6 * FT
     assert min(distance_to_border(goal, f) for f in world.obstacles("allens-office")) >= 2 * FT
-    assert room_to_move(world, "allens-office", goal) >= 2 * FT - 1e-9
+    assert clearance_m(world, "allens-office", goal) >= 2 * FT - 1e-9
 
 
 def test_the_straight_way_out_of_the_laboratory_is_blocked_but_another_is_free(world: World) -> None:
     start, out = place(world, "robot-laboratory", 16, 2), before_door(world, "laboratory-door", "robot-laboratory")
     on_line = [start + t * (out - start) for t in np.linspace(0, 1, 200)]
     assert any(inside_polygon(p, f) for p in on_line for f in world.obstacles("robot-laboratory"))
-    assert reachable(world, "robot-laboratory", start, out)
+    assert is_reachable(world, "robot-laboratory", start, out)
 
 
 def test_the_way_through_hallway_and_office_is_free(world: World) -> None:
     enter, leave = before_door(world, "laboratory-door", "hallway"), before_door(world, "allens-door", "hallway")
     assert 38 * FT < abs(leave[0] - enter[0]) < 42 * FT
-    assert reachable(world, "hallway", enter, leave)
-    assert reachable(world, "allens-office", before_door(world, "allens-door", "allens-office"),
+    assert is_reachable(world, "hallway", enter, leave)
+    assert is_reachable(world, "allens-office", before_door(world, "allens-door", "allens-office"),
                      place(world, "allens-office", 13, 12))
 
 
