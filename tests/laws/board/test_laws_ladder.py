@@ -1,7 +1,7 @@
-"""The ladder of Figure 2 with the experts themselves, without images: only what is measured is given.
+"""The ladder of Figure 2 with the knowledge sources themselves, without images: only what is measured is given.
 
-Tracker, judge and relocalizer are stood for by experts that post what a picture says in figures; all others, and the
-board, are the real ones. The body does what it is told. Every picture's figure is drawn by hypothesis.
+Tracker, judge and relocalizer are replaced by knowledge sources that post what a picture says in figures; all others,
+and the board, are the real ones. The body does what it is asked. Every picture's figure is drawn by hypothesis.
 """
 
 from __future__ import annotations
@@ -172,16 +172,16 @@ def robot(continuous: bool) -> RobotModel:
 
 
 class Ladder:
-    """A mission of the real experts with scripted measurements; each decision is held against the laws."""
+    """A mission of the real knowledge sources with scripted measurements; each decision is held against the laws."""
 
     def __init__(self, continuous: bool = False) -> None:
         model = robot(continuous)
-        real = [expert(model) for expert in KNOWLEDGE_SOURCES]
+        real = [source(model) for source in KNOWLEDGE_SOURCES]
         scripted = [ScriptedTracker(model), ScriptedJudge(model), ScriptedRelocalizer(model)]
         self.body = ScriptedBody()
         self.seen: dict[Ref, Discrepancy] = {}
         self.scheduler = Scheduler(
-            [*(e for e in real if e.name not in PERCEIVERS), *scripted], ports=[self.body], kinds=KINDS)
+            [*(s for s in real if s.name not in PERCEIVERS), *scripted], ports=[self.body], kinds=KINDS)
         task = with_settings(load_scenario("lab-to-allens-office"), {
             "goal": "(ptrans (allens-office (7,4,0)) (allens-office (13,12,0)))"}).command
         self.scheduler.tell([Post(task)], "user")

@@ -316,7 +316,7 @@ def test_a_damaged_scenario_never_ends_in_a_traceback(
     data: st.DataObject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sim.stage.build_stage", lambda scenario: SimpleNamespace(scenario=scenario))
-    monkeypatch.setattr("harvey.dry_run.dry_run", lambda _robot, _task: ((), Outcome("reached", "")))
+    monkeypatch.setattr("harvey.dry_run.dry_run", lambda *_known: ((), Outcome("reached", "")))
     file = tmp_path / "mission.toml"
     file.write_bytes(data.draw(damaged((SCENARIOS / "hallway-kidnap.toml").read_bytes())))
     assert main(["run", str(file), "--check"]) in (0, 2)

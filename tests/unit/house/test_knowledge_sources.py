@@ -13,40 +13,39 @@ from typing import Any
 import pytest
 
 from blackboard.board import View
-from blackboard.change import Change, Quiescence
+from blackboard.change import Change
 from blackboard.effect import Effect, Post, Retract
 from blackboard.entry import Entry, Ref
 from blackboard.journal import plain
+from blackboard.kinds import Role
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from harvey.simulation.run import build_robot_model, run_mission
-from harvey.wiring import knowledge_sources
+from harvey.wiring import knowledge_sources, known_kinds
 from sim.scenario import load_scenario
 from sim.stage import build_stage
-from world_models.entries.body import Frame, MotionReport, RideReport
-from world_models.entries.task import Command
 from world_models.robot import RobotModel
 
 FOLDER = Path(__file__).parents[3] / "knowledge_sources"
 FILES = {path.stem: path for level in Level for path in sorted((FOLDER / str(level)).glob("[!_]*.py"))}
 TREES = {stem: ast.parse(path.read_text(encoding="utf-8")) for stem, path in FILES.items()}
-FROM_OUTSIDE = {Command, MotionReport, RideReport, Frame, Quiescence}
-"""What nobody on the board writes: the user, the body and the clock of the mission do."""
+FROM_OUTSIDE = set(known_kinds().of_role(Role.OBSERVATION))
+"""What no knowledge source writes, but the user, the body and the clock of the mission."""
 
 
-def experts_in(stem: str) -> list[type[KnowledgeSource]]:
+def sources_in(stem: str) -> list[type[KnowledgeSource]]:
     module = importlib.import_module(f"knowledge_sources.{FILES[stem].parent.name}.{stem}")
     found = [c for _, c in inspect.getmembers(module, inspect.isclass) if c.__module__ == module.__name__]
     return [c for c in found if issubclass(c, KnowledgeSource) and not inspect.isabstract(c)]
 
 
-KNOWLEDGE_SOURCES = {stem: found[0] for stem in FILES if (found := experts_in(stem))}
-each_expert = pytest.mark.parametrize("expert", KNOWLEDGE_SOURCES.values(), ids=KNOWLEDGE_SOURCES)
+KNOWLEDGE_SOURCES = {stem: found[0] for stem in FILES if (found := sources_in(stem))}
+each_source = pytest.mark.parametrize("source", KNOWLEDGE_SOURCES.values(), ids=KNOWLEDGE_SOURCES)
 
 
-def test_there_is_one_expert_a_file_and_the_file_has_its_name() -> None:
+def test_there_is_one_knowledge_source_a_file_and_the_file_has_its_name() -> None:
     assert len(KNOWLEDGE_SOURCES) >= 10
-    assert [stem for stem in KNOWLEDGE_SOURCES if len(experts_in(stem)) > 1] == []
+    assert [stem for stem in KNOWLEDGE_SOURCES if len(sources_in(stem)) > 1] == []
     assert all(object.__new__(source).name == stem for stem, source in KNOWLEDGE_SOURCES.items())
 
 
@@ -54,33 +53,33 @@ def test_it_stands_in_the_folder_of_its_level() -> None:
     assert all(FILES[stem].parent.name == str(source.level) for stem, source in KNOWLEDGE_SOURCES.items())
 
 
-def test_every_expert_is_wired() -> None:
+def test_every_knowledge_source_is_wired() -> None:
     assert {type(source) for source in knowledge_sources(a_robot())} == set(KNOWLEDGE_SOURCES.values())
 
 
-@each_expert
-def test_it_says_at_which_level_it_works_what_it_watches_and_what_it_writes(expert: type[KnowledgeSource]) -> None:
-    assert isinstance(expert.level, Level) and (expert.closes is None or isinstance(expert.closes, Level))
-    assert expert.watches and expert.writes
-    for kind in (*(watch.value_type for watch in expert.watches), *expert.writes):
+@each_source
+def test_it_says_at_which_level_it_works_what_it_watches_and_what_it_writes(source: type[KnowledgeSource]) -> None:
+    assert isinstance(source.level, Level) and (source.closes is None or isinstance(source.closes, Level))
+    assert source.watches and source.writes
+    for kind in (*(watch.value_type for watch in source.watches), *source.writes):
         assert dataclasses.is_dataclass(kind) and kind.__dataclass_params__.frozen, kind
 
 
-@each_expert
-def test_it_says_what_it_is_and_where_the_method_comes_from(expert: type[KnowledgeSource]) -> None:
-    assert expert.__doc__ and "§" in (inspect.getmodule(expert).__doc__ or "") + expert.__doc__
+@each_source
+def test_it_says_what_it_is_and_where_the_method_comes_from(source: type[KnowledgeSource]) -> None:
+    assert source.__doc__ and "§" in (inspect.getmodule(source).__doc__ or "") + source.__doc__
 
 
 def test_what_is_watched_is_written_by_somebody() -> None:
-    written = {kind for expert in KNOWLEDGE_SOURCES.values() for kind in expert.writes} | FROM_OUTSIDE
-    watched = {watch.value_type for expert in KNOWLEDGE_SOURCES.values() for watch in expert.watches}
+    written = {kind for source in KNOWLEDGE_SOURCES.values() for kind in source.writes} | FROM_OUTSIDE
+    watched = {watch.value_type for source in KNOWLEDGE_SOURCES.values() for watch in source.watches}
     assert sorted(kind.__name__ for kind in watched - written) == []
 
 
-@each_expert
-def test_it_receives_the_robots_model_of_itself_and_settings_and_nothing_else(expert: type[KnowledgeSource]) -> None:
+@each_source
+def test_it_receives_the_robots_model_of_itself_and_settings_and_nothing_else(source: type[KnowledgeSource]) -> None:
     """So no body and no truth can be handed to it."""
-    given = list(inspect.signature(expert).parameters.values())
+    given = list(inspect.signature(source).parameters.values())
     assert [p.annotation for p in given] in ([], ["RobotModel"], ["RobotModel", "Settings"])
 
 
@@ -97,7 +96,7 @@ def test_it_keeps_no_memory_but_the_board(stem: str) -> None:
 
 
 @pytest.mark.parametrize("stem", KNOWLEDGE_SOURCES)
-def test_it_knows_no_other_expert(stem: str) -> None:
+def test_it_knows_no_other_knowledge_source(stem: str) -> None:
     modules = {n.module for n in ast.walk(TREES[stem]) if isinstance(n, ast.ImportFrom)}
     assert not modules & {f"knowledge_sources.{other}" for other in KNOWLEDGE_SOURCES}
 
@@ -119,7 +118,7 @@ def state(view: View) -> list[Ref]:
 
 
 def asked_twice(source: KnowledgeSource, impure: list[str]) -> KnowledgeSource:
-    """The same expert, but every question is put to it twice, and a change of answer or board is noted."""
+    """The same knowledge source, but every question is put to it twice, and a change of answer or board is noted."""
     cls = type(source)
 
     def twice(question: str, record: Any) -> Any:
