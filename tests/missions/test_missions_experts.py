@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -13,6 +14,7 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.journal import Decision, plain
+from blackboard.kinds import inference
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from harvey.simulation.run import build_robot_model, run_mission
@@ -46,22 +48,30 @@ def test_without_any_one_of_them_the_outcome_is_clear(short_stage: Stage, missin
         assert result.outcome != "reached"
 
 
+@inference()
+@dataclass(frozen=True)
+class Counted:
+    """A kind of its own: what one motion report claims."""
+
+    text: str
+
+
 class Odometer(KnowledgeSource):
-    """An expert of its own: counts motion reports."""
+    """A knowledge source of its own: counts motion reports."""
 
     level = Level.ACTION
     watches = (Watch(MotionReport, (Posted,)),)
-    writes = (str,)
+    writes = (Counted,)
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        yield Post(f"{trigger.entry.value.move_m:.2f} m", (trigger.entry,))
+        yield Post(Counted(f"{trigger.entry.value.move_m:.2f} m"), (trigger.entry,))
 
 
 def test_adding_one_takes_one_line(short_stage: Stage) -> None:
     said: list[str] = []
 
     def listen(decision: Decision) -> None:
-        said.extend(c.entry.value for c in decision.made if c.entry.author == "odometer")
+        said.extend(c.entry.value.text for c in decision.made if c.entry.author == "odometer")
 
     result = run_mission(
         short_stage, 3, sources=lambda *known: (*knowledge_sources(*known), Odometer()), sinks=[listen])
