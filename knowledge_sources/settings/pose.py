@@ -48,7 +48,7 @@ class PoseSettings:
 
     # Med R and T: least median of squares
     max_outlier_part: float = setting(
-        0.45, "1", "Share of wrong lines up to which the median is to hold.", "§6.2.4, Table 3")
+        0.45, "1", "Share of wrong lines up to which the median is to hold.", "§6.2.4, Table 3", most=0.49)
     med_drawn_outlier_part: float = setting(
         0.5, "1", "Share of wrong lines for which enough subsets are drawn.", "§6.2.4")
     med_candidates: int = setting(

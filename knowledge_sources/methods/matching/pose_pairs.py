@@ -101,7 +101,7 @@ def project_model(scene: LineScene, pose: Pose) -> tuple[Floats, Floats, Mask]:
     """
     c = scene.camera
     projected: tuple[Floats, Floats, Mask] = _project(
-        scene.model.points, np.array(pose.rotation), np.array(pose.translation), c.fx, c.fy, c.cx, c.cy
+        scene.model.points, np.array(pose.rotation), np.array(pose.translation), c.fx, c.fy, c.cx, c.cy, NEAR_PLANE_M
     )
     return projected
 
@@ -140,19 +140,19 @@ def find_near_pairs(pairs: PosePairs, pair_px: float, pair_rad: float) -> Mask:
 
 @compiled
 def _project(
-    points: Floats, rotation: Floats, translation: Floats, fx: float, fy: float, cx: float, cy: float
+    points: Floats, rotation: Floats, translation: Floats, fx: float, fy: float, cx: float, cy: float, near_m: float
 ) -> tuple[Floats, Floats, Mask]:
     px, lengths, visible = np.empty((len(points), 2, 2)), np.ones(len(points)), np.ones(len(points), np.bool_)
     for m in range(len(points)):
         first, second = rotation @ points[m, 0] + translation, rotation @ points[m, 1] + translation
-        visible[m] = first[2] >= NEAR_PLANE_M or second[2] >= NEAR_PLANE_M
+        visible[m] = first[2] >= near_m or second[2] >= near_m
         if not visible[m]:
             px[m, :, 0], px[m, :, 1] = cx, cy
             continue
-        if first[2] < NEAR_PLANE_M:
-            first = second + (second[2] - NEAR_PLANE_M) / (second[2] - first[2]) * (first - second)
-        elif second[2] < NEAR_PLANE_M:
-            second = first + (first[2] - NEAR_PLANE_M) / (first[2] - second[2]) * (second - first)
+        if first[2] < near_m:
+            first = second + (second[2] - near_m) / (second[2] - first[2]) * (first - second)
+        elif second[2] < near_m:
+            second = first + (first[2] - near_m) / (first[2] - second[2]) * (second - first)
         px[m, 0, 0], px[m, 0, 1] = fx * first[0] / first[2] + cx, fy * first[1] / first[2] + cy
         px[m, 1, 0], px[m, 1, 1] = fx * second[0] / second[2] + cx, fy * second[1] / second[2] + cy
         lengths[m] = max(math.hypot(px[m, 1, 0] - px[m, 0, 0], px[m, 1, 1] - px[m, 0, 1]), 1.0)

@@ -118,7 +118,7 @@ def refine_on_inliers(
     near = near & (lines.lengths_px > MIN_LENGTH_PX)
     if int(np.count_nonzero(near)) < SUBSET_SIZE:
         return build_prior_estimate(lines, prior, NO_SUBSET, settings)
-    for _ in range(settings.max_refinements):
+    for _ in range(max(settings.max_refinements, 1)):
         end, reason = find_likeliest(lines.take(near), prior, None, settings, start)
         start = rotation, translation = end.state
         fine = compute_squared_distances(lines, rotation, translation) <= bound

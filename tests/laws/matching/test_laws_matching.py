@@ -144,6 +144,18 @@ def test_moving_model_and_data_together_changes_nothing(seed: int, objective: An
     assert second.e_match == pytest.approx(first.e_match, rel=1e-6)
 
 
+@pytest.mark.parametrize("objective", ["paper", "likelihood"])
+def test_an_exchange_leaves_a_local_minimum(objective: str) -> None:
+    """One side of a square starts with a line 3 px beside the right one: no single flip improves that, §6.1.1."""
+    square = 100.0 * np.array([[[1, 1], [1, 2]], [[1, 1], [2, 1]], [[2, 1], [2, 2]], [[1, 2], [2, 2]]])
+    data = np.concatenate([square, square[:1] + np.array([3.0, 0.0])])
+    wrong, right = [(0, 4), (1, 1), (2, 2), (3, 3)], [(0, 0), (1, 1), (2, 2), (3, 3)]
+    for exchange, pairs in ((False, wrong), (True, right)):
+        chosen = search_with(objective, exchange=exchange)
+        found = match_lines(square, data, chosen, pair_px=4.0, start=Peak(0.0, (0.0, 0.0), 0.0), first_pairs=wrong)
+        assert [(int(m), int(d)) for m, d in found.pairs] == pairs
+
+
 @given(seed=seeds, objective=objectives)
 @settings(max_examples=5, deadline=None)
 def test_a_small_problem_ends_at_a_local_minimum_of_all_its_states(seed: int, objective: Any) -> None:
