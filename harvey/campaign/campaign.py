@@ -62,7 +62,7 @@ class Task:
         return split_settings(dict(self.settings), FORMAT.keys())
 
     @property
-    def named(self) -> str:
+    def label(self) -> str:
         """In a line."""
         return " ".join([self.scenario, f"seed {self.seed}", *(f"{key}={value}" for key, value in self.settings)])
 
@@ -164,7 +164,7 @@ def _keep_or_resume(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence
     from harvey.simulation.run import build_head, resume_mission
 
     if not RunHead.read(run.path).is_like(build_head(stage, task.seed, task.body, task.agent_settings)):
-        raise BadInput(f"{run.path}: expected a run of {task.named}, got one that began otherwise")
+        raise BadInput(f"{run.path}: expected a run of {task.label}, got one that began otherwise")
     remains, record = find_remains(run), run.read_result()
     if remains.outcome is None or record.get("outcome") != remains.outcome.kind:
         return resume_mission(run, remains, sinks=sinks, live=live, stage=stage)

@@ -99,6 +99,6 @@ def count_missions(
         for number, (task, result) in enumerate(done, 1):
             if not out.isatty():
                 how = f"{result.outcome}, {format_error(result.error_m)}"
-                print(f"{number} of {total}: {task.named}: {how}", file=out, flush=True)
+                print(f"{number} of {total}: {task.label}: {how}", file=out, flush=True)
             bar.update()
             yield task, result

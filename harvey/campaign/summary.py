@@ -30,7 +30,7 @@ def format_error(error_m: float) -> str:
     return f"{error_m * 1000.0:.1f} mm ({error_m / INCH_M:.2f} inches)"
 
 
-def one(r: MissionResult, out: Path | None) -> str:
+def format_result(r: MissionResult, out: Path | None) -> str:
     """The summary of one mission."""
     m = r.milestones
     lines = [
@@ -58,7 +58,7 @@ def _places(r: MissionResult) -> str:
     return f": {where}" if where else ""
 
 
-def several(results: Sequence[MissionResult]) -> str:
+def format_results(results: Sequence[MissionResult]) -> str:
     """A table, one row a seed, with a summary row."""
     rows = table(COLUMNS, [*(_cells(r) for r in results), _total(results)], last_is_summary=True)
     return "\n".join([rows, *(f"seed {r.seed}: {text}" for r in results for text in r.amiss)])

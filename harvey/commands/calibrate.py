@@ -68,14 +68,14 @@ def _run(args: Namespace) -> int:
     from knowledge_sources.methods.calibration.picture import draw_calibration
     from world_models.files.toml.camera_file import camera_text
 
-    board = _checked(args)
+    board = _check_options(args)
     try:
         columns, rows = args.pattern
         pattern = Pattern(columns, rows, args.square_m)
     except ValueError as error:
         raise BadInput(f"--pattern, --square-mm: {error}") from None
     place = None if args.mount_image is None else grey_of(Path(args.mount_image))
-    boards = boards_in(_pictures(args, pattern), pattern, _tell)
+    boards = boards_in(_pictures(args, pattern), pattern, _print_status)
     calibration = calibrate_camera(boards, pattern, with_k3=args.k3)
     found, mount = None, None
     if board is not None:
@@ -88,7 +88,7 @@ def _run(args: Namespace) -> int:
     return 0
 
 
-def _checked(args: Namespace) -> Mounted | None:
+def _check_options(args: Namespace) -> Mounted | None:
     """The board of the mounting. Raises BadInput where options do not go together."""
     from harvey.hardware.calibration import Mounted
 
@@ -114,9 +114,9 @@ def _pictures(args: Namespace, pattern: Pattern) -> Iterator[tuple[str, Grey]]:
     if args.camera is None:
         yield from ((str(path), grey_of(path)) for path in picture_files(args.images))
         return
-    with _opened(args.camera) as camera:
-        _tell("show the board from all sides: near and far, tilted, and in every corner of the picture")
-        yield from live_pictures(camera, pattern, args.count, _tell)
+    with _open_camera(args.camera) as camera:
+        _print_status("show the board from all sides: near and far, tilted, and in every corner of the picture")
+        yield from live_pictures(camera, pattern, args.count, _print_status)
 
 
 def _live_place(args: Namespace) -> Grey:
@@ -129,14 +129,14 @@ def _live_place(args: Namespace) -> Grey:
         input(f"put the board {where} in front of the robot, square to it, then press Enter ")
     except EOFError:
         raise BadInput("--mount-image: expected Enter, or a picture, got the end of the input") from None
-    with _opened(args.camera) as camera:
+    with _open_camera(args.camera) as camera:
         try:
             return decode(camera.look("mount").jpeg)
         except CameraFault as fault:
             raise BadInput(f"--camera {args.camera}: {fault.kind}: {fault.detail}") from None
 
 
-def _opened(source: str) -> VideoCamera:
+def _open_camera(source: str) -> VideoCamera:
     from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
 
     began_s = time.monotonic()
@@ -166,10 +166,10 @@ def _write(out: str, camera: str, lines: tuple[str, ...], picture: bytes) -> Non
         path.with_suffix(".png").write_bytes(picture)
     except OSError as error:
         raise BadInput(f"--out {out}: expected a file to write to, got: {error.strerror}") from None
-    _tell(f"written: {path}, {path.with_suffix('.txt').name}, {path.with_suffix('.png').name}")
+    _print_status(f"written: {path}, {path.with_suffix('.txt').name}, {path.with_suffix('.png').name}")
 
 
-def _tell(line: str) -> None:
+def _print_status(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 

@@ -60,7 +60,7 @@ def _run(args: Namespace) -> int:
         return time.monotonic() - began
 
     with Preflight(mission, out, clock, build_settings(numbers)) as dry:
-        if not checked(dry):
+        if not run_checks(dry):
             return 2
         if args.dry_run:
             print("\neverything is ready; nothing was moved")
@@ -68,10 +68,10 @@ def _run(args: Namespace) -> int:
         return _drive(mission, dry, clock, make_room(out, mission.name, 0), args.live, numbers)
 
 
-def checked(dry: Preflight) -> bool:
+def run_checks(dry: Preflight) -> bool:
     """Make all checks, and tell what came of each; whether nothing failed."""
     for check in dry.run():
-        _tell(check)
+        _print_check(check)
     if not dry.ok:
         failed = sum(1 for check in dry.checks if not check.ok)
         print(f"\n{failed} of {len(dry.checks)} failed: nothing was moved", file=sys.stderr)
@@ -92,7 +92,7 @@ def _mission(args: Namespace, more: dict[str, Any]) -> HardwareMission:
     return load_mission(None if args.mission is None else Path(args.mission), settings)
 
 
-def _tell(check: Check) -> None:
+def _print_check(check: Check) -> None:
     print(f"{'ok    ' if check.ok else 'FAILED'}  {check.what:<12} {check.found}", flush=True)
     if not check.ok:
         print(f"{'':<21} -> {check.todo}", flush=True)

@@ -72,7 +72,7 @@ def _again(run: RunDirectory) -> int:
     elsewhere = head.decided_elsewhere()
     agent = build_agent(head)
     try:
-        for decision in shown(replay(run, pictures, agent.scheduler())):
+        for decision in with_progress(replay(run, pictures, agent.scheduler())):
             if not decision.same:
                 print(f"{_perhaps(head, elsewhere)}\n\n{_difference(agreed, decision)}")
                 return 1
@@ -108,7 +108,7 @@ def _difference(agreed: int, decision: ReplayedDecision) -> str:
     return "\n".join(["first: as recorded; second: as decided now", *describe(agreed, decision.recorded, now)])
 
 
-def shown(decisions: Iterable[ReplayedDecision]) -> Iterator[ReplayedDecision]:
+def with_progress(decisions: Iterable[ReplayedDecision]) -> Iterator[ReplayedDecision]:
     """The decisions, with a bar on a terminal."""
     from tqdm import tqdm
 

@@ -29,7 +29,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 def _run(args: Namespace) -> int:
     run = open_run(args.run, "run.json")
-    from harvey.campaign.summary import one
+    from harvey.campaign.summary import format_result
     from harvey.run_files.run_head import HARDWARE, RunHead
     from harvey.runner.resume import find_remains
 
@@ -43,11 +43,11 @@ def _run(args: Namespace) -> int:
         return _on_hardware(run, head, remains, moved, args.live)
     if moved:
         raise BadInput(f"--base and --camera: expected a run on hardware, and {run.path} is one of the simulator")
-    _tell(run, remains, head)
+    _print_start(run, remains, head)
     from harvey.simulation.run import resume_mission
 
     result = resume_mission(run, remains, live=args.live)
-    print(one(result, run.path))
+    print(format_result(result, run.path))
     return 0 if result.outcome == "reached" else 1
 
 
@@ -57,7 +57,7 @@ def _on_hardware(
     """Everything is checked as before a first move; then the mission goes on."""
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
     from harvey.agent import settings_of
-    from harvey.commands.drive import checked, follow, summary, tell_how_to_stop
+    from harvey.commands.drive import follow, run_checks, summary, tell_how_to_stop
     from harvey.hardware.mission import rebuild_mission
     from harvey.hardware.preflight import Preflight
     from harvey.hardware.resume import time_of_last_observation
@@ -69,16 +69,16 @@ def _on_hardware(
         return time.monotonic() - began_s
 
     with Preflight(mission, run.path, clock, settings_of(head)) as dry:
-        if not checked(dry) or dry.base is None or dry.camera is None:
+        if not run_checks(dry) or dry.base is None or dry.camera is None:
             return 2
-        _tell(run, remains, head)
+        _print_start(run, remains, head)
         tell_how_to_stop()
         result = resume(mission, run, remains, dry.base, dry.camera, clock, sinks=[follow], live=live)
     print(summary(result, run.path))
     return 0 if result.outcome == "reached" else 1
 
 
-def _tell(run: RunDirectory, remains: Remains, head: RunHead) -> None:
+def _print_start(run: RunDirectory, remains: Remains, head: RunHead) -> None:
     if elsewhere := head.decided_elsewhere():
         print(f"note: the run {elsewhere}; it goes on only if it is decided again as it was", file=sys.stderr)
     for what in remains.dropped:

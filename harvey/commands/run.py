@@ -74,21 +74,21 @@ def _check(task: Task) -> int:
 
 def _one(task: Task, args: Namespace) -> int:
     from harvey.campaign.progress import following
-    from harvey.campaign.summary import one
+    from harvey.campaign.summary import format_result
     from harvey.why.trace import printing
 
     sinks = (printing(sys.stdout),) if args.trace else ()
     task.load()  # what is wrong with it is said first
-    print(f"{task.named}: setting the stage", file=sys.stderr, flush=True)
+    print(f"{task.label}: setting the stage", file=sys.stderr, flush=True)
     with following(sys.stderr) as follow:
         result = run_task(task, sinks=sinks, follow=None if args.trace else follow, live=args.live)
-    print(one(result, task.out))
+    print(format_result(result, task.out))
     return 0 if result.outcome == "reached" else 1
 
 
 def _several(tasks: tuple[Task, ...]) -> int:
     from harvey.campaign.progress import count_missions
-    from harvey.campaign.summary import several
+    from harvey.campaign.summary import format_results
 
     tasks[0].stage()
     try:
@@ -96,7 +96,7 @@ def _several(tasks: tuple[Task, ...]) -> int:
     except (KeyboardInterrupt, Terminated) as stop:
         stop.add_note("what was recorded is kept; the same command with --go-on goes on")
         raise
-    print(several([results[task.seed] for task in tasks]))
+    print(format_results([results[task.seed] for task in tasks]))
     print(f"the runs are in {tasks[0].out.parent if tasks[0].out else RUNS}")
     return 0 if all(r.outcome == "reached" for r in results.values()) else 1
 

@@ -43,7 +43,7 @@ def _run(args: Namespace) -> int:
     run = open_run(args.run)
     history = JournalHistory(run.journal)
     if args.check:
-        return _checked(history, args.json)
+        return _print_check(history, args.json)
     if args.not_ is not None:
         _print_not(run, history, args)
         return 0
@@ -108,7 +108,7 @@ def _record(one: Story) -> dict[str, Any]:
     return {"entry": one.ref, "headline": one.headline, "decided": one.decided, "steps": steps}
 
 
-def _checked(history: History, as_json: bool) -> int:
+def _print_check(history: History, as_json: bool) -> int:
     from harvey.why.reach import KINDS, check, named
 
     found = check(history)

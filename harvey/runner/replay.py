@@ -70,12 +70,12 @@ def replay(
         yield ReplayedDecision(recorded, line, decision)
 
 
-def check_same(run: RunDirectory, told: ReplayedDecision) -> ReplayedDecision:
+def check_same(run: RunDirectory, decision: ReplayedDecision) -> ReplayedDecision:
     """The same; raises BadInput where it was not decided as it was."""
-    if not told.same:
-        raise BadInput(f"{run.journal}: cycle {told.recorded.cycle} is not decided again as it was (harvey replay "
+    if not decision.same:
+        raise BadInput(f"{run.journal}: cycle {decision.recorded.cycle} is not decided again as it was (harvey replay "
                        f"{run.path} tells how); it takes the program that made the run")
-    return told
+    return decision
 
 
 def open_pictures(run: RunDirectory) -> Mapping[int, bytes]:

@@ -16,7 +16,7 @@ from blackboard.servoing import Discrepancy
 from experiments.paper.levels import _row
 from experiments.report import Report
 from experiments.scale.render_speed import measure_edge_offsets_px
-from harvey.campaign.summary import format_error, one, several, summarize_dry_run
+from harvey.campaign.summary import format_error, format_result, format_results, summarize_dry_run
 from harvey.dry_run import MilestonePreview
 from harvey.errors import BadInput
 from harvey.run_files.records import EntryRecord
@@ -112,8 +112,8 @@ def result(seed: int, outcome: str, error_m: float, collisions: int = 0) -> Miss
 
 
 def test_missions_are_summed_up() -> None:
-    assert "25.4 mm (1.00 inches) from the goal" in one(result(3, "reached", 0.0254), None)
-    last = several([result(0, "reached", 0.01), result(1, "lost", 2.0, collisions=3)]).splitlines()[-1]
+    assert "25.4 mm (1.00 inches) from the goal" in format_result(result(3, "reached", 0.0254), None)
+    last = format_results([result(0, "reached", 0.01), result(1, "lost", 2.0, collisions=3)]).splitlines()[-1]
     assert "1 of 2 reached" in last
     assert "max 2000.0" in last
     assert last.split()[-5:] == ["3", "20.0", "90", "400", "10.0"]

@@ -17,7 +17,6 @@ from blackboard.journal import Decision, decision_line
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from harvey.campaign.progress import Lines
-from harvey.campaign.summary import one
 from harvey.campaign.tally import Tally
 from harvey.run_files.records import DecisionRecord, decision_of
 from harvey.run_files.run_directory import RunDirectory
@@ -133,7 +132,7 @@ def test_the_summary_tells_them_and_the_result_keeps_them() -> None:
         final_heading_error_rad=0.0, path_length_m=20.0, sim_time_s=90.0, wall_time_s=10.0, frames=9, decisions=400,
         milestones={"verified": 5, "refuted": 1, "not_testable": 0, "false_accepts": 0}, replans=2, relocalizations=0,
         sketches=3, collisions=1, max_cross_track_m=1.0, contacts=contacts, turning_points=points)
-    text = one(known, None)
+    text = format_result(known, None)
     assert "collisions    1: in cycle 3 at kitchen (1.50, 2.00) m" in text
     assert "lost          cycle 4: here; nothing fits" in text
     assert MissionResult.of_record(json.loads(json.dumps(known.record()))) == replace(known, amiss=[])
