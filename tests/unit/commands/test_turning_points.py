@@ -17,6 +17,7 @@ from blackboard.journal import Decision, decision_line
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from harvey.campaign.progress import Lines
+from harvey.campaign.summary import format_result
 from harvey.campaign.tally import Tally
 from harvey.run_files.records import DecisionRecord, decision_of
 from harvey.run_files.run_directory import RunDirectory
