@@ -10,8 +10,8 @@ from pathlib import Path
 from logs.recording.overview.overview import Series, read_series
 from logs.recording.paths import CHAPTERS, HARVEY
 
-KINDS = ("the end", "fault", "found", "refuted", "doubt", "in truth", "lost", "resumed", "not testable", "goal", "plan",
-         "drives", "verified")
+KINDS = ("the end", "fault", "collision", "found", "refuted", "doubt", "in truth", "lost", "resumed", "not testable",
+         "goal", "plan", "drives", "verified")
 """What is told first; one of each kind is taken before a second one of any."""
 
 APART = 2

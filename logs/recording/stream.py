@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import socket
+from collections.abc import Iterable, Sequence
+from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
+import numpy as np
 import rerun as rr
 from rerun.chunk import RrdReader
 
 from logs.errors import RecordingError
-from logs.recording.columns import Batch, Columnar, Columns, Row
 from logs.recording.signs import viewable
 
 APPLICATION = "harvey"
@@ -23,6 +25,20 @@ LOCALHOST, LIVE_PORT = "127.0.0.1", 9876
 
 BATCHING = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1 << 30, flush_num_rows=1 << 40)
 """The stream itself never flushes: what is in a chunk then follows from the cycles alone, and equal runs are equal."""
+
+Batch = Sequence[Any] | np.ndarray[Any, Any]
+"""The values of one component in one row: none, one or many."""
+Row = tuple[int, float, dict[str, Batch]]
+"""Cycle, simulated time and components."""
+
+
+class Columnar(Protocol):
+    """Makes columns of components: an archetype of rerun, or what acts like one."""
+
+    @classmethod
+    def columns(cls, *args: Any, **kwargs: Any) -> Iterable[Any]:
+        """One column for each component."""
+
 
 class RecordingStream:
     """One recording: a file, a live server for a viewer, or both.
@@ -47,7 +63,6 @@ class RecordingStream:
         self._stream.send_recording_name(viewable(title))
         self._cycles, self._flush_cycles = 0, LIVE_FLUSH_CYCLES if live else FLUSH_CYCLES
         self._now = (0, 0.0)
-        self._columns = Columns()
         self._rows: dict[tuple[str, type[Columnar], tuple[str, ...]], list[Row]] = {}
 
     def at(self, cycle: int, sim_time_s: float) -> None:
@@ -80,7 +95,9 @@ class RecordingStream:
     def flush(self) -> None:
         """Bring what was logged to the disk; raises RecordingError where that fails."""
         for (path, kind, names), rows in self._rows.items():
-            index, columns = self._columns.of(kind, names, rows)
+            cycles, times_s, batches = zip(*rows, strict=True)
+            index = [rr.TimeColumn("cycle", sequence=cycles), rr.TimeColumn("sim_time", duration=times_s)]
+            columns = chain.from_iterable(_columns(kind, name, [batch[name] for batch in batches]) for name in names)
             self._stream.send_columns(path, index, columns)
         self._rows.clear()
         self._guarded(self._stream.flush)
@@ -97,6 +114,15 @@ class RecordingStream:
             act()
         except (RuntimeError, OSError, ValueError) as error:
             raise RecordingError(f"{self._path or 'live recording'}: cannot be written: {error}") from None
+
+
+def _columns(kind: type[Columnar], name: str, batches: Sequence[Batch]) -> Iterable[Any]:
+    """A component's values, row by row."""
+    lengths = [len(batch) for batch in batches]
+    is_array = isinstance(batches[0], np.ndarray)
+    values = np.concatenate(batches) if is_array else list(chain.from_iterable(batches))
+    columns = kind.columns(**{name: values})
+    return columns if lengths == [1] * len(lengths) else [column.partition(lengths) for column in columns]
 
 
 def _viewable(batch: Batch) -> Batch:

@@ -176,8 +176,10 @@ def test_a_watch_whose_condition_did_not_hold_is_told_as_that(
     runs: tuple[Path, Path], history: History, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The relocalizer watches for beliefs moved by odometry; one that rests on landmarks does not wake it."""
-    cycle, ref = next((d.cycle, ref) for d in history.decisions() for ref in d.seen if ref.startswith("Hypothesis-1.")
-                      if (r := history.entry(ref)) is not None and r.change == "Revised" and r.value["basis"] == "tracks")
+    beliefs = ((d.cycle, history.entry(ref)) for d in history.decisions() for ref in d.seen
+               if ref.startswith("Hypothesis-1."))
+    cycle, ref = next((cycle, r.ref) for cycle, r in beliefs
+                      if r is not None and r.change == "Revised" and r.value["basis"] == "tracks")
     assert main(["why", str(runs[0]), "--not", "relocalizer", "--at", str(cycle)]) == 0
     told = capsys.readouterr().out
     assert f"came what the relocalizer watches for, {ref} revised, but its watch has a condition" in told
