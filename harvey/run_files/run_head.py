@@ -110,7 +110,7 @@ class RunHead:
         return head
 
     def is_like(self, other: RunHead) -> bool:
-        """Whether both are written alike, whoever decides: then their runs began alike."""
+        """Whether both runs began alike, whichever program decides."""
         one, two = (replace(head, code="", arithmetic="") for head in (self, other))
         return json.dumps(asdict(one)) == json.dumps(asdict(two))
 
