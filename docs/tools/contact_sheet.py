@@ -24,10 +24,10 @@ COLUMNS = 2
 PICTURE_IN = (9.6, 5.4)
 CAPTION_IN = 0.34
 """Sizes on the sheet [inches]; at PIXELS_PER_IN."""
-PIXELS_PER_IN = 100
+PIXELS_PER_IN = 66
 LETTERS = 104
 """So many fit into a caption."""
-QUALITY = 68
+QUALITY = 60
 
 
 def contact_sheet(recording: Path, sheet: Path, pictures: Path | None = None) -> tuple[list[Moment], list[str]]:
