@@ -2,7 +2,7 @@
 
 The file is ``camera.mjpeg``; video tools play it (``ffplay camera.mjpeg``). It needs no index: the journal tells the
 length and the SHA-256 of every picture, in the order in which they stand in the file. A picture is on the disk before
-any expert sees it, so that no decision rests on something that a crash, or a power cut, could take away.
+any knowledge source sees it, so that no decision rests on something that a crash, or a power cut, could take away.
 """
 
 from __future__ import annotations

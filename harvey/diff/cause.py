@@ -32,32 +32,33 @@ class Parting:
         observation: ref of the first entry from outside that is not the same in both; "" where all are.
         decision: cycle of the first decision that does something else; 0 where none does.
         motion: the first motor command that differs; "" where none does.
-        expert: cycle of the first decision in which another expert, or the same on something else, acts; 0 for none.
+        source: cycle of the first decision in which another knowledge source acts, or the same on something else; 0:
+            there is none.
     """
 
     observation: str
     decision: int
     motion: str
-    expert: int
+    source: int
 
 
 def parting(ours: History, theirs: History, agreed: int) -> Parting:
     """Where two runs part that agree in their first ``agreed`` decisions."""
-    observation, motion, decision, expert = "", "", 0, 0
+    observation, motion, decision, source = "", "", 0, 0
     for cycle in ours.cycles[agreed:]:
         one, other = ours.cycle_of(cycle), theirs.cycle_of(cycle)
         if one is None or other is None:
             break
         observation = observation or _first(one.observed, other.observed)
         acted = _acted(one), _acted(other)
-        if not expert and acted[0] != acted[1]:
-            expert = cycle
+        if not source and acted[0] != acted[1]:
+            source = cycle
         if not decision and (acted[0] != acted[1] or _first(one.made, other.made) or one.refused != other.refused):
             decision = cycle
         motion = motion or _first(_motions(one), _motions(other))
-        if observation and decision and motion and expert:
+        if observation and decision and motion and source:
             break
-    return Parting(observation, decision, motion, expert)
+    return Parting(observation, decision, motion, source)
 
 
 def _first(ours: tuple[EntryRecord, ...], theirs: tuple[EntryRecord, ...]) -> str:
@@ -146,8 +147,8 @@ def because(ours: History, theirs: History, agreed: int, settings: tuple[str, ..
         yield from _decided(ours, theirs, where, settings)
     if where.motion and where.motion not in (where.observation, ""):
         yield from _moved(ours, theirs, where.motion)
-    if where.expert and where.expert != where.decision:
-        yield from _others(ours, theirs, where.expert)
+    if where.source and where.source != where.decision:
+        yield from _others(ours, theirs, where.source)
 
 
 def _observed(ours: History, theirs: History, where: Parting) -> Iterator[str]:

@@ -1,7 +1,7 @@
-"""Asking an expert again: could it have acted in a cycle, and if not, what did it find on the board?
+"""Asking a knowledge source again: could it have acted in a cycle, and if not, what did it find on the board?
 
-The board as it stood is put together from the journal, and the expert's own ``rate`` is asked once more. That is honest
-as far as ``rate`` is what it has to be, a pure function of the board; no act is repeated and no picture is looked at.
+The board as it stood is put together from the journal, and ``rate`` is asked once more. That is honest as far as
+``rate`` is what it has to be, a pure function of the board; no act is repeated and no picture is looked at.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def changes(history: History, cycle: int, kinds: Registry) -> tuple[Change, ...]
 
 
 def board_at(history: History, cycle: int, kinds: Registry) -> Blackboard:
-    """The board as experts saw it when they were asked in a cycle. Raises BadInput."""
+    """The board as knowledge sources saw it when they were asked in a cycle. Raises BadInput."""
     told: list[EntryRecord] = []
     for one in history.cycles:
         if one > cycle:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -14,8 +15,8 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from harvey.run_files.records import EntryRecord
 from harvey.why.history import History
-from harvey.why.links import reason
-from harvey.why.sentences import value_of
+from harvey.why.links import anchor_of, reason, tracks_of
+from harvey.why.sentences import sentence, value_of
 from world_models.entries.body import MotionReport
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
@@ -210,3 +211,51 @@ def doubt(d: Discrepancy) -> str:
     came = {"escalated": ", so the next level had to deal with it", "corrected": ", and was corrected"}
     return f"Something was not as expected, to be dealt with {CORRECTED_BY[d.level]}: {d.what}{large}" + (
         came.get(d.status, "") + ".")
+
+
+def in_one_sentence(history: History, command: EntryRecord) -> str:
+    """Why the robot moved as it did; "" for entries that are no motor command."""
+    if command.type not in ("MotorCommand", "Course"):
+        return ""
+    parts = list(_because(history, command))
+    return f"Harvey was told to {sentence(command)} {', '.join(parts)}." if parts else ""
+
+
+def _because(history: History, command: EntryRecord) -> Iterator[str]:
+    leg, milestone, belief = (reason(history, command, type) for type in ("Leg", "Milestone", "Hypothesis"))
+    aim_rad = None if leg is None else value_of(leg, Leg).aim_rad
+    if aim_rad is not None:
+        yield f"because the line to follow lay {turn(aim_rad)} of where it believed that it faced"
+    elif milestone is not None:
+        yield f"because it had to face {milestone_name(value_of(milestone, Milestone))} to look for it"
+    elif leg is None and (segments := reason(history, command, "Segments")) is not None:
+        seen = seen_in(value_of(segments, Segments), reason(history, segments, "Frame"))
+        yield f"because it did not know where it was, and did not find it out from {seen}"
+    if belief is not None:
+        yield from _seen(history, belief)
+        yield from _matched(history, belief)
+
+
+def _seen(history: History, belief: EntryRecord) -> Iterator[str]:
+    """The landmark that was furthest from its prediction, and the pose that the prediction was made from."""
+    tracks, before = tracks_of(history, belief), reason(history, belief, "Hypothesis")
+    if value_of(belief, Hypothesis).basis != "tracks" or tracks is None or before is None:
+        return
+    value = value_of(tracks, Tracks)
+    if not value.found_again():
+        return
+    frame = picture(reason(history, belief, "Frame"), value.frame)
+    yield f"because in {frame} {off(value.found_again()[0])} ({tracks.ref})"
+    yield f"made from pose {before.ref}"
+
+
+def _matched(history: History, belief: EntryRecord) -> Iterator[str]:
+    """The match that the belief goes back to."""
+    anchor = anchor_of(history, belief)
+    fix = None if anchor is None else reason(history, anchor, "PoseFix")
+    match = None if fix is None else reason(history, fix, "LineMatch")
+    whose = "" if value_of(belief, Hypothesis).basis == "tracks" else "where its pose was "
+    if fix is not None and match is not None:
+        yield f"{whose}made from match {match.id} of {best_pairs(history, fix, match)}"
+    elif anchor is not None:
+        yield f"made from pose {anchor.ref} by {value_of(anchor, Hypothesis).basis}"

@@ -87,8 +87,8 @@ def reaches(entry: Callable[[str], EntryRecord | None], refs: Iterable[str], kin
 def explained_by(decision: DecisionRecord) -> tuple[str, ...]:
     """The entries that a decision is explained by.
 
-    What it made; where it made nothing (it was refused), what woke the expert; where nobody acted, what woke those that
-    were dropped. Nothing where nothing was decided.
+    What it made; where it made nothing (it was refused), what woke the knowledge source; where nobody acted, what
+    woke those that were dropped. Nothing where nothing was decided.
     """
     if decision.made:
         return tuple(dict.fromkeys(ref for r in decision.made for ref in r.retracted_because or (r.ref,)))

@@ -19,7 +19,6 @@ from harvey.why import facts
 from harvey.why.history import History
 from harvey.why.links import STRANGE, anchor_of, nearest, reason, tracks_of, within, words
 from harvey.why.sentences import sentence, value_of
-from harvey.why.short import in_one_sentence
 from world_models import words as vocabulary
 from world_models.entries.body import Look, MotionReport
 from world_models.entries.location import Hypothesis
@@ -77,7 +76,7 @@ def story(history: History, record: EntryRecord) -> Story:
     teller = _Teller(history)
     try:
         steps = [*teller.reasons(record), *teller.context(record)]
-        head = in_one_sentence(history, record) or headline(record)
+        head = facts.in_one_sentence(history, record) or headline(record)
     except STRANGE:
         steps, head = list(_plain_steps(history, record)), _plainly(history, record)
     return Story(record.ref, head, decided(history, record), tuple(steps))

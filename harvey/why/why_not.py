@@ -1,7 +1,7 @@
-"""Why not: what an expert or an entry could have brought about and did not, and the rating or the reason that decided.
+"""Why not: what a knowledge source or an entry could have brought about and did not, and what decided.
 
-These answers are read from the journal. Whether an expert that the journal does not name in a cycle could have acted is
-asked of the expert itself (:mod:`harvey.why.ask`).
+These answers are read from the journal. Whether a knowledge source that the journal does not name in a cycle could
+have acted is asked of the knowledge source itself (:mod:`harvey.why.ask`).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SHOWN = 12
 
 
 class Fate(Enum):
-    """What became of an expert in a cycle."""
+    """What became of a knowledge source in a cycle."""
 
     ACTED = "acted"
     REFUSED = "acted, and was refused"
@@ -38,7 +38,7 @@ class Fate(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Occasion:
-    """One time that an expert could have acted.
+    """One time that a knowledge source could have acted.
 
     Attributes:
         cycle: when; fate: what became of it; trigger: what it would have answered; why: what decided, in a sentence.
@@ -51,7 +51,7 @@ class Occasion:
 
 
 def in_cycle(history: History, source: str, cycle: int) -> tuple[Occasion, ...]:
-    """What became of an expert in one cycle, for each trigger that it had; none where the journal does not name it.
+    """What became of a knowledge source in one cycle, for each trigger; none where the journal does not name it.
 
     Raises:
         BadInput: the run has no such cycle.
@@ -72,7 +72,7 @@ def in_cycle(history: History, source: str, cycle: int) -> tuple[Occasion, ...]:
 
 
 def in_run(history: History, source: str) -> tuple[Occasion, ...]:
-    """Every time in a run that an expert was woken, and what came of it in the end."""
+    """Every time in a run that a knowledge source was woken, and what came of it in the end."""
     open_: dict[int, Candidate] = {}
     ended: list[Occasion] = []
     last = 0
@@ -128,7 +128,7 @@ def _distance(c: Candidate, focus: str) -> int:
 
 
 def told(source: str, occasions: tuple[Occasion, ...]) -> Iterator[str]:
-    """What became of an expert, in sentences; an expert that always acted is told as such."""
+    """What became of a knowledge source, in sentences; one that always acted is said to have."""
     tally = Counter(o.fate for o in occasions)
     if not occasions:
         yield f"The {words(source)} was never able to act in this run."

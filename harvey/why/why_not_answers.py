@@ -1,4 +1,4 @@
-"""``harvey why RUN --not NAME``: the answers about an expert or an entry, from the journal and from the expert."""
+"""``harvey why RUN --not NAME``: the answers about a knowledge source or an entry."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from harvey.why.why_not import Fate, in_cycle, in_run, of_entry, told
 
 
 def answers(run: RunDirectory, history: History, name: str, cycle: int | None) -> Iterator[str]:
-    """Why an expert did not act (in a cycle), or why an entry did not stay.
+    """Why a knowledge source did not act (in a cycle), or why an entry did not stay.
 
     Raises:
-        BadInput: the run has no such entry and no such expert; near ones are named.
+        BadInput: the run has no such entry and no such knowledge source; near ones are named.
     """
     if "-" in name:
         yield from of_entry(history, history.named(name))
@@ -54,13 +54,13 @@ def _never(run: RunDirectory, source: str) -> Iterator[str]:
     from harvey.run_files.run_head import RunHead
 
     agent = build_agent(RunHead.read(run.path))
-    expert = _named(source, agent.sources)
-    if not agent.servoing.allows(expert.closes):
-        yield f"The {expert.closes} level of servoing was off, and the {words(source)} closes it."
+    named = _find(source, agent.sources)
+    if not agent.servoing.allows(named.closes):
+        yield f"The {named.closes} level of servoing was off, and the {words(source)} closes it."
 
 
 def _asked_again(run: RunDirectory, history: History, source: str, cycle: int) -> Iterator[str]:
-    """The expert is asked once more, on the board as it was."""
+    """The knowledge source is asked once more, on the board as it was."""
     from harvey.agent import build_agent
     from harvey.run_files.run_head import RunHead
     from harvey.why.ask import why_absent
@@ -70,16 +70,17 @@ def _asked_again(run: RunDirectory, history: History, source: str, cycle: int) -
         yield f"The {words(source)} was left out of this run."
         return
     agent = build_agent(head)
-    expert = _named(source, agent.sources)
-    if not agent.servoing.allows(expert.closes):
-        yield f"The {expert.closes} level of servoing was off, and the {words(source)} closes it."
+    named = _find(source, agent.sources)
+    if not agent.servoing.allows(named.closes):
+        yield f"The {named.closes} level of servoing was off, and the {words(source)} closes it."
     else:
-        yield from why_absent(history, expert, cycle, agent.kinds)
+        yield from why_absent(history, named, cycle, agent.kinds)
 
 
-def _named(source: str, sources: tuple[KnowledgeSource, ...]) -> KnowledgeSource:
-    names = [expert.name for expert in sources]
+def _find(source: str, sources: tuple[KnowledgeSource, ...]) -> KnowledgeSource:
+    names = [one.name for one in sources]
     if source not in names:
         near = difflib.get_close_matches(source, names, n=4, cutoff=0.5) or names
-        raise BadInput(f"--not: expected an expert as {', '.join(near)}, or an entry as Goal-1, got {source!r}")
+        raise BadInput(
+            f"--not: expected a knowledge source as {', '.join(near)}, or an entry as Goal-1, got {source!r}")
     return sources[names.index(source)]

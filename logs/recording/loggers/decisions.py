@@ -97,7 +97,7 @@ def _told(changes: Iterable[Change], messages: Messages) -> str:
 
 
 def log_level(decision: Decision) -> str:
-    """INFO for the ordinary; WARN when something was refused or goes wrong; ERROR when an expert raised."""
+    """INFO for the ordinary; WARN when something was refused or goes wrong; ERROR when a knowledge source raised."""
     if decision.refused:
         return "ERROR" if decision.refused.startswith("raised") else "WARN"
     return "WARN" if any(map(_is_trouble, decision.made)) else "INFO" if decision.made else "DEBUG"
@@ -111,7 +111,7 @@ def _is_trouble(change: Change) -> bool:
 
 
 def _colour(decision: Decision) -> tuple[int, int, int, int]:
-    """Of the servo level at which the expert works, as in the lanes; red where the act was refused."""
+    """Of the servo level at which the knowledge source works, as in the lanes; red where the act was refused."""
     if decision.refused:
         return REJECTED
     return LEVELS[str(decision.chosen.source.level)] if decision.chosen else DONE

@@ -129,7 +129,7 @@ class Image(Logger):
         return self._bent(lines), inside
 
     def _bent(self, pixels: Floats) -> Floats:
-        """Where points (..., 2) of the picture without distortion, as the experts see it, lie in the camera's."""
+        """Where points (..., 2) of the rectified picture, which knowledge sources see, lie in the camera's."""
         return pixels if self._pinhole is self._lens else self._lens.project(self._pinhole.rays(pixels))
 
     def _expected(self, stream: RecordingStream, milestone: Milestone) -> None:

@@ -1,4 +1,4 @@
-"""Lanes: what Harvey is busy with, which servo level is in focus, when each expert acts, what ails the robot."""
+"""Lanes: what Harvey is busy with, the servo level in focus, when each knowledge source acts, faults of the body."""
 
 from __future__ import annotations
 
