@@ -5,9 +5,37 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 from heapq import heapify, heappop, heappush
+from typing import NamedTuple
 
-from blackboard.activation import Activation, Obviated
+from blackboard.change import Change
+from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
+
+
+class Activation(NamedTuple):
+    """One knowledge source x one trigger.
+
+    Attributes:
+        number: sequence number; ties go by it.
+        source: who would act.
+        trigger: on what.
+        rating: how well, 0..1.
+        cycle: when it was activated.
+    """
+
+    number: int
+    source: KnowledgeSource
+    trigger: Change
+    rating: float
+    cycle: int
+
+
+class Obviated(NamedTuple):
+    """An activation that was dropped, and why."""
+
+    activation: Activation
+    reason: str
+
 
 SPARE = 16
 """So many queues of a level are kept whether or not they are empty."""

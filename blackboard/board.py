@@ -8,9 +8,8 @@ from typing import Any, TypeVar
 from blackboard.change import Change, Posted, Retracted, Revised
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref, new_tuple
-from blackboard.index import Index
+from blackboard.entry_store import EntryStore, Index
 from blackboard.kinds import always
-from blackboard.shelf import Shelf
 
 T = TypeVar("T")
 Reasons = tuple[Ref, ...]
@@ -23,11 +22,11 @@ class StaleError(Exception):
 
 
 class Blackboard:
-    """The current revision of every entry; a shelf for each type of value."""
+    """The current revision of every entry; an entry store for each type of value."""
 
     def __init__(self) -> None:
         self._current: dict[str, Entry[Any]] = {}
-        self._shelves: dict[type[Any], Shelf] = {}
+        self._stores: dict[type[Any], EntryStore] = {}
         self._numbers: dict[type[Any], int] = {}
         self.current: Mapping[str, Entry[Any]] = self._current
         self.view = View(self)
@@ -100,7 +99,7 @@ class Blackboard:
             number = self._numbers[kind] = self._numbers.get(kind, 0) + 1
             id, revision = f"{kind.__name__}-{number}", 0
         entry = self._current[id] = new_tuple(Entry, (id, revision, value, author, cycle, because))
-        (self._shelves.get(kind) or self._shelf(kind)).store(entry)
+        (self._stores.get(kind) or self._store(kind)).put(entry)
         return new_tuple(Revised if revision else Posted, (entry, ()))
 
     def forget(self, id: str) -> None:
@@ -113,13 +112,13 @@ class Blackboard:
 
     def _remove(self, id: str) -> Entry[Any]:
         last = self._current.pop(id)
-        return self._shelf(type(last.value)).remove(id)
+        return self._store(type(last.value)).remove(id)
 
-    def _shelf(self, kind: type[Any]) -> Shelf:
-        shelf = self._shelves.get(kind)
-        if shelf is None:
-            shelf = self._shelves[kind] = Shelf()
-        return shelf
+    def _store(self, kind: type[Any]) -> EntryStore:
+        store = self._stores.get(kind)
+        if store is None:
+            store = self._stores[kind] = EntryStore()
+        return store
 
 
 class View:
@@ -148,11 +147,11 @@ class View:
 
     def all(self, kind: type[T]) -> tuple[Entry[T], ...]:
         """Current entries of a type, oldest first."""
-        return tuple(self._board._shelf(kind).entries.values())
+        return tuple(self._board._store(kind).entries.values())
 
     def newest_first(self, kind: type[T]) -> Iterator[Entry[T]]:
         """Current entries of a type, newest posting first, read one by one."""
-        return reversed(self._board._shelf(kind).entries.values())
+        return reversed(self._board._store(kind).entries.values())
 
     def latest(self, kind: type[T], where: Callable[[T], bool] = always) -> Entry[T] | None:
         """The newest posting of a type that satisfies a predicate, or None; :meth:`newest` asks no other."""
@@ -164,23 +163,23 @@ class View:
 
     def having(self, index: Index[T], key: Hashable) -> tuple[Entry[T], ...]:
         """Current entries that an index files under a key, oldest first; takes as long as there are any."""
-        found = self._board._shelf(index.kind).having(index, key)
+        found = self._board._store(index.kind).having(index, key)
         return () if found is None else tuple(found)
 
     def newest(self, index: Index[T], key: Hashable) -> Entry[T] | None:
         """The newest posting that an index files under a key, or None; takes the same time however many there are."""
-        shelf = self._board._shelves.get(index.kind)
-        found = None if shelf is None else shelf.having(index, key)
+        store = self._board._stores.get(index.kind)
+        found = None if store is None else store.having(index, key)
         return None if found is None else found.newest()
 
     def keys(self, index: Index[T]) -> Collection[Hashable]:
         """The keys under which an index files something now."""
-        shelf = self._board._shelves.get(index.kind)
-        return () if shelf is None else shelf.keys(index)
+        store = self._board._stores.get(index.kind)
+        return () if store is None else store.keys(index)
 
     def since(self, kind: type[T], cycle: int) -> tuple[Entry[T], ...]:
         """Current entries of a type whose current revision was written in a cycle or later, in that order."""
-        return self._board._shelf(kind).since(cycle)
+        return self._board._store(kind).since(cycle)
 
     def __len__(self) -> int:
         return len(self._board._current)

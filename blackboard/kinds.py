@@ -12,11 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, TypeVar
-
-if TYPE_CHECKING:
-    from blackboard.board import View
-    from blackboard.entry import Entry
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 
@@ -36,7 +32,7 @@ def always(_value: Any) -> bool:
     return True
 
 
-def never(_view: View, _entry: Entry[Any]) -> bool:
+def never(_view: Any, _entry: Any) -> bool:
     return False
 
 
@@ -52,14 +48,14 @@ class Kind:
         role: request, observation or inference.
         keep: the newest postings, so many, always stay in memory; None: all of them do.
         when: of the older ones only those leave for which this holds; pure.
-        unless: and of these, not those that something on the board still needs; pure.
+        unless: and of these, not those for which this holds of the view and the entry; pure.
         needs: ids of the entries that must stay in memory as long as one with this value does; pure.
     """
 
     role: Role
     keep: int | None = None
     when: Callable[[Any], bool] = always
-    unless: Callable[[View, Entry[Any]], bool] = never
+    unless: Callable[[Any, Any], bool] = never
     needs: Callable[[Any], Iterable[str]] = nothing
 
 

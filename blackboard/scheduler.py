@@ -13,8 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import chain
 from typing import Any, Protocol
 
-from blackboard.activation import Activation, Obviated
-from blackboard.agenda import Agenda
+from blackboard.agenda import Activation, Agenda, Obviated
 from blackboard.board import Blackboard, StaleError, View
 from blackboard.change import Change, Posted, Quiescence, Retracted
 from blackboard.effect import Effect, type_of

@@ -16,7 +16,7 @@ from itertools import groupby
 
 from blackboard.board import View
 from blackboard.entry import Entry
-from blackboard.index import Index
+from blackboard.entry_store import Index
 from blackboard.kinds import inference
 from blackboard.level import Level
 

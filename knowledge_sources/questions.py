@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from blackboard.board import View
 from blackboard.entry import Entry
-from blackboard.index import Index
+from blackboard.entry_store import Index
 from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
 from knowledge_sources.settings.action import ActionSettings

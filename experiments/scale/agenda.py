@@ -9,7 +9,7 @@ from functools import partial
 
 from blackboard.board import Blackboard
 from blackboard.effect import Post
-from blackboard.index import Index
+from blackboard.entry_store import Index
 from experiments.report import Cell, Report
 from experiments.scale import agenda_memory, agenda_peers
 from experiments.scale.agenda_load import LOADS, PART_CYCLES, SINGLE, Speed, Task, measure

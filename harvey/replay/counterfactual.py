@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 
 from blackboard.change import Change
 from blackboard.effect import Post
-from blackboard.encoding import plain
-from blackboard.journal import Decision, decision_line, decision_record
+from blackboard.journal import Decision, decision_line, decision_record, plain
 from blackboard.kinds import Registry, Role, is_request
 from blackboard.scheduler import Scheduler
 from harvey.agent import build_agent

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from blackboard.encoding import NOT_FINITE
+from blackboard.journal import NOT_FINITE
 
 WORDS: Mapping[type[Any], str] = {
     float: "a number", int: "a whole number", str: "a text", bool: "true or false", dict: "an object", list: "a list"}

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from blackboard.encoding import plain
+from blackboard.journal import plain
 from harvey.arithmetic import arithmetic
 from harvey.errors import BadInput
 from harvey.run_files.deciding_code import deciding_code

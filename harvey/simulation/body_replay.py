@@ -15,8 +15,8 @@ import numpy as np
 
 from blackboard.change import Change, Posted
 from blackboard.effect import Effect, Retract
-from blackboard.encoding import plain
 from blackboard.entry import Entry
+from blackboard.journal import plain
 from blackboard.scheduler import Port
 from harvey.errors import BadInput
 from harvey.run_files.records import EntryRecord, as_line

@@ -13,7 +13,7 @@ from blackboard.board import Blackboard, View
 from blackboard.change import Change, Posted, Retracted, Revised
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry
-from blackboard.index import Index
+from blackboard.entry_store import Index
 from blackboard.kinds import Registry, always
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level

@@ -9,7 +9,7 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from blackboard.activation import Activation
+from blackboard.agenda import Activation
 from blackboard.change import Change
 from blackboard.journal import Decision
 from blackboard.servoing import Discrepancy

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import rerun as rr
 import rerun.blueprint as rrb
 
-from blackboard.activation import Activation
+from blackboard.agenda import Activation
 from logs.recording.activity import ACTIVITIES, ACTIVITY_KINDS, activity
 from logs.recording.board_mirror import Moment
 from logs.recording.logger import Logger, Subject

@@ -8,8 +8,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from blackboard.activation import Activation
-from blackboard.agenda import Agenda
+from blackboard.agenda import Activation, Agenda
 from blackboard.change import Posted, Revised
 from blackboard.entry import Entry
 from blackboard.level import Level

@@ -13,7 +13,7 @@ from blackboard.board import Blackboard, StaleError
 from blackboard.change import Posted, Retracted, Revised
 from blackboard.effect import Effect, Post, Retract, Revise, to_say
 from blackboard.entry import Entry, Ref
-from blackboard.index import Index
+from blackboard.entry_store import Index
 from strategies import Note, Tally, notes, tallies, values
 
 picks = st.integers(0, 30)

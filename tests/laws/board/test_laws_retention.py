@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from blackboard.board import View
 from blackboard.change import Change, Posted, Retracted, Revised
 from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.index import Index
+from blackboard.entry_store import Index
 from blackboard.journal import decision_line, entry_record
 from blackboard.kinds import Kind, Role
 from blackboard.level import Level

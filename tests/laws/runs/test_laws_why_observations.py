@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 from blackboard.board import Blackboard
 from blackboard.change import Quiescence
 from blackboard.effect import Post
-from blackboard.encoding import plain
 from blackboard.entry import Ref
-from blackboard.journal import change_record
+from blackboard.journal import change_record, plain
 from blackboard.scheduler import registry_of
 from harvey.errors import BadInput
 from harvey.run_files.observations import effect_of, value_of

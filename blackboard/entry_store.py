@@ -1,18 +1,39 @@
-"""Shelf: the current entries of one type, in order of posting, and the indexes over them."""
+"""EntryStore: the current entries of one type, in order of posting, and the indexes over them."""
 
 from __future__ import annotations
 
 from bisect import bisect_left, insort
-from collections.abc import Collection, Hashable, Iterator
-from typing import Any
+from collections.abc import Callable, Collection, Hashable, Iterator
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 from blackboard.entry import Entry
-from blackboard.index import Index
+
+T_contra = TypeVar("T_contra", contravariant=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Index(Generic[T_contra]):
+    """A question that is asked often: which entries of a type have a certain key?
+
+    The board keeps the answer from the first time that it is asked, and brings it up to date with every change. Declare
+    an index once, beside the questions that use it, and not anew for each question.
+
+    Attributes:
+        kind: the class of the values.
+        key: what they are found by, a pure function of the value; None leaves an entry out.
+        word: what the entries are that are not left out, for people: "open".
+    """
+
+    kind: type[Any]
+    key: Callable[[T_contra], Hashable | None]
+    word: str = ""
+
 
 Entries = tuple[Entry[Any], ...]
 
 
-class Shelf:
+class EntryStore:
     """Everything of one type that is believed now.
 
     Posting, revising and removing take the same time however many entries there are, but for the order within a key,
@@ -26,7 +47,7 @@ class Shelf:
         self._indexes: dict[Index[Any], _Buckets] = {}
         self._times: _Times | None = None
 
-    def store(self, entry: Entry[Any]) -> None:
+    def put(self, entry: Entry[Any]) -> None:
         """A new entry, or a new revision of one."""
         if self._indexes:
             old = self.entries.get(entry.id)
