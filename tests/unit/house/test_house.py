@@ -87,14 +87,20 @@ def test_the_blackboard_needs_the_standard_library_only() -> None:
     ("package", "others"),
     [
         ("knowledge_sources", {"sim", "logs", "harvey"}),
-        ("knowledge_sources.methods", {"sim", "logs", "harvey", "blackboard"}),
-        ("world_models", {"sim", "logs", "harvey", "blackboard", "knowledge_sources"}),
-        ("sim", {"logs", "harvey", "blackboard", "knowledge_sources"}),
+        ("world_models", {"sim", "logs", "harvey", "knowledge_sources"}),
+        ("sim", {"logs", "harvey", "knowledge_sources"}),
     ],
 )
 def test_what_a_package_cannot_reach(package: str, others: set[str]) -> None:
     """Not by any chain of imports: what decides never sees the truth, and the truth borrows no perception."""
     assert [name for name in MODULES if where(name, (package,)) and tops(reached_from(name)) & others] == []
+
+
+@pytest.mark.parametrize("package", ["knowledge_sources.methods", "sim", "harvey.hardware.drivers"])
+def test_what_computes_or_moves_knows_entries_but_no_board(package: str) -> None:
+    """Entries are marked as kinds of the blackboard; nothing else of it is imported, but by the entries themselves."""
+    users = [name for name in MODULES if where(name, (package,))]
+    assert [name for name in users if "blackboard" in tops(set(DIRECT[name]))] == []
 
 
 @pytest.mark.parametrize(
