@@ -21,6 +21,7 @@ from experiments.report import Report
 from harvey.dry_run import PLANNING_SOURCES, AcceptEveryMilestone, IdealBodyPort
 from harvey.simulation.run import build_robot_model
 from harvey.wiring import knowledge_sources
+from knowledge_sources.methods.verification.predicted_colors import SURFACES
 from sim.scenario import Scenario, load_scenario
 from world_models.building.world import World
 from world_models.entries.task import Milestone, Outcome, PlanSketch
@@ -92,7 +93,7 @@ def run(quick: bool, seed: int) -> Report:
 
 def _plan_afresh(known: RobotModel, scenario: Scenario) -> Clock:
     world = World(known.world.locale_source)
-    world.cache["looks"] = known.world.cache.setdefault("looks", {})  # surfaces in arrays, laid out once
+    world.cache[SURFACES] = known.world.cache.setdefault(SURFACES, {})  # surfaces in arrays, laid out once
     return plan(replace(known, world=world), scenario)
 
 

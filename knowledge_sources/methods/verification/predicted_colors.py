@@ -26,6 +26,8 @@ MAX_CORNERS = 8
 """Corners that the array of polygons has room for; regions of more corners are left out."""
 RAYS = 5
 """Rays of a sample: the pixel itself and four around it."""
+SURFACES = "colored regions"
+"""Key of a world's cache under which the arrays of surfaces are kept."""
 WHITE = Finish((1.0, 1.0, 1.0))
 
 
@@ -108,7 +110,7 @@ def _to_face_color(color: Floats, points: Floats, max_points: int) -> FaceColor:
 
 def _build_surfaces(memo: dict[str, Any], packet: LocaleGeometry) -> tuple[Floats, Floats, Floats]:
     """Corners (m, MAX_CORNERS, 3), shaded colors (m, 3) and normals (m, 3) of a packet's regions; built once."""
-    known: dict[object, tuple[Floats, Floats, Floats]] = memo.setdefault("colored regions", {})
+    known: dict[object, tuple[Floats, Floats, Floats]] = memo.setdefault(SURFACES, {})
     key = packet.locale, packet.neighbour
     if key not in known:
         regions = [region for _, face in packet.faces for region in (*face.front, *face.back)
