@@ -18,7 +18,7 @@ from world_models.entries.body import BodyFault
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch, Resumed
 
-TOLD = ("refuted", "lost", "found", "fault", "resumed")
+TOLD = ("refuted", "not testable", "lost", "found", "fault", "resumed")
 """Kinds that a short account of a run must not leave out."""
 REMEMBERED = 8
 """The newest entries of a type that are looked back for."""

@@ -20,7 +20,7 @@ from logs.turning_points import TurningPoint, turning_points
 from world_models.entries.location import Place
 from world_models.words import count
 
-MARKS = ("escalated", "refuted", "relocalization")
+MARKS = ("escalated", "refuted", "not testable", "relocalization")
 """A turning point that must be told has one of these words in its line of the journal, or is of one of these kinds."""
 KINDS = ("BodyFault-", "Resumed-")
 WIDTH = 120
@@ -54,7 +54,7 @@ def on_the_way(history: History, result: Mapping[str, Any]) -> Iterator[str]:
     points = sorted([*told_by_journal(history), *_collisions(result)], key=lambda point: point.cycle)
     unplaced = (result.get("collisions") or 0) - sum(point.kind == "collision" for point in points)
     if not points and unplaced <= 0:
-        yield "Nothing went wrong on the way: it was never lost, no milestone was refuted, and there was no fault."
+        yield "Nothing went wrong on the way: it was never lost, each milestone was verified, and there was no fault."
         return
     yield "On the way:"
     width = max((len(f"{point.cycle}{point.kind}") for point in points), default=0)
