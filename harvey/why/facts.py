@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from world_models.entries.task import Certificate, Goal, Leg, Milestone, PlanSke
 from world_models.words import count, degrees, landmark, listed, metres, point, quantity, size, turn
 
 SLIGHT_RAD = math.radians(0.05)
-CORRECTED_BY = {
+CORRECTED_BY: Mapping[Level, str] = {
     Level.ACTION: "on the move", Level.PLAN: "at a milestone", Level.GOAL: "by finding out anew where it is",
 }
 

@@ -93,6 +93,13 @@ def test_the_recording_has_its_words(installed: Path, run: Path) -> None:
     assert "timekeeper: the battery runs short: " in done.stdout, done.stderr
 
 
+def test_the_recording_has_the_foreign_panel(installed: Path, run: Path) -> None:
+    code = ("import sys; from pathlib import Path; from logs import reader;"
+            "print(len(reader._rows(Path(sys.argv[1]), 'battery', ('Scalars:scalars',))))")
+    done = python(installed, "-c", code, str(run / "recording.rrd"))
+    assert int(done.stdout or "0") > 3, done.stderr
+
+
 def test_the_generated_table_has_its_row(installed: Path) -> None:
     done = python(installed, str(ROOT / "docs" / "tools" / "knowledge_source_table.py"))
     assert "| `timekeeper` | action |" in done.stdout, done.stderr
