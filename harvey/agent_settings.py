@@ -1,4 +1,4 @@
-"""Settings of an agent from ``--set ROOM.NAME=VALUE``: told apart from a mission's, checked and put together."""
+"""Settings of an agent from ``--set ROOM.NAME=VALUE``: separated from a mission's, checked and put together."""
 
 from __future__ import annotations
 
@@ -58,6 +58,6 @@ def _format_value(value: Any) -> str:
 
 
 def unknown(key: str, others: Sequence[str] = ()) -> BadInput:
-    """What to say of a key that nobody understands."""
+    """The error for a key that neither the mission nor the agent has."""
     expected = suggest_keys(key, (*others, *names()))
     return BadInput(f"--set {key}: expected {expected}, got {key!r} (harvey settings lists all)")

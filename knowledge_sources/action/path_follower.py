@@ -86,9 +86,9 @@ class PathFollower(RobotKnowledgeSource):
         yield step
         wanted = compute_curvature_to(point, here) - (0.0 if drift is None else drift.value.curvature_per_m)
         curvature = min(max(wanted, -s.max_curvature_per_m), s.max_curvature_per_m)
-        told = Course(leg.id, self._robot.actuator.speed_m_per_s, curvature)
+        new = Course(leg.id, self._robot.actuator.speed_m_per_s, curvature)
         because = (step, belief, *(() if drift is None else (drift,)))
-        yield Post(told, because) if course is None else Revise(course, told, (course, *because))
+        yield Post(new, because) if course is None else Revise(course, new, (course, *because))
 
     def _may_start(self, view: View) -> bool:
         """Whether the robot stands before a leg that is long enough, and faces along it."""

@@ -98,8 +98,8 @@ class Relocalizer(RobotKnowledgeSource):
             result = self._prefer_reachable(result, belief.value.locale)
         for old in view.where(Hypothesis, lambda h: h.status == "candidate"):
             yield Retract(old, (segments,))
-        told = Panorama(glimpses, _describe(result))
-        seen = Post(told, because) if before is None else Revise(before, told, (*because, before))
+        panorama = Panorama(glimpses, _describe(result))
+        seen = Post(panorama, because) if before is None else Revise(before, panorama, (*because, before))
         yield seen
         if result.status is LocalizationStatus.FOUND:
             yield from self._adopt(view, (segments, seen), lost, belief, result.candidates[0])
@@ -137,7 +137,7 @@ class Relocalizer(RobotKnowledgeSource):
         return replace(glimpse, now_from_then=pose, covariance=covariance_tuple(covariance))
 
     def _list_rooms(self, belief: Hypothesis) -> list[str]:
-        """The rooms of the floor, the nearest to the last belief first: nobody is carried off to another floor."""
+        """The rooms of the floor, the nearest to the last belief first; other floors are not searched."""
         world, here = self._robot.world, belief.world_from_robot(self._robot.world)
         container, level_m = world.locale(belief.locale).parent or belief.locale, world.floor_m(belief.locale)
         same_m = self._settings.goal.max_floor_difference_m
