@@ -7,7 +7,6 @@ a journal, how long an entry is kept, and what people are told of it.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -16,6 +15,9 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 
+MARK = "KIND"
+"""The class attribute that holds the mark."""
+
 
 class Role(Enum):
     """Where entries of a kind come from, and who acts on them."""
@@ -23,7 +25,7 @@ class Role(Enum):
     REQUEST = "request"
     """A knowledge source writes it, and a port acts on it: it is on the disk before the port is asked."""
     OBSERVATION = "observation"
-    """It comes from outside: from a port, the user, or whoever runs the mission."""
+    """It comes from outside: from a port, from the user, or from the runner of the mission."""
     INFERENCE = "inference"
     """A knowledge source concludes it from other entries."""
 
@@ -80,7 +82,7 @@ def inference(**retention: Any) -> Callable[[type[T]], type[T]]:
 
 def kind_of(value_type: type[Any]) -> Kind:
     """The mark of a type. Raises NotAKindError."""
-    kind = value_type.__dict__.get("KIND")
+    kind = value_type.__dict__.get(MARK)
     if not isinstance(kind, Kind):
         raise NotAKindError(f"expected a kind of entry, got {value_type.__name__}: mark it with @request, @observation "
                             "or @inference (blackboard.kinds)")
@@ -89,7 +91,7 @@ def kind_of(value_type: type[Any]) -> Kind:
 
 def is_kind(value_type: type[Any]) -> bool:
     """Whether a type is marked."""
-    return isinstance(value_type.__dict__.get("KIND"), Kind)
+    return isinstance(value_type.__dict__.get(MARK), Kind)
 
 
 def is_request(value_type: type[Any]) -> bool:
@@ -136,9 +138,10 @@ class Registry(Mapping[str, type[Any]]):
 
 def _mark(kind: Kind) -> Callable[[type[T]], type[T]]:
     def mark(value_type: type[T]) -> type[T]:
-        if not (dataclasses.is_dataclass(value_type) and value_type.__dataclass_params__.frozen):  # type: ignore[attr-defined]
+        parameters = getattr(value_type, "__dataclass_params__", None)
+        if parameters is None or not parameters.frozen:
             raise TypeError(f"expected a frozen dataclass, got {value_type.__name__}")
-        value_type.KIND = kind  # type: ignore[attr-defined]
+        setattr(value_type, MARK, kind)
         return value_type
 
     return mark

@@ -100,7 +100,7 @@ class RecordingWriter:
         self._stream.end_cycle()
 
     def flush(self) -> None:
-        """Bring everything to the disk, and to whoever watches, now.
+        """Bring everything to the disk and to the viewers now.
 
         Raises:
             RecordingError: the recording cannot be written any more.

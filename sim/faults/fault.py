@@ -101,7 +101,7 @@ class Fault(ABC):
 
 @dataclass(frozen=True, slots=True)
 class DeviceFault(Fault):
-    """A device does not work for a while; whoever asks it gets a ``BodyFault`` with these words.
+    """A device does not work for a while; every request to it is answered by a ``BodyFault`` with these words.
 
     Attributes:
         part: the device, "base" or "camera".
