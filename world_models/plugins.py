@@ -3,6 +3,7 @@
 ============================  ==========================================================================
 ``harvey.knowledge_sources``  a class under ``blackboard.knowledge_source.KnowledgeSource``
 ``harvey.bases``              a ``harvey.hardware.drivers.bases.base.BaseKind``
+``harvey.emulators``          a ``sim.emulators.registry.EmulatorKind``
 ``harvey.faults``             a class under ``sim.faults.fault.Fault``
 ``harvey.loggers``            a class under ``logs.recording.logger.Logger``
 ============================  ==========================================================================

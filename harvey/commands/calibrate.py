@@ -59,7 +59,7 @@ def _arguments(parser: ArgumentParser) -> None:
     mount.add_argument("--board-ahead-mm", metavar="MM", type=_millimetres, dest="board_ahead_m",
                        help="from the robot's turning axis ahead to the nearest inner corners (standing: to the board)")
     mount.add_argument("--forward-mm", metavar="MM", type=_millimetres, dest="forward_m",
-                       help="or: from the turning axis ahead to the lens, by stream measure (0)")
+                       help="or: from the turning axis ahead to the lens, by tape measure (0)")
 
 
 def _run(args: Namespace) -> int:

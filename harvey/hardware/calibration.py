@@ -174,7 +174,7 @@ def _mounting_lines(found: Mounting, board: Mounted) -> tuple[str, ...]:
              f"  board   {found.to_board_m:8.4f} +- {s[3]:.4f} m ahead of the camera"]
     if board.board_ahead_m is not None:
         forward = board.board_ahead_m - found.to_board_m
-        lines += [f"  forward {forward:8.4f} +- {s[3]:.4f} m, and what the stream measure errs",
+        lines += [f"  forward {forward:8.4f} +- {s[3]:.4f} m, and what the tape measure errs",
                   f"  yaw     {math.degrees(found.yaw_rad):8.3f} +- {math.degrees(s[4]):.3f} degrees to the left, if "
                   "the board was square to the robot"]
     for name, angle in (("roll", found.roll_rad), ("yaw", found.yaw_rad if board.board_ahead_m is not None else 0.0)):

@@ -118,6 +118,14 @@ def test_a_foreign_base_can_be_named(installed: Path) -> None:
     assert "expected denning:PORT or p2os:PORT or create2:PORT" in python(None, "-c", code).stderr
 
 
+def test_a_foreign_base_drives_a_mission_behind_its_own_emulator(installed: Path, run: Path, tmp_path: Path) -> None:
+    scenario = run.parent / "slide.toml"
+    done = harvey(installed, "run", str(scenario), "--body", "serial:counting", "--out", str(tmp_path / "run"))
+    assert done.returncode == 0, done.stderr
+    assert "expected one of simulated, serial:denning" in harvey(
+        None, "run", "forty-foot-hallway", "--body", "serial:counting").stderr
+
+
 def test_what_cannot_be_loaded_is_named(installed: Path, tmp_path: Path) -> None:
     info = tmp_path / "broken-0.1.dist-info"
     info.mkdir()

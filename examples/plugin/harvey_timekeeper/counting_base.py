@@ -30,11 +30,11 @@ class CountingBase(Driver):
     def _halt(self) -> None:
         self._ask("s")
 
-    def _counted(self) -> Odometry:
+    def _read_odometry(self) -> Odometry:
         self._ask("?")
         return Odometry(self.pose.x_m, self.pose.y_m, self.pose.heading_rad, self._link.now())
 
-    def _reopened(self) -> None:
+    def _after_reopening(self) -> None:
         """Nothing is half read: every line is answered before the next."""
 
     def _ask(self, line: str) -> tuple[float, float, float]:

@@ -11,24 +11,32 @@ import pytest
 
 from harvey.cli import parser
 from sim.scenario import parse_scenario
+from world_models import plugins
 from world_models.building.checks import check_world
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 
 ROOT = Path(__file__).parents[3]
-FOLDERS = (ROOT, ROOT / "knowledge_sources", ROOT / "world_models")
-"""Where a file may be that a table names after another one of the same folder."""
+DOCUMENTS = ("README.md", "ARCHITECTURE.md", "tests/README.md",
+             *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")))
+ROOMS = ("blackboard", "world_models", "knowledge_sources", "sim", "logs", "harvey", "experiments")
+NOT_OF_ONE_FOLDER = ("__init__.py",)
+"""Named as what any folder has."""
 MOST_BYTES = 400_000
 SHEET_BYTES = 1_500_000
 """Of a sheet of ten pictures."""
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+ARCHITECTURE = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
 COMMAND = re.compile(r"^(?:\.venv/bin/)?harvey ([^#\n]+)|`harvey ([^`]+)`", re.MULTILINE)
 
 
-def test_every_command_is_understood_with_all_its_options() -> None:
-    shown = [line or inline for line, inline in COMMAND.findall(README)]
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_every_command_is_understood_with_all_its_options(document: str) -> None:
+    text = (ROOT / document).read_text(encoding="utf-8")
+    shown = [line or " ".join(inline.split()) for line, inline in COMMAND.findall(text)]
+    assert [name for name in shown if " " not in name and name not in parser().format_help()] == []
+    shown = [line for line in shown if " " in line and "--help" not in line]
     parsed = [(line, *parser().parse_known_args(shlex.split(line))) for line in shown]
-    assert len(shown) >= 12
     assert [(line, unknown) for line, args, unknown in parsed if unknown and not args.command.open_ended] == []
 
 
@@ -42,12 +50,46 @@ def test_every_toml_example_is_a_scenario_or_a_world_without_faults() -> None:
     assert [fault for text in worlds for fault in check_world(read_world(Source.parse(text, "README.md"), []))] == []
 
 
-@pytest.mark.parametrize("document", ["README.md", "ARCHITECTURE.md"])
+@pytest.mark.parametrize("document", DOCUMENTS)
 def test_every_file_that_is_named_is_there(document: str) -> None:
+    """Relative to the repository, or to the document's own folder; runs and what a reader makes are not checked."""
     text = (ROOT / document).read_text(encoding="utf-8")
-    named = re.findall(r"`([a-z_]+(?:/[\w.-]+)*/?(?:\.py|\.toml|\.md|/))`", text)
-    assert named
-    assert [name for name in named if not any((folder / name).exists() for folder in FOLDERS)] == []
+    named = re.findall(r"`([\w.-]+(?:/[\w.-]+)*/?(?:\.py|\.toml|\.md|\.svg|/))`", text)
+    links = [link for link in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in link]
+    folders = (ROOT, (ROOT / document).parent)
+    shipped = [name for name in named if not name.startswith("runs/") and name not in NOT_OF_ONE_FOLDER]
+    assert [name for name in shipped if not any((folder / name).exists() for folder in folders)] == []
+    assert [link for link in links if not ((ROOT / document).parent / link).exists()] == []
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_every_module_that_is_run_is_there(document: str) -> None:
+    text = (ROOT / document).read_text(encoding="utf-8")
+    modules = re.findall(r"python -m ([\w.]+)", text)
+    assert [name for name in modules if not (ROOT / f"{name.replace('.', '/')}.py").exists()] == []
+
+
+def test_architecture_names_every_folder_of_two_levels() -> None:
+    """What a newcomer sees with ``ls`` is in the table, each with its question."""
+    folders = {f"{path.parent.relative_to(ROOT)}/" for room in ROOMS for path in (ROOT / room).glob("*/__init__.py")}
+    missing = [name for name in sorted(folders | {f"{room}/" for room in (*ROOMS, "examples", "tests", "docs")})
+               if f"`{name}`" not in ARCHITECTURE]
+    assert missing == []
+
+
+def test_the_example_of_a_knowledge_source_is_the_one_in_the_package() -> None:
+    example = (ROOT / "examples/plugin/harvey_timekeeper/timekeeper.py").read_text(encoding="utf-8")
+    shown = re.findall(r"```python\n(.*?)```", ARCHITECTURE, re.DOTALL)
+    assert shown
+    lines = [line for text in shown for line in text.splitlines() if "RunningShort.\"" not in line]
+    assert [line for line in lines if line.strip(' "') not in example] == []
+
+
+def test_entry_points_are_those_of_the_plugins_table() -> None:
+    groups = set(re.findall(r"``(harvey\.\w+)``", plugins.__doc__ or ""))
+    package = tomllib.loads((ROOT / "examples/plugin/pyproject.toml").read_text(encoding="utf-8"))
+    assert groups == set(package["project"]["entry-points"])
+    assert [group for group in sorted(groups) if f"`{group}`" not in ARCHITECTURE] == []
 
 
 def test_pictures_are_small() -> None:
