@@ -69,6 +69,8 @@ def run(quick: bool, seed: int) -> Report:
             "The smallest world against itself, as a measure of the noise: first action"
             f" {again.first(times[0]):.3f} x, sketching {again.sketching(times[0]):.3f} x,"
             f" worst step {again.worst(times[0]):.3f} x.",
+            *([f"Not claimed by --quick: that each single sketch step is within {MAX_RATIO} x; {QUICK_PLANS} repetitions"
+               " are too few for that on a busy machine."] if quick else []),
         ),
         claims=tuple(claim for each in zip(answers[1:], times[1:], rows[1:], strict=True)
                      for claim in _claims(*each, answers[0], times[0], rows[0])),
@@ -201,8 +203,8 @@ def _claims(answers: Answers, times: _Times, row: Sequence[Cell], small: Answers
         (f"{size}: the same journal, and the same frames touched", row[9] == "yes" and touched),
         (f"{size}: first action within {MAX_RATIO} x the small world's ({first:.3f})", first <= MAX_RATIO),
         (f"{size}: all later sketch steps together within {MAX_RATIO} x ({together:.3f})", together <= MAX_RATIO),
-        (f"{size}: each later sketch step of {MIN_STEP_MS} ms and more within {MAX_RATIO} x (worst {worst:.3f})",
-         worst <= MAX_RATIO),
+        *([(f"{size}: each later sketch step of {MIN_STEP_MS} ms and more within {MAX_RATIO} x (worst {worst:.3f})",
+            worst <= MAX_RATIO)] if len(times.steps_ms) >= PLANS else []),
         (f"{size}: memory within {MAX_MORE_MB:.0f} MB ({more_mb:+.1f})", more_mb <= MAX_MORE_MB),
         (f"{size}: opened in less than {MAX_OPEN_MS:.0f} ms", float(str(row[3])) < MAX_OPEN_MS),
     ]
