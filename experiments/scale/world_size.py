@@ -69,7 +69,7 @@ def run(quick: bool, seed: int) -> Report:
             "The smallest world against itself, as a measure of the noise: first action"
             f" {again.first(times[0]):.3f} x, sketching {again.sketching(times[0]):.3f} x,"
             f" worst step {again.worst(times[0]):.3f} x.",
-            *([f"Not claimed by --quick: that each single sketch step is within {MAX_RATIO} x; {QUICK_PLANS} repetitions"
+            *([f"Not claimed by --quick: that each sketch step is within {MAX_RATIO} x; {QUICK_PLANS} repetitions"
                " are too few for that on a busy machine."] if quick else []),
         ),
         claims=tuple(claim for each in zip(answers[1:], times[1:], rows[1:], strict=True)
