@@ -13,12 +13,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from itertools import groupby
+from typing import Literal
 
 from blackboard.board import View
 from blackboard.entry import Entry
 from blackboard.entry_store import Index
 from blackboard.kinds import inference
 from blackboard.level import Level
+
+DiscrepancyStatus = Literal["open", "corrected", "escalated"]
 
 
 def is_closed(discrepancy: Discrepancy) -> bool:
@@ -52,7 +55,7 @@ class Discrepancy:
     magnitude: float | None
     bounds: tuple[float, float]
     unit: str
-    status: str = "open"
+    status: DiscrepancyStatus = "open"
     tried: str = ""
     times: int = 0
 

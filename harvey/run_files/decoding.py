@@ -49,6 +49,8 @@ def decoded(value: Any, hint: Any) -> Any:
     origin = typing.get_origin(hint)
     if origin in (types.UnionType, typing.Union):
         return None if value is None else decoded(value, next(a for a in typing.get_args(hint) if a is not type(None)))
+    if origin is typing.Literal:
+        return _choice(value, typing.get_args(hint))
     if origin is collections.abc.Mapping:
         if not isinstance(value, dict):
             raise ValueError(f"expected an object, got {_brief(value)}")
@@ -66,6 +68,12 @@ def decoded(value: Any, hint: Any) -> Any:
     fits = isinstance(value, (int, float) if hint is float else hint)
     if not fits or (isinstance(value, bool) and hint is not bool):
         raise ValueError(f"expected {WORDS.get(hint, hint.__name__)}, got {_brief(value)}")
+    return value
+
+
+def _choice(value: Any, choices: tuple[Any, ...]) -> Any:
+    if value not in choices:
+        raise ValueError(f"expected one of {', '.join(map(str, choices))}, got {_brief(value)}")
     return value
 
 

@@ -25,7 +25,7 @@ from knowledge_sources.methods.localization.views import CameraView, propagate_p
 from knowledge_sources.questions import active_goal, find_belief, is_over, is_standing, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Look, MotionReport, MotorCommand
-from world_models.entries.location import Hypothesis, Place, covariance_tuple
+from world_models.entries.location import Hypothesis, HypothesisStatus, Place, covariance_tuple
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import Glimpse, Panorama, Segments
 from world_models.entries.task import Goal, PlanSketch
@@ -169,7 +169,9 @@ class Relocalizer(RobotKnowledgeSource):
         origin = Place.of_world(self._robot.world, candidate.room, pose.x_m, pose.y_m)
         yield Post(Goal(origin, goal.value.destination), (here, abandon))
 
-    def _to_hypothesis(self, candidate: Candidate, belief: Hypothesis, status: str, weight: float) -> Hypothesis:
+    def _to_hypothesis(
+        self, candidate: Candidate, belief: Hypothesis, status: HypothesisStatus, weight: float
+    ) -> Hypothesis:
         return Hypothesis.of_world(
             self._robot.world, candidate.room, candidate.world_from_robot, candidate.covariance, "relocalization",
             status=status, weight=weight, motion=belief.motion, evidence=str(candidate.likelihood),

@@ -26,7 +26,7 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Frame
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
-from world_models.entries.task import Certificate, Milestone
+from world_models.entries.task import Certificate, Milestone, MilestoneVerdict
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
@@ -70,7 +70,7 @@ class Weighed:
 class Verdict:
     """What is decided: ``verified``, ``refuted`` or ``not testable``, in words why, and how likely it is wrong."""
 
-    kind: str
+    kind: MilestoneVerdict
     reason: str
     p_false: float
 
@@ -160,7 +160,7 @@ class MilestoneJudge(RobotKnowledgeSource):
             return Verdict("not testable", f"{reason}; but {elsewhere}", p_false)
         return Verdict(kind, reason, weighed.p_false)
 
-    def _first_verdict(self, w: Weighed) -> tuple[str, str]:
+    def _first_verdict(self, w: Weighed) -> tuple[MilestoneVerdict, str]:
         """The verdict by this place alone, and why."""
         a, faces = w.lines.agreement, w.faces
         if w.segments.contrast < self._settings.plan.min_contrast:

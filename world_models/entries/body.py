@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from blackboard.board import View
 from blackboard.entry import Entry
 from blackboard.kinds import observation, request
 from world_models import words
+
+FaultStatus = Literal["open", "over"]
+RecoveryStatus = Literal["asked", "in vain", "over"]
 
 LAST_REQUESTS = 8
 """The newest requests and faults that stay on the board: the fault handler looks back over a few of them."""
@@ -209,7 +213,7 @@ class BodyFault:
     when_s: float
     turn_rad: float | None = None
     move_m: float | None = None
-    status: str = "open"
+    status: FaultStatus = "open"
 
     @property
     def is_open(self) -> bool:
@@ -244,7 +248,7 @@ class Recovery:
     wait_s: float
     tries: int = 0
     waited_s: float = 0.0
-    status: str = "asked"
+    status: RecoveryStatus = "asked"
     what: str = ""
     detail: str = ""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from blackboard.kinds import inference
 from world_models import words
 from world_models.frames import Pose, Pose2, flattened
+
+HypothesisStatus = Literal["held", "candidate", "doubted"]
 
 
 class Frames(Protocol):
@@ -84,7 +86,7 @@ class Hypothesis:
     locale_from_robot: Pose2
     covariance: Covariance
     basis: str
-    status: str = "held"
+    status: HypothesisStatus = "held"
     weight: float = 1.0
     motion: str = ""
     evidence: str = ""
@@ -114,7 +116,7 @@ class Hypothesis:
     @staticmethod
     def of_world(
         world: Frames, locale: str, world_from_robot: Pose2, covariance_world: Any, basis: str,
-        *, status: str = "held", weight: float = 1.0, motion: str = "", evidence: str = "",
+        *, status: HypothesisStatus = "held", weight: float = 1.0, motion: str = "", evidence: str = "",
     ) -> Hypothesis:
         """From a pose and covariance in the world frame."""
         locale_from_world = flattened(world.world_from_locale(locale)).inverse()

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from blackboard.kinds import inference, observation
 from world_models import words
 from world_models.entries.location import Covariance, Place
+
+GoalStatus = Literal["active", "reached", "abandoned"]
+SketchStatus = Literal["active", "done", "superseded"]
+LegStatus = Literal["moving", "arrived", "halted"]
+MilestoneVerdict = Literal["verified", "refuted", "not testable"]
+MilestoneStatus = Literal["turning", "expected", "verified", "refuted", "not testable"]
 
 
 def is_inactive(task: Goal | PlanSketch) -> bool:
@@ -57,7 +64,7 @@ class Goal:
 
     origin: Place
     destination: Place
-    status: str = "active"
+    status: GoalStatus = "active"
 
     @property
     def is_active(self) -> bool:
@@ -114,7 +121,7 @@ class PlanSketch:
     subgoals: tuple[Subgoal, ...]
     at: int = 0
     verified: bool = False
-    status: str = "active"
+    status: SketchStatus = "active"
     adjustments: int = 0
 
     @property
@@ -176,7 +183,7 @@ class Leg:
     tolerance_m: float
     heading_rad: float | None = None
     increments: int = 0
-    status: str = "moving"
+    status: LegStatus = "moving"
     to_go_m: float | None = None
     left_m: float | None = None
     aim_rad: float | None = None
@@ -218,7 +225,7 @@ class Milestone:
     landmark_of: tuple[int, ...] = ()
     looks: tuple[tuple[tuple[float, ...], tuple[tuple[float, ...], ...]], ...] = ()
     tried: tuple[float, ...] = ()
-    status: str = "turning"
+    status: MilestoneStatus = "turning"
 
     @property
     def is_open(self) -> bool:
@@ -258,7 +265,7 @@ class Certificate:
 
     milestone: str
     fix: str
-    verdict: str
+    verdict: MilestoneVerdict
     reason: str
     expected: int
     matched: int
