@@ -9,7 +9,7 @@ BUILDING = f"{WORLD}/building"
 NAMES, DOORWAYS = f"{BUILDING}/names", f"{BUILDING}/doorways"
 TRUE_ROBOT, TRUE_TRAIL = f"{WORLD}/robot/true", f"{WORLD}/robot/true_trail"
 BELIEVED_ROBOT, BELIEVED_TRAIL = f"{WORLD}/robot/believed", f"{WORLD}/robot/believed_trail"
-BELIEVED_BODY, BELIEVED_SIGHT = f"{BELIEVED_ROBOT}/body", f"{BELIEVED_ROBOT}/sight"
+BELIEVED_BODY = f"{BELIEVED_ROBOT}/body"
 CANDIDATES = f"{WORLD}/robot/candidates"
 GOAL, PATH, LEG, LANDMARKS = f"{WORLD}/plan/goal", f"{WORLD}/plan/path", f"{WORLD}/plan/leg", f"{WORLD}/plan/landmarks"
 

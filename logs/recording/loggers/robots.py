@@ -19,7 +19,6 @@ from logs.recording.panel import Panel
 from logs.recording.paths import (
     BELIEVED_BODY,
     BELIEVED_ROBOT,
-    BELIEVED_SIGHT,
     BELIEVED_TRAIL,
     CANDIDATES,
     NAMES,
@@ -64,17 +63,17 @@ class Robots(Logger):
         self._has_candidates = False
 
     def panels(self) -> Sequence[Panel]:
-        """The building from near by; the eye goes with the believed robot, as far away as to see what it looks at."""
+        """The building from near by; the eye goes with the believed robot."""
         eye = rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital, position=[0.0, -CLOSE_SOUTH_M, CLOSE_ABOVE_M], look_target=[0.0, 0.0, 0.0],
-            eye_up=[0.0, 0.0, 1.0], tracking_entity=f"/{BELIEVED_SIGHT}")
+            eye_up=[0.0, 0.0, 1.0], tracking_entity=f"/{BELIEVED_BODY}")
         return (Panel(space_view("Close by", eye, f"- /{NAMES}"), "decisions", 3, 6),)
 
     def begin(self, stream: RecordingStream) -> None:
         wires = rr.components.FillMode.MajorWireframe
         stream.fix(BELIEVED_BODY, _cylinder(BELIEVED, RADIUS_M + 0.08, 1.3, wires))
         stream.fix(f"{BELIEVED_ROBOT}/heading", _arrow(BELIEVED, 1.35))
-        stream.fix(BELIEVED_SIGHT, _wedge(self._camera, self._mount.forward_m))
+        stream.fix(f"{BELIEVED_ROBOT}/sight", _wedge(self._camera, self._mount.forward_m))
         stream.fix(BELIEVED_TRAIL, rr.LineStrips3D.from_fields(colors=[BELIEVED], radii=0.04))
         label = f"1 sigma, drawn {SIGMA_SCALE:.0f} times as large"
         stream.fix(BELIEVED_ROBOT, rr.LineStrips3D.from_fields(
