@@ -180,7 +180,7 @@ class RecordedRun:
 
     @cached_property
     def _kinds(self) -> Registry:
-        return registry_of(self._sources, wiring.known_kinds().values())
+        return registry_of(self._sources, wiring.load_kinds().values())
 
     @property
     def result(self) -> Mapping[str, Any]:

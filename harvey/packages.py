@@ -20,9 +20,10 @@ def check_packages() -> None:
         folders = list(spec.submodule_search_locations or ()) if spec is not None else []
         if not any(path for folder in folders for path in Path(folder).glob(f"{module}.*")):
             there = next(iter(folders), spec.origin if spec is not None else None)
-            raise ImportError(_hidden(name, there) if there else f"harvey: expected its package {name!r}, got none")
+            raise ImportError(
+                _describe_conflict(name, there) if there else f"harvey: expected its package {name!r}, got none")
 
 
-def _hidden(name: str, there: str) -> str:
+def _describe_conflict(name: str, there: str) -> str:
     return (f"harvey: its package {name!r} is hidden by {there}, which Python finds first; rename that one, or start "
             "Python in another folder")

@@ -88,7 +88,7 @@ def foreign_sources() -> Mapping[str, type[KnowledgeSource]]:
 
 
 @cache
-def known_kinds() -> Registry:
+def load_kinds() -> Registry:
     """The kinds of entries that may be on a board: those of the project and of every knowledge source there is."""
     return registry_of((*KNOWLEDGE_SOURCES, *foreign_sources().values()), KINDS)
 

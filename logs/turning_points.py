@@ -84,7 +84,7 @@ def turning_points(change: Change, cycle: int, get: Get, belief: Entry[Hypothesi
     elif isinstance(value, Certificate):
         yield TurningPoint(cycle, value.verdict, _verdict(value, get))
     elif isinstance(value, Discrepancy) and value.status == "escalated":
-        yield _escalated(value, cycle, belief)
+        yield _to_turning_point(value, cycle, belief)
     elif isinstance(value, Hypothesis) and value.is_held and value.basis == "relocalization":
         yield TurningPoint(cycle, "found", f"{value.place()}; it knows again where it is")
     elif isinstance(value, BodyFault):
@@ -95,7 +95,7 @@ def turning_points(change: Change, cycle: int, get: Get, belief: Entry[Hypothesi
         yield TurningPoint(cycle, "the end", f"{value.kind}: {value.reason}")
 
 
-def _escalated(discrepancy: Discrepancy, cycle: int, belief: Entry[Hypothesis] | None) -> TurningPoint:
+def _to_turning_point(discrepancy: Discrepancy, cycle: int, belief: Entry[Hypothesis] | None) -> TurningPoint:
     if discrepancy.level.above is not Level.GOAL:
         return TurningPoint(cycle, "doubt", discrepancy.what)
     where = f"{belief.value.place()} by its belief; " if belief is not None else ""

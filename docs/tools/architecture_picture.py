@@ -9,7 +9,7 @@ from xml.sax.saxutils import escape
 from blackboard.kinds import Registry, Role
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from harvey.wiring import KNOWLEDGE_SOURCES, known_kinds
+from harvey.wiring import KNOWLEDGE_SOURCES, load_kinds
 
 PICTURE = Path(__file__).parents[1] / "architecture.svg"
 WIDTH, MARGIN, GAP = 1000, 16, 40
@@ -172,4 +172,4 @@ def fit(lines: Sequence[Line]) -> int:
 
 
 if __name__ == "__main__":
-    PICTURE.write_text(draw_architecture(KNOWLEDGE_SOURCES, known_kinds()), encoding="utf-8")
+    PICTURE.write_text(draw_architecture(KNOWLEDGE_SOURCES, load_kinds()), encoding="utf-8")

@@ -36,10 +36,10 @@ def moments_of(recording: Path, most: int) -> list[Moment]:
     """The most telling moments of a recording, in the order of time. Raises RecordingError where it cannot be read."""
     kinds, texts = (read_series(recording, CHAPTERS, f"TextLog:{what}") for what in ("level", "text"))
     turns = [Moment(cycle, kind, text) for (cycle, kind), (_, text) in zip(kinds, texts, strict=True)]
-    return chosen([*turns, *_drives(read_series(recording, HARVEY, "StateChange:state"))], most)
+    return choose([*turns, *_drives(read_series(recording, HARVEY, "StateChange:state"))], most)
 
 
-def chosen(candidates: Sequence[Moment], most: int) -> list[Moment]:
+def choose(candidates: Sequence[Moment], most: int) -> list[Moment]:
     """As many as wanted, one of each kind before a second one of any; of a kind those that lie farthest apart."""
     found: list[Moment] = []
     while len(found) < most:

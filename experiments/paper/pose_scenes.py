@@ -152,7 +152,7 @@ def compute_position_bound_ft(scene: PoseScene, sigma_px: float) -> Array:
     return np.asarray(np.sqrt(variance[[1, 0, 2]]) * FEET_PER_M)
 
 
-def drawn_prior(truth: Pose, shift_m: float, turn_rad: float, rng: np.random.Generator) -> Pose:
+def draw_prior(truth: Pose, shift_m: float, turn_rad: float, rng: np.random.Generator) -> Pose:
     """The truth with uniform errors of up to ``shift_m`` and ``turn_rad`` along and about each camera axis."""
     return truth.perturbed(rng.uniform(-turn_rad, turn_rad, 3), rng.uniform(-shift_m, shift_m, 3))
 

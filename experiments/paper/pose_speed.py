@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from experiments.paper.pose_peer import NOT_INSTALLED, Peer
-from experiments.paper.pose_scenes import PoseScene, campus, drawn_prior, end_noise, wrong_landmarks
+from experiments.paper.pose_scenes import PoseScene, campus, draw_prior, end_noise, wrong_landmarks
 from experiments.report import Cell, Report
 from knowledge_sources.methods.pose import med_r_and_t, r_and_t, r_and_t_ml, trunc_r_and_t
 from world_models.frames import Pose
@@ -78,7 +78,7 @@ def _calls(scene: PoseScene, peer: Peer | None, rng: np.random.Generator) -> dic
     lines, camera, ids = scene.lines_world, scene.camera, scene.landmark_ids
     clean = end_noise(scene.segments_px, SIGMA_PX, rng)
     mixed, _ = wrong_landmarks(scene, clean, WRONG, rng)
-    prior: Pose = drawn_prior(scene.camera_from_world, PRIOR_M, PRIOR_RAD, rng)
+    prior: Pose = draw_prior(scene.camera_from_world, PRIOR_M, PRIOR_RAD, rng)
     calls: dict[str, Call] = {
         "r_and_t_ml": lambda: r_and_t_ml(lines, clean, camera, prior, sigma_px=SIGMA_PX),
         "r_and_t": lambda: r_and_t(lines, clean, camera, prior, sigma_px=SIGMA_PX),

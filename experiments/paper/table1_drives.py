@@ -78,7 +78,7 @@ def run_drive(drive: Drive, out: Path | None = None) -> DriveResult:
     body = run.simulated_body
     way = np.array([_to_line_in(stage, truth) for truth in body.track])
     if drive.continuous:
-        z_in, x_in = _interpolate_ends(way, _mean_move_in(stage))
+        z_in, x_in = _interpolate_ends(way, _compute_mean_move_in(stage))
     else:
         z_in, x_in = (list(column) for column in zip(*(_to_line_in(stage, t) for t in ends[:INCREMENTS]), strict=True))
     open_z, open_x = run_open_loop(drive.seed, drive.feet)
@@ -129,7 +129,7 @@ def _to_line_in(stage: Stage, truth: Truth) -> tuple[float, float]:
     return z / INCH_M, -left / INCH_M
 
 
-def _mean_move_in(stage: Stage) -> float:
+def _compute_mean_move_in(stage: Stage) -> float:
     """Mean length of a commanded MOVE of two feet [in]."""
     a = stage.scenario.actuator
     return (1.0 - 0.5 * (a.shortfall_low + a.shortfall_high)) * INCREMENT_M / INCH_M

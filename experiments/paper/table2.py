@@ -17,7 +17,7 @@ from experiments.paper.pose_scenes import (
     campus,
     compute_information,
     compute_position_error_ft,
-    drawn_prior,
+    draw_prior,
     end_noise,
     fragment,
     rho_theta_noise,
@@ -125,7 +125,7 @@ def _errors(
     found: dict[str, list[Array]] = {"r_then_t": [], "r_and_t": [], "r_and_t_ml": [], "peer": []}
     for _ in range(count):
         segments = rho_theta_noise(scene.segments_px, noise, math.radians(noise), centre, rng)
-        prior = drawn_prior(scene.camera_from_world, PRIOR_M, PRIOR_RAD, rng)
+        prior = draw_prior(scene.camera_from_world, PRIOR_M, PRIOR_RAD, rng)
         for solver in (r_then_t, r_and_t, r_and_t_ml):
             pose = solver(scene.lines_world, segments, scene.camera, prior).camera_from_world
             found[solver.__name__].append(_error(pose, scene))
@@ -147,7 +147,7 @@ def _compare_to_bound(scene: PoseScene, whole: bool, count: int, rng: np.random.
     bound = compute_information(fixed, SIGMA_PX)
     for _ in range(count):
         segments = end_noise(fixed.segments_px, SIGMA_PX, rng)
-        prior = drawn_prior(truth, PRIOR_M, PRIOR_RAD, rng)
+        prior = draw_prior(truth, PRIOR_M, PRIOR_RAD, rng)
         found = r_and_t_ml(fixed.lines_world, segments, fixed.camera, prior, sigma_px=SIGMA_PX)
         apart = found.camera_from_world @ truth.inverse()
         error = np.concatenate([apart.rotation_vector, apart.translation])

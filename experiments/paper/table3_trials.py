@@ -16,7 +16,7 @@ from experiments.paper.pose_scenes import (
     compute_position_bound_ft,
     compute_position_error_ft,
     corridor,
-    drawn_prior,
+    draw_prior,
     end_noise,
     fragment,
     wrong_landmarks,
@@ -102,7 +102,7 @@ def _run_trial(frame: Frame, rng: np.random.Generator) -> tuple[Errors, float]:
     if frame.parts:
         scene = fragment(scene, rng)
     segments, wrong = wrong_landmarks(scene, end_noise(scene.segments_px, SIGMA_PX, rng), frame.wrong, rng)
-    prior = drawn_prior(scene.camera_from_world, PRIOR_M, PRIOR_RAD, rng)
+    prior = draw_prior(scene.camera_from_world, PRIOR_M, PRIOR_RAD, rng)
     methods = _methods(scene, segments, prior, Peer.find())
     errors = {name: np.abs(compute_position_error_ft(solve(), scene.camera_from_world))
               for name, solve in methods.items()}

@@ -21,7 +21,7 @@ import numpy as np
 from experiments.report import Cell, Report
 from experiments.trials import campaign_folder, run_trials
 from harvey.run_files.records import read_records
-from harvey.simulation.body_replay import interrupted_in
+from harvey.simulation.body_replay import find_interrupted
 from sim.made_up.short_missions import HALLWAY, OFFICE, fault
 
 CHILD = (sys.executable, "-m", "experiments.robustness.crash_child")
@@ -200,7 +200,7 @@ def _compare(journal: Path, logs: Sequence[Path]) -> tuple[int, str]:
     commands: list[tuple[str, list[float]]] = []
     interrupted: set[str] = set()
     for decision in read_records(journal):
-        interrupted |= interrupted_in(decision.observed)
+        interrupted |= find_interrupted(decision.observed)
         commands += [(record.ref, [record.value["turn_rad"], record.value["move_m"]])
                      for record in decision.made if record.type == "MotorCommand"]
     lines = (line for log in logs if log.exists() for line in log.read_text("utf-8").splitlines())

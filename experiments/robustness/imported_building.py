@@ -88,13 +88,13 @@ def run(quick: bool, seed: int) -> Report:
             f"Rooms and headings are drawn with seed {seed}; mission N has seed {seed} + N. Errors are true distances.",
             f"Each mission is a scenario file: {folder}/mission-N.toml.",
             *(_describe(trip, end, seed) for trip, end in zip(trips, ends, strict=True)
-              if not _arrived(end) or end.collisions),
+              if not _has_arrived(end) or end.collisions),
         ),
         claims=(
             ("the imported house is a world without faults", not check_world(world)),
-            (f"at least {_min_reached(len(ends))} of {len(ends)} missions reach their goals, and truly are within"
-             f" {1000.0 * MAX_ERROR_M:.0f} mm of them", sum(map(_arrived, ends)) >= _min_reached(len(ends))),
-            ("every other one ends in a declared outcome", all(_arrived(r) or _declared(r) for r in ends)),
+            (f"at least {_min_goals(len(ends))} of {len(ends)} missions reach their goals, and truly are within"
+             f" {1000.0 * MAX_ERROR_M:.0f} mm of them", sum(map(_has_arrived, ends)) >= _min_goals(len(ends))),
+            ("every other one ends in a declared outcome", all(_has_arrived(r) or _is_declared(r) for r in ends)),
         ),
     )
 
@@ -135,24 +135,24 @@ def _task(trip: Trip, folder: Path, seed: int) -> Task:
     return Task(str(path), (), seed + trip.number)
 
 
-def _arrived(result: MissionResult) -> bool:
+def _has_arrived(result: MissionResult) -> bool:
     return result.outcome == "reached" and result.error_m <= MAX_ERROR_M
 
 
-def _declared(result: MissionResult) -> bool:
+def _is_declared(result: MissionResult) -> bool:
     """Whether it ended in a declared outcome, and not because a knowledge source raised an exception."""
     return result.outcome in DECLARED and " raised " not in result.reason
 
 
-def _min_reached(count: int) -> int:
+def _min_goals(count: int) -> int:
     return int(np.ceil(MIN_REACHED_SHARE * count - 1e-9))
 
 
 def _row(name: str, results: Sequence[MissionResult]) -> tuple[Cell, ...]:
-    errors_mm = [1000.0 * r.error_m for r in results if _arrived(r)]
+    errors_mm = [1000.0 * r.error_m for r in results if _has_arrived(r)]
     return (
         name, len(results), len(errors_mm),
-        count_kinds(r.outcome for r in results if not _arrived(r)),
+        count_kinds(r.outcome for r in results if not _has_arrived(r)),
         float(np.mean(errors_mm)) if errors_mm else None, max(errors_mm, default=None),
         sum(r.collisions or 0 for r in results), sum(r.false_accepts for r in results),
         sum(r.replans for r in results), sum(r.relocalizations for r in results),

@@ -76,10 +76,10 @@ def mission_cost(cycles: int | None, seed: int) -> Cost:
         scenario = replace(scenario, limits=replace(scenario.limits, max_cycles=cycles))
     recorded: list[Decision] = []
     run_mission(build_stage(scenario), seed, sinks=[recorded.append])
-    return _replay_timed(scenario, recorded)
+    return _time_replay(scenario, recorded)
 
 
-def _replay_timed(scenario: Scenario, recorded: list[Decision]) -> Cost:
+def _time_replay(scenario: Scenario, recorded: list[Decision]) -> Cost:
     timed = [_Timed(source) for source in knowledge_sources(build_robot_model(scenario))]
     scheduler = Scheduler(timed, servoing=servoing(scenario.servo), kinds=KINDS)
     lines_s, steps_s = 0.0, 0.0

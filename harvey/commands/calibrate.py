@@ -63,7 +63,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.hardware.calibration import boards_in, calibrate_camera, find_mounting, grey_of, report
+    from harvey.hardware.calibration import calibrate_camera, find_boards, find_mounting, grey_of, report
     from knowledge_sources.methods.calibration.chessboard import Pattern
     from knowledge_sources.methods.calibration.picture import draw_calibration
     from world_models.files.toml.camera_file import camera_text
@@ -75,7 +75,7 @@ def _run(args: Namespace) -> int:
     except ValueError as error:
         raise BadInput(f"--pattern, --square-mm: {error}") from None
     place = None if args.mount_image is None else grey_of(Path(args.mount_image))
-    boards = boards_in(_pictures(args, pattern), pattern, _print_status)
+    boards = find_boards(_pictures(args, pattern), pattern, _print_status)
     calibration = calibrate_camera(boards, pattern, with_k3=args.k3)
     found, mount = None, None
     if board is not None:

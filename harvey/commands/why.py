@@ -49,7 +49,7 @@ def _run(args: Namespace) -> int:
         return 0
     refs = _refs(history, args)
     if not asked and args.at is None and history.cut_off is not None:
-        print(_unfinished(run, history.cut_off), file=sys.stderr if args.json else sys.stdout)
+        print(_describe_unfinished(run, history.cut_off), file=sys.stderr if args.json else sys.stdout)
     if args.json:
         print(json.dumps([_record(one) for one in _stories(history, args, refs)], indent=2))
     else:
@@ -59,7 +59,7 @@ def _run(args: Namespace) -> int:
     return 0
 
 
-def _unfinished(run: RunDirectory, cycle: int) -> str:
+def _describe_unfinished(run: RunDirectory, cycle: int) -> str:
     """What to say first of a run that has no outcome."""
     if is_being_written(run.journal):
         return f"The run is still going on, in cycle {cycle} or later.\nThe last thing that its journal tells of:\n"

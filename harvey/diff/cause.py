@@ -50,7 +50,7 @@ def parting(ours: History, theirs: History, agreed: int) -> Parting:
         if one is None or other is None:
             break
         observation = observation or _first(one.observed, other.observed)
-        acted = _acted(one), _acted(other)
+        acted = _to_action(one), _to_action(other)
         if not source and acted[0] != acted[1]:
             source = cycle
         if not decision and (acted[0] != acted[1] or _first(one.made, other.made) or one.refused != other.refused):
@@ -75,7 +75,7 @@ def same(a: EntryRecord | None, b: EntryRecord | None) -> bool:
     return a == b if a is None or b is None else a == b and as_line(a.value) == as_line(b.value)
 
 
-def _acted(d: DecisionRecord) -> tuple[str, str]:
+def _to_action(d: DecisionRecord) -> tuple[str, str]:
     return ("", "") if d.chosen is None else (d.chosen.source, d.chosen.trigger)
 
 
@@ -142,16 +142,16 @@ def because(ours: History, theirs: History, agreed: int, settings: tuple[str, ..
     """Why the runs part, in sentences. The runs are called first and second."""
     where = parting(ours, theirs, agreed)
     if where.observation:
-        yield from _observed(ours, theirs, where)
+        yield from _tell_observation(ours, theirs, where)
     if where.decision:
-        yield from _decided(ours, theirs, where, settings)
+        yield from _tell_decision(ours, theirs, where, settings)
     if where.motion and where.motion not in (where.observation, ""):
-        yield from _moved(ours, theirs, where.motion)
+        yield from _tell_first_motion(ours, theirs, where.motion)
     if where.source and where.source != where.decision:
         yield from _others(ours, theirs, where.source)
 
 
-def _observed(ours: History, theirs: History, where: Parting) -> Iterator[str]:
+def _tell_observation(ours: History, theirs: History, where: Parting) -> Iterator[str]:
     a, b = ours.entry(where.observation), theirs.entry(where.observation)
     cycle = (a or b or EntryRecord("", "", "", "", (), None, 0, True)).cycle
     later = "" if not where.decision or cycle <= where.decision else ", after they had decided differently"
@@ -170,18 +170,18 @@ def _both(a: EntryRecord | None, b: EntryRecord | None) -> Iterator[str]:
             yield f"  (they differ in {', '.join(path for path, _, _ in leaves[:4])})"
 
 
-def _decided(ours: History, theirs: History, where: Parting, settings: tuple[str, ...]) -> Iterator[str]:
+def _tell_decision(ours: History, theirs: History, where: Parting, settings: tuple[str, ...]) -> Iterator[str]:
     one, other = ours.decision(where.decision), theirs.decision(where.decision)
-    if _acted(one) != _acted(other):
+    if _to_action(one) != _to_action(other):
         yield from _others(ours, theirs, where.decision, "The first decision that differs is in cycle")
     else:
         ref = _first(one.made, other.made)
-        who = words(_acted(one)[0])
+        who = words(_to_action(one)[0])
         yield f"The first decision that differs is in cycle {where.decision}, of the {who}: {ref or 'nothing'}"
-        yield from _both(_made(one, ref), _made(other, ref))
+        yield from _both(_find_entry(one, ref), _find_entry(other, ref))
         if one.refused != other.refused:
             yield f"  refused in the {'first' if one.refused else 'second'}: {(one.refused or other.refused).strip()}"
-        yield from _down(ours, theirs, ref)
+        yield from _tell_grounds(ours, theirs, ref)
     if not where.observation or _cycle(ours, where.observation) > where.decision:
         yield from _minds(one, other, settings)
 
@@ -197,23 +197,23 @@ def _minds(one: DecisionRecord, other: DecisionRecord, settings: tuple[str, ...]
     yield f"Until then both observed the same, so the knowledge sources, their settings or their code differ: {why}."
 
 
-def _made(d: DecisionRecord, ref: str) -> EntryRecord | None:
+def _find_entry(d: DecisionRecord, ref: str) -> EntryRecord | None:
     return next((r for r in d.made if r.ref == ref), None)
 
 
-def _down(ours: History, theirs: History, ref: str) -> Iterator[str]:
+def _tell_grounds(ours: History, theirs: History, ref: str) -> Iterator[str]:
     """What the difference comes from, down to what was observed."""
     for a, b in list(grounds(ours, theirs, ref))[1:]:
         yield f"  because of {a.ref}" + (", which came from outside" if a.observed else "") + ":"
         yield from (f"  {line}" for line in _both(a, b))
 
 
-def _moved(ours: History, theirs: History, ref: str) -> Iterator[str]:
+def _tell_first_motion(ours: History, theirs: History, ref: str) -> Iterator[str]:
     a, b = ours.entry(ref), theirs.entry(ref)
     cycle = (a or b or EntryRecord("", "", "", "", (), None, 0, True)).cycle
     yield f"The first motion that differs is {ref}, in cycle {cycle}:"
     yield from _both(a, b)
-    yield from _down(ours, theirs, ref)
+    yield from _tell_grounds(ours, theirs, ref)
 
 
 def _others(ours: History, theirs: History, cycle: int, head: str = "They take other steps for the first time in cycle"

@@ -76,7 +76,7 @@ def _field(key: str, one: DecisionRecord, other: DecisionRecord) -> Iterator[str
         yield from _entries(getattr(one, key), getattr(other, key))
         return
     for name, decision in (("first", one), ("second", other)):
-        yield f"    {name + ':':<8}{_shown(key, decision)}"
+        yield f"    {name + ':':<8}{_to_text(key, decision)}"
 
 
 def _entries(ours: tuple[EntryRecord, ...], theirs: tuple[EntryRecord, ...]) -> Iterator[str]:
@@ -128,7 +128,7 @@ def short(value: Any) -> str:
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 
-def _shown(key: str, d: DecisionRecord) -> str:
+def _to_text(key: str, d: DecisionRecord) -> str:
     value = getattr(d, key)
     if isinstance(value, tuple):
         return ", ".join(_candidate(v) if isinstance(v, Candidate) else str(v) for v in value) or "nothing"

@@ -70,7 +70,7 @@ def grey_of(path: Path) -> Grey:
         raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}") from None
 
 
-def boards_in(pictures: Iterator[tuple[str, Grey]], pattern: Pattern, tell: Callable[[str], None]) -> Boards:
+def find_boards(pictures: Iterator[tuple[str, Grey]], pattern: Pattern, tell: Callable[[str], None]) -> Boards:
     """Look for the board in pictures. Raises BadInput where there is none in any."""
     views: list[BoardView] = []
     useless: list[tuple[str, str]] = []

@@ -78,15 +78,15 @@ def _time_s(files: RunDirectory, seen: EntryRecord) -> float:
     try:
         return max(float(value.get(key, 0.0)) for key in ("sim_time_s", "when_s"))
     except (TypeError, ValueError):
-        raise _refused(files, seen, "when it was observed") from None
+        raise _build_error(files, seen, "when it was observed") from None
 
 
 def _number(files: RunDirectory, frame: EntryRecord) -> int:
     try:
         return int(frame.value["number"])
     except (KeyError, TypeError, ValueError):
-        raise _refused(files, frame, "a picture's number") from None
+        raise _build_error(files, frame, "a picture's number") from None
 
 
-def _refused(files: RunDirectory, seen: EntryRecord, expected: str) -> BadInput:
+def _build_error(files: RunDirectory, seen: EntryRecord, expected: str) -> BadInput:
     return BadInput(f"{files.journal}: {seen.ref}: expected {expected}, got {seen.value!r}")

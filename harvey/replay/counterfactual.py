@@ -100,11 +100,11 @@ def what_if(
         finally:
             recorder.close()
     with SimulatedRun(rebuild_stage(head), head, agent, recorder, (player.compare,)) as simulated:
-        result = simulated.drive(out, lambda: _drive_changed(simulated, player, go_on))
+        result = simulated.drive(out, lambda: _run_changed(simulated, player, go_on))
     return player.answer(Outcome(result.outcome, result.reason), result)
 
 
-def _drive_changed(run: SimulatedRun, player: _Player, go_on: bool) -> Outcome:
+def _run_changed(run: SimulatedRun, player: _Player, go_on: bool) -> Outcome:
     """By the record as far as it answers; then by the simulated robot, if it is to go on."""
     run.recorded_port.closed = True
     with run.body_replay.replay(player.pictures) as live:
@@ -144,7 +144,7 @@ class _Player:
 
     def compare(self, decision: Decision) -> None:
         """Sink: compares with the record until the first difference."""
-        self.last, self.open = decision, tuple(change for change in decision.made if is_asked(change))
+        self.last, self.open = decision, tuple(change for change in decision.made if is_port_request(change))
         if self._first is None:
             recorded = self.records[self._agreed] if self._agreed < len(self.records) else None
             if recorded is not None and recorded.line == decision_line(decision):
@@ -194,7 +194,7 @@ class _Player:
             scheduler.tell([effect], record.author)
 
 
-def is_asked(change: Change) -> bool:
+def is_port_request(change: Change) -> bool:
     """Whether a port acts on a change."""
     return is_request(type(change.entry.value))
 

@@ -33,8 +33,8 @@ def _parting(answer: Answer) -> Iterator[str]:
         return
     held = count(answer.answered, "request")
     yield f"What was observed holds for {held} to the body, which are the same. Then it asks for something else:"
-    yield f"  as recorded:              {_asked(answer.parting.then, answer.parting.requests)}"
-    yield f"  as it would have been:    {_asked(answer.parting.now, answer.parting.requests)}"
+    yield f"  as recorded:              {_describe_requests(answer.parting.then, answer.parting.requests)}"
+    yield f"  as it would have been:    {_describe_requests(answer.parting.now, answer.parting.requests)}"
     yield from _leaves(answer.parting)
     if answer.outcome.kind == UNFINISHED:
         yield "From there the record cannot tell what it would have observed."
@@ -42,7 +42,7 @@ def _parting(answer: Answer) -> Iterator[str]:
         yield "From there the record cannot tell what it would have observed; the simulated robot went on by itself."
 
 
-def _asked(decision: DecisionRecord | None, requests: Set[str]) -> str:
+def _describe_requests(decision: DecisionRecord | None, requests: Set[str]) -> str:
     if decision is None:
         return "nothing any more"
     asked = "; ".join(f"{entry.ref}, {sentence(entry)}" for entry in decision.made if entry.type in requests)

@@ -28,10 +28,10 @@ DIGITS = 16
 @cache
 def deciding_code() -> str:
     """The first digits of a SHA-256 of what decides; it takes some milliseconds, once a process."""
-    return code_in(Path(__file__).parents[2], Path(blackboard.__file__).parents[1])
+    return read_code_in(Path(__file__).parents[2], Path(blackboard.__file__).parents[1])
 
 
-def code_in(root: Path, board: Path | None = None) -> str:
+def read_code_in(root: Path, board: Path | None = None) -> str:
     """The same of a program elsewhere, whose board may be somewhere else again. Raises OSError."""
     files = {WIRING: f"{root}/{WIRING}"}
     for package, endings in DECIDING.items():

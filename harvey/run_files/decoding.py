@@ -38,7 +38,7 @@ class MisfitError(ValueError):
         return MisfitError(name, str(error))
 
 
-def decoded(value: Any, hint: Any) -> Any:
+def decode(value: Any, hint: Any) -> Any:
     """A value of the type that a hint names, from JSON types. Numbers stay as they were written; arrays are frozen.
 
     Raises:
@@ -48,7 +48,7 @@ def decoded(value: Any, hint: Any) -> Any:
         return value
     origin = typing.get_origin(hint)
     if origin in (types.UnionType, typing.Union):
-        return None if value is None else decoded(value, next(a for a in typing.get_args(hint) if a is not type(None)))
+        return None if value is None else decode(value, next(a for a in typing.get_args(hint) if a is not type(None)))
     if origin is typing.Literal:
         return _choice(value, typing.get_args(hint))
     if origin is collections.abc.Mapping:
@@ -99,7 +99,7 @@ def _tuple(value: Any, hints: tuple[Any, ...]) -> tuple[Any, ...]:
     kinds = hints[:1] * len(value) if Ellipsis in hints else hints
     if len(kinds) != len(value):
         raise ValueError(f"expected {len(kinds)} items, got {_brief(value)}")
-    return tuple(decoded(item, kind) for item, kind in zip(value, kinds, strict=True))
+    return tuple(decode(item, kind) for item, kind in zip(value, kinds, strict=True))
 
 
 def _dataclass(value: Any, kind: type[Any]) -> Any:
@@ -110,13 +110,13 @@ def _dataclass(value: Any, kind: type[Any]) -> Any:
 
 
 def fields_of(value: Mapping[str, Any], kind: type[Any]) -> dict[str, Any]:
-    """The fields of a dataclass that JSON types tell, each of its type. Raises ValueError as :func:`decoded` does."""
+    """The fields of a dataclass that JSON types tell, each of its type. Raises ValueError as :func:`decode` does."""
     hints, fields = typing.get_type_hints(kind), dict[str, Any]()
     for name, item in value.items():
         if name not in hints:
             raise ValueError(f"expected {', '.join(field.name for field in dataclasses.fields(kind))}, got {name!r}")
         try:
-            fields[name] = decoded(item, hints[name])
+            fields[name] = decode(item, hints[name])
         except (ValueError, TypeError) as error:
             raise MisfitError.within(name, error) from None
     return fields

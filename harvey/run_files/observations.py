@@ -11,7 +11,7 @@ from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref
 from blackboard.kinds import Registry
 from harvey.errors import BadInput
-from harvey.run_files.decoding import decoded
+from harvey.run_files.decoding import decode
 from harvey.run_files.records import EntryRecord
 from logs.camera_file import Pictures
 
@@ -40,12 +40,12 @@ def effect_of(record: EntryRecord, frames: Mapping[int, bytes], view: View, kind
 
 def value_of(record: EntryRecord, frames: Mapping[int, bytes], kinds: Registry) -> Any:
     """The value itself. Raises BadInput as :func:`effect_of` does."""
-    kind = kind_named(record, kinds)
+    kind = find_kind(record, kinds)
     value = dict(record.value) if isinstance(record.value, dict) else record.value
     if record.type == "Frame" and isinstance(value, dict):
         value["jpeg"] = _picture(record, value, frames)
     try:
-        return decoded(value, kind)
+        return decode(value, kind)
     except (ValueError, TypeError) as error:
         raise BadInput(f"{record.ref}: {error}") from None
 
@@ -63,7 +63,7 @@ def _picture(record: EntryRecord, value: Mapping[str, Any], frames: Mapping[int,
     return jpeg
 
 
-def kind_named(record: EntryRecord, kinds: Registry) -> type[Any]:
+def find_kind(record: EntryRecord, kinds: Registry) -> type[Any]:
     """The type of a record's value. Raises BadInput where it is not known here."""
     if record.type not in kinds:
         raise BadInput(f"{record.ref}: expected a kind of entry that is known here ({', '.join(sorted(kinds))}), got a "
@@ -79,14 +79,14 @@ def entry_of(record: EntryRecord, kinds: Registry) -> Entry[Any]:
     """
     value = {**record.value, "jpeg": b""} if record.type == "Frame" and isinstance(record.value, dict) else record.value
     try:
-        restored = decoded(value, kind_named(record, kinds))
+        restored = decode(value, find_kind(record, kinds))
     except (ValueError, TypeError) as error:
         raise BadInput(f"{record.ref}: expected a {record.type} as this version has it, got another: {error}") from None
     ref = ref_of(record.ref)
-    return Entry(ref.id, ref.revision, restored, record.author, written_in(record), refs_of(record.because))
+    return Entry(ref.id, ref.revision, restored, record.author, cycle_of_writing(record), refs_of(record.because))
 
 
-def written_in(record: EntryRecord) -> int:
+def cycle_of_writing(record: EntryRecord) -> int:
     """In which cycle it was put on the board; what comes from outside is taken up in the next."""
     return record.cycle - record.observed
 

@@ -15,7 +15,7 @@ from blackboard.journal import plain
 from harvey.arithmetic import arithmetic
 from harvey.errors import BadInput
 from harvey.run_files.deciding_code import deciding_code
-from harvey.run_files.decoding import MisfitError, decoded, fields_of
+from harvey.run_files.decoding import MisfitError, decode, fields_of
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
@@ -104,7 +104,7 @@ class RunHead:
             raise BadInput(f"{path}: expected JSON, got: {error}") from None
         try:
             older = {"code": "", "arithmetic": "", "plugins": {}}
-            head: RunHead = decoded({**older, **data} if isinstance(data, dict) else data, RunHead)
+            head: RunHead = decode({**older, **data} if isinstance(data, dict) else data, RunHead)
         except (ValueError, TypeError) as error:
             raise BadInput(f"{path}: {error}") from None
         return head
@@ -139,17 +139,17 @@ class RunHead:
         if _sha256_or_none(path) != self.world_sha256:
             raise BadInput(f"{path}: expected the world file as it was when the run was made, got another or none")
         world = _world(path, self.world_sha256)
-        return _made("robot", lambda: RobotModel(world, **self._known()))
+        return _build("robot", lambda: RobotModel(world, **self._robot_fields()))
 
     def task(self) -> Command:
         """What the user asked for. Raises BadInput."""
-        return _made("command", lambda: _whole(self.command, Command))
+        return _build("command", lambda: _whole(self.command, Command))
 
     def servo_settings(self) -> Servo:
         """Which levels are on. Raises BadInput."""
-        return _made("servo", lambda: _whole(self.servo, Servo))
+        return _build("servo", lambda: _whole(self.servo, Servo))
 
-    def _known(self) -> dict[str, Any]:
+    def _robot_fields(self) -> dict[str, Any]:
         """What the robot knows of itself; a run of an older version may lack what has a default. Raises ValueError."""
         parts = {name: self.robot[name] for name in PARTS if name in self.robot}
         rest = {name: value for name, value in self.robot.items() if name not in parts}
@@ -175,7 +175,7 @@ def _world(path: Path, _sha256: str) -> World:
     return load_world(path)
 
 
-def _made(what: str, make: Callable[[], T]) -> T:
+def _build(what: str, make: Callable[[], T]) -> T:
     """What a part of ``run.json`` stands for. Raises BadInput where a value in it cannot be used, and names it."""
     try:
         return make()

@@ -51,7 +51,7 @@ class Remains:
 def find_remains(run: RunDirectory) -> Remains:
     """Look at a run without touching it. Raises BadInput where it cannot be used at all."""
     there = camera_bytes(run)
-    decisions, outcome = _decided(run) if run.journal.is_file() else (0, None)
+    decisions, outcome = _count_decisions(run) if run.journal.is_file() else (0, None)
     if decisions == 0:
         _check_not_lost(run, there)
     if not run.journal.is_file():
@@ -136,7 +136,7 @@ def is_command(change: Change) -> bool:
     return isinstance(change, Posted) and isinstance(change.entry.value, MotorCommand)
 
 
-def _decided(run: RunDirectory) -> tuple[int, Outcome | None]:
+def _count_decisions(run: RunDirectory) -> tuple[int, Outcome | None]:
     """How many decisions there are, and the outcome, if it was seen."""
     decisions, seen, outcome = 0, False, None
     for record in read_records(run.journal):

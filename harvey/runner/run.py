@@ -115,7 +115,7 @@ class Run:
                 files.write_result({"scenario": self.head.name, "seed": self.head.seed, "outcome": UNFINISHED})
             outcome = start()
         except (CannotWriteError, RecordingError) as error:
-            outcome = _stopped(files, error)
+            outcome = _build_outcome(files, error)
         except BaseException as error:
             self._close()
             if files is not None and not isinstance(error, BadInput):
@@ -193,7 +193,7 @@ def _declare(scheduler: Scheduler, reason: str) -> Outcome:
     return outcome
 
 
-def _stopped(files: RunDirectory | None, error: Exception) -> Outcome:
+def _build_outcome(files: RunDirectory | None, error: Exception) -> Outcome:
     """The outcome of a run whose files cannot be written any more."""
     full = files is not None and shutil.disk_usage(files.path).free < MIN_FREE_BYTES
     why = f"{error} (the disk is full)" if full else str(error)

@@ -49,7 +49,7 @@ class BodyReplay:
 
     def __call__(self, made: Sequence[Change], observed: Sequence[EntryRecord]) -> None:
         """Let the body do what the changes asked for. Raises BadInput where it answers otherwise than ``observed``."""
-        broken_off = interrupted_in(observed)
+        broken_off = find_interrupted(observed)
         answers = [effect for change in made for effect in self.answer(change, str(change.entry.ref) in broken_off)]
         now = [as_line(plain(effect.value)) for effect in answers if not isinstance(effect, Retract)]
         then = [as_line(record.value) for record in observed if record.author == self._port.name]
@@ -89,7 +89,7 @@ def part_of(command: MotorCommand, part: float, actuator: ActuatorParameters) ->
     return MotorCommand(command.turn_rad * turned, command.move_m * min(1.0, moved))
 
 
-def interrupted_in(observed: Sequence[EntryRecord]) -> frozenset[str]:
+def find_interrupted(observed: Sequence[EntryRecord]) -> frozenset[str]:
     """The refs of the commands that a run, when it went on, was told not to have been answered."""
     told = (record.value for record in observed if record.type == Resumed.__name__ and isinstance(record.value, dict))
     return frozenset(str(ref) for value in told for ref in value.get("interrupted", ()))

@@ -18,7 +18,7 @@ from blackboard.kinds import Registry, always
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from harvey.errors import BadInput
-from harvey.run_files.observations import entry_of, refs_of, written_in
+from harvey.run_files.observations import cycle_of_writing, entry_of, refs_of
 from harvey.run_files.records import EntryRecord
 from harvey.why.history import History
 from harvey.why.links import words
@@ -36,14 +36,14 @@ def why_absent(history: History, source: KnowledgeSource, cycle: int, kinds: Reg
     seen = changes(history, cycle, kinds)
     woken = [change for change in seen if any(watch.sees(change) for watch in source.watches)]
     if not woken:
-        yield from _not_woken(source, seen, cycle)
+        yield from _tell_why_not_triggered(source, seen, cycle)
         return
     board = board_at(history, cycle, kinds)
     for change in woken:
-        yield from _asked(source, board, change)
+        yield from _ask_rating(source, board, change)
 
 
-def _not_woken(source: KnowledgeSource, seen: Sequence[Change], cycle: int) -> Iterator[str]:
+def _tell_why_not_triggered(source: KnowledgeSource, seen: Sequence[Change], cycle: int) -> Iterator[str]:
     """Nothing came of the kinds that it watches for, or the condition of its watch did not hold for what came."""
     name = words(source.name)
     held_back = [change for change in seen if any(
@@ -59,7 +59,7 @@ def _not_woken(source: KnowledgeSource, seen: Sequence[Change], cycle: int) -> I
     yield f"Nothing that the {name} watches for came in cycle {cycle}. It watches for: {watched}; what came: {came}."
 
 
-def _asked(source: KnowledgeSource, board: Blackboard, change: Change) -> Iterator[str]:
+def _ask_rating(source: KnowledgeSource, board: Blackboard, change: Change) -> Iterator[str]:
     name, ref = words(source.name), change.entry.ref
     if not isinstance(change, Retracted) and not board.view.is_current(change.entry):
         now = board.view.get(change.entry.id)
@@ -150,7 +150,7 @@ def board_at(history: History, cycle: int, kinds: Registry) -> Blackboard:
     values = {id: entry_of(record, kinds).value for id, record in last.items()}
     board = Blackboard()
     for record in told:
-        board.apply([_effect(board, record, values[record.id])], author=record.author, cycle=written_in(record))
+        board.apply([_effect(board, record, values[record.id])], author=record.author, cycle=cycle_of_writing(record))
     return board
 
 

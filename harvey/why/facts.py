@@ -84,7 +84,7 @@ def off(track: Track) -> str:
     return f"{landmark(track.landmark)} was {' and '.join(parts) or 'at'} its prediction at ({u:.0f}, {v:.0f}) px"
 
 
-def moved_belief(now: Hypothesis, before: Hypothesis) -> str:
+def describe_belief_change(now: Hypothesis, before: Hypothesis) -> str:
     """How far a new belief is from the one before; empty where they are in different frames."""
     if now.locale != before.locale:
         return ""
@@ -198,7 +198,7 @@ def goal(value: Goal) -> str:
     return f"All of it serves the goal: {way}."
 
 
-def seen_in(segments: Segments, frame: EntryRecord | None) -> str:
+def describe_segments(segments: Segments, frame: EntryRecord | None) -> str:
     """``179 line segments in Frame-49 (contrast 41 of 255)``."""
     found = count(len(segments.segments_px), "line segment")
     return f"{found} in {picture(frame, segments.frame)} (contrast {segments.contrast:.0f} of 255)"
@@ -229,14 +229,14 @@ def _because(history: History, command: EntryRecord) -> Iterator[str]:
     elif milestone is not None:
         yield f"because it had to face {milestone_name(value_of(milestone, Milestone))} to look for it"
     elif leg is None and (segments := reason(history, command, "Segments")) is not None:
-        seen = seen_in(value_of(segments, Segments), reason(history, segments, "Frame"))
+        seen = describe_segments(value_of(segments, Segments), reason(history, segments, "Frame"))
         yield f"because it did not know where it was, and did not find it out from {seen}"
     if belief is not None:
-        yield from _seen(history, belief)
-        yield from _matched(history, belief)
+        yield from _describe_worst_landmark(history, belief)
+        yield from _describe_match(history, belief)
 
 
-def _seen(history: History, belief: EntryRecord) -> Iterator[str]:
+def _describe_worst_landmark(history: History, belief: EntryRecord) -> Iterator[str]:
     """The landmark that was furthest from its prediction, and the pose that the prediction was made from."""
     tracks, before = tracks_of(history, belief), reason(history, belief, "Hypothesis")
     if value_of(belief, Hypothesis).basis != "tracks" or tracks is None or before is None:
@@ -249,7 +249,7 @@ def _seen(history: History, belief: EntryRecord) -> Iterator[str]:
     yield f"made from pose {before.ref}"
 
 
-def _matched(history: History, belief: EntryRecord) -> Iterator[str]:
+def _describe_match(history: History, belief: EntryRecord) -> Iterator[str]:
     """The match that the belief goes back to."""
     anchor = anchor_of(history, belief)
     fix = None if anchor is None else reason(history, anchor, "PoseFix")

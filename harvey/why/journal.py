@@ -59,10 +59,10 @@ class JournalHistory(History):
         return tuple(self._line_of)
 
     def entry(self, ref: str) -> EntryRecord | None:
-        return self._found(ref, self._entries.get(ref.encode(errors="replace")), retracted=False)
+        return self._find(ref, self._entries.get(ref.encode(errors="replace")), retracted=False)
 
     def retraction(self, ref: str) -> EntryRecord | None:
-        return self._found(ref, self._retracted.get(ref.encode(errors="replace")), retracted=True)
+        return self._find(ref, self._retracted.get(ref.encode(errors="replace")), retracted=True)
 
     def cycle_of(self, cycle: int) -> DecisionRecord | None:
         line = self._line_of.get(cycle)
@@ -120,7 +120,7 @@ class JournalHistory(History):
                 where = self._retracted if record.change == "Retracted" else self._entries
                 where[record.ref.encode(errors="replace")] = self._ends[line] - 1
 
-    def _found(self, ref: str, offset: int | None, *, retracted: bool) -> EntryRecord | None:
+    def _find(self, ref: str, offset: int | None, *, retracted: bool) -> EntryRecord | None:
         """The newest change of that name; where the sweep was deceived, it is looked for in every line."""
         if offset is None:
             return None

@@ -33,7 +33,7 @@ def milestones(history: History, name: str) -> tuple[str, ...]:
     low = name.lower()
     if exact := [id for id in ids if low in (id.lower(), history.newest[id].lower(), id.rpartition("-")[2])]:
         return tuple(exact)
-    called = {id: _called(history, id) for id in ids}
+    called = {id: _name_of(history, id) for id in ids}
     found = tuple(id for id, what in called.items() if _means(low, what.lower()))
     if not found:
         history.verify()
@@ -45,7 +45,7 @@ def milestones(history: History, name: str) -> tuple[str, ...]:
     return found
 
 
-def _called(history: History, id: str) -> str:
+def _name_of(history: History, id: str) -> str:
     value = _last(history, id).value
     return str(value.get("what", "")) if isinstance(value, dict) else ""
 
@@ -78,10 +78,10 @@ def milestone_story(history: History, id: str) -> Story:
 def _story(history: History, id: str, last: EntryRecord) -> Story:
     first = history.entry(f"{id}.0") or last
     certificate = reason(history, last, "Certificate")
-    steps = [*_wanted(history, first), *_expected(history, last, certificate)]
+    steps = [*_tell_origin(history, first), *_tell_expectation(history, last, certificate)]
     if certificate is not None:
-        steps += _seen_and_judged(history, certificate)
-        steps += _followed(history, certificate)
+        steps += _tell_verdict(history, certificate)
+        steps += _tell_consequences(history, certificate)
     else:
         steps.append(Step("judged", f"It was never judged: when the run ended it was {last.value['status']}.",
                           (last.ref,)))
@@ -90,7 +90,7 @@ def _story(history: History, id: str, last: EntryRecord) -> Story:
     return Story(last.ref, head, decided(history, first), tuple(steps))
 
 
-def _wanted(history: History, first: EntryRecord) -> Iterator[Step]:
+def _tell_origin(history: History, first: EntryRecord) -> Iterator[Step]:
     doubt, sketch = reason(history, first, "Discrepancy"), reason(history, first, "PlanSketch")
     if doubt is not None:
         yield Step("wanted", facts.doubt(value_of(doubt, Discrepancy)), (doubt.ref,))
@@ -98,7 +98,7 @@ def _wanted(history: History, first: EntryRecord) -> Iterator[Step]:
         yield Step("wanted", facts.plan(value_of(sketch, PlanSketch)), (sketch.ref,))
 
 
-def _expected(history: History, last: EntryRecord, certificate: EntryRecord | None) -> Iterator[Step]:
+def _tell_expectation(history: History, last: EntryRecord, certificate: EntryRecord | None) -> Iterator[Step]:
     judged = None if certificate is None else reason(history, certificate, "Milestone")
     looked = judged or last
     belief = reason(history, looked, "Hypothesis")
@@ -108,7 +108,7 @@ def _expected(history: History, last: EntryRecord, certificate: EntryRecord | No
     yield Step("expected", facts.expectation(value_of(looked, Milestone)), (looked.ref,))
 
 
-def _seen_and_judged(history: History, certificate: EntryRecord) -> Iterator[Step]:
+def _tell_verdict(history: History, certificate: EntryRecord) -> Iterator[Step]:
     fix, milestone = reason(history, certificate, "PoseFix"), reason(history, certificate, "Milestone")
     match = None if fix is None else reason(history, fix, "LineMatch")
     segments = None if match is None else reason(history, match, "Segments")
@@ -121,7 +121,7 @@ def _seen_and_judged(history: History, certificate: EntryRecord) -> Iterator[Ste
     yield Step("judged", said[0].upper() + said[1:], (certificate.ref,))
 
 
-def _followed(history: History, certificate: EntryRecord) -> Iterator[Step]:
+def _tell_consequences(history: History, certificate: EntryRecord) -> Iterator[Step]:
     """What those did whom the verdict woke."""
     for record in history.made(certificate.cycle):
         if record.type not in FOLLOWED:

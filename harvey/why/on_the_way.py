@@ -51,7 +51,7 @@ def on_the_way(history: History, result: Mapping[str, Any]) -> Iterator[str]:
     Args:
         result: what ``result.json`` holds: only the simulator knows of collisions.
     """
-    points = sorted([*told_by_journal(history), *_collisions(result)], key=lambda point: point.cycle)
+    points = sorted([*read_turning_points(history), *_collisions(result)], key=lambda point: point.cycle)
     unplaced = (result.get("collisions") or 0) - sum(point.kind == "collision" for point in points)
     if not points and unplaced <= 0:
         yield "Nothing went wrong on the way: it was never lost, each milestone was verified, and there was no fault."
@@ -65,7 +65,7 @@ def on_the_way(history: History, result: Mapping[str, Any]) -> Iterator[str]:
         yield f"  {count(unplaced, 'collision')}; this run does not say where"
 
 
-def told_by_journal(history: History) -> Iterator[TurningPoint]:
+def read_turning_points(history: History) -> Iterator[TurningPoint]:
     """The turning points that a short account must not leave out. Entries of another version are passed over."""
     cycles = {decision.cycle for mark in MARKS for decision in history.naming(mark)}
     records = (history.entry(ref) for ref in history.refs if ref.startswith(KINDS))

@@ -22,9 +22,9 @@ def kinds_for(record: EntryRecord) -> Registry:
     """The kinds that are known here; those of other packages are loaded only for an entry that needs them."""
     if record.type in OWN:
         return OWN
-    from harvey.wiring import known_kinds
+    from harvey.wiring import load_kinds
 
-    return known_kinds()
+    return load_kinds()
 
 
 def value_of(record: EntryRecord, kind: type[T]) -> T:

@@ -96,11 +96,11 @@ def headline(record: EntryRecord) -> str:
     if record.type == "Look":
         return f"A picture was taken {vocabulary.purpose(value_of(record, Look).purpose)}."
     if record.type == "Hypothesis" and value_of(record, Hypothesis).is_held:
-        return _believed(value_of(record, Hypothesis))
+        return _describe_belief(value_of(record, Hypothesis))
     return f"{said[0].upper()}{said[1:]}." if said else record.ref
 
 
-def _believed(hypothesis: Hypothesis) -> str:
+def _describe_belief(hypothesis: Hypothesis) -> str:
     if hypothesis.basis == "relocalization":
         return f"It found out where it is: at {facts.pose(hypothesis)}."
     return f"It believed that it stood at {facts.pose(hypothesis)}."
@@ -159,7 +159,7 @@ class _Teller:
         elif record.type == "Certificate":
             yield from self._certificate(record)
         elif record.type == "PoseFix":
-            yield from self._matched(record)
+            yield from self._tell_match(record)
         for type in FOLLOW.get(record.type) or [r.rpartition("-")[0] for r in record.because]:
             for below in self._below(record, type):
                 yield from self._tell(below, record)
@@ -187,7 +187,7 @@ class _Teller:
         self.met.add(record.ref)
         if record.type == "Segments" and above.type in ("MotorCommand", "Look"):
             frame = reason(self.history, record, "Frame")
-            seen = facts.seen_in(value_of(record, Segments), frame)
+            seen = facts.describe_segments(value_of(record, Segments), frame)
             text = f"It saw {seen}; where it is did not yet follow from them."
             yield from self._one(key, "seen", text, record, frame)
         elif perhaps:
@@ -214,31 +214,31 @@ class _Teller:
         """What it saw, what it had expected; what it was sure of last."""
         basis = value_of(record, Hypothesis).basis
         if basis == "tracks":
-            yield from self._tracked(record)
+            yield from self._tell_tracks(record)
         elif basis == "odometry":
-            yield from self._rolled(record)
-        yield from self._anchored(record)
+            yield from self._tell_odometry(record)
+        yield from self._tell_anchor(record)
 
-    def _tracked(self, record: EntryRecord) -> Iterator[Step]:
+    def _tell_tracks(self, record: EntryRecord) -> Iterator[Step]:
         history = self.history
         before, frame = reason(history, record, "Hypothesis"), reason(history, record, "Frame")
         tracks = tracks_of(history, record)
         if tracks is not None:
             now = value_of(record, Hypothesis)
-            moved = facts.moved_belief(now, value_of(before, Hypothesis)) if before is not None else ""
+            moved = facts.describe_belief_change(now, value_of(before, Hypothesis)) if before is not None else ""
             text = f"{facts.tracking(value_of(tracks, Tracks), frame)} {moved}".strip()
             yield from self._one("Tracks", "seen", text, tracks, frame)
         if before is not None and value_of(before, Hypothesis).basis == "odometry":
-            yield from self._rolled(before)
+            yield from self._tell_odometry(before)
 
-    def _rolled(self, record: EntryRecord) -> Iterator[Step]:
+    def _tell_odometry(self, record: EntryRecord) -> Iterator[Step]:
         report = reason(self.history, record, "MotionReport")
         if report is not None:
             led_to = facts.pose(value_of(record, Hypothesis))
             text = f"That was expected because {facts.wheels(value_of(report, MotionReport))}, which led to {led_to}."
             yield from self._one("MotionReport", "expected", text, record, report)
 
-    def _anchored(self, record: EntryRecord) -> Iterator[Step]:
+    def _tell_anchor(self, record: EntryRecord) -> Iterator[Step]:
         """What the belief began with: a milestone, finding itself anew, or what the user told."""
         anchor = anchor_of(self.history, record)
         if anchor is None:
@@ -246,14 +246,14 @@ class _Teller:
         command, certificate = (reason(self.history, anchor, type) for type in ("Command", "Certificate"))
         begun = value_of(anchor, Hypothesis)
         if begun.basis == "relocalization":
-            yield from self._recognized(anchor)
+            yield from self._tell_recognition(anchor)
         elif certificate is not None:
             yield from self._certificate(certificate, f"In cycle {certificate.cycle} ")
         elif command is not None:
             text = f"Where it began it was told by the user: at {facts.pose(begun)}."
             yield from self._one("told", "told", text, anchor, command)
 
-    def _recognized(self, anchor: EntryRecord) -> Iterator[Step]:
+    def _tell_recognition(self, anchor: EntryRecord) -> Iterator[Step]:
         """It was lost, and found where it was."""
         segments, lost = reason(self.history, anchor, "Segments"), reason(self.history, anchor, "Discrepancy")
         frame = None if segments is None else reason(self.history, segments, "Frame")
@@ -272,9 +272,9 @@ class _Teller:
         said = when + facts.verdict(value_of(record, Certificate), judged)
         yield from self._one(record.id, "checked", said[0].upper() + said[1:], record, milestone)
         if fix is not None:
-            yield from self._matched(fix)
+            yield from self._tell_match(fix)
 
-    def _matched(self, fix: EntryRecord) -> Iterator[Step]:
+    def _tell_match(self, fix: EntryRecord) -> Iterator[Step]:
         """From pixels and model to a pose."""
         match = reason(self.history, fix, "LineMatch")
         segments = None if match is None else reason(self.history, match, "Segments")
@@ -338,12 +338,12 @@ FOLLOW: Mapping[str, tuple[str, ...]] = {
 
 def lines_of(told: Story) -> Iterator[str]:
     """A story as paragraphs: label, sentences and the entries that say so."""
-    yield _wrapped(f"{told.headline}  [{told.ref}]")
-    yield _wrapped(told.decided)
+    yield _wrap(f"{told.headline}  [{told.ref}]")
+    yield _wrap(told.decided)
     width = max((len(step.label) for step in told.steps), default=0)
     for step in told.steps:
-        yield _wrapped(f"{step.text}  [{', '.join(step.refs)}]", f"  {step.label.ljust(width)}  ")
+        yield _wrap(f"{step.text}  [{', '.join(step.refs)}]", f"  {step.label.ljust(width)}  ")
 
 
-def _wrapped(text: str, head: str = "") -> str:
+def _wrap(text: str, head: str = "") -> str:
     return fill(text, WIDTH, initial_indent=head, subsequent_indent=" " * len(head), break_on_hyphens=False)

@@ -32,7 +32,7 @@ class Trace:
         for dropped in decision.obviated:
             candidates.pop(dropped.number, None)
         chosen = decision.chosen
-        yield from cycle_lines(decision, _ranked(candidates.values(), chosen))
+        yield from cycle_lines(decision, _rank(candidates.values(), chosen))
         self._pending = {n: c for n, c in candidates.items() if chosen is None or n != chosen.number}
 
 
@@ -43,14 +43,14 @@ def cycle_lines(decision: DecisionRecord, candidates: Iterable[Candidate]) -> It
     outside = {change.ref for change in decision.observed}
     if inside := [ref for ref in decision.seen if ref not in outside]:
         yield f"  sees      {', '.join(inside)}"
-    yield from (f"  drops     {_named(c)}: {c.reason}" for c in decision.obviated)
+    yield from (f"  drops     {_describe(c)}: {c.reason}" for c in decision.obviated)
     yield from (_candidate_line(c, decision) for c in candidates)
     yield from (_change_line(change.change.lower(), change) for change in decision.made)
     if decision.refused:
         yield f"  refused   {decision.refused.rstrip().splitlines()[-1]}"
 
 
-def _ranked(candidates: Iterable[Candidate], chosen: Candidate | None) -> list[Candidate]:
+def _rank(candidates: Iterable[Candidate], chosen: Candidate | None) -> list[Candidate]:
     """The chosen one first, then the best rated, then the oldest."""
     first = chosen.number if chosen else None
     return sorted(candidates, key=lambda c: (c.number != first, -c.rating, c.number))
@@ -59,10 +59,10 @@ def _ranked(candidates: Iterable[Candidate], chosen: Candidate | None) -> list[C
 def _candidate_line(c: Candidate, decision: DecisionRecord) -> str:
     chosen = decision.chosen is not None and c.number == decision.chosen.number
     second = decision.runner_up is not None and c.number == decision.runner_up.number
-    return f"  {'chooses' if chosen else 'next' if second else 'pending':<9} {_named(c)}, rated {c.rating:.2f}"
+    return f"  {'chooses' if chosen else 'next' if second else 'pending':<9} {_describe(c)}, rated {c.rating:.2f}"
 
 
-def _named(c: Candidate) -> str:
+def _describe(c: Candidate) -> str:
     return f"{c.source} ({c.level}) on {c.trigger}"
 
 

@@ -90,26 +90,26 @@ def explain(history: History, refs: Sequence[str], depth: int = DEPTH) -> Iterat
         if reason.depth == 0 and reason.record is not None:
             yield from ["", _who(reason.record, history)] if index else [_who(reason.record, history)]
         leads_on = index + 1 < len(reasons) and reasons[index + 1].depth > reason.depth
-        yield _wrapped(reason.depth, _told(reason) + (", because" if leads_on else ""))
+        yield _wrap(reason.depth, _describe(reason) + (", because" if leads_on else ""))
     if any(reason.hidden for reason in reasons):
         yield f"(--depth {depth + 1} goes on where it says \"and so on\")"
 
 
-def _wrapped(depth: int, text: str) -> str:
+def _wrap(depth: int, text: str) -> str:
     indent = "  " * min(depth, DEEPEST_INDENT)
     return fill(text, WIDTH, initial_indent=indent, subsequent_indent=indent + "    ", break_on_hyphens=False)
 
 
-def _told(reason: Reason) -> str:
+def _describe(reason: Reason) -> str:
     if reason.known:
         return f"{reason.ref}, as {reason.known}"
     if reason.record is None:
         return f"{reason.ref}, of which the journal says nothing"
     tail = f" (and so on: {count(reason.hidden, 'reason')} below)" if reason.hidden else ""
-    return f"{reason.ref}: {_said(reason.record, reason.after)}{tail}"
+    return f"{reason.ref}: {_describe_record(reason.record, reason.after)}{tail}"
 
 
-def _said(record: EntryRecord, after: EntryRecord | None) -> str:
+def _describe_record(record: EntryRecord, after: EntryRecord | None) -> str:
     """The sentence; of an earlier revision of what rests on it, only what little was different, if it was little."""
     if after is not None and after.id == record.id:
         changed = list(differing_leaves(record.value, after.value))

@@ -57,15 +57,15 @@ def in_cycle(history: History, source: str, cycle: int) -> tuple[Occasion, ...]:
         BadInput: the run has no such cycle.
     """
     decision = history.decision(cycle)
-    found = [Occasion(cycle, Fate.DROPPED, c.trigger, _dropped(c)) for c in decision.obviated if c.source == source]
+    found = [Occasion(cycle, Fate.DROPPED, c.trigger, _tell_drop(c)) for c in decision.obviated if c.source == source]
     chosen = decision.chosen
     for c in history.candidates(cycle):
         if c.source != source:
             continue
         if chosen is None or c.number != chosen.number:
-            found.append(Occasion(cycle, Fate.OUTRANKED, c.trigger, _outranked(c, decision)))
+            found.append(Occasion(cycle, Fate.OUTRANKED, c.trigger, _tell_ranking(c, decision)))
         elif decision.refused:
-            found.append(Occasion(cycle, Fate.REFUSED, c.trigger, _refused(decision)))
+            found.append(Occasion(cycle, Fate.REFUSED, c.trigger, _tell_refusal(decision)))
         else:
             found.append(Occasion(cycle, Fate.ACTED, c.trigger, f"it was the best there was, rated {c.rating:.2f}"))
     return tuple(found)
@@ -81,17 +81,17 @@ def in_run(history: History, source: str) -> tuple[Occasion, ...]:
         open_ |= {c.number: c for c in decision.activated if c.source == source}
         for c in decision.obviated:
             if open_.pop(c.number, None) is not None:
-                ended.append(Occasion(last, Fate.DROPPED, c.trigger, _dropped(c)))
+                ended.append(Occasion(last, Fate.DROPPED, c.trigger, _tell_drop(c)))
         chosen = decision.chosen
         if chosen is not None and open_.pop(chosen.number, None) is not None:
-            fate, why = (Fate.REFUSED, _refused(decision)) if decision.refused else (Fate.ACTED, _did(decision))
+            fate, why = (Fate.REFUSED, _tell_refusal(decision)) if decision.refused else (Fate.ACTED, _did(decision))
             ended.append(Occasion(last, fate, chosen.trigger, why))
     ended += [Occasion(last, Fate.OUTRANKED, c.trigger, "it was still waiting when the run ended")
               for c in open_.values()]
     return tuple(ended)
 
 
-def _dropped(c: Candidate) -> str:
+def _tell_drop(c: Candidate) -> str:
     waited = f"it had waited since cycle {c.since}, rated {c.rating:.2f}; " if c.rating else ""
     reason = {"trigger no longer holds": "what woke it no longer held"}.get(c.reason, c.reason)
     return f"{waited}{reason}"
@@ -101,16 +101,16 @@ def _did(decision: DecisionRecord) -> str:
     return f"it made {', '.join(r.ref for r in decision.made) or 'nothing'}"
 
 
-def _refused(decision: DecisionRecord) -> str:
+def _tell_refusal(decision: DecisionRecord) -> str:
     last = decision.refused.rstrip().splitlines()[-1]
     return f"its act was refused, and nothing of it applied: {last}"
 
 
-def _outranked(c: Candidate, decision: DecisionRecord) -> str:
+def _tell_ranking(c: Candidate, decision: DecisionRecord) -> str:
     """By what the chosen activation came before this one: focus, then rating, then age."""
     chosen = decision.chosen
     if chosen is None:
-        return f"nobody acted ({_refused(decision)})" if decision.refused else "nobody acted"
+        return f"nobody acted ({_tell_refusal(decision)})" if decision.refused else "nobody acted"
     who = f"the {words(chosen.source)} (on {chosen.trigger})"
     ours, theirs = _distance(c, decision.focus), _distance(chosen, decision.focus)
     if ours != theirs:
@@ -186,10 +186,10 @@ def _use(history: History, record: EntryRecord) -> Iterator[str]:
     resting, fates = list[str](), list[str]()
     for decision in history.naming(record.ref):
         resting += [r.ref for r in decision.made if record.ref in r.because]
-        fates += [f"  cycle {decision.cycle}: it woke the {words(c.source)}, which was dropped: {_dropped(c)}."
+        fates += [f"  cycle {decision.cycle}: it woke the {words(c.source)}, which was dropped: {_tell_drop(c)}."
                   for c in decision.obviated if c.trigger == record.ref]
         if decision.chosen is not None and decision.chosen.trigger == record.ref:
-            how = _refused(decision) if decision.refused else _did(decision)
+            how = _tell_refusal(decision) if decision.refused else _did(decision)
             fates.append(f"  cycle {decision.cycle}: it woke the {words(decision.chosen.source)}, which acted: {how}.")
     yield from fates or ["  It woke nobody who then acted."]
     yield f"Resting on it: {', '.join(dict.fromkeys(resting))}." if resting else "Nothing rests on it."

@@ -34,7 +34,7 @@ def answers(run: RunDirectory, history: History, name: str, cycle: int | None) -
         for one in found:
             yield f"In cycle {cycle} the {words(source)} {one.fate.value} on {one.trigger}: {one.why}."
     else:
-        yield from _asked_again(run, history, source, cycle)
+        yield from _ask_again(run, history, source, cycle)
     yield from _instead(history, cycle, any(one.fate is Fate.ACTED for one in found))
 
 
@@ -59,7 +59,7 @@ def _never(run: RunDirectory, source: str) -> Iterator[str]:
         yield f"The {named.closes} level of servoing was off, and the {words(source)} closes it."
 
 
-def _asked_again(run: RunDirectory, history: History, source: str, cycle: int) -> Iterator[str]:
+def _ask_again(run: RunDirectory, history: History, source: str, cycle: int) -> Iterator[str]:
     """The knowledge source is asked once more, on the board as it was."""
     from harvey.agent import build_agent
     from harvey.run_files.run_head import RunHead

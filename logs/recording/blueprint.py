@@ -23,11 +23,11 @@ MIDDLE_SHARES = (11, 10)
 def blueprint(loggers: Sequence[Logger]) -> Any:
     """All panels of some loggers under one cursor."""
     panels = [panel for logger in loggers for panel in logger.panels()]
-    middle = _joined(rrb.Vertical, [_area(panels, "world", rrb.Horizontal), _area(panels, "decisions", rrb.Horizontal)],
+    middle = _join(rrb.Vertical, [_area(panels, "world", rrb.Horizontal), _area(panels, "decisions", rrb.Horizontal)],
                      MIDDLE_SHARES, "row_shares")
     columns = [_area(panels, "words", rrb.Vertical), middle, _area(panels, "measurements", rrb.Vertical)]
     return rrb.Blueprint(
-        _joined(rrb.Horizontal, columns, SHARES, "column_shares") or rrb.Vertical(),
+        _join(rrb.Horizontal, columns, SHARES, "column_shares") or rrb.Vertical(),
         rrb.TimePanel(timeline="cycle", state="collapsed", fps=PLAYED_PER_S),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
@@ -41,10 +41,10 @@ def _area(panels: Sequence[Panel], area: Area, container: Any) -> Any:
     groups = [list(group) for _, group in groupby(inside, key=lambda panel: panel.order)]
     parts = [group[0].view if len(group) == 1 else rrb.Tabs(*(panel.view for panel in group)) for group in groups]
     shares = [max(panel.share for panel in group) for group in groups]
-    return _joined(container, parts, shares, "row_shares" if container is rrb.Vertical else "column_shares")
+    return _join(container, parts, shares, "row_shares" if container is rrb.Vertical else "column_shares")
 
 
-def _joined(container: Any, parts: Sequence[Any], shares: Sequence[float], name: str) -> Any:
+def _join(container: Any, parts: Sequence[Any], shares: Sequence[float], name: str) -> Any:
     """The parts that there are in a container; None where there are none."""
     there = [(part, share) for part, share in zip(parts, shares, strict=True) if part is not None]
     if not there:

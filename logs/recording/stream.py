@@ -59,7 +59,7 @@ class RecordingStream:
             APPLICATION, recording_id=recording_id, send_properties=False, batcher_config=BATCHING)
         self._stream.set_log_time_enabled(False)
         self._stream.set_log_tick_enabled(False)
-        self._guarded(lambda: self._stream.set_sinks(*_sinks(path, live, live_port), default_blueprint=blueprint))
+        self._try(lambda: self._stream.set_sinks(*_sinks(path, live, live_port), default_blueprint=blueprint))
         self._stream.send_recording_name(viewable(title))
         self._cycles, self._flush_cycles = 0, LIVE_FLUSH_CYCLES if live else FLUSH_CYCLES
         self._now = (0, 0.0)
@@ -100,7 +100,7 @@ class RecordingStream:
             columns = chain.from_iterable(_columns(kind, name, [batch[name] for batch in batches]) for name in names)
             self._stream.send_columns(path, index, columns)
         self._rows.clear()
-        self._guarded(self._stream.flush)
+        self._try(self._stream.flush)
 
     def close(self) -> None:
         """End the recording with its footer."""
@@ -109,7 +109,7 @@ class RecordingStream:
         finally:
             self._stream.disconnect()
 
-    def _guarded(self, act: Any) -> None:
+    def _try(self, act: Any) -> None:
         try:
             act()
         except (RuntimeError, OSError, ValueError) as error:

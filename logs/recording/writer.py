@@ -32,10 +32,10 @@ def logger_classes() -> tuple[type[Logger], ...]:
     Raises:
         RecordingError: a logger of another package cannot be loaded.
     """
-    return (*_built_in(), *_foreign())
+    return (*_find_built_in_loggers(), *_foreign())
 
 
-def _built_in() -> Iterator[type[Logger]]:
+def _find_built_in_loggers() -> Iterator[type[Logger]]:
     """Those in the folder ``loggers``, in the order of their files' names."""
     for module in pkgutil.iter_modules(built_in.__path__):
         yield import_module(f"{built_in.__name__}.{module.name}").LOGGER

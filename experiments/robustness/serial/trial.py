@@ -63,25 +63,25 @@ class Trial:
         self._from = (self._floor.turned_rad, self._floor.moved_m)
         self._found.asked += 1
         reports: list[MotionReport] = []
-        if not self._guarded(lambda: reports.append(self._host.execute(command)), command):
+        if not self._try(lambda: reports.append(self._host.execute(command)), command):
             return False
         self._found.done += 1
         report, (turn, move), bounds = reports[0], self._since(), self._bounds
         off = (abs(report.turn_rad - turn), abs(report.move_m - move))
         short = (_short(report.turn_rad, command.turn_rad), _short(report.move_m, command.move_m))
         if short[0] > bounds.done_rad or short[1] > bounds.done_m:
-            self._violated(f"{command} was reported done, as {report}")
+            self._add_violation(f"{command} was reported done, as {report}")
         self._found.overtaken += off[0] > bounds.done_rad or off[1] > bounds.done_m
         if off[0] > max(bounds.done_rad, bounds.beyond_rad) or off[1] > max(bounds.done_m, bounds.beyond_m):
-            self._violated(f"{report} was reported, but it was {turn} rad, {move} m")
+            self._add_violation(f"{report} was reported, but it was {turn} rad, {move} m")
         return True
 
     def _idle(self, beats: int) -> None:
         for _ in range(beats):
             self.line.wait(0.2)
-            self._guarded(self._host.heartbeat, MotorCommand(0.0, 0.0))
+            self._try(self._host.heartbeat, MotorCommand(0.0, 0.0))
 
-    def _guarded(self, call: Callable[[], object], command: MotorCommand) -> bool:
+    def _try(self, call: Callable[[], object], command: MotorCommand) -> bool:
         """Call a driver; if it fails, check that the base stops, and wait until it can be reached again."""
         began_s = self.line.now()
         try:
@@ -98,7 +98,7 @@ class Trial:
             took_s = self.line.now() - began_s
             self._found.longest_s = max(self._found.longest_s, took_s)
             if took_s > 60.0 + 8.0 * (abs(command.turn_rad) + command.move_m / 0.05):
-                self._violated(f"{command} took {took_s:.0f} s")
+                self._add_violation(f"{command} took {took_s:.0f} s")
         return False
 
     def _stands(self, known: bool, *, dead: bool = False) -> None:
@@ -157,7 +157,7 @@ class Trial:
         if self._ask(last) or self._ask(last):
             self._found.resumed += 1
         else:
-            self._violated("it did not recover when the line was good again")
+            self._add_violation("it did not recover when the line was good again")
         self._record_excess()
         self._record_line()
 
@@ -173,13 +173,13 @@ class Trial:
         found.beyond_rad, found.beyond_m = max(found.beyond_rad, beyond[0]), max(found.beyond_m, beyond[1])
         found.strays += beyond[0] > math.radians(2.0) or beyond[1] > 0.02
         if beyond[0] > bounds.beyond_rad or beyond[1] > bounds.beyond_m:
-            self._violated(f"{asked} became {turn} rad, {move} m")
+            self._add_violation(f"{asked} became {turn} rad, {move} m")
 
     def _record_line(self) -> None:
         found = self._found
         found.frames += self.line.frames
         found.cuts += len(self.line.cuts)
-        found.states |= {(_spoken(self._protocol, said), moving) for said, moving in self.line.cuts}
+        found.states |= {(_describe_message(self._protocol, said), moving) for said, moving in self.line.cuts}
         for noise in self._noises:
             found.noise.update(noise.done)
         found.forged += sum(1 for raw in self._accepted if not any(raw in said for said in self.line.ever_said))
@@ -190,10 +190,10 @@ class Trial:
         """Check that each command was executed at most once, in order, and unaltered."""
         done = self._base_end.executed
         if len({(e.token, e.seq) for e in done}) != len(done):
-            self._violated("a command was executed twice")
+            self._add_violation("a command was executed twice")
         asked = iter((c.turn_rad, c.move_m) for c in self._asked)
         if not all(any(a == (e.turn_rad, e.move_m) for a in asked) for e in done):
-            self._violated("a command was executed that was never sent, or twice")
+            self._add_violation("a command was executed that was never sent, or twice")
 
     def _since(self) -> tuple[float, float]:
         return self._floor.turned_rad - self._from[0], self._floor.moved_m - self._from[1]
@@ -201,9 +201,9 @@ class Trial:
     def _late_if(self, moving: bool, when: str) -> None:
         if moving:
             self._found.late += 1
-            self._violated(f"it moves, though {when}")
+            self._add_violation(f"it moves, though {when}")
 
-    def _violated(self, how: str) -> None:
+    def _add_violation(self, how: str) -> None:
         self._found.violations.append(f"{self._protocol}: {how}")
 
     def _emulator(self) -> Any:
@@ -230,7 +230,7 @@ def _short(done: float, asked: float) -> float:
     return abs(asked) - (done if asked >= 0 else -done)
 
 
-def _spoken(protocol: str, said: bytes) -> str:
+def _describe_message(protocol: str, said: bytes) -> str:
     """Describe the host's last message in a word."""
     if protocol == "denning":
         return said.split(b" ")[2].split(b"*")[0].decode() if said.count(b" ") >= 2 else "nothing"

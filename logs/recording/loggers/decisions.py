@@ -81,9 +81,9 @@ class Decisions(Logger):
 
 def sentence(decision: Decision, messages: Messages) -> str:
     """What was seen and decided, in words."""
-    seen = _told(decision.observed, messages)
+    seen = _describe_changes(decision.observed, messages)
     given = f" [{seen}]" if seen else ""
-    done = _told(decision.made, messages) or "changes nothing"
+    done = _describe_changes(decision.made, messages) or "changes nothing"
     if decision.chosen is None:
         return f"nobody had anything to do{given}"
     who = words.source(decision.chosen.source.name)
@@ -92,7 +92,7 @@ def sentence(decision: Decision, messages: Messages) -> str:
     return f"{who}: {done}{given}"
 
 
-def _told(changes: Iterable[Change], messages: Messages) -> str:
+def _describe_changes(changes: Iterable[Change], messages: Messages) -> str:
     return "; ".join(words.grouped(said for change in changes if (said := messages.message(change))))
 
 

@@ -76,7 +76,7 @@ class Image(Logger):
         if moment.touched(Obstruction):
             self._obstruction(stream, moment.mirror)
         for milestone in moment.changed(Milestone)[-1:]:
-            self._expected(stream, milestone.value)
+            self._log_expected(stream, milestone.value)
         for segments in moment.changed(Segments)[-1:]:
             self._lines(stream, SEGMENTS_PATH, segments.value.segments_px)
         for match in moment.changed(LineMatch)[-1:]:
@@ -109,18 +109,18 @@ class Image(Logger):
         """It moves with the camera: its outline stays from picture to picture."""
         known = mirror.latest(Obstruction)
         corners = np.zeros((0, 2)) if known is None else np.array(known.value.outline_px, float)
-        sides, inside = self._clipped(np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
+        sides, inside = self._clip(np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
         stream.log(OBSTRUCTION, rr.LineStrips2D, strips=sides[inside].astype(np.float32))
 
     def _lines(self, stream: RecordingStream, path: str, segments_px: Any) -> None:
-        lines, inside = self._clipped(np.asarray(segments_px))
+        lines, inside = self._clip(np.asarray(segments_px))
         self._log_lines(stream, path, lines[inside])
 
     def _log_lines(self, stream: RecordingStream, path: str, lines: Floats) -> None:
         stream.log(path, rr.LineStrips2D, strips=lines.astype(np.float32))
         self._shown[path] = None
 
-    def _clipped(self, lines: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def _clip(self, lines: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """Lines (n, 2, 2) cut at the picture's border, and which of them are left; most need no cut."""
         lines = lines.reshape(-1, 2, 2)
         if lines.size == 0 or (lines.min() >= 0.0 and (lines.max(axis=(0, 1)) <= np.subtract(self._size, 1.0)).all()):
@@ -132,11 +132,11 @@ class Image(Logger):
         """Where points (..., 2) of the rectified picture, which knowledge sources see, lie in the camera's."""
         return pixels if self._pinhole is self._lens else self._lens.project(self._pinhole.rays(pixels))
 
-    def _expected(self, stream: RecordingStream, milestone: Milestone) -> None:
+    def _log_expected(self, stream: RecordingStream, milestone: Milestone) -> None:
         if milestone.status == "turning" or not milestone.expected_px:
             return
         lines = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
-        clipped, inside = self._clipped(lines)
+        clipped, inside = self._clip(lines)
         self._log_lines(stream, EXPECTED_PATH, clipped[inside])
         names = _largest(milestone, clipped, inside, self._size[0])
         spots = np.array(list(names.values()), float).reshape(-1, 2)
@@ -171,7 +171,7 @@ class Image(Logger):
         """From where a template was expected towards where it was found, drawn longer."""
         ends = np.array([(t.predicted_px, t.found_px) for t in items if t.found_px], float).reshape(-1, 2, 2)
         ends[:, 1] = ends[:, 0] + DRIFT_SCALE * (ends[:, 1] - ends[:, 0])
-        ends, inside = self._clipped(ends)
+        ends, inside = self._clip(ends)
         ends = ends[inside]
         stream.log(DRIFTS, rr.Arrows2D, origins=ends[:, 0], vectors=ends[:, 1] - ends[:, 0])
         self._shown[DRIFTS] = None

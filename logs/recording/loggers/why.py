@@ -58,7 +58,7 @@ class Why(Logger):
             self._told[title] = tell(moment.mirror)
         if moment.touched(Hypothesis):
             self._told[TRULY] = in_truth(self._belief.now(moment.mirror), self._truth)
-        text = composed(self._told)
+        text = compose(self._told)
         if text != self._last:
             self._last = text
             stream.log(WHY, rr.TextDocument, text=[text])
@@ -66,10 +66,10 @@ class Why(Logger):
 
 def story(mirror: Mirror) -> str:
     """The text, as markdown: one short paragraph a theme, none where there is nothing to say."""
-    return composed({title: tell(mirror) for title, tell, _ in CHAPTERS})
+    return compose({title: tell(mirror) for title, tell, _ in CHAPTERS})
 
 
-def composed(told: dict[str, str]) -> str:
+def compose(told: dict[str, str]) -> str:
     """Paragraphs in the order of the themes, the headline first."""
     titles = [title for title, _, _ in CHAPTERS]
     titles.insert(titles.index(BELIEVES) + 1, TRULY)
@@ -90,7 +90,7 @@ def _headline(mirror: Mirror) -> str:
     return mirror.ask(activity).line
 
 
-def _ended(mirror: Mirror) -> str:
+def _describe_outcome(mirror: Mirror) -> str:
     outcome = mirror.latest(Outcome)
     return f"{outcome.value.kind}: {outcome.value.reason}." if outcome else ""
 
@@ -162,10 +162,10 @@ def _expects(mirror: Mirror) -> str:
 
 
 def _sees(mirror: Mirror) -> str:
-    return " ".join(part for part in (_followed(mirror), _verified(mirror)) if part)
+    return " ".join(part for part in (_describe_tracks(mirror), _describe_verification(mirror)) if part)
 
 
-def _followed(mirror: Mirror) -> str:
+def _describe_tracks(mirror: Mirror) -> str:
     tracks = mirror.latest(Tracks)
     if tracks is None or not tracks.value.items:
         return ""
@@ -174,7 +174,7 @@ def _followed(mirror: Mirror) -> str:
     return f"{len(found)} of the {len(items)} points that it follows."
 
 
-def _verified(mirror: Mirror) -> str:
+def _describe_verification(mirror: Mirror) -> str:
     """The evidence for or against the milestone that is open, as far as it goes."""
     milestone, segments = mirror.latest(Milestone, lambda m: m.is_open), mirror.latest(Segments)
     if milestone is None or segments is None or segments.value.milestone != milestone.id:
@@ -264,7 +264,7 @@ BELIEVES, TRULY = "It believes", "In truth"
 
 CHAPTERS: tuple[tuple[str, Tell, tuple[type[Any], ...]], ...] = (
     ("", _headline, ACTIVITY_KINDS),
-    ("The end:", _ended, (Outcome,)),
+    ("The end:", _describe_outcome, (Outcome,)),
     ("Trouble:", _ails, (BodyFault, Recovery)),
     ("Harvey wants", _wants, (Goal,)),
     (BELIEVES, _believes, (Hypothesis,)),

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, wrong_landmarks
+from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose.line_set import build_line_set
 from knowledge_sources.methods.pose.numerics.finish import compute_weak_information
@@ -60,7 +60,7 @@ def take_some(scene: PoseScene, rng: np.random.Generator, count: int = 14) -> Po
 @quick
 def test_exact_lines_give_the_truth(solver: Solver, scene: PoseScene, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    prior = drawn_prior(scene.camera_from_world, 0.5, 0.05, rng)
+    prior = draw_prior(scene.camera_from_world, 0.5, 0.05, rng)
     found = solve(solver, scene, scene.segments_px, prior)
     assert found.ok and is_same(found.camera_from_world, scene.camera_from_world)
     assert found.inliers.all() and np.abs(found.residuals_px).max() < 1e-3
@@ -73,7 +73,7 @@ def test_the_order_of_the_lines_does_not_matter(solver: Solver, scene: PoseScene
     rng = np.random.default_rng(seed)
     scene = take_some(scene, rng)
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
-    prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    prior = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
     order = rng.permutation(len(scene))
     first = solve(solver, scene, segments, prior)
     second = solve(solver, scene.take(order), segments[order], prior)
@@ -89,7 +89,7 @@ def test_which_end_comes_first_does_not_matter(solver: Solver, scene: PoseScene,
     rng = np.random.default_rng(seed)
     scene = take_some(scene, rng)
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
-    prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    prior = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
     first = solve(solver, scene, segments, prior)
     lines, flipped = scene.lines_world.copy(), segments.copy()
     a, b = rng.random(len(scene)) < 0.5, rng.random(len(scene)) < 0.5
@@ -106,7 +106,7 @@ def test_moving_the_world_moves_the_pose_with_it(solver: Solver, scene: PoseScen
     rng = np.random.default_rng(seed)
     scene = take_some(scene, rng)
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
-    prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    prior = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
     moved_from_world = Pose.from_rotation_vector(rng.normal(0.0, 1.0, 3), rng.uniform(-30.0, 30.0, 3))
     lines = moved_from_world.apply(scene.lines_world)
     moved = PoseScene(lines, segments, scene.landmark_ids, scene.camera, scene.camera_from_world)
@@ -132,7 +132,7 @@ def test_gross_outliers_do_not_move_a_robust_pose(
         more = {"landmark_ids": None, "probability": 0.9999999, "rng": rng}
     else:
         segments, _ = wrong_landmarks(scene, segments, count, rng)
-    found = solve(solver, scene, segments, drawn_prior(scene.camera_from_world, 0.3, 0.03, rng), **more)
+    found = solve(solver, scene, segments, draw_prior(scene.camera_from_world, 0.3, 0.03, rng), **more)
     turn, shift = measure_error(found.camera_from_world, scene.camera_from_world)
     assert turn < 0.01 and shift < 0.33
     gross = np.abs(found.residuals_px).max(axis=1) > 25.0 * SIGMA_PX
@@ -164,7 +164,7 @@ def test_few_lines_never_make_a_prior_worse(scene: PoseScene, count: int, seed: 
     rng = np.random.default_rng(seed)
     scene = take_some(scene, rng, count)
     truth = scene.camera_from_world
-    prior = drawn_prior(truth, 0.1, 0.01, rng)
+    prior = draw_prior(truth, 0.1, 0.01, rng)
     for solver in (r_and_t_ml, med_r_and_t, trunc_r_and_t):
         found = solve(solver, scene, scene.segments_px, prior)
         assert weigh_error(found.camera_from_world, truth) <= weigh_error(prior, truth) * 1.02 + 1e-6
@@ -178,7 +178,7 @@ def test_few_noisy_lines_never_make_a_prior_worse(count: int, scene: PoseScene, 
     rng = np.random.default_rng(seed)
     scene = take_some(scene, rng, count)
     truth, segments = scene.camera_from_world, end_noise(scene.segments_px, SIGMA_PX, rng)
-    prior = drawn_prior(truth, 0.1, 0.01, rng)
+    prior = draw_prior(truth, 0.1, 0.01, rng)
     for solver in (r_and_t_ml, med_r_and_t, trunc_r_and_t):
         found = solve(solver, scene, segments, prior)
         assert weigh_error(found.camera_from_world, truth) <= weigh_error(prior, truth) * 1.02 + 1e-6
@@ -192,7 +192,7 @@ def test_r_then_t_and_r_and_t_return_the_prior_below_three_lines(
 ) -> None:
     rng = np.random.default_rng(seed)
     scene = take_some(scene, rng, count)
-    prior = drawn_prior(scene.camera_from_world, 0.1, 0.01, rng)
+    prior = draw_prior(scene.camera_from_world, 0.1, 0.01, rng)
     found = solve(solver, scene, scene.segments_px, prior)
     assert is_same(found.camera_from_world, prior) and not found.ok
 
@@ -208,7 +208,7 @@ def weigh_error(found: Pose, truth: Pose) -> float:
 def test_derivatives_are_those_of_the_residuals(scene: PoseScene, seed: int) -> None:
     rng = np.random.default_rng(seed)
     lines = build_line_set(scene.lines_world, end_noise(scene.segments_px, 2.0, rng), scene.camera, 1.0)
-    pose = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    pose = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
     _, image = compute_image_jacobian(lines, pose.rotation, pose.translation)
     plane = compute_plane_jacobian(lines, compute_camera_ends(lines, pose.rotation, pose.translation))
     for k in range(6):
@@ -232,5 +232,5 @@ def test_lens_distortion_is_undone(solver: Solver, seed: int) -> None:
     bent = Camera(plain.fx, plain.fy, plain.cx, plain.cy, plain.width, plain.height, (-0.08, 0.02, 1e-3, -1e-3, 0.0))
     through = bent.project(plain.rays(scene.segments_px))
     seen = PoseScene(scene.lines_world, through, scene.landmark_ids, bent, scene.camera_from_world)
-    found = solve(solver, seen, through, drawn_prior(scene.camera_from_world, 0.3, 0.03, rng))
+    found = solve(solver, seen, through, draw_prior(scene.camera_from_world, 0.3, 0.03, rng))
     assert is_same(found.camera_from_world, scene.camera_from_world)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, wrong_landmarks
+from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose.estimate import BEHIND, DISTANCE, NO_LENGTH, NO_OVERLAP
 from knowledge_sources.methods.pose.line_set import build_line_set
@@ -33,7 +33,7 @@ def by_solver(solvers: list[Any]) -> Any:
 
 
 def solve(solver: Solver, scene: PoseScene, segments: Any, rng: np.random.Generator) -> PoseEstimate:
-    prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    prior = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
     return solver(
         scene.lines_world, segments, scene.camera, prior, landmark_ids=scene.landmark_ids, sigma_px=SIGMA_PX
     )
@@ -101,7 +101,7 @@ def test_the_covariance_scales_with_the_variance_of_the_lines(
 ) -> None:
     """With exact lines and ``factor`` times the deviation, the covariance is ``factor`` squared times as large."""
     rng = np.random.default_rng(seed)
-    prior = drawn_prior(scene.camera_from_world, 0.1, 0.01, rng)
+    prior = draw_prior(scene.camera_from_world, 0.1, 0.01, rng)
     first, second = (
         solver(scene.lines_world, scene.segments_px, scene.camera, prior, landmark_ids=scene.landmark_ids, sigma_px=s)
         for s in (SIGMA_PX, factor * SIGMA_PX)

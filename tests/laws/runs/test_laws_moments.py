@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from docs.tools.contact_sheet import LETTERS, caption
-from docs.tools.moments import APART, KINDS, Moment, _drives, chosen
+from docs.tools.moments import APART, KINDS, Moment, _drives, choose
 
 moments = st.builds(Moment, st.integers(1, 60), st.sampled_from((*KINDS, "something new")), st.text(max_size=200))
 
 
 @given(candidates=st.lists(moments, max_size=30), most=st.integers(0, 12))
 def test_they_are_apart_in_order_and_happened(candidates: list[Moment], most: int) -> None:
-    found = chosen(candidates, most)
+    found = choose(candidates, most)
     assert len(found) <= most and set(found) <= set(candidates)
     assert all(later.cycle - earlier.cycle >= APART for earlier, later in pairwise(found))
     if len(found) < most:  # whatever is left out lies too near to one that is there
@@ -26,7 +26,7 @@ def test_they_are_apart_in_order_and_happened(candidates: list[Moment], most: in
 def test_every_kind_is_there_before_any_comes_again(kinds: list[str]) -> None:
     told = [Moment(3 * number, kind, "") for number, kind in enumerate(kinds)]
     distinct = len(set(kinds))
-    assert {m.kind for m in chosen(told, distinct)} == set(kinds)
+    assert {m.kind for m in choose(told, distinct)} == set(kinds)
 
 
 def test_a_drive_is_looked_at_in_its_middle() -> None:

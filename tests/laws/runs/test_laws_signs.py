@@ -16,7 +16,7 @@ from blackboard.servoing import Discrepancy
 from logs.recording.paths import RECORDS
 from logs.recording.signs import REFUTED, SIGNS, TROUBLE, VERIFIED, viewable
 from logs.recording.writer import RecordingWriter
-from rehearsal import CAMERA, HOUSE, MOUNT, play
+from scripted_mission import CAMERA, HOUSE, MOUNT, play
 from world_models.entries.body import BodyFault
 from world_models.entries.location import Place
 from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch, Subgoal

@@ -28,7 +28,7 @@ from harvey.why.story import lines_of, story
 from harvey.why.trace import Trace
 from harvey.why.walk import explain, walk
 from harvey.why.why_not import Fate, in_cycle, in_run, of_entry
-from harvey.wiring import known_kinds
+from harvey.wiring import load_kinds
 from strategies import Note, Scripted, Tally
 
 LAWS = settings(deadline=None, max_examples=60)
@@ -302,7 +302,7 @@ def test_leaves_differ_where_values_do(a: Any, b: Any) -> None:
 
 
 @settings(deadline=None, max_examples=200)
-@given(st.sampled_from([*known_kinds(), "Unheard"]), json_values, st.sampled_from(["Posted", "Revised", "Retracted"]))
+@given(st.sampled_from([*load_kinds(), "Unheard"]), json_values, st.sampled_from(["Posted", "Revised", "Retracted"]))
 def test_every_value_has_a_sentence(kind: str, value: Any, change: str) -> None:
     told = sentence(EntryRecord(change, f"{kind}-1.0", kind, "expert", (), value, 1, False))
     assert isinstance(told, str)
@@ -311,7 +311,7 @@ def test_every_value_has_a_sentence(kind: str, value: Any, change: str) -> None:
 
 @settings(deadline=None, max_examples=200)
 @given(st.lists(
-    st.tuples(st.sampled_from([*known_kinds(), "Unheard"]), json_values, st.lists(st.integers(0, 14), max_size=4)),
+    st.tuples(st.sampled_from([*load_kinds(), "Unheard"]), json_values, st.lists(st.integers(0, 14), max_size=4)),
     min_size=1, max_size=12))
 def test_the_story_of_any_web_of_entries_ends_and_tells_each_thing_once(
     web: list[tuple[str, Any, list[int]]]

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harvey.hardware.drivers.bases import create2_wire, denning_wire, p2os_wire
-from harvey.hardware.drivers.bases.counters import signed, step
+from harvey.hardware.drivers.bases.counters import step, to_signed
 from sim.emulators import p2os_packets
 from sim.emulators.create2 import Create2Emulator
 from sim.emulators.denning import DenningEmulator
@@ -173,5 +173,5 @@ def test_a_wrapping_counter_tells_every_step_below_half_its_range(start: int, ch
 
 @given(st.integers(), st.integers(2, 40))
 def test_signed_is_the_number_in_range_that_agrees_modulo(value: int, bits: int) -> None:
-    result = signed(value, bits)
+    result = to_signed(value, bits)
     assert (result - value) % 2**bits == 0 and -(2 ** (bits - 1)) <= result < 2 ** (bits - 1)

@@ -23,7 +23,7 @@ from harvey.run_files.deciding_code import deciding_code
 from harvey.run_files.observations import entry_of
 from harvey.run_files.records import read_records
 from harvey.why.sentences import sentence
-from harvey.wiring import known_kinds
+from harvey.wiring import load_kinds
 from logs.disk import Appended
 from logs.journal_file import read_journal
 from logs.reader import read_decisions
@@ -101,7 +101,7 @@ def test_every_kind_of_entry_has_its_own_sentence(run: Path) -> None:
     records = [r for d in read_records(run / "journal.jsonl") for r in (*d.observed, *d.made)]
     assert len({r.type for r in records}) >= 15
     for record in records:
-        said = words.sentence(entry_of(record, known_kinds()).value)
+        said = words.sentence(entry_of(record, load_kinds()).value)
         assert len(said) > 5 and sentence(record).startswith(said)
 
 

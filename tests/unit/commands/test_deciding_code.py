@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from harvey.run_files.deciding_code import DECIDING, DIGITS, WIRING, code_in, deciding_code
+from harvey.run_files.deciding_code import DECIDING, DIGITS, WIRING, deciding_code, read_code_in
 
 ROOT = Path(__file__).parents[3]
 
@@ -27,7 +27,7 @@ def test_the_same_files_are_the_same_program_wherever_they_are(program: Path) ->
     (program / "blackboard" / "notes.txt").write_text("no code")
     entry = program / "blackboard" / "entry.py"
     entry.write_bytes(entry.read_bytes().replace(b"\n", b"\r\n"))
-    assert code_in(program) == deciding_code() == code_in(ROOT)
+    assert read_code_in(program) == deciding_code() == read_code_in(ROOT)
     assert len(deciding_code()) == DIGITS
 
 
@@ -38,20 +38,20 @@ def test_the_same_files_are_the_same_program_wherever_they_are(program: Path) ->
     ])
 def test_a_changed_file_is_another_program(program: Path, name: str) -> None:
     (program / name).write_text((program / name).read_text(encoding="utf-8") + "# otherwise\n", encoding="utf-8")
-    assert code_in(program) != deciding_code()
+    assert read_code_in(program) != deciding_code()
 
 
 def test_a_file_that_was_renamed_or_is_new_makes_another_program(program: Path) -> None:
     (program / "knowledge_sources" / "action" / "motor.py").rename(program / "knowledge_sources" / "engine.py")
-    renamed = code_in(program)
+    renamed = read_code_in(program)
     (program / "knowledge_sources" / "gearbox.py").write_text("")
-    assert len({renamed, code_in(program), deciding_code()}) == 3
+    assert len({renamed, read_code_in(program), deciding_code()}) == 3
 
 
 def test_a_board_that_was_compiled_of_other_source_is_another_program(program: Path, tmp_path: Path) -> None:
     board = tmp_path / "compiled"
     shutil.copytree(program / "blackboard", board / "blackboard")
     (board / "blackboard" / "agenda.cpython-311-x86_64-linux-gnu.so").write_bytes(b"machine code")
-    assert code_in(program, board) == deciding_code()
+    assert read_code_in(program, board) == deciding_code()
     (board / "blackboard" / "agenda.py").write_text("as it was last week")
-    assert code_in(program, board) != deciding_code()
+    assert read_code_in(program, board) != deciding_code()

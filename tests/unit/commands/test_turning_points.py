@@ -27,7 +27,7 @@ from harvey.why.history import Told
 from harvey.why.on_the_way import levels_off, on_the_way
 from harvey.why.story import decided, headline, story
 from logs.turning_points import TurningPoint, TurningPointFinder
-from rehearsal import house
+from scripted_mission import house
 from sim.body.simulated_body import SimulatedBody
 from sim.truth import Truth
 from world_models.entries.body import BodyFault, Recovery

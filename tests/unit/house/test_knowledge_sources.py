@@ -21,7 +21,7 @@ from blackboard.kinds import Role
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from harvey.simulation.run import build_robot_model, run_mission
-from harvey.wiring import knowledge_sources, known_kinds
+from harvey.wiring import knowledge_sources, load_kinds
 from sim.scenario import load_scenario
 from sim.stage import build_stage
 from world_models.robot import RobotModel
@@ -29,7 +29,7 @@ from world_models.robot import RobotModel
 FOLDER = Path(__file__).parents[3] / "knowledge_sources"
 FILES = {path.stem: path for level in Level for path in sorted((FOLDER / str(level)).glob("[!_]*.py"))}
 TREES = {stem: ast.parse(path.read_text(encoding="utf-8")) for stem, path in FILES.items()}
-FROM_OUTSIDE = set(known_kinds().of_role(Role.OBSERVATION))
+FROM_OUTSIDE = set(load_kinds().of_role(Role.OBSERVATION))
 """What no knowledge source writes, but the user, the body and the clock of the mission."""
 
 

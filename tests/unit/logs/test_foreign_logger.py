@@ -20,7 +20,7 @@ from logs.recording.blueprint import blueprint
 from logs.recording.logger import Subject
 from logs.recording.paths import TABLE
 from logs.recording.writer import RecordingWriter, logger_classes
-from rehearsal import CAMERA, MOUNT, house, play
+from scripted_mission import CAMERA, MOUNT, house, play
 
 MODULE = '''
 from dataclasses import dataclass

@@ -18,7 +18,7 @@ from logs.recording.blueprint import blueprint
 from logs.recording.logger import Subject
 from logs.recording.paths import BELIEVED_BODY, FAULTS, IMAGE
 from logs.recording.writer import RecordingWriter, logger_classes
-from rehearsal import CAMERA, MOUNT, house, play
+from scripted_mission import CAMERA, MOUNT, house, play
 from world_models.frames import Pose2
 
 NEEDED: Mapping[str, tuple[str, ...]] = {

@@ -8,7 +8,7 @@ import pytest
 from blackboard.journal import Decision, decision_line, decision_record
 from logs import disk
 from logs.journal_file import HELD_LINES, JournalError, JournalFile, is_acted_on, read_journal
-from rehearsal import play
+from scripted_mission import play
 from world_models.entries.body import Look, MotorCommand
 
 

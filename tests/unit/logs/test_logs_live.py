@@ -16,7 +16,7 @@ import pytest
 from logs.errors import RecordingError
 from logs.reader import read_decisions, read_frames
 from logs.recording.writer import RecordingWriter
-from rehearsal import CAMERA, MOUNT, house, play
+from scripted_mission import CAMERA, MOUNT, house, play
 
 PATIENCE_S = 300.0
 

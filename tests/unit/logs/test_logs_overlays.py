@@ -10,7 +10,7 @@ from rerun.chunk import RrdReader
 from logs.recording.loggers.image import LABEL_PX
 from logs.recording.paths import DRIFTS, EXPECTED, IMAGE, LANDMARK_NAMES, MATCHED, SEGMENTS, WINDOWS
 from logs.recording.writer import RecordingWriter
-from rehearsal import CAMERA, MOUNT, house, play
+from scripted_mission import CAMERA, MOUNT, house, play
 
 LAST_PX = CAMERA.width - 0.5
 

@@ -13,7 +13,7 @@ from logs.recording.loggers.lanes import GAP
 from logs.recording.overview.overview import FOUND, RunFiles, _marks, read_series, summary, write_overview
 from logs.recording.paths import BUILDING, FLEET, HARVEY, MILESTONES, MOODS_OF, OFF, TRUE_ROBOT
 from logs.recording.writer import RecordingWriter
-from rehearsal import CAMERA, MOUNT, house, play
+from scripted_mission import CAMERA, MOUNT, house, play
 from world_models.frames import Pose2
 
 RESULT = {"scenario": "house", "seed": 3, "outcome": "reached", "final_error_m": 0.0042, "relocalizations": 0,

@@ -13,7 +13,7 @@ from logs.errors import RecordingError
 from logs.journal_file import JournalFile, read_journal
 from logs.reader import read_decisions, read_frames
 from logs.recording.writer import RecordingWriter
-from rehearsal import CAMERA, MOUNT, house, picture, play
+from scripted_mission import CAMERA, MOUNT, house, picture, play
 from world_models.frames import Pose2
 
 

@@ -11,7 +11,7 @@ from logs.recording.loggers.decisions import COLUMNS, log_level, row, sentence
 from logs.recording.loggers.sketch_tree import NO_SKETCH, outline
 from logs.recording.loggers.why import story
 from logs.recording.messages import Messages
-from rehearsal import play
+from scripted_mission import play
 from world_models.entries.body import BodyFault, MotorCommand, Recovery
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Leg

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, fragment
+from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, fragment
 from knowledge_sources.methods.pose import PoseEstimate, r_and_t, r_and_t_ml, r_then_t
 from knowledge_sources.methods.pose.line_set import build_line_set
 from knowledge_sources.methods.pose.numerics.image_error import compute_image_distances, compute_image_jacobian
@@ -41,7 +41,7 @@ def run_trials(solver: Callable[..., PoseEstimate], scene: PoseScene) -> tuple[A
     errors, sizes = [], []
     for _ in range(TRIALS):
         segments = end_noise(scene.segments_px, SIGMA_PX, rng)
-        prior = drawn_prior(scene.camera_from_world, 0.5, 0.03, rng)
+        prior = draw_prior(scene.camera_from_world, 0.5, 0.03, rng)
         found = solver(scene.lines_world, segments, scene.camera, prior, sigma_px=SIGMA_PX)
         apart = found.camera_from_world @ scene.camera_from_world.inverse()
         error = np.concatenate([apart.rotation_vector, apart.translation])
@@ -90,7 +90,7 @@ def test_maximum_likelihood_agrees_with_scipy_s_least_squares() -> None:
     scene = build_scene("corridor", True)
     rng = np.random.default_rng(5)
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
-    prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    prior = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
     found = r_and_t_ml(scene.lines_world, segments, scene.camera, prior, sigma_px=SIGMA_PX)
     lines = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
 

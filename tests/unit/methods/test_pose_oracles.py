@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from experiments.paper.pose_scenes import PoseScene, campus, corridor, drawn_prior, end_noise, wrong_landmarks
+from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import med_r_and_t, planar_from_points, r_and_t, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose.line_set import LineSet, build_line_set
 from knowledge_sources.methods.pose.numerics.plane_error import compute_camera_ends, compute_plane_distances
@@ -28,7 +28,7 @@ def build_problem(scene: PoseScene, seed: int) -> tuple[Array, Pose, LineSet]:
     rng = np.random.default_rng(seed)
     segments = end_noise(scene.segments_px, SIGMA_PX, rng)
     lines = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX)
-    return segments, drawn_prior(scene.camera_from_world, 0.3, 0.03, rng), lines
+    return segments, draw_prior(scene.camera_from_world, 0.3, 0.03, rng), lines
 
 
 def minimise(residuals: Residuals, start: Pose) -> Pose:
@@ -125,7 +125,7 @@ def test_the_truncated_loss_holds_beyond_half() -> None:
     off = []
     for _ in range(10):
         segments, _ = wrong_landmarks(scene, end_noise(scene.segments_px, SIGMA_PX, rng), 31, rng)
-        prior = drawn_prior(scene.camera_from_world, 0.3, 0.03, rng)
+        prior = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
         found = trunc_r_and_t(
             scene.lines_world, segments, scene.camera, prior, landmark_ids=scene.landmark_ids, sigma_px=SIGMA_PX
         )

@@ -8,7 +8,7 @@ import pytest
 
 from harvey.cli import main
 from harvey.dry_run import dry_run
-from rehearsal import CAMERA, HOUSE, MOUNT
+from scripted_mission import CAMERA, HOUSE, MOUNT
 from world_models.actuator import ActuatorModel
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command, Outcome

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-def signed(value: int, bits: int) -> int:
+def to_signed(value: int, bits: int) -> int:
     """The number that this many low bits stand for, in two's complement."""
     half = 1 << (bits - 1)
     return ((value + half) & ((1 << bits) - 1)) - half
@@ -11,4 +11,4 @@ def signed(value: int, bits: int) -> int:
 
 def step(before: int, after: int, bits: int) -> int:
     """By how much a wrapping counter went on: the smallest change that explains both readings."""
-    return signed(after - before, bits)
+    return to_signed(after - before, bits)

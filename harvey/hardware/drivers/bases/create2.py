@@ -251,11 +251,11 @@ class _Way:
 
     def to_go_m(self, goal_m: float) -> float:
         """How far each wheel has to go still."""
-        return goal_m - self._gone()[0]
+        return goal_m - self._progress()[0]
 
     def is_astray(self, goal_m: float) -> bool:
         """Whether the wheels have gone too far, backwards, together in a turn, or apart in a move."""
-        gone_m, askew_m = self._gone()
+        gone_m, askew_m = self._progress()
         return not -STRAY_M <= gone_m <= goal_m + STRAY_M or abs(askew_m) > ASKEW_M
 
     @property
@@ -265,7 +265,7 @@ class _Way:
 
     def note(self) -> None:
         """Keep what has been done so far."""
-        base, gone_m = self._base, self._gone()[0]
+        base, gone_m = self._base, self._progress()[0]
         if gone_m > self._best_m:
             self._best_m, self._best_s = gone_m, base._link.now()
         right, left = base._right_m - self._from[0], base._left_m - self._from[1]
@@ -279,7 +279,7 @@ class _Way:
         done = self._base._so_far
         return done if done is not None else MotionReport(0.0, 0.0, 0.0, self._base._link.now())
 
-    def _gone(self) -> tuple[float, float]:
+    def _progress(self) -> tuple[float, float]:
         """As asked for, and otherwise, since this part began [m of each wheel]."""
         right, left = self._base._right_m - self._part[0], self._base._left_m - self._part[1]
         apart, together = (right - left) / 2.0, (right + left) / 2.0

@@ -239,9 +239,9 @@ class P2osBase(Driver):
                 self._halt()
                 raise self._fault("stopped", "a stop was asked for", stopped=True)
             if self._link.now() - self._heard_s > PATIENCE_S:
-                self._lost()
+                self._give_up()
 
-    def _lost(self) -> None:
+    def _give_up(self) -> None:
         """Nothing is heard: say stop, in case that we still are, and greet it anew the next time."""
         self._link.write(3 * encode(ESTOP))
         self._heard_s = -math.inf

@@ -1,4 +1,4 @@
-"""A small mission played by experts with given lines, for whoever watches the board: a room, a door, another room."""
+"""A small mission played by scripted knowledge sources: a room, a door, another room."""
 
 from __future__ import annotations
 
@@ -73,14 +73,14 @@ def house() -> World:
 @inference()
 @dataclass(frozen=True, slots=True)
 class Cue:
-    """Tells an expert to say a line of the play."""
+    """Triggers a line of the script: whose it is, and its number."""
 
     who: str
     line: int
 
 
 class Player(KnowledgeSource):
-    """An expert that says its lines of the play when its cue comes."""
+    """A knowledge source that acts by the script when its cue comes."""
 
     def __init__(self, called: str, level: Level, lines: Sequence[Line]) -> None:
         self._called, self._lines = called, lines
