@@ -44,7 +44,7 @@ SPARE = 16
 class Agenda:
     """Pending activations, one for each (source, entry).
 
-    Adding, taking and finding the best cost the same however many are pending: experts give few different ratings, and
+    Adding, taking and finding the best cost the same however many are pending: sources give few different ratings, and
     those of one rating stand in a queue.
     """
 

@@ -1,4 +1,4 @@
-"""KnowledgeSource: an expert that watches, is asked whether it could act, and acts by asking for effects."""
+"""KnowledgeSource: it watches the board, rates its own activations, and acts by returning effects."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from blackboard.level import Level
 
 
 class KnowledgeSource(ABC):
-    """One expert. It keeps no memory between acts but the board; what it is built with must be immutable.
+    """One knowledge source. It keeps no memory between acts but the board; what it is built with must be immutable.
 
     Class attributes:
         level: the servo level (Figure 2) at which it works.

@@ -1,4 +1,4 @@
-"""Scheduler: one cycle takes the changes, lets the experts bid, executes one act and journals it.
+"""Scheduler: one cycle takes the changes, asks knowledge sources for ratings, executes one act and journals it.
 
 Order of a cycle: changes of the last cycle -> obviate what they made stale -> activate the watchers -> choose (pure),
 asking the best whether it still holds, and obviating it if not -> act -> apply -> journal -> ports. The journal has the
@@ -119,7 +119,7 @@ class Scheduler:
         return decision
 
     def _hear_bids(self, seen: tuple[Change, ...], activated: list[Activation], obviated: list[Obviated]) -> str:
-        """Drops what is stale, activates the watchers; tells how an expert raised, if so: then nobody acts."""
+        """Drop what is stale, activate the watchers. Returns the traceback of a source that raised, else nothing."""
         try:
             for change in seen:
                 if not isinstance(change, Posted):
@@ -132,7 +132,7 @@ class Scheduler:
                     watchers = self._watchers[kind, value] = self._watchers_of(kind, value)
                 if watchers:
                     self._hear_bids_on(change, watchers, activated, obviated)
-        except Exception:  # whatever an expert does wrong is journalled, never lost
+        except Exception:  # whatever a source does wrong is journalled, never lost
             return RAISED + traceback.format_exc(limit=-4)
         return ""
 
@@ -181,7 +181,7 @@ class Scheduler:
     def _two_best(
         self, focus: Level, obviated: list[Obviated]
     ) -> tuple[Activation | None, Activation | None, str]:
-        """The activation to be executed, taken from the agenda, and the next best; or how an expert raised."""
+        """Take the activation to be executed from the agenda; also the next best, or the traceback of a source."""
         chosen: Activation | None = None
         groups = self._servoing.nearest(focus)
         try:

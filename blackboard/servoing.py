@@ -81,7 +81,7 @@ class Discrepancy:
         return replace(self, status="corrected")
 
     def escalated(self) -> tuple[Discrepancy, Discrepancy]:
-        """This one, closed, and the one that stands for it one level up, not yet measured there.
+        """This one, closed, and its counterpart one level up, not yet measured there.
 
         Raises:
             ValueError: it does not exceed its bound.

@@ -1,4 +1,4 @@
-"""What the laws of the board share: small values, an expert whose answers are given, and hypothesis strategies."""
+"""What the laws of the board share: small values, a scripted knowledge source, and hypothesis strategies."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Scripted(KnowledgeSource):
 
     def __init__(
         self,
-        called: str = "expert",
+        called: str = "source",
         on: type[Any] = Note,
         act: Callable[[View, Change], Iterable[Effect]] = silent,
         *,

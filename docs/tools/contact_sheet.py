@@ -1,4 +1,4 @@
-"""A mission at a glance: the viewer's pictures of its ten most telling moments, on one sheet with captions.
+"""A mission on one page: the viewer's pictures of its ten most telling moments, on one sheet with captions.
 
     python -m docs.tools.contact_sheet runs/bump-0/recording.rrd docs/moments-bump.jpg
 """

@@ -237,7 +237,7 @@ def _is_free(here: Site, pose: Pose2) -> bool:
 
 
 def _headings(pose: Pose2) -> list[float]:
-    return [pose.heading_rad, *(wrap_angle(pose.heading_rad + glance) for glance in DEFAULT.plan.look_turns_rad)]
+    return [pose.heading_rad, *(wrap_angle(pose.heading_rad + turn_rad) for turn_rad in DEFAULT.plan.look_turns_rad)]
 
 
 def _draw_covariance(actuator: ActuatorModel, pose: Pose2, rng: np.random.Generator) -> Floats:

@@ -176,7 +176,7 @@ def _world(path: Path, _sha256: str) -> World:
 
 
 def _build(what: str, make: Callable[[], T]) -> T:
-    """What a part of ``run.json`` stands for. Raises BadInput where a value in it cannot be used, and names it."""
+    """Build a part of ``run.json``. Raises BadInput, which names the value, where one cannot be used."""
     try:
         return make()
     except (TypeError, ValueError) as error:

@@ -115,8 +115,8 @@ def decided(history: History, record: EntryRecord) -> str:
     text = f"Decided in {when} by the {words(record.author)}"
     if decision.chosen is None:
         return text + "."
-    rival = decision.runner_up
-    second = f"; next best was {rated(rival)}" if rival else "; nobody else could act"
+    next_best = decision.runner_up
+    second = f"; next best was {rated(next_best)}" if next_best else "; nobody else could act"
     return f"{text}, woken by {decision.chosen.trigger}, rated {decision.chosen.rating:.2f}{second}."
 
 

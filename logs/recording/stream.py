@@ -18,8 +18,8 @@ from logs.recording.signs import viewable
 APPLICATION = "harvey"
 
 FLUSH_CYCLES, LIVE_FLUSH_CYCLES = 128, 4
-"""A crash loses at most so many cycles of the recording (the journal loses none, so they can be drawn again); whoever
-watches sees it so late."""
+"""A crash loses at most so many cycles of the recording (the journal loses none, so they can be drawn again); a live
+viewer sees it so late."""
 
 LOCALHOST, LIVE_PORT = "127.0.0.1", 9876
 

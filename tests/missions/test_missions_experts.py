@@ -1,4 +1,4 @@
-"""The experts round the board: each may be missing, one may be added, none may know the truth, all rate purely."""
+"""Knowledge sources: each may be missing, one may be added, none may know the truth, all rate purely."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from sim.truth import Truth
 from world_models.entries.body import MotionReport
 from world_models.robot import RobotModel
 
-NAMES = [expert.__module__.rpartition(".")[2] for expert in KNOWLEDGE_SOURCES]
+NAMES = [source.__module__.rpartition(".")[2] for source in KNOWLEDGE_SOURCES]
 NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "fault_handler", "path_follower",
               "elevator_rider", "obstruction_finder"}
 """Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
@@ -80,7 +80,7 @@ def test_adding_one_takes_one_line(short_stage: Stage) -> None:
 
 
 def test_no_expert_holds_the_truth(short_stage: Stage) -> None:
-    """Nothing of the simulator can be reached from what an expert is built with."""
+    """Nothing of the simulator can be reached from what a knowledge source is built with."""
     body = short_stage.body(3)
     for source in knowledge_sources(build_robot_model(short_stage.scenario)):
         assert not any(isinstance(thing, Truth | SimulatedBody | Stage) for thing in _reachable(source)), source.name
@@ -100,11 +100,11 @@ def _reachable(root: Any) -> Iterable[Any]:
 
 
 def test_rating_and_acting_are_pure(short_stage: Stage) -> None:
-    """Asked twice, every expert gives the same rating and asks for the same effects, and the board is as it was."""
+    """Asked twice, every source gives the same rating and effects, and the board is as it was."""
     checked = 0
 
     class Asked(KnowledgeSource):
-        """Stands in for an expert and asks it twice."""
+        """Stands in for a knowledge source and asks it twice."""
 
         def __init__(self, inner: KnowledgeSource) -> None:
             self._inner = inner

@@ -59,7 +59,7 @@ class Goal:
     """A top-level goal: ptrans from one place to another.
 
     Attributes:
-        status: active, reached or abandoned (a new one stands for it, §2).
+        status: active, reached or abandoned (a new one replaces it, §2).
     """
 
     origin: Place

@@ -159,7 +159,7 @@ def _intersect(one: Window, other: Window | None) -> Window | None:
 
 
 def _unite(one: Window | None, other: Window | None) -> Window | None:
-    """The window round two windows; None stands for an empty one."""
+    """The window round two windows; None is an empty one."""
     if one is None or other is None:
         return one or other
     return min(one[0], other[0]), min(one[1], other[1]), max(one[2], other[2]), max(one[3], other[3])

@@ -27,7 +27,7 @@ from world_models.entries.task import Certificate, Goal, Leg, Milestone, Outcome
 from world_models.frames import Pose2
 
 MOST_REASONS = 5
-MAX_RIVALS = 4
+MAX_HYPOTHESES = 4
 
 Tell = Callable[[Mirror], str]
 
@@ -123,9 +123,11 @@ def _believes(mirror: Mirror) -> str:
 
 
 def _may_be(mirror: Mirror) -> str:
-    """The rival places while it is lost, the likeliest first."""
-    rivals = sorted((e.value for e in mirror.all(Hypothesis) if e.value.status == "candidate"), key=lambda h: -h.weight)
-    return words.listed([f"{h.place()} ({h.weight:.0%})" for h in rivals], MAX_RIVALS) + "." if rivals else ""
+    """The pose hypotheses while it is lost, the likeliest first."""
+    hypotheses = [e.value for e in mirror.all(Hypothesis) if e.value.status == "candidate"]
+    hypotheses.sort(key=lambda h: -h.weight)
+    places = [f"{h.place()} ({h.weight:.0%})" for h in hypotheses]
+    return words.listed(places, MAX_HYPOTHESES) + "." if places else ""
 
 
 def _does(mirror: Mirror) -> str:

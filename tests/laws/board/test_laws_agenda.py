@@ -16,7 +16,7 @@ from blackboard.servoing import Servoing
 from strategies import Note, Scripted, ratings
 
 KNOWLEDGE_SOURCES = [Scripted(f"{level}_{number}", level=level) for level in Level for number in range(2)]
-experts = st.sampled_from(KNOWLEDGE_SOURCES)
+sources = st.sampled_from(KNOWLEDGE_SOURCES)
 few_ratings = st.sampled_from((0.0, 0.3, 0.5, 1.0)) | ratings
 
 
@@ -29,7 +29,7 @@ class AgendaMachine(RuleBasedStateMachine):
         self.model: list[Activation] = []
         self.number = 0
 
-    @rule(source=experts, id=st.integers(0, 6), revision=st.integers(0, 2), rating=few_ratings)
+    @rule(source=sources, id=st.integers(0, 6), revision=st.integers(0, 2), rating=few_ratings)
     def add(self, source: Any, id: int, revision: int, rating: float) -> None:
         self.number += 1
         entry = Entry(f"Note-{id}", revision, Note("a"), "user", 0)

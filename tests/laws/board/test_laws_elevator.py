@@ -48,8 +48,8 @@ def driven(world: World, origin: str, destination: str) -> tuple[list[object], O
         made.extend(change.entry.value for change in decision.made)
 
     robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel())
-    experts = [source for source in knowledge_sources(robot) if source.name in PLANNING_SOURCES]
-    scheduler = Scheduler([*experts, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(note,))
+    planners = [source for source in knowledge_sources(robot) if source.name in PLANNING_SOURCES]
+    scheduler = Scheduler([*planners, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(note,))
     goal = f"(ptrans ({origin} (12,4.5,0)) ({destination} (14,4.2,0)))"
     scheduler.tell([Post(Command(goal, 0.5, None, diagonal(0.003, 0.001)))], "user")
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < 4_000:

@@ -41,7 +41,7 @@ rules = st.lists(
 keeps = st.integers(1, 4)
 
 
-def expert_of(number: int, rule: Rule) -> Scripted:
+def source_of(number: int, rule: Rule) -> Scripted:
     """It asks for the newest of each kind and for its trigger: what the rules below keep."""
     on, what, rating, level = rule
 
@@ -63,10 +63,10 @@ def expert_of(number: int, rule: Rule) -> Scripted:
     return Scripted(f"e{number}", on, act, rate=rate, level=level, kinds=(Posted, Revised, Retracted))
 
 
-def told_again(program: list[Rule], retention: Mapping[type[Any], Kind]) -> tuple[list[str], Scheduler]:
+def run_board(program: list[Rule], retention: Mapping[type[Any], Kind]) -> tuple[list[str], Scheduler]:
     lines: list[str] = []
     scheduler = Scheduler(
-        [expert_of(i, rule) for i, rule in enumerate(program)], retention=retention,
+        [source_of(i, rule) for i, rule in enumerate(program)], retention=retention,
         sinks=[lambda d: lines.append(decision_line(d))],
     )
     for text in "abc":
@@ -78,15 +78,15 @@ def told_again(program: list[Rule], retention: Mapping[type[Any], Kind]) -> tupl
 @settings(deadline=None, max_examples=60)
 @given(program=rules, notes_kept=keeps, tallies_kept=keeps)
 def test_decisions_are_the_same_with_it_and_without(program: list[Rule], notes_kept: int, tallies_kept: int) -> None:
-    """The newest are kept, so whoever asks for the newest, or was triggered, finds what it found without."""
-    without, all_of_it = told_again(program, {})
-    lines, rest = told_again(program, {Note: keeping(notes_kept), Tally: keeping(tallies_kept)})
+    """The newest are kept, so a source that asks for the newest, or was triggered, finds what it found without."""
+    without, all_of_it = run_board(program, {})
+    lines, rest = run_board(program, {Note: keeping(notes_kept), Tally: keeping(tallies_kept)})
     assert lines == without
     assert len(rest.view) <= len(all_of_it.view)
 
 
 def chatter(retention: Mapping[type[Any], Kind], cycles: int, *, patient: bool = False) -> Scheduler:
-    """An expert that answers each tally with the next, and perhaps one that is never chosen and waits for notes."""
+    """A source that answers each tally with the next, and perhaps one that is never chosen and waits for notes."""
     def count_on(view: View, trigger: Change) -> Iterable[Effect]:
         yield Post(Tally(trigger.entry.value.count + 1), (trigger.entry,))
 
@@ -168,7 +168,7 @@ def test_every_revision_can_be_read_back_from_the_journal(program: list[Rule]) -
                 if not isinstance(change, Retracted):
                     written[str(change.entry.ref)] = entry_record(change.entry)["value"]
 
-        scheduler = Scheduler([expert_of(i, r) for i, r in enumerate(program)], sinks=[journal, remember],
+        scheduler = Scheduler([source_of(i, r) for i, r in enumerate(program)], sinks=[journal, remember],
                               retention={Note: keeping(1), Tally: keeping(1)})
         scheduler.tell([Post(Note("a")), Post(Tally(1))], "user")
         run(scheduler, 24)

@@ -35,7 +35,7 @@ class Port:
             yield Post(Note("observed"), (change.entry,))
 
 
-def told(scheduler: Scheduler, *values: Any) -> list[Entry[Any]]:
+def post(scheduler: Scheduler, *values: Any) -> list[Entry[Any]]:
     return [change.entry for change in scheduler.tell([Post(value) for value in values], "user")]
 
 
@@ -55,23 +55,23 @@ def test_a_cycle_goes_in_order() -> None:
         return answer
 
     pending = Scripted("pending", valid=lambda v, t: said("still valid", True), rate=0.1)
-    expert = Scripted(
-        "expert", Tally, lambda v, t: said("act", [Post(Tally(2))]), rate=lambda v, t: said("rate", 0.9),
+    source = Scripted(
+        "source", Tally, lambda v, t: said("act", [Post(Tally(2))]), rate=lambda v, t: said("rate", 0.9),
         where=lambda tally: tally.count == 1,
     )
-    scheduler = Scheduler([pending, expert], ports=[Port(heard)], sinks=[lambda d: heard.append("sink")])
-    told(scheduler, Note("a"), Note("b"))
+    scheduler = Scheduler([pending, source], ports=[Port(heard)], sinks=[lambda d: heard.append("sink")])
+    post(scheduler, Note("a"), Note("b"))
     scheduler.step()
     heard.clear()
-    told(scheduler, Tally(1))
+    post(scheduler, Tally(1))
     decision = scheduler.step()
-    assert decision.chosen.source is expert
+    assert decision.chosen.source is source
     assert heard == ["rate", "still valid", "act", "sink", ("port", "Tally-2")]
 
 
 def test_changes_made_now_wait_a_cycle() -> None:
     scheduler = Scheduler([Scripted("first", Note, post_tally), Scripted("second", Tally, rate=1.0)])
-    (note,) = told(scheduler, Note("a"))
+    (note,) = post(scheduler, Note("a"))
     first, second = run(scheduler)
     assert [c.entry for c in first.seen] == [note] and names(first.activated) == ["first"]
     assert second.seen == first.made and names(second.activated) == ["second"]
@@ -81,7 +81,7 @@ def test_changes_made_now_wait_a_cycle() -> None:
 def test_what_a_port_observes_is_seen_in_the_next_cycle() -> None:
     heard: list[Any] = []
     scheduler = Scheduler([Scripted("first", Note, post_tally, where=lambda n: n.text == "a")], ports=[Port(heard)])
-    told(scheduler, Note("a"))
+    post(scheduler, Note("a"))
     first, second = run(scheduler)
     assert [c.entry.value for c in first.observed] == [Note("a")]
     assert [c.entry.value for c in second.seen] == [Tally(1), Note("observed")]
@@ -95,7 +95,7 @@ def test_the_journal_has_the_decision_before_any_port_sees_it() -> None:
         [Scripted("first", Note, post_tally, where=lambda n: n.text == "a")], ports=[Port(heard)],
         sinks=[lambda d: heard.append(("one", d.cycle)), lambda d: heard.append(("two", d.cycle))],
     )
-    told(scheduler, Note("a"))
+    post(scheduler, Note("a"))
     scheduler.step()
     assert heard == [("one", 1), ("two", 1), ("port", "Tally-1")]
 
@@ -107,7 +107,7 @@ def test_a_newer_trigger_on_the_same_entry_replaces_the_pending_one() -> None:
         yield Revise(trigger.entry, Note("b"))
 
     scheduler = Scheduler([patient, Scripted("editor", Note, rewrite, where=lambda n: n.text == "a")])
-    told(scheduler, Note("a"), Note("other"))
+    post(scheduler, Note("a"), Note("other"))
     first, second, third, *rest = run(scheduler)
     assert names(first.activated) == ["patient", "editor", "patient"] and first.pending == 2
     (dropped,) = second.obviated
@@ -121,7 +121,7 @@ def test_a_newer_trigger_on_the_same_entry_replaces_the_pending_one() -> None:
 def test_an_activation_whose_entry_changed_is_obviated(effect: Any, now: str) -> None:
     eager = Scripted("eager", Note, lambda v, t: [effect(t.entry)], rate=0.9, kinds=(Posted,))
     scheduler = Scheduler([Scripted("late", Note, post_tally, rate=0.1, kinds=(Posted,)), eager])
-    told(scheduler, Note("a"))
+    post(scheduler, Note("a"))
     first, second = run(scheduler)
     assert names(first.activated) == ["late", "eager"] and first.chosen.source is eager
     assert [(o.activation.source.name, o.reason) for o in second.obviated] == [
@@ -133,7 +133,7 @@ def test_an_activation_whose_entry_changed_is_obviated(effect: Any, now: str) ->
 def test_an_activation_that_could_no_longer_answer_is_obviated() -> None:
     shy = Scripted("shy", Note, rate=lambda view, t: None if view.all(Tally) else 0.1)
     scheduler = Scheduler([shy, Scripted("eager", Note, post_tally, rate=0.9)])
-    told(scheduler, Note("a"))
+    post(scheduler, Note("a"))
     _, second = run(scheduler)
     assert [(o.activation.source.name, o.reason) for o in second.obviated] == [("shy", "could not answer any more")]
 
@@ -141,7 +141,7 @@ def test_an_activation_that_could_no_longer_answer_is_obviated() -> None:
 def test_a_retraction_triggers_its_watchers() -> None:
     mourner = Scripted("mourner", Note, post_tally, kinds=(Retracted,))
     scheduler = Scheduler([mourner])
-    (note,) = told(scheduler, Note("a"))
+    (note,) = post(scheduler, Note("a"))
     scheduler.tell([Retract(note)], "user")
     assert names([run(scheduler)[0].chosen]) == ["mourner"]
 
@@ -151,7 +151,7 @@ def test_a_retraction_triggers_its_watchers() -> None:
 def test_the_nearest_level_then_the_best_rated_then_the_oldest_acts(bids: list[tuple[float, Level]]) -> None:
     order = sorted(range(len(bids)), key=lambda i: (bids[i][1], -bids[i][0], i))
     scheduler = Scheduler([Scripted(f"e{i}", rate=rating, level=level) for i, (rating, level) in enumerate(bids)])
-    told(scheduler, Note("a"))
+    post(scheduler, Note("a"))
     decisions = run(scheduler)
     assert names(d.chosen for d in decisions) == [f"e{i}" for i in order]
     assert [d.runner_up and d.runner_up.source.name for d in decisions] == [*(f"e{i}" for i in order[1:]), None]
@@ -164,7 +164,7 @@ def test_an_act_sees_the_board_as_it_was_before_it() -> None:
         yield Post(Tally(len(view)))
 
     scheduler = Scheduler([Scripted(act=look_twice)])
-    told(scheduler, Note("a"))
+    post(scheduler, Note("a"))
     run(scheduler)
     assert [e.value.count for e in scheduler.view.all(Tally)] == [1, 1]
 
@@ -194,11 +194,11 @@ def yield_no_effect(_view: View, _trigger: Change) -> Iterable[Any]:
     [(raise_late, "no such landmark"), (rest_on_nothing, "'nothing'"), (change_type, "to stay a Note"),
      (yield_no_effect, "Tally")],
 )
-def test_an_expert_that_raises_is_journalled_and_nothing_is_applied(act: Any, named: str) -> None:
+def test_a_source_that_raises_is_journalled_and_nothing_is_applied(act: Any, named: str) -> None:
     lines: list[str] = []
     bad = Scripted("bad", act=act, rate=0.9)
     scheduler = Scheduler([bad, Scripted("good", act=post_tally)], sinks=[lambda d: lines.append(decision_line(d))])
-    told(scheduler, Note("a"))
+    post(scheduler, Note("a"))
     first, second, *_ = run(scheduler)
     assert first.chosen.source is bad and first.made == ()
     assert first.refused.startswith(RAISED) and "Traceback" in first.refused and named in first.refused
@@ -215,9 +215,9 @@ def fail(*_args: Any) -> Any:
     [Scripted("bad", rate=fail), Scripted("bad", valid=fail), Scripted("bad", where=fail), Scripted("bad", rate=1.5),
      Scripted("bad", rate=float("nan"))],
 )
-def test_an_expert_that_raises_when_it_is_asked_is_journalled_and_nobody_acts(bad: Scripted) -> None:
+def test_a_source_that_raises_when_it_is_asked_is_journalled_and_nobody_acts(bad: Scripted) -> None:
     scheduler = Scheduler([Scripted("good", act=post_tally), bad])
-    told(scheduler, Note("a"))
+    post(scheduler, Note("a"))
     first = scheduler.step()
     assert first.refused.startswith(RAISED) and "Traceback" in first.refused
     assert first.chosen is None and first.runner_up is None and first.made == ()
@@ -230,7 +230,7 @@ def test_effects_of_a_kind_not_its_own_are_refused() -> None:
         yield Retract(trigger.entry)
 
     scheduler = Scheduler([Scripted("meddler", act=meddle, writes=(Tally,))])
-    (note,) = told(scheduler, Note("a"))
+    (note,) = post(scheduler, Note("a"))
     (decision,) = run(scheduler)
     assert decision.refused == "meddler may not write Note" and decision.made == ()
     assert scheduler.view.is_current(note) and len(scheduler.view) == 1
@@ -240,7 +240,7 @@ def test_a_stale_act_is_refused() -> None:
     old = Entry("Note-1", 0, Note("a"), "user", 0)
     slow = Scripted("slow", Tally, lambda v, t: [Post(Tally(2)), Revise(old, Note("c"))], kinds=(Posted,))
     scheduler = Scheduler([slow])
-    (entry,) = told(scheduler, Note("a"))
+    (entry,) = post(scheduler, Note("a"))
     scheduler.tell([Revise(entry, Note("b")), Post(Tally(1))], "user")
     decision = run(scheduler)[0]
     assert decision.refused == "stale: Note-1.0 is now Note-1.1" and decision.made == ()
@@ -249,13 +249,13 @@ def test_a_stale_act_is_refused() -> None:
 
 def test_two_experts_of_one_name_are_refused() -> None:
     with pytest.raises(ValueError, match="different names"):
-        Scheduler([Scripted("twin"), Scripted("twin")])
+        Scheduler([Scripted("same"), Scripted("same")])
 
 
 def test_a_level_that_is_off_silences_the_experts_that_close_it() -> None:
     sources = [Scripted("closer", closes=Level.ACTION), Scripted("worker", level=Level.ACTION)]
     scheduler = Scheduler(sources, servoing=Servoing(frozenset({Level.ACTION})))
-    told(scheduler, Note("a"))
+    post(scheduler, Note("a"))
     assert names(scheduler.step().activated) == ["worker"]
 
 
@@ -270,7 +270,7 @@ rules = st.lists(
 )
 
 
-def expert_of(number: int, rule: tuple[type[Any], str, float, Level]) -> Scripted:
+def source_of(number: int, rule: tuple[type[Any], str, float, Level]) -> Scripted:
     on, what, rating, level = rule
 
     def act(view: View, trigger: Change) -> Iterable[Effect]:
@@ -289,10 +289,10 @@ def expert_of(number: int, rule: tuple[type[Any], str, float, Level]) -> Scripte
 def journal_of(program: list[Any], focus: Level) -> list[str]:
     lines: list[str] = []
     scheduler = Scheduler(
-        [expert_of(i, rule) for i, rule in enumerate(program)], ports=[Port([])],
+        [source_of(i, rule) for i, rule in enumerate(program)], ports=[Port([])],
         sinks=[lambda d: lines.append(decision_line(d))],
     )
-    told(scheduler, Note("a"), Discrepancy(focus, "it is elsewhere", 1.0, (2.0, 3.0), "px"))
+    post(scheduler, Note("a"), Discrepancy(focus, "it is elsewhere", 1.0, (2.0, 3.0), "px"))
     run(scheduler, 20)
     return lines
 
@@ -307,8 +307,8 @@ def test_equal_runs_give_equal_journals(program: list[Any], focus: Level) -> Non
 @settings(deadline=None, max_examples=40)
 @given(program=rules, focus=levels)
 def test_every_change_is_seen_exactly_once_in_the_cycle_after_it(program: list[Any], focus: Level) -> None:
-    scheduler = Scheduler([expert_of(i, rule) for i, rule in enumerate(program)])
-    told(scheduler, Note("a"))
+    scheduler = Scheduler([source_of(i, rule) for i, rule in enumerate(program)])
+    post(scheduler, Note("a"))
     decisions = run(scheduler, 20)
     for one, two in pairwise(decisions):
         assert two.seen == one.made

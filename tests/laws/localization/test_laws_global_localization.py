@@ -52,7 +52,7 @@ def robot_in(world_name: str) -> RobotModel:
 
 CENTRE = robot_in("research_center")
 SYMMETRIC = generated_floor(11, 4, symmetric=True)
-TWIN = RobotModel(SYMMETRIC.world, CAMERA, MOUNT, ActuatorModel())
+SYMMETRIC_ROBOT = RobotModel(SYMMETRIC.world, CAMERA, MOUNT, ActuatorModel())
 
 
 def seen_from(robot: RobotModel, pose: Pose2, rng: np.random.Generator) -> Floats:
@@ -299,7 +299,7 @@ def test_in_a_corridor_that_looks_the_same_from_both_ends_it_never_says_where_it
     pose = Pose2(low[0] + part * (high[0] - low[0]), 0.5 * (low[1] + high[1]) + 0.3, heading)
     rooms = list(SYMMETRIC.world.rooms)
     for turns in ((0.0, math.pi), (0.0, 1.5, 3.0, 4.5)):
-        found = localize(TWIN, views_from(TWIN, pose, turns, seed), rooms)
+        found = localize(SYMMETRIC_ROBOT, views_from(SYMMETRIC_ROBOT, pose, turns, seed), rooms)
         assert found.status is not LocalizationStatus.FOUND
     assert len(found.candidates) >= 2
     turned = Pose2(*(low + high - pose.position), wrap_angle(pose.heading_rad + turns[-1] + math.pi))
@@ -317,7 +317,7 @@ def test_the_alias_of_a_place_is_found_from_the_model_alone(part: float, heading
     looks = [CameraView(nothing, Pose2(0.0, 0.0, a), np.diag([1e-5, 1e-5, 1e-4])) for a in (turn, turn + 1.0, 0.0)]
     turned = Pose2(*(low + high - pose.position), wrap_angle(heading + math.pi))
     assume(pose.distance_to(turned) > 0.5)
-    found = [other for _, other, _ in find_aliases(TWIN, looks, pose, list(SYMMETRIC.world.rooms))]
+    found = [other for _, other, _ in find_aliases(SYMMETRIC_ROBOT, looks, pose, list(SYMMETRIC.world.rooms))]
     assert any(other.distance_to(turned) < 0.02 for other in found)
 
 

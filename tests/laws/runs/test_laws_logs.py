@@ -27,15 +27,15 @@ KINDS = st.sampled_from([Note, Tally])
 
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.tuples(st.sampled_from(["post", "revise", "retract"]), st.integers(0, 5), KINDS), max_size=30))
-def test_the_mirror_shows_what_the_board_holds(deeds: list[tuple[str, int, type]]) -> None:
+def test_the_mirror_shows_what_the_board_holds(actions: list[tuple[str, int, type]]) -> None:
     board, mirror = Blackboard(), Mirror()
-    for deed, number, kind in deeds:
+    for action, number, kind in actions:
         known = board.view.all(kind)
         value = Note(str(number)) if kind is Note else Tally(number)
         effect: Effect = Post(value)
-        if known and deed != "post":
+        if known and action != "post":
             entry = known[number % len(known)]
-            effect = Revise(entry, value) if deed == "revise" else Retract(entry)
+            effect = Revise(entry, value) if action == "revise" else Retract(entry)
         for change in board.apply([effect], author="x", cycle=1):
             mirror.take(change)
     for kind in (Note, Tally):

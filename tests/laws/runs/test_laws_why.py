@@ -35,7 +35,7 @@ LAWS = settings(deadline=None, max_examples=60)
 
 
 def wilful(choices: list[int]) -> Scripted:
-    """An expert that posts, revises and retracts as the numbers say, each for reasons that they pick."""
+    """A knowledge source that posts, revises and retracts as the numbers say, each for reasons that they pick."""
     numbers = iter(choices)
 
     def act(view: View, _trigger: Change) -> Iterable[Effect]:
@@ -63,8 +63,8 @@ def journals(draw: st.DrawFn) -> list[str]:
     """The lines of a journal."""
     decisions: list[Decision] = []
     choices = draw(st.lists(st.integers(0, 60), min_size=1, max_size=120))
-    rival = Scripted("rival", Tally, lambda view, trigger: [Post(Note("seen"), (trigger.entry,))], rate=0.4)
-    scheduler = Scheduler([wilful(choices), rival], sinks=(decisions.append,))
+    second = Scripted("second", Tally, lambda view, trigger: [Post(Note("seen"), (trigger.entry,))], rate=0.4)
+    scheduler = Scheduler([wilful(choices), second], sinks=(decisions.append,))
     scheduler.tell([Post(Note("first")), Post(Tally(1))], "user")
     for _ in range(40):
         if scheduler.step() is None:
@@ -218,7 +218,7 @@ def test_a_decision_is_explained_exactly_if_the_closure_of_each_effect_has_a_gro
 @LAWS
 @given(st.dictionaries(st.integers(0, 9), st.lists(st.integers(0, 12), max_size=4), min_size=1))
 def test_a_walk_ends_on_any_graph_and_names_what_is_lacking(graph: dict[int, list[int]]) -> None:
-    known = {f"Note-{n}.0": EntryRecord("Posted", f"Note-{n}.0", "Tally" if n == 7 else "Note", "expert",
+    known = {f"Note-{n}.0": EntryRecord("Posted", f"Note-{n}.0", "Tally" if n == 7 else "Note", "source",
                                         tuple(f"Note-{m}.0" for m in below), {}, 1, False)
              for n, below in graph.items()}
     first = next(iter(known))
@@ -248,7 +248,7 @@ def test_candidates_are_those_that_the_trace_keeps(lines: list[str]) -> None:
 
 
 @LAWS
-@given(journals(), st.sampled_from(["wilful", "rival"]))
+@given(journals(), st.sampled_from(["wilful", "second"]))
 def test_why_not_agrees_with_a_plain_reading(lines: list[str], source: str) -> None:
     decisions = read(lines)
     told = Told(decisions)
@@ -304,7 +304,7 @@ def test_leaves_differ_where_values_do(a: Any, b: Any) -> None:
 @settings(deadline=None, max_examples=200)
 @given(st.sampled_from([*load_kinds(), "Unheard"]), json_values, st.sampled_from(["Posted", "Revised", "Retracted"]))
 def test_every_value_has_a_sentence(kind: str, value: Any, change: str) -> None:
-    told = sentence(EntryRecord(change, f"{kind}-1.0", kind, "expert", (), value, 1, False))
+    told = sentence(EntryRecord(change, f"{kind}-1.0", kind, "source", (), value, 1, False))
     assert isinstance(told, str)
     assert ("no longer believed" in told) == (change == "Retracted")
 
@@ -318,7 +318,7 @@ def test_the_story_of_any_web_of_entries_ends_and_tells_each_thing_once(
 ) -> None:
     """Whatever the values are, and however the reasons run, in circles too."""
     refs = [f"{type}-{number}.0" for number, (type, _, _) in enumerate(web)]
-    made = [EntryRecord("Posted", ref, type, "expert", tuple(refs[k % len(refs)] for k in below), value, 1, False)
+    made = [EntryRecord("Posted", ref, type, "source", tuple(refs[k % len(refs)] for k in below), value, 1, False)
             for ref, (type, value, below) in zip(refs, web, strict=True)]
     decision = DecisionRecord(1, "plan", (), (), (), (), None, None, 0, tuple(made), "", {})
     history = Told([decision])

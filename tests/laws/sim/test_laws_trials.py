@@ -24,7 +24,7 @@ def square(number: int) -> Square:
 
 
 def spoilt(number: int) -> Square:
-    """Fails in every trial: whoever asks for nothing but what is kept never calls it."""
+    """Fails in every trial: a call that only reads kept results never calls it."""
     raise RuntimeError(f"trial {number} was done again")
 
 

@@ -33,8 +33,8 @@ def plan_sketches(world: World) -> tuple[list[PlanSketch], Outcome]:
         sketches.extend(c.entry.value for c in decision.made if isinstance(c.entry.value, PlanSketch))
 
     robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel())
-    experts = [source for source in knowledge_sources(robot) if source.name in PLANNING_SOURCES]
-    scheduler = Scheduler([*experts, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(note,))
+    planners = [source for source in knowledge_sources(robot) if source.name in PLANNING_SOURCES]
+    scheduler = Scheduler([*planners, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(note,))
     ends = [world.locale(name).outline.mean(axis=0) / FOOT_M * part
             for name, part in ((world.rooms[0], 0.35), (world.rooms[-1], 0.35))]
     first, last = (f"({room} ({x:.2f},{y:.2f},0))" for room, (x, y) in

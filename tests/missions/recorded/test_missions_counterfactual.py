@@ -1,4 +1,4 @@
-"""What would have been: a agent without an expert, a landmark or a segment, told what the recorded run observed."""
+"""What would have been: an agent without a source, a landmark or a segment, given what the run observed."""
 
 from __future__ import annotations
 

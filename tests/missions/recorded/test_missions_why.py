@@ -1,4 +1,4 @@
-"""Why, on whole missions: every entry has a story, every decision its grounds, every expert a reason to keep still.
+"""Why, on whole missions: every entry has a story, every decision its grounds, every source a reason not to act.
 
 Two seeds of one mission across Allen's office, in which somebody bumps into Harvey.
 """
@@ -59,7 +59,7 @@ def history(runs: tuple[Path, Path]) -> History:
 
 
 @pytest.fixture(scope="module")
-def experts(runs: tuple[Path, Path]) -> Iterator[tuple[KnowledgeSource, ...]]:
+def sources(runs: tuple[Path, Path]) -> Iterator[tuple[KnowledgeSource, ...]]:
     agent = build_agent(RunHead.read(runs[0]))
     yield agent.sources
 
@@ -131,22 +131,22 @@ def test_a_milestone_tells_what_was_expected_seen_and_judged_and_what_followed(h
 
 
 def test_who_is_not_named_could_not_act_and_who_is_says_so_again(
-    history: History, experts: tuple[KnowledgeSource, ...]
+    history: History, sources: tuple[KnowledgeSource, ...]
 ) -> None:
-    """The journal and the experts, asked again on a board that is put together from it, agree in every cycle."""
+    """The journal and the sources, asked again on a board that is built from it, agree in every cycle."""
     asked = 0
     for cycle in history.cycles:
         board, decision = board_at(history, cycle, KNOWN), history.decision(cycle)
         ratings = {(c.source, c.trigger): c.rating for c in decision.activated}
-        for expert in experts:
+        for source in sources:
             for change in changes(history, cycle, KNOWN):
-                key = (expert.name, str(change.entry.ref))
-                if any(watch.sees(change) for watch in expert.watches) and board.view.is_current(change.entry):
-                    assert expert.rate(AskedView(board), change) == ratings.get(key)
+                key = (source.name, str(change.entry.ref))
+                if any(watch.sees(change) for watch in source.watches) and board.view.is_current(change.entry):
+                    assert source.rate(AskedView(board), change) == ratings.get(key)
                     asked += 1
-        absent = [e for e in experts if not in_cycle(history, e.name, cycle)]
-        for expert in absent[:: len(absent) // 2 or 1]:
-            assert "could have acted" not in "\n".join(why_absent(history, expert, cycle, KNOWN))
+        absent = [e for e in sources if not in_cycle(history, e.name, cycle)]
+        for source in absent[:: len(absent) // 2 or 1]:
+            assert "could have acted" not in "\n".join(why_absent(history, source, cycle, KNOWN))
     assert asked > 100
 
 

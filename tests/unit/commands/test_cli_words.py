@@ -42,7 +42,7 @@ def test_an_error_is_told_in_units_of_its_size(error_m: float, text: str) -> Non
 def say(value: Any) -> str:
     kind = type(value).__name__
     data = json.loads(json.dumps(plain(value)))
-    return sentence(EntryRecord("Posted", f"{kind}-1.0", kind, "expert", (), data, 1, False))
+    return sentence(EntryRecord("Posted", f"{kind}-1.0", kind, "source", (), data, 1, False))
 
 
 @pytest.mark.parametrize(("value", "told"), [

@@ -45,7 +45,7 @@ def decisions() -> list[Decision]:
 
     def act(*effects: Effect) -> None:
         cycle = len(made) + 1
-        changes = board.apply(list(effects), author="expert", cycle=cycle)
+        changes = board.apply(list(effects), author="source", cycle=cycle)
         made.append(Decision(cycle, (), (), Level.ACTION, (), (), None, None, 0, changes, ""))
 
     act(Post(HELD), Post(Milestone("PlanSketch-1", 2, "M2 of the route", 0.0)))

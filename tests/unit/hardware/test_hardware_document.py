@@ -67,7 +67,7 @@ def test_every_fault_has_advice(word: str) -> None:
     assert f"`{word}`" in TEXT
 
 
-def test_its_figures_are_those_of_the_experts() -> None:
+def test_its_figures_are_those_of_the_sources() -> None:
     s = DEFAULT.action
     assert (s.min_retry_wait_s, s.max_retry_wait_s, s.max_fault_s, s.max_broken_motions) == (0.25, 2.0, 30.0, 5)
     assert "after 0.25, 0.5, 1, 2, 2, ... s, and after 30 s" in TEXT and "after five motions in a row" in TEXT

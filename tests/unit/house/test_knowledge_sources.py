@@ -1,4 +1,4 @@
-"""What every knowledge source must be, whoever wrote it: found by looking into the folder."""
+"""What every knowledge source must be; sources are found by looking into the folder."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def test_what_is_held_back_is_not_much(tmp_path: Path) -> None:
 
 
 def test_what_is_drawn_is_told_in_the_words_of_the_journal(tmp_path: Path) -> None:
-    """Whoever asks for a line gets it, and the file has the same lines in the same order."""
+    """Every reader of a line gets it, and the file has the same lines in the same order."""
     path = tmp_path / "journal.jsonl"
     journal = JournalFile(path)
     drawn: list[str] = []

@@ -68,7 +68,7 @@ def test_file_and_watcher_get_everything(tmp_path: Path) -> None:
     recorder = recording_writer(tmp_path / "kept.rrd", port)
     cycles = play([recorder]).cycle
     recorder.flush()
-    with watching(port, tmp_path / "seen.rrd"):  # whoever comes late is told what was before
+    with watching(port, tmp_path / "seen.rrd"):  # a late viewer gets what was before
         assert until(lambda: arrived(tmp_path / "seen.rrd") == cycles)
     recorder.close()
     assert read_decisions(tmp_path / "seen.rrd") == read_decisions(tmp_path / "kept.rrd")

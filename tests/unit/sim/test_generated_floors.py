@@ -43,9 +43,9 @@ def test_a_symmetric_corridor_looks_the_same_from_both_ends() -> None:
         corners = floor.world.outline("corridor-0")
         (west, south), (east, north) = corners.min(axis=0), corners.max(axis=0)
         here = Pose2(west + 2.0, south + 1.0, 0.1)
-        twin = Pose2(west + east - here.x_m, south + north - here.y_m, math.pi + 0.1)
+        alias = Pose2(west + east - here.x_m, south + north - here.y_m, math.pi + 0.1)
         one, other = (renderer.image(settings.camera, settings.mount.camera_from_robot @ pose.lifted().inverse())
-                      for pose in (here, twin))
+                      for pose in (here, alias))
         return one.astype(float), other.astype(float)
 
     one, other = seen(True)

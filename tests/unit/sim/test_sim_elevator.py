@@ -60,7 +60,7 @@ def test_after_the_ride_walls_and_doors_are_those_of_the_floor(helped: Stage) ->
     assert body.truth.collisions == 0
 
 
-def test_whoever_helps_once_has_gone_home_after_it(helped: Stage) -> None:
+def test_a_rider_who_helps_once_has_gone_home_after_it(helped: Stage) -> None:
     body = helped.body(0)
     ride(body)
     again = ride(body, "car-2")

@@ -46,7 +46,7 @@ def body(seed: int) -> SimulatedBody:
 def test_known_pictures_change_nothing_but_who_makes_them(
     seed: int, acts: list[MotorCommand | None], known: int
 ) -> None:
-    """None stands for a look. The first pictures are known from the first body, the others are made."""
+    """None is a look. The first pictures are known from the first body, the others are made."""
     first, second = body(seed), body(seed)
     answers = [first.look() if act is None else first.execute(act) for act in acts]
     pictures = {a.number: a.jpeg for a in answers if isinstance(a, Frame) and a.number < known}
