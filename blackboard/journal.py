@@ -60,7 +60,7 @@ class Decision(NamedTuple):
         obviated: activations that were dropped, with reasons.
         chosen, runner_up: the activation that was executed and the next best.
         pending: how many were left.
-        made: the changes that the act brought about.
+        made: the changes of the act.
         refused: why an act was not applied (stale, raised, effect of a kind not its own), or "".
     """
 

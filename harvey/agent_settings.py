@@ -1,4 +1,4 @@
-"""Settings of an agent from ``--set ROOM.NAME=VALUE``: separated from a mission's, checked and put together."""
+"""Settings of an agent from ``--set ROOM.NAME=VALUE``: separated from a mission's, checked and combined."""
 
 from __future__ import annotations
 

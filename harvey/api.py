@@ -251,7 +251,7 @@ class RecordedRun:
         if isinstance(what, int):
             refs = principal(history.decision(what))
         else:
-            refs = [history.named(what) if what else history.outcome()]
+            refs = [history.resolve(what) if what else history.outcome()]
         return [story(history, record) for ref in refs if (record := history.entry(ref)) is not None]
 
     def replay(self) -> int | None:

@@ -73,7 +73,7 @@ def _refs(history: History, args: Namespace) -> list[str]:
     if args.milestone is not None:
         return []
     if args.at is None:
-        return [history.named(args.entry) if args.entry else history.outcome()]
+        return [history.resolve(args.entry) if args.entry else history.outcome()]
     return principal(history.decision(args.at))
 
 
@@ -109,7 +109,7 @@ def _record(one: Story) -> dict[str, Any]:
 
 
 def _print_check(history: History, as_json: bool) -> int:
-    from harvey.why.reach import KINDS, check, named
+    from harvey.why.reach import KINDS, check, ground_names
 
     found = check(history)
     if not found.decisions:
@@ -118,7 +118,7 @@ def _print_check(history: History, as_json: bool) -> int:
         print(json.dumps({"decisions": found.decisions, "acts": found.acts, "reached": found.reached, **found.by_kind,
                           "failing": [one.decision.cycle for one in found.failing]}, indent=2))
     else:
-        kinds = ", ".join(f"{found.by_kind[kind]} {words}" for kind, words in zip(KINDS, named(), strict=True))
+        kinds = ", ".join(f"{found.by_kind[kind]} {words}" for kind, words in zip(KINDS, ground_names(), strict=True))
         print(f"{found.reached} of {found.decisions} decisions rest on something ({kinds}).")
         for one in found.failing:
             lacking = ", ".join(ref for ref, grounds in one.grounds.items() if not grounds.hold)

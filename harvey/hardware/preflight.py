@@ -58,7 +58,7 @@ class Check:
 
 
 class Preflight:
-    """The robot as far as it could be put together, and the finding of each check; closes what it opened.
+    """The robot as far as it could be built, and the finding of each check; closes what it opened.
 
     Attributes:
         checks: in the order in which they were made.

@@ -17,7 +17,7 @@ from logs.camera_file import Pictures
 
 
 def effect_of(record: EntryRecord, frames: Mapping[int, bytes], view: View, kinds: Registry) -> Effect:
-    """The effect that brought about an observed change.
+    """The effect behind an observed change.
 
     Args:
         frames: number -> JPEG bytes of the pictures.

@@ -44,7 +44,7 @@ def open_body(body: SimulatedBody, kind: str) -> Iterator[Body]:
         return
     emulator = emulator_kinds()[kind]
     clock = (lambda: body.truth.time_s) if emulator.keeps_time else None
-    base = base_kinds()[kind].emulated(PseudoTerminalLink(FaultyLine(emulator.on_body(body), body), clock))
+    base = base_kinds()[kind].connect_to_emulator(PseudoTerminalLink(FaultyLine(emulator.on_body(body), body), clock))
     try:
         yield HardwareBody(base, FaultyBody(body), clock=lambda: body.truth.time_s, pause=body.wait,
                            carried=body.ride)

@@ -1,6 +1,6 @@
 """Asking a knowledge source again: could it have acted in a cycle, and if not, what did it find on the board?
 
-The board as it stood is put together from the journal, and ``rate`` is asked once more. That is honest as far as
+The board as it stood is rebuilt from the journal, and ``rate`` is asked once more. That is honest as far as
 ``rate`` is what it has to be, a pure function of the board; no act is repeated and no picture is looked at.
 """
 
@@ -133,7 +133,7 @@ def changes(history: History, cycle: int, kinds: Registry) -> tuple[Change, ...]
     """What a cycle took up: what the one before had made, and what came from outside. Raises BadInput."""
     decision = history.decision(cycle)
     outside = {r.ref for r in decision.observed}
-    before = [r for r in history.made(cycle - 1) if r.ref in decision.seen and r.ref not in outside]
+    before = [r for r in history.written_by(cycle - 1) if r.ref in decision.seen and r.ref not in outside]
     return tuple(CHANGES.get(r.change, Posted)(entry_of(r, kinds)) for r in (*before, *decision.observed))
 
 

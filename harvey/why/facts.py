@@ -101,7 +101,7 @@ def wheels(report: MotionReport) -> str:
     return f"the wheels claimed to have {' and '.join(parts) or 'stood still'}"
 
 
-def matched(history: History, record: EntryRecord) -> str:
+def describe_line_match(history: History, record: EntryRecord) -> str:
     """Which segments of which frame were taken for which model elements, and what pose follows."""
     match, fix = reason(history, record, "LineMatch"), value_of(record, PoseFix)
     if match is None:

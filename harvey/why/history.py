@@ -14,7 +14,7 @@ from harvey.run_files.records import Candidate, DecisionRecord, EntryRecord
 class History(ABC):
     """What a run's journal tells, asked for by name.
 
-    Two kinds give the same answers: :class:`Told`, from decisions in memory, and
+    Two kinds give the same answers: :class:`MemoryHistory`, from decisions in memory, and
     :class:`harvey.why.journal.JournalHistory`, which reads of a long journal only the lines that are needed.
     """
 
@@ -91,8 +91,8 @@ class History(ABC):
         first = decision.chosen.number if decision.chosen else None
         return tuple(sorted(found.values(), key=lambda c: (c.number != first, -c.rating, c.number)))
 
-    def made(self, cycle: int) -> tuple[EntryRecord, ...]:
-        """What a cycle brought about."""
+    def written_by(self, cycle: int) -> tuple[EntryRecord, ...]:
+        """The entries that a cycle wrote."""
         found = self.cycle_of(cycle)
         return () if found is None else found.made
 
@@ -114,7 +114,7 @@ class History(ABC):
         ended = any(id.startswith("Outcome-") for id in self.newest)
         return None if ended or not self.cycles else self.cycles[-1]
 
-    def named(self, text: str) -> str:
+    def resolve(self, text: str) -> str:
         """The ref that a user means: ``MotorCommand-12.3``, or ``MotorCommand-12`` for its last revision.
 
         Raises:
@@ -151,7 +151,7 @@ def _numbers(ids: Iterable[str], kind: str) -> Iterator[int]:
             yield int(number)
 
 
-class Told(History):
+class MemoryHistory(History):
     """A history of decisions that are in memory."""
 
     def __init__(self, decisions: Iterable[DecisionRecord]) -> None:

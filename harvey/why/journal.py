@@ -121,7 +121,7 @@ class JournalHistory(History):
                 where[record.ref.encode(errors="replace")] = self._ends[line] - 1
 
     def _find(self, ref: str, offset: int | None, *, retracted: bool) -> EntryRecord | None:
-        """The newest change of that name; where the sweep was deceived, it is looked for in every line."""
+        """The newest change of that name; where the index is wrong, every line is searched."""
         if offset is None:
             return None
         for line in range(self._line_at(offset), -1, -1):

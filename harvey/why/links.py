@@ -49,7 +49,7 @@ def nearest(history: History, record: EntryRecord, types: Iterable[str]) -> Entr
 
 def tracks_of(history: History, belief: EntryRecord) -> EntryRecord | None:
     """The landmarks that corrected a belief: they were written in the same act."""
-    here = [r for r in history.made(belief.cycle) if r.type == "Tracks" and r.author == belief.author]
+    here = [r for r in history.written_by(belief.cycle) if r.type == "Tracks" and r.author == belief.author]
     return here[0] if here else reason(history, belief, "Tracks")
 
 

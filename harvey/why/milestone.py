@@ -12,7 +12,7 @@ from harvey.why import facts
 from harvey.why.history import History
 from harvey.why.links import STRANGE, reason, words
 from harvey.why.sentences import sentence, value_of
-from harvey.why.story import Step, Story, decided
+from harvey.why.story import Step, Story, describe_decision
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Certificate, Milestone, PlanSketch
 
@@ -87,7 +87,7 @@ def _story(history: History, id: str, last: EntryRecord) -> Story:
                           (last.ref,)))
     name = facts.milestone_name(value_of(last, Milestone))
     head = f"{name[0].upper()}{name[1:]}: {last.value['status']}."
-    return Story(last.ref, head, decided(history, first), tuple(steps))
+    return Story(last.ref, head, describe_decision(history, first), tuple(steps))
 
 
 def _tell_origin(history: History, first: EntryRecord) -> Iterator[Step]:
@@ -115,7 +115,7 @@ def _tell_verdict(history: History, certificate: EntryRecord) -> Iterator[Step]:
     frame = None if segments is None else reason(history, segments, "Frame")
     if fix is not None:
         refs = tuple(r.ref for r in (fix, match, segments, frame) if r is not None)
-        yield Step("seen", facts.matched(history, fix), refs)
+        yield Step("seen", facts.describe_line_match(history, fix), refs)
     judged = None if milestone is None else value_of(milestone, Milestone)
     said = facts.verdict(value_of(certificate, Certificate), judged)
     yield Step("judged", said[0].upper() + said[1:], (certificate.ref,))
@@ -123,7 +123,7 @@ def _tell_verdict(history: History, certificate: EntryRecord) -> Iterator[Step]:
 
 def _tell_consequences(history: History, certificate: EntryRecord) -> Iterator[Step]:
     """What those did whom the verdict woke."""
-    for record in history.made(certificate.cycle):
+    for record in history.written_by(certificate.cycle):
         if record.type not in FOLLOWED:
             continue
         for decision in history.naming(record.ref):

@@ -97,7 +97,7 @@ def explained_by(decision: DecisionRecord) -> tuple[str, ...]:
     return tuple(dict.fromkeys(c.trigger for c in decision.obviated))
 
 
-def accounted(decisions: Iterable[DecisionRecord], kind_of: Kind = kind_of) -> Iterator[Accounted]:
+def trace_grounds(decisions: Iterable[DecisionRecord], kind_of: Kind = kind_of) -> Iterator[Accounted]:
     """Each decision of a run with what it rests on; reasons are older than what rests on them, so one pass does."""
     known: dict[str, Grounds] = {}
     for decision in decisions:
@@ -115,7 +115,7 @@ def _together(record: EntryRecord, known: Mapping[str, Grounds], own: str | None
     return Grounds(tuple(k for k in KINDS if k in kinds), tuple(lacking))
 
 
-def named() -> tuple[str, ...]:
+def ground_names() -> tuple[str, ...]:
     """The kinds of grounds in words, as those who reach them."""
     return "reach the goal", "the model", "a camera frame"
 
@@ -143,7 +143,7 @@ def check(history: History) -> Check:
     decisions = acts = reached = 0
     by_kind = dict.fromkeys(KINDS, 0)
     failing: list[Accounted] = []
-    for one in accounted(history.decisions()):
+    for one in trace_grounds(history.decisions()):
         decisions += 1
         acts += one.decision.chosen is not None
         reached += one.holds

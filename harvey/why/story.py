@@ -79,7 +79,7 @@ def story(history: History, record: EntryRecord) -> Story:
         head = facts.in_one_sentence(history, record) or headline(record)
     except STRANGE:
         steps, head = list(_plain_steps(history, record)), _plainly(history, record)
-    return Story(record.ref, head, decided(history, record), tuple(steps))
+    return Story(record.ref, head, describe_decision(history, record), tuple(steps))
 
 
 def _plain_steps(history: History, record: EntryRecord) -> Iterator[Step]:
@@ -106,7 +106,7 @@ def _describe_belief(hypothesis: Hypothesis) -> str:
     return f"It believed that it stood at {facts.pose(hypothesis)}."
 
 
-def decided(history: History, record: EntryRecord) -> str:
+def describe_decision(history: History, record: EntryRecord) -> str:
     """By whom, when and against what."""
     when = f"cycle {record.cycle}" + _time(history, record)
     if record.observed:
@@ -116,11 +116,11 @@ def decided(history: History, record: EntryRecord) -> str:
     if decision.chosen is None:
         return text + "."
     next_best = decision.runner_up
-    second = f"; next best was {rated(next_best)}" if next_best else "; nobody else could act"
+    second = f"; next best was {describe_candidate(next_best)}" if next_best else "; nobody else could act"
     return f"{text}, woken by {decision.chosen.trigger}, rated {decision.chosen.rating:.2f}{second}."
 
 
-def rated(c: Candidate) -> str:
+def describe_candidate(c: Candidate) -> str:
     return f"the {words(c.source)}, rated {c.rating:.2f}"
 
 
@@ -278,7 +278,7 @@ class _Teller:
         """From pixels and model to a pose."""
         match = reason(self.history, fix, "LineMatch")
         segments = None if match is None else reason(self.history, match, "Segments")
-        yield from self._one(fix.id, "matched", facts.matched(self.history, fix), fix, match, segments)
+        yield from self._one(fix.id, "matched", facts.describe_line_match(self.history, fix), fix, match, segments)
 
 
 def _plainly(_history: History, record: EntryRecord) -> str:

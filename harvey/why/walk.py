@@ -11,7 +11,7 @@ from harvey.diff.first_difference import differing_leaves
 from harvey.run_files.records import DecisionRecord, EntryRecord
 from harvey.why.history import History
 from harvey.why.sentences import sentence
-from harvey.why.story import decided
+from harvey.why.story import describe_decision
 from world_models.words import count
 
 WIDTH = 120
@@ -119,7 +119,7 @@ def _describe_record(record: EntryRecord, after: EntryRecord | None) -> str:
 
 
 def _who(record: EntryRecord, history: History) -> str:
-    return fill(f"{record.ref}: {decided(history, record)}", WIDTH, break_on_hyphens=False)
+    return fill(f"{record.ref}: {describe_decision(history, record)}", WIDTH, break_on_hyphens=False)
 
 
 PRINCIPAL = (

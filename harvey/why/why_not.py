@@ -127,7 +127,7 @@ def _distance(c: Candidate, focus: str) -> int:
     return abs(LEVELS.index(c.level) - LEVELS.index(focus))
 
 
-def told(source: str, occasions: tuple[Occasion, ...]) -> Iterator[str]:
+def tell_fates(source: str, occasions: tuple[Occasion, ...]) -> Iterator[str]:
     """What became of a knowledge source, in sentences; one that always acted is said to have."""
     tally = Counter(o.fate for o in occasions)
     if not occasions:

@@ -10,7 +10,7 @@ from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory
 from harvey.why.history import History
 from harvey.why.links import words
-from harvey.why.why_not import Fate, in_cycle, in_run, of_entry, told
+from harvey.why.why_not import Fate, in_cycle, in_run, of_entry, tell_fates
 
 
 def answers(run: RunDirectory, history: History, name: str, cycle: int | None) -> Iterator[str]:
@@ -20,14 +20,14 @@ def answers(run: RunDirectory, history: History, name: str, cycle: int | None) -
         BadInput: the run has no such entry and no such knowledge source; near ones are named.
     """
     if "-" in name:
-        yield from of_entry(history, history.named(name))
+        yield from of_entry(history, history.resolve(name))
         return
     source = name.lower().replace(" ", "_")
     if cycle is None:
         occasions = in_run(history, source)
         if not occasions:
             yield from _never(run, source)
-        yield from told(source, occasions)
+        yield from tell_fates(source, occasions)
         return
     found = in_cycle(history, source, cycle)
     if found:

@@ -36,7 +36,7 @@ class Belief:
 
     def now(self, mirror: Mirror) -> Held | None:
         """The belief as of now; None where there is none, as when it is lost."""
-        value = believed(mirror)
+        value = find_belief(mirror)
         if value is None:
             return None
         if self._last is None or self._last.value is not value:
@@ -44,7 +44,7 @@ class Belief:
         return self._last
 
 
-def believed(mirror: Mirror) -> Hypothesis | None:
+def find_belief(mirror: Mirror) -> Hypothesis | None:
     """The hypothesis that is acted on."""
     entry = mirror.latest(Hypothesis, _is_held)
     return entry.value if entry else None

@@ -12,7 +12,7 @@ import rerun.blueprint as rrb
 from blackboard.entry import Entry
 from blackboard.servoing import Discrepancy
 from logs.recording.activity import ACTIVITY_KINDS, activity, is_doubt, leg_under_way
-from logs.recording.belief import Held, believed, sigma_m
+from logs.recording.belief import Held, find_belief, sigma_m
 from logs.recording.board_mirror import Mirror, Moment
 from logs.recording.logger import Logger, Subject
 from logs.recording.loggers.sketch_tree import subgoal_label
@@ -113,7 +113,7 @@ def _wants(mirror: Mirror) -> str:
 
 
 def _believes(mirror: Mirror) -> str:
-    held = believed(mirror)
+    held = find_belief(mirror)
     if held is None:
         return "nothing about where it is: it is lost."
     pose = held.locale_from_robot

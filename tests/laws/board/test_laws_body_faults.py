@@ -62,7 +62,7 @@ def asking(_view: View, trigger: Change) -> Iterable[Effect]:
     yield Post(value, (trigger.entry,))
 
 
-def driven(requests: list[str], body: ScriptedBody) -> tuple[Scheduler, list[Any]]:
+def drive(requests: list[str], body: ScriptedBody) -> tuple[Scheduler, list[Any]]:
     """The fault_handler, and somebody who asks for the next request when the one before is answered; what was told."""
     told: list[Any] = []
 
@@ -90,7 +90,7 @@ requests = st.lists(st.sampled_from(["move", "look"]), min_size=1, max_size=6)
 def test_each_request_is_answered_once_or_the_mission_ends_declared(
     asked: list[str], script: list[str], ever_after: str
 ) -> None:
-    scheduler, told = driven(asked, ScriptedBody(script, ever_after))
+    scheduler, told = drive(asked, ScriptedBody(script, ever_after))
     view, outcome = scheduler.view, scheduler.view.latest(Outcome)
     posted = [e for e in told if e.revision == 0 and isinstance(e.value, MotorCommand | Look)]
     replies = [e for e in told if isinstance(e.value, MotionReport | Frame)]
@@ -106,7 +106,7 @@ def test_each_request_is_answered_once_or_the_mission_ends_declared(
 @given(requests, st.lists(answers, max_size=12), answers)
 def test_waits_double_and_the_patience_is_the_stated_one(asked: list[str], script: list[str], ever_after: str) -> None:
     body = ScriptedBody(script, ever_after)
-    scheduler, told = driven(asked, body)
+    scheduler, told = drive(asked, body)
     assert all(S.min_retry_wait_s <= wait <= S.max_retry_wait_s for wait in body.waits)
     last: dict[str, float] = {}
     for r in (e.value for e in told if isinstance(e.value, Recovery) and e.value.status == "asked"):
@@ -118,7 +118,7 @@ def test_waits_double_and_the_patience_is_the_stated_one(asked: list[str], scrip
 
 @given(st.lists(st.sampled_from(["", "link lost"]), max_size=12))
 def test_a_broken_off_motion_and_only_that_puts_the_belief_in_doubt(script: list[str]) -> None:
-    scheduler, told = driven(["move"], ScriptedBody(script, ""))
+    scheduler, told = drive(["move"], ScriptedBody(script, ""))
     doubts = scheduler.view.all(Discrepancy)
     broken = [e for e in told if isinstance(e.value, BodyFault)]
     assert len(tuple(doubts)) == (1 if broken else 0)
@@ -127,7 +127,7 @@ def test_a_broken_off_motion_and_only_that_puts_the_belief_in_doubt(script: list
 def test_a_stop_key_ends_it_at_once_also_while_something_else_is_wrong() -> None:
     for script in ([STOP_KEY], ["link lost", "link lost", STOP_KEY]):
         body = ScriptedBody(script, STOP_KEY)
-        scheduler, _ = driven(["move", "move"], body)
+        scheduler, _ = drive(["move", "move"], body)
         outcome = scheduler.view.latest(Outcome)
         assert outcome is not None and outcome.value.kind == "stopped"
         assert len(body.waits) == len(script) - 1
@@ -137,7 +137,7 @@ def test_a_stop_key_ends_it_at_once_also_while_something_else_is_wrong() -> None
 def test_a_base_that_breaks_off_every_motion_is_given_up(whole: int) -> None:
     """Each fault passes at once, but so many in a row are too many; one whole motion starts the count anew."""
     script = ["stalled", ""] * (S.max_broken_motions - 1) + [""] * bool(whole) + ["stalled", ""] * S.max_broken_motions
-    scheduler, told = driven(["move"] * 20, ScriptedBody(script, ""))
+    scheduler, told = drive(["move"] * 20, ScriptedBody(script, ""))
     outcome = scheduler.view.latest(Outcome)
     assert outcome is not None and f"{S.max_broken_motions} motions in a row" in outcome.value.reason
     moves = [e for e in told if isinstance(e.value, MotorCommand)]

@@ -40,7 +40,7 @@ def towers(draw: st.DrawFn) -> World:
     return read_world(Source.parse(text, "tower.toml"))
 
 
-def driven(world: World, origin: str, destination: str) -> tuple[list[object], Outcome]:
+def drive(world: World, origin: str, destination: str) -> tuple[list[object], Outcome]:
     """What is put on the board in a dry run, from hall to hall, and how it ends."""
     made: list[object] = []
 
@@ -85,7 +85,7 @@ def check_subgoal(world: World, subgoal: Subgoal) -> None:
 def test_sketches_pass_no_barrier_on_any_floor_and_keep_what_is_verified(world: World, data: st.DataObject) -> None:
     halls = [room for room in world.rooms if room.startswith("hall")]
     origin, destination = data.draw(st.permutations(halls))[:2]
-    made, outcome = driven(world, origin, destination)
+    made, outcome = drive(world, origin, destination)
     assert outcome.kind == "reached", outcome
     latest: dict[tuple[object, ...], PlanSketch] = {}
     for sketch in (value for value in made if isinstance(value, PlanSketch)):

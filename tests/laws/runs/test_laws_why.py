@@ -20,9 +20,9 @@ from blackboard.scheduler import Scheduler
 from harvey.diff.first_difference import describe, differing_leaves, first_difference
 from harvey.errors import BadInput
 from harvey.run_files.records import Candidate, DecisionRecord, EntryRecord, as_line, decision_of
-from harvey.why.history import Told
+from harvey.why.history import MemoryHistory
 from harvey.why.journal import JournalHistory
-from harvey.why.reach import SENSOR, accounted, explained_by, reaches
+from harvey.why.reach import SENSOR, explained_by, reaches, trace_grounds
 from harvey.why.sentences import sentence
 from harvey.why.story import lines_of, story
 from harvey.why.trace import Trace
@@ -105,7 +105,7 @@ def within(known: dict[str, EntryRecord], ref: str, steps: int) -> set[str]:
 @given(journals(), st.integers(0, 10**6))
 def test_the_whole_walk_is_the_closure_and_tells_each_entry_once(lines: list[str], pick: int) -> None:
     decisions = read(lines)
-    known, history = entries(decisions), Told(decisions)
+    known, history = entries(decisions), MemoryHistory(decisions)
     ref = sorted(known)[pick % len(known)]
     reasons = list(walk(history, [ref], depth=10**6))
     told = [r.ref for r in reasons if not r.known]
@@ -120,7 +120,7 @@ def test_a_short_walk_is_the_beginning_of_the_whole_and_says_what_it_leaves_out(
     lines: list[str], pick: int, depth: int
 ) -> None:
     decisions = read(lines)
-    known, history = entries(decisions), Told(decisions)
+    known, history = entries(decisions), MemoryHistory(decisions)
     ref = sorted(known)[pick % len(known)]
     reasons = list(walk(history, [ref], depth))
     assert max(r.depth for r in reasons) <= depth
@@ -168,7 +168,7 @@ def test_diff_finds_the_first_line_that_differs(ours: list[str], theirs: list[st
 @LAWS
 @given(journals(), st.binary(max_size=30).filter(lambda tail: b"\n" not in tail), st.integers(0, 10**6))
 def test_a_file_that_is_swept_tells_what_a_file_that_is_read_tells(lines: list[str], tail: bytes, pick: int) -> None:
-    told = Told(read(lines))
+    told = MemoryHistory(read(lines))
     with NamedTemporaryFile() as file:
         file.write("".join(line + "\n" for line in lines).encode() + tail)
         file.flush()
@@ -187,7 +187,7 @@ def test_a_file_that_is_swept_tells_what_a_file_that_is_read_tells(lines: list[s
 @LAWS
 @given(journals())
 def test_an_oddly_written_file_tells_the_same(lines: list[str]) -> None:
-    told = Told(read(lines))
+    told = MemoryHistory(read(lines))
     with NamedTemporaryFile("w") as file:
         file.write("".join(json.dumps(json.loads(line)) + "\n" for line in lines))
         file.flush()
@@ -205,8 +205,8 @@ def sensed(record: EntryRecord) -> str | None:
 @given(journals())
 def test_a_decision_is_explained_exactly_if_the_closure_of_each_effect_has_a_ground(lines: list[str]) -> None:
     decisions = read(lines)
-    known, told = entries(decisions), Told(decisions)
-    for one in accounted(decisions, sensed):
+    known, told = entries(decisions), MemoryHistory(decisions)
+    for one in trace_grounds(decisions, sensed):
         assert tuple(one.grounds) == explained_by(one.decision)
         for ref, found in one.grounds.items():
             closure = grounds(known, ref)
@@ -236,7 +236,7 @@ def test_a_walk_ends_on_any_graph_and_names_what_is_lacking(graph: dict[int, lis
 @given(journals())
 def test_candidates_are_those_that_the_trace_keeps(lines: list[str]) -> None:
     decisions = read(lines)
-    told, pending = Told(decisions), dict[int, Candidate]()
+    told, pending = MemoryHistory(decisions), dict[int, Candidate]()
     for d in decisions:
         pending |= {c.number: c for c in d.activated}
         for c in d.obviated:
@@ -251,7 +251,7 @@ def test_candidates_are_those_that_the_trace_keeps(lines: list[str]) -> None:
 @given(journals(), st.sampled_from(["wilful", "second"]))
 def test_why_not_agrees_with_a_plain_reading(lines: list[str], source: str) -> None:
     decisions = read(lines)
-    told = Told(decisions)
+    told = MemoryHistory(decisions)
     activated = [c.number for d in decisions for c in d.activated if c.source == source]
     acted = [d.cycle for d in decisions if d.chosen is not None and d.chosen.source == source and not d.refused]
     dropped = [d.cycle for d in decisions for c in d.obviated if c.source == source]
@@ -321,7 +321,7 @@ def test_the_story_of_any_web_of_entries_ends_and_tells_each_thing_once(
     made = [EntryRecord("Posted", ref, type, "source", tuple(refs[k % len(refs)] for k in below), value, 1, False)
             for ref, (type, value, below) in zip(refs, web, strict=True)]
     decision = DecisionRecord(1, "plan", (), (), (), (), None, None, 0, tuple(made), "", {})
-    history = Told([decision])
+    history = MemoryHistory([decision])
     for record in made:
         told = story(history, record)
         assert len({(step.text, step.refs) for step in told.steps}) == len(told.steps)

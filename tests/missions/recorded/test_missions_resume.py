@@ -50,7 +50,7 @@ def cut(whole: RunDirectory, to: Path, decisions: int, *, tail: int = 40) -> Run
     return run
 
 
-def gone_on(run: RunDirectory, stage: Stage) -> MissionResult:
+def go_on(run: RunDirectory, stage: Stage) -> MissionResult:
     return resume_mission(run, find_remains(run), stage=stage)
 
 
@@ -77,7 +77,7 @@ def test_where_no_motion_was_broken_off_it_is_as_if_nothing_had_been(
     records = list(read_records(whole.journal))
     before = made_by(records, "Look", 2)
     run = cut(whole, tmp_path / "run", before)
-    assert gone_on(run, short_stage).outcome == "reached"
+    assert go_on(run, short_stage).outcome == "reached"
     first, second = ([r.data for r in read_records(d.journal)] for d in (whole, run))
     assert first[:before] == second[:before]
     assert first[before + 1:] == second[before + 1:]
@@ -95,7 +95,7 @@ def test_a_motion_that_nobody_reported_on_is_not_carried_out_again(
     """Cut off twice, each time while a motor command is under way: the wheels are asked how far it went."""
     before = made_by(list(read_records(whole.journal)), "MotorCommand", 2)
     run = cut(whole, tmp_path / "once", before)
-    assert gone_on(run, short_stage).outcome == "reached"
+    assert go_on(run, short_stage).outcome == "reached"
     records = list(read_records(run.journal))
     command = next(e for e in records[before - 1].made if e.type == "MotorCommand")
     resumed, report = records[before].observed
@@ -107,7 +107,7 @@ def test_a_motion_that_nobody_reported_on_is_not_carried_out_again(
     assert decided_again(run)
 
     again = cut(run, tmp_path / "twice", made_by(records, "MotorCommand", 4))
-    assert gone_on(again, short_stage).outcome == "reached"
+    assert go_on(again, short_stage).outcome == "reached"
     assert sum(e.type == "Resumed" for r in read_records(again.journal) for e in r.observed) == 2
     assert len(answered(again)) == len(set(answered(again)))
     assert decided_again(again)
@@ -119,7 +119,7 @@ def test_a_run_that_had_hardly_begun_begins(
 ) -> None:
     run = cut(whole, tmp_path / "run", 0, tail=tail)
     run.camera.write_bytes(b"")
-    assert gone_on(run, short_stage).outcome == "reached"
+    assert go_on(run, short_stage).outcome == "reached"
     assert run.journal.read_bytes() == whole.journal.read_bytes()
 
 
@@ -193,7 +193,7 @@ def test_a_full_disk_stops_the_run_and_what_was_written_stays(
     assert (run.path / name).stat().st_size <= room
     assert run.journal.read_bytes().endswith(b"\n")
     assert decided_again(run)
-    assert gone_on(run, short_stage).outcome == "reached"
+    assert go_on(run, short_stage).outcome == "reached"
 
 
 def _with_room(path: Path, room: int) -> Callable[[int, bytes], int]:

@@ -28,7 +28,7 @@ from harvey.why.journal import JournalHistory
 from harvey.why.links import reason
 from harvey.why.milestone import milestone_story, milestones
 from harvey.why.reach import check
-from harvey.why.story import decided, lines_of, story
+from harvey.why.story import describe_decision, lines_of, story
 from harvey.why.why_not import in_cycle
 from sim.made_up.short_missions import OFFICE, fault
 from world_models.entries import KINDS
@@ -102,7 +102,7 @@ def test_the_time_that_is_told_is_the_newest_that_was_observed(history: History)
         times = [r.value["sim_time_s"] for r in decision.observed if r.type in ("Frame", "MotionReport")]
         now = times[-1] if times else now
         for made in decision.made if now is not None else ():
-            assert f", {now:.1f} s into the run," in decided(history, made)
+            assert f", {now:.1f} s into the run," in describe_decision(history, made)
             told += 1
     assert told > 100
 

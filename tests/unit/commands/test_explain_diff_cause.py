@@ -8,7 +8,7 @@ import pytest
 
 from harvey.diff.cause import grounds
 from harvey.run_files.records import DecisionRecord, EntryRecord
-from harvey.why.history import Told
+from harvey.why.history import MemoryHistory
 
 BECAUSE = {
     "Look-1.0": (), "Frame-1.0": ("Look-1.0",), "Belief-1.0": ("Frame-1.0",), "Frame-2.0": ("Look-1.0",),
@@ -16,11 +16,12 @@ BECAUSE = {
 }
 
 
-def told(otherwise: Collection[str]) -> Told:
+def build_history(otherwise: Collection[str]) -> MemoryHistory:
     """A run that makes one entry a cycle, some of them otherwise."""
     entries = [EntryRecord("Posted", ref, "Note", "somebody", because, int(ref in otherwise), cycle, False)
                for cycle, (ref, because) in enumerate(BECAUSE.items(), 1)]
-    return Told(DecisionRecord(e.cycle, "action", (), (), (), (), None, None, 0, (e,), "", {}) for e in entries)
+    return MemoryHistory(
+        DecisionRecord(e.cycle, "action", (), (), (), (), None, None, 0, (e,), "", {}) for e in entries)
 
 
 @pytest.mark.parametrize(("differing", "way"), [
@@ -31,4 +32,4 @@ def told(otherwise: Collection[str]) -> Told:
 ])
 def test_it_comes_from_the_oldest_difference_and_not_from_the_nearest(differing: list[str], way: list[str]) -> None:
     """A belief that differs since the first picture rests on the last one too, which differs as well."""
-    assert [a.ref for a, _ in grounds(told(()), told(differing), "Motion-1.0")] == way
+    assert [a.ref for a, _ in grounds(build_history(()), build_history(differing), "Motion-1.0")] == way

@@ -23,9 +23,9 @@ from harvey.run_files.records import DecisionRecord, decision_of
 from harvey.run_files.run_directory import RunDirectory
 from harvey.runner.result import Contact, MissionResult
 from harvey.simulation.contacts import ContactWatch
-from harvey.why.history import Told
+from harvey.why.history import MemoryHistory
 from harvey.why.on_the_way import levels_off, on_the_way
-from harvey.why.story import decided, headline, story
+from harvey.why.story import describe_decision, headline, story
 from logs.turning_points import TurningPoint, TurningPointFinder
 from scripted_mission import house
 from sim.body.simulated_body import SimulatedBody
@@ -79,7 +79,7 @@ def test_what_must_be_told_is_found_with_cycle_and_place() -> None:
 
 def test_why_tells_them_first_with_the_collisions_that_the_simulator_knows_of() -> None:
     contact = {"cycle": 3, "locale": "kitchen", "x_m": 1.5, "y_m": 2.0}
-    told = list(on_the_way(Told(records()), {"collisions": 1, "contacts": [contact]}))
+    told = list(on_the_way(MemoryHistory(records()), {"collisions": 1, "contacts": [contact]}))
     assert told == [
         "On the way:",
         "  cycle 2  refuted    M2 of the route: 1 of 9 lines",
@@ -88,8 +88,9 @@ def test_why_tells_them_first_with_the_collisions_that_the_simulator_knows_of() 
         "  cycle 5  found      kitchen (3.00, 1.00) m; it knows again where it is",
         "  cycle 6  fault      camera: camera unplugged",
     ]
-    assert list(on_the_way(Told(records()[:1]), {"collisions": 2}))[-1] == "  2 collisions; this run does not say where"
-    assert "Nothing went wrong on the way" in next(on_the_way(Told(records()[:1]), {}))
+    lines = list(on_the_way(MemoryHistory(records()[:1]), {"collisions": 2}))
+    assert lines[-1] == "  2 collisions; this run does not say where"
+    assert "Nothing went wrong on the way" in next(on_the_way(MemoryHistory(records()[:1]), {}))
 
 
 def test_the_time_of_a_decision_is_in_the_clock_of_the_run_also_while_a_fault_lasts() -> None:
@@ -99,15 +100,15 @@ def test_the_time_of_a_decision_is_in_the_clock_of_the_run_also_while_a_fault_la
     seen = board.apply([Post(fault), Post(recovery)], author="body", cycle=1)
     made = board.apply([Post(Outcome("failed", "camera unplugged"))], author="fault_handler", cycle=1)
     line = decision_line(Decision(1, seen, seen, Level.ACTION, (), (), None, None, 0, made, ""))
-    history = Told([decision_of(json.loads(line))])
+    history = MemoryHistory([decision_of(json.loads(line))])
     outcome = history.entry("Outcome-1.0")
     assert outcome is not None
-    assert decided(history, outcome) == "Decided in cycle 1, 38.8 s into the run, by the fault handler."
+    assert describe_decision(history, outcome) == "Decided in cycle 1, 38.8 s into the run, by the fault handler."
     assert "since 7.0 s into the run" in fault.sentence()
 
 
 def test_finding_itself_is_headed_as_that() -> None:
-    history = Told(records())
+    history = MemoryHistory(records())
     found = history.entry("Hypothesis-1.1")
     assert found is not None
     assert headline(found).startswith("It found out where it is: at (3.00, 1.00) m of kitchen")

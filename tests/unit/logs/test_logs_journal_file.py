@@ -12,7 +12,7 @@ from scripted_mission import play
 from world_models.entries.body import Look, MotorCommand
 
 
-def played(path: Path, *, forced: bool = False) -> list[Decision]:
+def play_to(path: Path, *, forced: bool = False) -> list[Decision]:
     decisions: list[Decision] = []
     journal = JournalFile(path, forced=lambda _decision: forced)
     play([journal, decisions.append])
@@ -22,7 +22,7 @@ def played(path: Path, *, forced: bool = False) -> list[Decision]:
 
 @pytest.mark.parametrize("forced", [False, True])
 def test_every_decision_comes_back(tmp_path: Path, forced: bool) -> None:
-    decisions = played(tmp_path / "journal.jsonl", forced=forced)
+    decisions = play_to(tmp_path / "journal.jsonl", forced=forced)
     assert decisions
     assert list(read_journal(tmp_path / "journal.jsonl")) == [decision_record(d) for d in decisions]
 
@@ -79,7 +79,7 @@ def test_the_remembered_line_is_that_of_the_decision(tmp_path: Path) -> None:
 
 def test_it_goes_on_behind_what_is_whole(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
-    decisions = played(path)
+    decisions = play_to(path)
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(lines[0] + lines[1][:9])
     journal = JournalFile(path, keep=len(lines[0]))
@@ -110,7 +110,7 @@ def test_what_a_port_will_act_on_is_on_the_disk_before_it_does(
 
 def test_a_truncated_last_line_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
-    count = len(played(path))
+    count = len(play_to(path))
     path.write_bytes(path.read_bytes()[:-7])
     records = list(read_journal(path))
     assert len(records) == count

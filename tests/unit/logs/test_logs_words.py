@@ -19,7 +19,7 @@ from world_models.words import grouped
 from world_models.words import sentence as words_of
 
 
-def played(until: str = "") -> tuple[list[Decision], Mirror]:
+def play_to(until: str = "") -> tuple[list[Decision], Mirror]:
     """The decisions and the mirror after the one that made the entry ``until``, or after all."""
     decisions: list[Decision] = []
     play([decisions.append])
@@ -34,7 +34,7 @@ def played(until: str = "") -> tuple[list[Decision], Mirror]:
 
 def test_a_decision_is_told_in_a_sentence() -> None:
     messages = Messages()
-    told = "\n".join(sentence(d, messages) for d in played()[0])
+    told = "\n".join(sentence(d, messages) for d in play_to()[0])
     assert ("sketcher: plan sketch from locale to locale: milestone M0 of M2 yet to be verified; "
             "plan sketch through kitchen: milestone M0 of M1 yet to be verified") in told
     assert ("motor: straight leg of 2.24 m, moving after 0 increments; "
@@ -54,7 +54,7 @@ def test_a_change_is_told_by_the_first_clause_of_the_entrys_own_sentence() -> No
     """One vocabulary: the recording and ``why`` say the same; the recording has room for less of it."""
     messages = Messages()
     kinds = set()
-    for decision in played()[0]:
+    for decision in play_to()[0]:
         for change in decision.made:
             said, value = messages.message(change), change.entry.value
             if said and not isinstance(value, Hypothesis) and not isinstance(change, Retracted):
@@ -64,7 +64,7 @@ def test_a_change_is_told_by_the_first_clause_of_the_entrys_own_sentence() -> No
 
 
 def faulty(status: str) -> Mirror:
-    mirror, board = played("MotorCommand-1.0")[1], Blackboard()
+    mirror, board = play_to("MotorCommand-1.0")[1], Blackboard()
     fault = BodyFault("camera", "camera unplugged", "no picture for 2.0 s", "Look-3", 12.0, status=status)
     for change in board.apply([Post(fault), Post(Recovery("BodyFault-1", "Look-3", 12.0, 0.5, tries=1))],
                               author="body", cycle=20):
@@ -81,18 +81,18 @@ def test_a_fault_of_the_body_is_the_headline() -> None:
 
 
 def test_trouble_stands_out() -> None:
-    levels = {d.chosen.source.name: log_level(d) for d in played()[0] if d.chosen}
+    levels = {d.chosen.source.name: log_level(d) for d in play_to()[0] if d.chosen}
     assert levels["clumsy"] == "ERROR"
     assert levels["tracker"] == "WARN"
     assert levels["motor"] == levels["sketcher"] == "INFO"
 
 
 def test_the_table_has_its_columns_in_every_cycle() -> None:
-    assert all(tuple(row(d)) == COLUMNS for d in played()[0])
+    assert all(tuple(row(d)) == COLUMNS for d in play_to()[0])
 
 
 def test_the_tree_is_an_outline_with_the_sketch_under_its_subgoal() -> None:
-    nodes = outline(played("Certificate-1.0")[1])
+    nodes = outline(play_to("Certificate-1.0")[1])
     assert [(n.depth, n.label) for n in nodes] == [
         (0, "Goal-1: be in parlour (active)"),
         (1, "· M0"),
@@ -107,7 +107,7 @@ def test_the_tree_is_an_outline_with_the_sketch_under_its_subgoal() -> None:
 
 
 def test_a_goal_without_a_sketch_says_so() -> None:
-    assert [n.label for n in outline(played("Goal-1.0")[1])] == ["Goal-1: be in parlour (active)", NO_SKETCH]
+    assert [n.label for n in outline(play_to("Goal-1.0")[1])] == ["Goal-1: be in parlour (active)", NO_SKETCH]
 
 
 def test_the_tree_of_nothing_is_empty() -> None:
@@ -115,7 +115,7 @@ def test_the_tree_of_nothing_is_empty() -> None:
 
 
 def test_the_story_says_what_it_wants_expects_sees_doubts_and_does() -> None:
-    told = story(played("PoseFix-1.0")[1])
+    told = story(play_to("PoseFix-1.0")[1])
     assert told.startswith("### Looking for a milestone")
     assert "**Harvey wants** to be in parlour (2.00, 2.00) m." in told
     assert ("**It believes** it is in kitchen at (1.00, 1.00) m, heading 0.0 degrees, "
@@ -126,12 +126,12 @@ def test_the_story_says_what_it_wants_expects_sees_doubts_and_does() -> None:
 
 
 def test_the_story_tells_of_a_discrepancy_and_of_being_lost() -> None:
-    told = story(played("Discrepancy-2.0")[1])
+    told = story(play_to("Discrepancy-2.0")[1])
     assert "the door is not where it was expected: not yet measured (at the plan level" in told
     assert told.startswith("### In doubt: checking where it is before it goes on")
     assert "It does:** has halted on a straight leg of 2.24 m" in told
     assert "turn 22.9 degrees left and move 0.60 m ahead, to follow Leg-1, as PlanSketch-2 has it for kitchen" in told
-    lost = story(played()[1])
+    lost = story(play_to()[1])
     assert lost.startswith("### The end: reached\n\n**The end:** reached: there.")
     assert "it is lost" in lost
 

@@ -78,7 +78,7 @@ class BaseKind:
     watchdog: str
     connect_emulated: Callable[[Link], Base] | None = None
 
-    def emulated(self, link: Link) -> Base:
+    def connect_to_emulator(self, link: Link) -> Base:
         """The driver over a line to an emulated base."""
         return (self.connect_emulated or self.connect)(link)
 

@@ -89,7 +89,7 @@ class P2osBase(Driver):
         way = _Way(self, began_s)
         for part in _parts(command.turn_rad, TURN_PART_RAD):
             self._turn_by(way, part)
-        way.turned()
+        way.end_turn()
         for part in _parts(command.move_m, MOVE_PART_M):
             self._move_by(way, part)
         return way.report()
@@ -289,7 +289,7 @@ class _Way:
         self.gone_m, self._held = 0.0, 0
         self._note()
 
-    def turned(self) -> None:
+    def end_turn(self) -> None:
         """The turn is over; moves go along the heading that it came to."""
         self.heading_rad = self._base._heading_rad
         self._from_m = (self._base._x_m, self._base._y_m)
