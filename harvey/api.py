@@ -40,8 +40,8 @@ from harvey.runner.replay import replay as replay_run
 from harvey.runner.result import MissionResult
 from harvey.simulation.run import build_head, run_mission
 from harvey.why.journal import JournalHistory
-from harvey.why.story import Story, lines_of, story
-from harvey.why.walk import principal
+from harvey.why.story import Story, lines_of, tell_stories
+from harvey.why.walk import find_refs
 from knowledge_sources.settings import Settings
 from logs.reader import read_true_track
 from sim.scenario import FORMAT, Scenario, ScenarioError, load_scenario, with_settings
@@ -248,11 +248,7 @@ class RecordedRun:
     def stories(self, what: str | int | None = None) -> Sequence[Story]:
         """The same as data: headline, decision and reasons with the entries that say so."""
         history = JournalHistory(self._files.journal)
-        if isinstance(what, int):
-            refs = principal(history.decision(what))
-        else:
-            refs = [history.resolve(what) if what else history.outcome()]
-        return [story(history, record) for ref in refs if (record := history.entry(ref)) is not None]
+        return list(tell_stories(history, find_refs(history, what)))
 
     def replay(self) -> int | None:
         """Decide it again from what it observed: the first cycle that is decided otherwise, or None where none is.

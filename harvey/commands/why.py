@@ -14,9 +14,9 @@ from harvey.run_files.run_directory import RunDirectory, open_run
 from harvey.why.history import History
 from harvey.why.journal import JournalHistory
 from harvey.why.on_the_way import levels_off, on_the_way
-from harvey.why.story import LEGEND, Story, lines_of, story
+from harvey.why.story import LEGEND, Story, lines_of, tell_stories
 from harvey.why.trace import cycle_lines
-from harvey.why.walk import explain, principal
+from harvey.why.walk import explain, find_refs
 from logs.disk import is_being_written
 
 
@@ -47,7 +47,7 @@ def _run(args: Namespace) -> int:
     if args.not_ is not None:
         _print_not(run, history, args)
         return 0
-    refs = _refs(history, args)
+    refs = [] if args.milestone is not None else find_refs(history, args.entry if args.at is None else args.at)
     if not asked and args.at is None and history.cut_off is not None:
         print(_describe_unfinished(run, history.cut_off), file=sys.stderr if args.json else sys.stdout)
     if args.json:
@@ -68,26 +68,12 @@ def _describe_unfinished(run: RunDirectory, cycle: int) -> str:
             "The last thing that its journal tells of:\n")
 
 
-def _refs(history: History, args: Namespace) -> list[str]:
-    """What is to be explained."""
-    if args.milestone is not None:
-        return []
-    if args.at is None:
-        return [history.resolve(args.entry) if args.entry else history.outcome()]
-    return principal(history.decision(args.at))
-
-
 def _stories(history: History, args: Namespace, refs: Iterable[str]) -> Iterator[Story]:
     if args.milestone is not None:
         from harvey.why.milestone import milestone_story, milestones
 
         yield from (milestone_story(history, id) for id in milestones(history, args.milestone))
-    for ref in refs:
-        record = history.entry(ref)
-        if record is None:
-            history.verify()
-            raise BadInput(f"{history.source}: expected {ref} in the journal, which does not say how it came about")
-        yield story(history, record)
+    yield from tell_stories(history, refs)
 
 
 def _paragraphs(history: History, args: Namespace, refs: list[str]) -> Iterator[str]:

@@ -9,11 +9,12 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from textwrap import fill
 
 from blackboard.servoing import Discrepancy
+from harvey.errors import BadInput
 from harvey.run_files.records import Candidate, EntryRecord
 from harvey.why import facts
 from harvey.why.history import History
@@ -69,6 +70,16 @@ LEGEND = """\
 Places are in metres in each room's own frame, headings counter-clockwise from its x axis; pixels count right and
 down from the top left. Model lines are edges that the map of the building says can be seen. Names in brackets are
 entries of the journal: ask on with harvey why RUN NAME."""
+
+
+def tell_stories(history: History, refs: Iterable[str]) -> Iterator[Story]:
+    """The story of each of some entries. Raises BadInput where the journal does not say how one came about."""
+    for ref in refs:
+        record = history.entry(ref)
+        if record is None:
+            history.verify()
+            raise BadInput(f"{history.source}: expected {ref} in the journal, which does not say how it came about")
+        yield story(history, record)
 
 
 def story(history: History, record: EntryRecord) -> Story:

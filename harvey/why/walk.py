@@ -137,6 +137,13 @@ def _rank(record: EntryRecord) -> int:
     return 1 + (PRINCIPAL.index(record.type) if record.type in PRINCIPAL else len(PRINCIPAL))
 
 
+def find_refs(history: History, what: str | int | None) -> list[str]:
+    """The entries that explain an entry (by name), a cycle (by number), or the outcome (None). Raises BadInput."""
+    if isinstance(what, int):
+        return principal(history.decision(what))
+    return [history.resolve(what) if what else history.outcome()]
+
+
 def principal(decision: DecisionRecord) -> list[str]:
     """What to explain of a decision: the chief entry that it made, or what woke those who made nothing."""
     made = sorted(decision.made, key=_rank)
