@@ -14,7 +14,6 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import registry_of
 from blackboard.servoing import Servoing
-from harvey.run_files.run_head import SOURCES
 from knowledge_sources.action.correlator_tracker import CorrelatorTracker
 from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.action.elevator_rider import ElevatorRider
@@ -37,7 +36,7 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.entries import KINDS
 from world_models.files.toml.mission import Servo
-from world_models.plugins import PluginError, load_plugin_classes
+from world_models.plugins import SOURCES_GROUP, PluginError, load_plugin_classes
 from world_models.robot import RobotModel
 
 KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
@@ -80,10 +79,10 @@ def foreign_sources() -> Mapping[str, type[KnowledgeSource]]:
     Raises:
         PluginError: one cannot be loaded, or is called otherwise than its entry point.
     """
-    found = load_plugin_classes(SOURCES, KnowledgeSource)
+    found = load_plugin_classes(SOURCES_GROUP, KnowledgeSource)
     for name, source in found.items():
         if source.called() != name:
-            raise PluginError(f"entry point {SOURCES}, {name}: expected the name of its class, {source.called()}")
+            raise PluginError(f"entry point {SOURCES_GROUP}, {name}: expected the name of its class, {source.called()}")
     return found
 
 

@@ -17,6 +17,9 @@ from collections.abc import Callable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
+SOURCES_GROUP = "harvey.knowledge_sources"
+"""The group of knowledge sources: named in ``run.json`` and put round the board, so it is said once, here."""
+
 
 class PluginError(ImportError):
     """What an installed package adds cannot be used: names the package, what was expected and what came."""

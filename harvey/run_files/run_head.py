@@ -22,12 +22,10 @@ from world_models.camera import Camera, CameraMount
 from world_models.entries.task import Command
 from world_models.files.toml.mission import ROOT, Servo
 from world_models.files.world_files import fingerprint, load_world
-from world_models.plugins import list_plugins
+from world_models.plugins import SOURCES_GROUP, list_plugins
 from world_models.robot import RobotModel
 
 SIMULATOR, HARDWARE = "simulator", "hardware"
-SOURCES = "harvey.knowledge_sources"
-"""The entry points of other packages' knowledge sources; the name of each is that of its knowledge source."""
 PARTS: Mapping[str, type[Any]] = {"camera": Camera, "mount": CameraMount, "actuator": ActuatorModel}
 """What a robot knows of itself that has parts of its own."""
 
@@ -73,7 +71,7 @@ class RunHead:
     harvey: str = field(default_factory=lambda: version("harvey"))
     code: str = field(default_factory=deciding_code)
     arithmetic: str = field(default_factory=arithmetic)
-    plugins: Mapping[str, str] = field(default_factory=lambda: dict(list_plugins(SOURCES)))
+    plugins: Mapping[str, str] = field(default_factory=lambda: dict(list_plugins(SOURCES_GROUP)))
 
     @staticmethod
     def of(
@@ -125,7 +123,7 @@ class RunHead:
             return f"was decided by version {self.harvey} of harvey, and this is {here.harvey}"
         if self.code and self.code != here.code:
             return f"was decided by other code than this ({self.code} by its run.json, and here {here.code})"
-        installed = list_plugins(SOURCES)
+        installed = list_plugins(SOURCES_GROUP)
         for name, package in self.plugins.items():
             if name in installed and installed[name] != package:
                 return f"was decided with {name} of {package}, and here it is of {installed[name]}"
