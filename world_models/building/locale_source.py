@@ -89,8 +89,8 @@ class LocaleSource(Protocol):
     def passage_edges(self, container: str, /) -> tuple[PassageEdge, ...]:
         """The passages between the locales directly in a container."""
 
-    def component(self, locale: str, component: int, /) -> int:
-        """The component of its container that a component of a locale belongs to."""
+    def components(self, locale: str, /) -> tuple[int, ...]:
+        """For each component of a locale, in order, the component of its container; () for the root."""
 
     def passage(self, name: str, /) -> Doorway | Link | None: ...
 

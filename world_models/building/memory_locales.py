@@ -68,8 +68,8 @@ class MemoryLocales:
     def passage_edges(self, container: str) -> tuple[PassageEdge, ...]:
         return self._graphs.edges.get(container, ())
 
-    def component(self, locale: str, component: int) -> int:
-        return self._graphs.containing[locale, component]
+    def components(self, locale: str) -> tuple[int, ...]:
+        return self._graphs.components.get(locale, ())
 
     def passage(self, name: str) -> Doorway | Link | None:
         return self._passages.get(name)

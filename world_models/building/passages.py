@@ -31,11 +31,11 @@ class PassageGraphs:
 
     Attributes:
         edges: of each container's graph.
-        containing: for each component but the root's, the number of the component of its container that it is in.
+        components: of each locale but the root: for each of its components the component of its container.
     """
 
     edges: Mapping[str, tuple[PassageEdge, ...]]
-    containing: Mapping[Component, int]
+    components: Mapping[str, tuple[int, ...]]
 
 
 def drivable_passages(passages: Iterable[Doorway | Link]) -> list[tuple[str, str, str]]:
@@ -59,17 +59,19 @@ def build_passage_graphs(parents: Mapping[str, str | None], passages: Iterable[t
         if parent is not None:
             children.setdefault(parent, []).append(name)
     edges: dict[str, tuple[PassageEdge, ...]] = {}
-    containing: dict[Component, int] = {}
+    components: dict[str, tuple[int, ...]] = {}
     sizes = {name: 1 for name in parents if name not in children}
     for container in sorted(children, key=tree.depth, reverse=True):
-        own = [PassageEdge(name, (tree.component_below(a, container, containing),
-                                  tree.component_below(b, container, containing)))
+        own = [PassageEdge(name, (tree.component_below(a, container, components),
+                                  tree.component_below(b, container, components)))
                for name, a, b in crossing.get(container, ())]
         nodes = [(child, number) for child in children[container] for number in range(sizes[child])]
-        containing |= _number_components(nodes, own)
-        sizes[container] = 1 + max((containing[node] for node in nodes), default=0)
+        numbers = _number_components(nodes, own)
+        for child in children[container]:
+            components[child] = tuple(numbers[child, number] for number in range(sizes[child]))
+        sizes[container] = 1 + max(numbers.values(), default=0)
         edges[container] = tuple(own)
-    return PassageGraphs(edges, containing)
+    return PassageGraphs(edges, components)
 
 
 class _Hierarchy:
@@ -93,12 +95,12 @@ class _Hierarchy:
             a, b = (above, b) if deeper is a else (a, above)
         return a
 
-    def component_below(self, room: str, container: str, containing: Mapping[Component, int]) -> Component:
+    def component_below(self, room: str, container: str, components: Mapping[str, tuple[int, ...]]) -> Component:
         """The component directly in ``container`` that a room belongs to."""
         component: Component = (room, 0)
         while (parent := self._parents[component[0]]) != container:
             assert parent is not None
-            component = (parent, containing[component])
+            component = parent, components[component[0]][component[1]]
         return component
 
 
@@ -115,7 +117,8 @@ def components_above(source: LocaleSource, room: str) -> list[Component]:
     """The components that a room belongs to, from itself up to the root."""
     chain: list[Component] = [(room, 0)]
     while (locale := source.locale(chain[-1][0])) is not None and locale.parent is not None:
-        chain.append((locale.parent, source.component(*chain[-1])))
+        name, component = chain[-1]
+        chain.append((locale.parent, source.components(name)[component]))
     return chain
 
 

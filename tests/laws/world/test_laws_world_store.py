@@ -16,6 +16,7 @@ from world_models.building.checks import check_world
 from world_models.building.locale_source import LocaleGeometry
 from world_models.building.passages import find_route
 from world_models.building.world import World
+from world_models.files.compiled.schema import FORMAT
 from world_models.files.compiled.sqlite_locales import SqliteLocales
 from world_models.files.compiled.writer import compile_world
 from world_models.files.toml.source import Source, WorldError
@@ -45,6 +46,7 @@ def check_same(one: World, other: World) -> None:
         assert [d.name for d in one.doorways_of(name)] == [d.name for d in other.doorways_of(name)]
         assert [t.name for t in one.things_of(name)] == [t.name for t in other.things_of(name)]
         assert one.locale_source.passage_edges(name) == other.locale_source.passage_edges(name)
+        assert one.locale_source.components(name) == other.locale_source.components(name)
 
 
 @pytest.mark.parametrize("details", [[], [DETAILS]])
@@ -69,6 +71,10 @@ def test_what_is_no_compiled_world_is_told(compiled: Path, tmp_path: Path) -> No
         load_world(tmp_path / "none.world")
     with pytest.raises(WorldError, match=r"expected the details .*\(research_center_details\), got others"):
         load_world(compiled, details=["others.toml"])
+    old = compiled.read_bytes().replace(FORMAT.encode(), b"harvey world 1")
+    (tmp_path / "old.world").write_bytes(old)
+    with pytest.raises(WorldError, match=r"old\.world: expected '.*', got 'harvey world 1': compile it anew"):
+        load_world(tmp_path / "old.world")
     for text in (b"", b"name = 'x'", compiled.read_bytes()[:5000]):
         (tmp_path / "bad.world").write_bytes(text)
         with pytest.raises(WorldError, match=r"bad\.world: expected"):

@@ -5,7 +5,7 @@ Table ``packet`` holds the geometry of locales, ``arc`` the edges of passage gra
 
 from __future__ import annotations
 
-FORMAT = "harvey world 1"
+FORMAT = "harvey world 2"
 
 SUFFIXES = (".world", ".sqlite")
 """Suffixes of compiled worlds."""

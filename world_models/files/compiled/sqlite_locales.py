@@ -162,13 +162,10 @@ class SqliteLocales:
                 " join locale lb on lb.id = b where container = (select id from locale where name = ?) order by arc.id",
                 container)))
 
-    def component(self, locale: str, component: int) -> int:
-        def load() -> int:
-            rows = self._rows("select above from component where number = ? and"
-                              " locale = (select id from locale where name = ?)", component, locale)
-            return int(rows[0][0]) if rows else 0
-
-        return self._load_once("component", (locale, component), load)
+    def components(self, locale: str) -> tuple[int, ...]:
+        return self._load_once("components", locale, lambda: tuple(int(row[0]) for row in self._rows(
+            "select above from component where locale = (select id from locale where name = ?) order by number",
+            locale)))
 
     def passage(self, name: str) -> Doorway | Link | None:
         def load() -> Doorway | Link | None:

@@ -161,7 +161,8 @@ class WorldWriter:
         self._file.executemany("insert into arc (container, passage, a, a_part, b, b_part) values (?, ?, ?, ?, ?, ?)",
                                edges)
         self._file.executemany("insert into component values (?, ?, ?)",
-                               ((ids[name], part, above) for (name, part), above in graphs.containing.items() if above))
+                               ((ids[name], part, above) for name, several in graphs.components.items()
+                                for part, above in enumerate(several)))
         self._file.executemany("insert into word values (?, ?)", self._words)
         self._meta("sha256", self._digest.hexdigest())
         self._file.executemany("insert into fault values (?, ?)", ((fault.source, fault.what) for fault in faults))
