@@ -9,6 +9,7 @@ In reading order:
 * :mod:`.intervals`, :mod:`.outlines`: geometry on a line and on the floor.
 * :mod:`.solids`: boxes, from which faces and model lines follow.
 * :mod:`.scene`: model lines and surfaces in arrays.
+* :mod:`.extents`: where locales lie, with all that they contain.
 * :mod:`.locale_source`, :mod:`.memory_locales`: where locale data come from, and those in memory.
 * :mod:`.passages`: passage graphs at every level of the hierarchy, and routes.
 * :mod:`.world`: the world, which answers for all of these.

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
+from world_models.building.extents import LocaleExtent
 from world_models.building.faces import Face
 from world_models.building.landmarks import Landmark
 from world_models.building.locales import Doorway, Link, Locale
@@ -71,6 +72,15 @@ class LocaleSource(Protocol):
 
     def is_room(self, name: str, /) -> bool:
         """Whether this is a locale that contains no other."""
+
+    def number(self, name: str, /) -> int:
+        """The place of a locale in the order of the file; the root's is 0. Raises ValueError where there is none."""
+
+    def extent(self, name: str, /) -> LocaleExtent:
+        """Where a locale lies. Raises ValueError where there is none."""
+
+    def extents_in(self, name: str, /) -> tuple[LocaleExtent, ...]:
+        """Where the locales lie that this one contains directly, in the order of ``children``."""
 
     def near(self, x_m: float, y_m: float, margin_m: float, /) -> Sequence[str]:
         """Locales whose bounding rectangle, grown by a margin, holds a point [m, world]; in the order of the file."""

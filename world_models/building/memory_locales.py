@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from world_models.building.extents import LocaleExtent, bounding_box, bounding_rectangle, compute_reaches
 from world_models.building.faces import Face
 from world_models.building.landmarks import Landmark
 from world_models.building.locale_source import LocaleGeometry, PassageEdge
@@ -52,6 +53,17 @@ class MemoryLocales:
         names, low, high = self._rectangles
         p = np.array([x_m, y_m])
         return [names[i] for i in np.flatnonzero(np.all((low - margin_m <= p) & (p <= high + margin_m), axis=1))]
+
+    def number(self, name: str) -> int:
+        return self.extent(name).number
+
+    def extent(self, name: str) -> LocaleExtent:
+        if name not in self.locales:
+            raise ValueError(f"expected a locale of {self.name}, got {name!r}")
+        return self._extents[name]
+
+    def extents_in(self, name: str) -> tuple[LocaleExtent, ...]:
+        return tuple(self._extents[child] for child in self.children(name))
 
     def doorways(self, locale: str) -> tuple[Doorway, ...]:
         return self._doorways.get(locale, ())
@@ -134,8 +146,7 @@ class MemoryLocales:
                       for name in dict.fromkeys((part.locale, part.neighbour)) if name is not None)
 
     @cached_property
-    def _rectangles(self) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64]]:
-        """Names of all locales, and low and high corners (n, 2) of their bounding rectangles [m, world]."""
+    def _extents(self) -> dict[str, LocaleExtent]:
         poses: dict[str, Pose] = {}
 
         def pose_of(name: str) -> Pose:
@@ -144,15 +155,16 @@ class MemoryLocales:
                 poses[name] = frame if parent is None else pose_of(parent) @ frame
             return poses[name]
 
-        rows = [bounding_rectangle(locale, pose_of(name)) for name, locale in self.locales.items()]
-        rectangles = np.array(rows).reshape(-1, 4)
-        return tuple(self.locales), rectangles[:, :2], rectangles[:, 2:]
+        boxes = {name: bounding_box(locale, pose_of(name)) for name, locale in self.locales.items()}
+        reaches = compute_reaches({name: locale.parent for name, locale in self.locales.items()}, boxes)
+        return {name: LocaleExtent(name, number, self.is_room(name), bounding_rectangle(box), reaches[name])
+                for number, (name, box) in enumerate(boxes.items())}
 
-
-def bounding_rectangle(locale: Locale, world_from_locale: Pose) -> NDArray[np.float64]:
-    """(4,) x0, y0, x1, y1 of a locale's outline on the plan, enlarged by a micrometre [m, world]."""
-    flat = world_from_locale.apply(np.column_stack([locale.outline, np.zeros(len(locale.outline))]))[:, :2]
-    return np.concatenate([flat.min(axis=0) - 1e-6, flat.max(axis=0) + 1e-6])
+    @cached_property
+    def _rectangles(self) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64]]:
+        """Names of all locales, and low and high corners (n, 2) of their bounding rectangles [m, world]."""
+        rectangles = np.array([extent.rectangle for extent in self._extents.values()]).reshape(-1, 4)
+        return tuple(self._extents), rectangles[:, :2], rectangles[:, 2:]
 
 
 def words_of(text: str) -> frozenset[str]:

@@ -1,6 +1,8 @@
 """The tables of a compiled world: one SQLite file, indexed by locale, by place (R*-tree) and by word.
 
-Table ``packet`` holds the geometry of locales, ``arc`` the edges of passage graphs; ``layer`` counts files of details.
+Table ``extent`` holds the rectangles of locales in 32 bits, rounded outwards; ``bounds`` holds them exactly, with the
+boxes round all that the locales contain. ``packet`` holds the geometry of locales, ``arc`` the edges of passage graphs;
+``layer`` counts files of details.
 """
 
 from __future__ import annotations
@@ -17,6 +19,9 @@ create table locale (
     outline blob not null, height_m real not null, floor_m real not null, properties text not null,
     survey_m real not null, survey_rad real not null, source text not null, leaf integer not null);
 create virtual table extent using rtree (id, x0, x1, y0, y1);
+create table bounds (
+    id integer primary key, x0 real not null, y0 real not null, x1 real not null, y1 real not null,
+    reach blob not null);
 create table doorway (
     id integer primary key, name text not null unique, a integer not null, b integer not null,
     thresholds blob not null, height_m real not null, source text not null);

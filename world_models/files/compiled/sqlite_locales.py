@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
+from world_models.building.extents import LocaleExtent
 from world_models.building.locale_source import LocaleGeometry, PassageEdge
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.memory_locales import words_of
@@ -25,6 +26,12 @@ DOORWAY = "select d.name, la.name, lb.name, thresholds, d.height_m, d.source fro
           " join locale la on la.id = d.a join locale lb on lb.id = d.b"
 LINK = "select k.name, k.kind, la.name, lb.name, stops, k.source from link k" \
        " join locale la on la.id = k.a join locale lb on lb.id = k.b"
+EXTENT = "select l.name, l.id, l.leaf, x0, y0, x1, y1, reach from locale l join bounds b on b.id = l.id"
+NEAR = "select l.name from extent e join bounds b on b.id = e.id join locale l on l.id = e.id" \
+       " where e.x0 <= ?1 + ?4 and e.x1 >= ?1 - ?4 and e.y0 <= ?2 + ?4 and e.y1 >= ?2 - ?4" \
+       " and b.x0 - ?3 <= ?1 and b.x1 + ?3 >= ?1 and b.y0 - ?3 <= ?2 and b.y1 + ?3 >= ?2 order by e.id"
+SLACK_M = 1e-6
+"""The index is searched this much further, so that rounding leaves nothing out; the exact rectangles decide."""
 PACKET = "select la.name, lb.name, words, numbers from packet p" \
          " join locale la on la.id = p.locale left join locale lb on lb.id = p.neighbour"
 THING = "select t.name, la.name, t.kind, footprint, low_m, high_m, proud_m, t.source from thing t" \
@@ -123,10 +130,23 @@ class SqliteLocales:
 
     def near(self, x_m: float, y_m: float, margin_m: float) -> Sequence[str]:
         with self._world_errors():
-            return [row[0] for row in self._rows(
-                "select l.name from extent e join locale l on l.id = e.id"
-                " where x0 <= ? and x1 >= ? and y0 <= ? and y1 >= ? order by e.id",
-                x_m + margin_m, x_m - margin_m, y_m + margin_m, y_m - margin_m)]
+            return [row[0] for row in self._rows(NEAR, x_m, y_m, margin_m, margin_m + SLACK_M)]
+
+    def number(self, name: str) -> int:
+        return self.extent(name).number
+
+    def extent(self, name: str) -> LocaleExtent:
+        rows = self._load_once("extent", name, lambda: self._extents("l.name = ?", name))
+        if not rows:
+            raise ValueError(f"expected a locale of {self.name}, got {name!r}")
+        return rows[0]
+
+    def extents_in(self, name: str) -> tuple[LocaleExtent, ...]:
+        return self._load_once("extents", name, lambda: self._extents(
+            "l.parent = (select id from locale where name = ?) order by l.id", name))
+
+    def _extents(self, where: str, name: str) -> tuple[LocaleExtent, ...]:
+        return tuple(_build_extent(row) for row in self._rows(f"{EXTENT} where {where}", name))
 
     def doorways(self, locale: str) -> tuple[Doorway, ...]:
         return self._load_once("doorways", locale, lambda: tuple(_build_doorway(row) for row in self._rows(
@@ -219,6 +239,12 @@ class SqliteLocales:
     def faults(self) -> tuple[Finding, ...]:
         with self._world_errors():
             return tuple(Finding(source, what) for source, what in self._rows("select source, what from fault"))
+
+
+def _build_extent(row: tuple[Any, ...]) -> LocaleExtent:
+    name, number, is_room, x0, y0, x1, y1, reach = row
+    low_x, low_y, low_z, high_x, high_y, high_z = unpack_array(reach, (6,)).tolist()
+    return LocaleExtent(name, number, bool(is_room), (x0, y0, x1, y1), (low_x, low_y, low_z, high_x, high_y, high_z))
 
 
 def _build_doorway(row: tuple[Any, ...]) -> Doorway:

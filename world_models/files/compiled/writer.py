@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from world_models.building.extents import Box, bounding_box, bounding_rectangle, compute_reaches
 from world_models.building.locale_source import LocaleGeometry
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.memory_locales import bounding_rectangle, words_about
+from world_models.building.memory_locales import words_about
 from world_models.building.passages import build_passage_graphs, drivable_passages
 from world_models.building.things import Finding, Thing
 from world_models.building.world import World
@@ -51,8 +52,9 @@ def compile_world(layers: Sequence[World], out: Path, details: Sequence[str] = (
 
 def _write(writer: WorldWriter, layers: Sequence[World]) -> None:
     world = layers[-1]
-    for name in dict.fromkeys(step for each in world.locale_source.names() for step in world.path_of(each)):
-        writer.add_locale(world.locale(name))
+    numbers = {name: number for number, name in enumerate(world.locale_source.names())}
+    for name in dict.fromkeys(step for each in numbers for step in world.path_of(each)):
+        writer.add_locale(world.locale(name), numbers[name])
     for doorway in world.doorways:
         writer.add_doorway(doorway)
     for link in world.links:
@@ -84,6 +86,7 @@ class WorldWriter:
         self._ids: dict[str, int] = {}
         self._parents: dict[str, str | None] = {}
         self._poses: dict[str, Pose] = {}
+        self._boxes: dict[str, Box] = {}
         self._passages: list[tuple[str, str, str]] = []
         self._words: list[tuple[str, int]] = []
         self._digest = hashlib.sha256()
@@ -99,19 +102,23 @@ class WorldWriter:
     def _meta(self, key: str, value: str) -> None:
         self._file.execute("insert into meta values (?, ?)", (key, value))
 
-    def add_locale(self, locale: Locale) -> None:
-        """Add a locale; its container must have been added before."""
-        number = self._ids[locale.name] = len(self._ids)
+    def add_locale(self, locale: Locale, number: int | None = None) -> None:
+        """Add a locale; its container must have been added before.
+
+        Args:
+            locale: the locale.
+            number: its place in the order of the world's file; by default the order in which locales are added.
+        """
+        number = self._ids[locale.name] = len(self._ids) if number is None else number
         parent = locale.parent
         pose = locale.frame if parent is None else self._poses[parent] @ locale.frame
         self._poses[locale.name], self._parents[locale.name] = pose, parent
-        x0, y0, x1, y1 = (float(v) for v in bounding_rectangle(locale, pose))
+        self._boxes[locale.name] = bounding_box(locale, pose)
         frame = pack_array(np.column_stack([locale.frame.rotation, locale.frame.translation]))
         self._insert("insert into locale values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 1)", (
             number, locale.name, locale.kind, None if parent is None else self._ids[parent], frame,
             pack_array(locale.outline), locale.height_m, locale.floor_m, json.dumps(dict(locale.properties)),
             locale.survey_m, locale.survey_rad, locale.source))
-        self._file.execute("insert into extent values (?, ?, ?, ?, ?)", (number, x0, x1, y0, y1))
         self._words += [(word, number) for word in sorted(words_about(locale))]
 
     def add_doorway(self, doorway: Doorway) -> None:
@@ -154,7 +161,8 @@ class WorldWriter:
     def finish(self, faults: Iterable[Finding] = ()) -> None:
         """Build the passage graphs, index everything and commit."""
         ids = self._ids
-        graphs = build_passage_graphs(self._parents, self._passages)
+        graphs = build_passage_graphs({name: self._parents[name] for name in sorted(ids, key=ids.__getitem__)},
+                                      self._passages)
         edges = [(ids[container], edge.passage, ids[a], a_part, ids[b], b_part)
                  for container, several in graphs.edges.items() for edge in several
                  for (a, a_part), (b, b_part) in [edge.between]]
@@ -163,6 +171,11 @@ class WorldWriter:
         self._file.executemany("insert into component values (?, ?, ?)",
                                ((ids[name], part, above) for name, several in graphs.components.items()
                                 for part, above in enumerate(several)))
+        rectangles = ((ids[name], *bounding_rectangle(box)) for name, box in self._boxes.items())
+        self._file.executemany("insert into extent (id, x0, y0, x1, y1) values (?, ?, ?, ?, ?)", rectangles)
+        reaches = compute_reaches(self._parents, self._boxes)
+        self._file.executemany("insert into bounds values (?, ?, ?, ?, ?, ?)", (
+            (ids[name], *bounding_rectangle(box), pack_array(reaches[name])) for name, box in self._boxes.items()))
         self._file.executemany("insert into word values (?, ?)", self._words)
         self._meta("sha256", self._digest.hexdigest())
         self._file.executemany("insert into fault values (?, ?)", ((fault.source, fault.what) for fault in faults))
