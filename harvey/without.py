@@ -18,7 +18,7 @@ from harvey.run_files.records import DecisionRecord
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import Settings
 from world_models.building.landmarks import Edges
-from world_models.building.locale_source import LocaleGeometry, LocaleSource
+from world_models.building.locale_source import LocaleGeometry, WorldSource
 from world_models.building.world import World
 from world_models.entries.percepts import Segments
 from world_models.frames import frozen
@@ -54,7 +54,7 @@ def remove_from_world(world: World, names: Sequence[str], sources: Sequence[str]
     for name in names:
         if name not in known:
             raise BadInput(f"--without {name}: expected {_suggest(name, sources, known)}, got {name!r}")
-    return World(cast(LocaleSource, _ReducedSource(world.locale_source, frozenset(names))))
+    return World(cast(WorldSource, _ReducedSource(world.locale_source, frozenset(names))))
 
 
 class SegmentHider(LineFinder):
@@ -116,7 +116,7 @@ def _suggest(name: str, sources: Sequence[str], elements: Set[str]) -> str:
 class _ReducedSource:
     """Locales without some of their faces. A landmark that is removed keeps its number, but has no lines any more."""
 
-    def __init__(self, source: LocaleSource, names: frozenset[str]) -> None:
+    def __init__(self, source: WorldSource, names: frozenset[str]) -> None:
         self._source, self._names = source, names
 
     def __getattr__(self, name: str) -> Any:

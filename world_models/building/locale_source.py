@@ -1,4 +1,4 @@
-"""Where locale data come from (§3.4): the interface of memory and compiled files, asked for one locale at a time.
+"""Where locale data come from (§3.4): the interfaces of memory and compiled files.
 
 The paper keeps a frame of slots for each locale (its place, contents and neighbours). Here "frame" means a coordinate
 frame only; the paper's frame of a locale is its ``Locale`` with doorways, links, geometry and things.
@@ -56,14 +56,7 @@ class PassageEdge:
 
 
 class LocaleSource(Protocol):
-    """Locale data by name. An unknown name gives None or an empty result."""
-
-    @property
-    def name(self) -> str:
-        """Name of the world and of its root locale."""
-
-    def names(self) -> Sequence[str]:
-        """All locales, root first, then in the order of the file."""
+    """Locale data by name, one locale at a time. An unknown name gives None or an empty result."""
 
     def locale(self, name: str, /) -> Locale | None: ...
 
@@ -101,6 +94,17 @@ class LocaleSource(Protocol):
 
     def components(self, locale: str, /) -> tuple[int, ...]:
         """For each component of a locale, in order, the component of its container; () for the root."""
+
+
+class WorldSource(LocaleSource, Protocol):
+    """Locale data by name, with what takes a search of the whole world."""
+
+    @property
+    def name(self) -> str:
+        """Name of the world and of its root locale."""
+
+    def names(self) -> Sequence[str]:
+        """All locales, root first, then in the order of the file."""
 
     def passage(self, name: str, /) -> Doorway | Link | None: ...
 

@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class MemoryLocales:
-    """A :class:`world_models.building.locale_source.LocaleSource` that holds all locales of a world."""
+    """A :class:`world_models.building.locale_source.WorldSource` that holds all locales of a world."""
 
     name: str
     locales: Mapping[str, Locale]

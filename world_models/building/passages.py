@@ -19,7 +19,7 @@ from world_models.building.locale_source import PassageEdge
 from world_models.building.locales import Doorway, Link
 
 if TYPE_CHECKING:
-    from world_models.building.locale_source import LocaleSource
+    from world_models.building.locale_source import LocaleSource, WorldSource
 
 Component = tuple[str, int]
 """A locale and the number of one of its components."""
@@ -144,7 +144,7 @@ class Route:
     steps: tuple[Step, ...]
 
 
-def find_route(source: LocaleSource, origin: str, destination: str) -> Route | None:
+def find_route(source: WorldSource, origin: str, destination: str) -> Route | None:
     """The route with the fewest passages in the smallest locale that holds one; None where no passage leads there."""
     if origin == destination:
         return Route(origin, ())
@@ -158,7 +158,7 @@ def find_route(source: LocaleSource, origin: str, destination: str) -> Route | N
     return None
 
 
-def _build_step(source: LocaleSource, name: str, side: int) -> Step:
+def _build_step(source: WorldSource, name: str, side: int) -> Step:
     passage = source.passage(name)
     assert passage is not None
     return Step(passage, passage.between[side], passage.between[1 - side])

@@ -1,6 +1,6 @@
 """The world (§3.4): locales in a contained-by hierarchy, their doorways, faces and landmarks, and queries on them.
 
-A world takes locale data from a :class:`~world_models.building.locale_source.LocaleSource`, one locale at a time and
+A world takes locale data from a :class:`~world_models.building.locale_source.WorldSource`, one locale at a time and
 only when asked, so that a robot in a room loads that room. The attributes that name everything (``faces``,
 ``things``, ``scene``, ...) are for drawing and checking.
 """
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from world_models.building.faces import Face
 from world_models.building.landmarks import Landmark
-from world_models.building.locale_source import LocaleGeometry, LocaleSource
+from world_models.building.locale_source import LocaleGeometry, WorldSource
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.passages import Route, find_route
 from world_models.building.scene import Scene, build_scene, concatenate_scenes
@@ -42,7 +42,7 @@ class World:
         cache: results that others compute from the world once and keep with it, by name.
     """
 
-    def __init__(self, locale_source: LocaleSource) -> None:
+    def __init__(self, locale_source: WorldSource) -> None:
         self.locale_source = locale_source
         self.name = locale_source.name
         self._poses: dict[str, tuple[Pose, Pose]] = {}
@@ -315,7 +315,7 @@ def _in_order(numbered: Iterable[tuple[int, T]]) -> tuple[T, ...]:
 class _Locales(Mapping[str, Locale]):
     """Locales by name, each loaded when asked for."""
 
-    def __init__(self, locale_source: LocaleSource) -> None:
+    def __init__(self, locale_source: WorldSource) -> None:
         self._locale_source = locale_source
 
     def __getitem__(self, name: str) -> Locale:

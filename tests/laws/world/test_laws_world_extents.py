@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from world_models.building.extents import LocaleExtent
-from world_models.building.locale_source import LocaleSource
+from world_models.building.locale_source import WorldSource
 from world_models.building.locales import Locale
 from world_models.building.memory_locales import MemoryLocales
 from world_models.building.world import World
@@ -41,7 +41,7 @@ def draw_locale(draw: st.DrawFn, name: str, parent: str | None) -> Locale:
     return Locale(name, "room", parent, frame, outline, draw(st.floats(2.0, 4.0)), floor_m=draw(st.floats(-1.0, 1.0)))
 
 
-def descend(source: LocaleSource, x_m: float, y_m: float, margin_m: float) -> list[str]:
+def descend(source: WorldSource, x_m: float, y_m: float, margin_m: float) -> list[str]:
     """The locales near a point, found from the root down."""
     found: list[LocaleExtent] = []
     todo = [source.extent(source.name)]
@@ -53,7 +53,7 @@ def descend(source: LocaleSource, x_m: float, y_m: float, margin_m: float) -> li
     return [extent.name for extent in sorted(found, key=lambda extent: extent.number)]
 
 
-def check_extents(one: LocaleSource, other: LocaleSource) -> None:
+def check_extents(one: WorldSource, other: WorldSource) -> None:
     names = list(one.names())
     assert names == list(other.names())
     world = World(one)
@@ -72,7 +72,7 @@ def check_extents(one: LocaleSource, other: LocaleSource) -> None:
         assert extent.reach == (*np.min(inside, axis=0)[:3], *np.max(inside, axis=0)[3:])
 
 
-def check_near(source: LocaleSource, x_m: float, y_m: float, margin_m: float, expected: list[str]) -> None:
+def check_near(source: WorldSource, x_m: float, y_m: float, margin_m: float, expected: list[str]) -> None:
     assert list(source.near(x_m, y_m, margin_m)) == expected
     assert descend(source, x_m, y_m, margin_m) == expected
 

@@ -39,7 +39,7 @@ THING = "select t.name, la.name, t.kind, footprint, low_m, high_m, proud_m, t.so
 
 
 class SqliteLocales:
-    """A :class:`world_models.building.locale_source.LocaleSource` that reads a compiled world.
+    """A :class:`world_models.building.locale_source.WorldSource` that reads a compiled world.
 
     Attributes:
         name: of the world.
