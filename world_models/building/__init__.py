@@ -12,6 +12,7 @@ In reading order:
 * :mod:`.extents`: where locales lie, with all that they contain.
 * :mod:`.locale_source`, :mod:`.memory_locales`: where locale data come from, and those in memory.
 * :mod:`.passages`: passage graphs at every level of the hierarchy, and routes.
+* :mod:`.changes`: what is believed otherwise than the world file says: a door found shut, a thing gone.
 * :mod:`.world`: the world, which answers for all of these.
 * :mod:`.checks`: faults of a world.
 * :mod:`.plan_view`: a floor plan as a drawing.

@@ -109,7 +109,7 @@ def _draw_storey(world: World, rooms: list[str]) -> Iterator[Shape]:
         yield Shape("doorway", doorway.thresholds_world.reshape(-1, 2), doorway.name)
     for name in rooms:
         for face in world.faces_of(name):
-            if face.name.endswith("/leaf"):
+            if face.name.endswith(("/leaf", "/shut")):
                 yield Shape("leaf", _footprint(face), face.name)
         for link in world.links_of(name):
             yield Shape("link", link.stop_of(name)[None, :2], f"{link.name} to {link.other(name)}")

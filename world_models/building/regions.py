@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from dataclasses import dataclass
 from typing import Any
@@ -25,7 +26,10 @@ LAMP_DIRECTION = LAMP / np.linalg.norm(LAMP)
 
 @dataclass(frozen=True, slots=True)
 class Finish:
-    """Appearance of a surface: colour (red, green, blue) in 0..1, one of :data:`TEXTURES`, size of its cells [m]."""
+    """Appearance of a surface.
+
+    Its colour (red, green, blue) in 0..1 (NaN: unknown), one of :data:`TEXTURES`, size of its cells [m].
+    """
 
     colour: tuple[float, float, float]
     texture: str = "plain"
@@ -36,6 +40,10 @@ class Finish:
         return float(np.dot(LUMA, self.colour))
 
 
+UNKNOWN = Finish((math.nan, math.nan, math.nan))
+"""Of a surface whose colour the model does not know: it hides what is behind it, and no colour of it is expected."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Region:
     """An area of a face with uniform appearance.
@@ -43,7 +51,7 @@ class Region:
     Attributes:
         name: unique in the world.
         polygon_world: (k, 3) convex and flat, counter-clockwise as seen from its visible side [m].
-        colour: (red, green, blue) in 0..1.
+        colour: (red, green, blue) in 0..1; NaN: unknown.
         texture: one of :data:`TEXTURES`.
         texture_scale_m: size of the texture's cells [m].
         seed: of the texture.
@@ -65,5 +73,8 @@ def build_region(name: str, polygon_world: Any, finish: Finish) -> Region:
 
 
 def expected_brightness(finish: Finish, normal_world: Any) -> float:
-    """Brightness, 0..1, of a surface with this finish and unit normal (3,): ambient plus Lambertian light."""
+    """Brightness, 0..1, of a surface with this finish and unit normal (3,): ambient plus Lambertian light.
+
+    NaN where its colour is unknown.
+    """
     return float(finish.luma * (AMBIENT + 0.25 * np.dot(LAMP_DIRECTION, normal_world)))

@@ -60,6 +60,7 @@ def _predict(
     facing = facing[in_view]
     turned = normals[facing] @ camera_from_world.rotation.T
     surface, depth = _cast_rays(near[in_view], turned, boxes[in_view], rays, settings.color_grid_size)
+    surface[np.append(np.isnan(colors[facing, 0]), False)[surface]] = -1  # of unknown color: it only hides
     if camera.obstruction is not None:
         surface[camera.obstruction.covers(_sample_pixels(camera.width, camera.height, settings)).ravel()] = -1
     hit = np.unique(surface[surface >= 0])

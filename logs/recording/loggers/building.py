@@ -26,6 +26,9 @@ HEAD_HIGH_M = 1.8
 STOREY_M = 0.5
 """Rooms whose floors differ by less are of one storey."""
 
+UNKNOWN_GREY = 0.5
+"""A surface of unknown colour is drawn so bright."""
+
 SOFT_LIGHT = 0.75
 LAMP_LIGHT = 0.35
 
@@ -89,7 +92,7 @@ def space_view(name: str, eye: Any, *without: str) -> Any:
 def _meshes(world: World) -> Iterator[tuple[str, Any]]:
     """A mesh for each storey, so that one can take the upper ones off; they are one where there is only one."""
     regions = [(face, region) for face in world.faces for region in (*face.front, *face.back)]
-    colours = np.array([region.colour for _, region in regions])
+    colours = np.nan_to_num([region.colour for _, region in regions], nan=UNKNOWN_GREY)
     floors = {name: world.floor_m(name) for name in world.rooms}
     levels = np.array([floors.get(face.locale, 0.0) for face, _ in regions])
     storeys = np.unique(np.round(levels, 1))
