@@ -49,10 +49,12 @@ class PassageEdge:
     Attributes:
         passage: name of the doorway or link.
         between: the two nodes.
+        rooms: the two rooms that the passage joins, each within the locale of its node.
     """
 
     passage: str
     between: tuple[tuple[str, int], tuple[str, int]]
+    rooms: tuple[str, str]
 
 
 class LocaleSource(Protocol):

@@ -19,7 +19,7 @@ from world_models.building.locale_source import PassageEdge
 from world_models.building.locales import Doorway, Link
 
 if TYPE_CHECKING:
-    from world_models.building.locale_source import LocaleSource, WorldSource
+    from world_models.building.locale_source import LocaleSource
 
 Component = tuple[str, int]
 """A locale and the number of one of its components."""
@@ -63,7 +63,7 @@ def build_passage_graphs(parents: Mapping[str, str | None], passages: Iterable[t
     sizes = {name: 1 for name in parents if name not in children}
     for container in sorted(children, key=tree.depth, reverse=True):
         own = [PassageEdge(name, (tree.component_below(a, container, components),
-                                  tree.component_below(b, container, components)))
+                                  tree.component_below(b, container, components)), (a, b))
                for name, a, b in crossing.get(container, ())]
         nodes = [(child, number) for child in children[container] for number in range(sizes[child])]
         numbers = _number_components(nodes, own)
@@ -144,7 +144,7 @@ class Route:
     steps: tuple[Step, ...]
 
 
-def find_route(source: WorldSource, origin: str, destination: str) -> Route | None:
+def find_route(source: LocaleSource, origin: str, destination: str) -> Route | None:
     """The route with the fewest passages in the smallest locale that holds one; None where no passage leads there."""
     if origin == destination:
         return Route(origin, ())
@@ -154,35 +154,35 @@ def find_route(source: WorldSource, origin: str, destination: str) -> Route | No
         if depth and below.get(name) == (name, number):
             start, goal = up[depth - 1], down[down.index((name, number)) - 1]
             path = _shortest_path(source.passage_edges(name), start, goal)
-            return Route(name, tuple(_build_step(source, passage, side) for passage, side in path))
+            return Route(name, tuple(_build_step(source, edge, side) for edge, side in path))
     return None
 
 
-def _build_step(source: WorldSource, name: str, side: int) -> Step:
-    passage = source.passage(name)
-    assert passage is not None
-    return Step(passage, passage.between[side], passage.between[1 - side])
+def _build_step(source: LocaleSource, edge: PassageEdge, side: int) -> Step:
+    room = edge.rooms[side]
+    passages: tuple[Doorway | Link, ...] = (*source.doorways(room), *source.links(room))
+    return Step(next(p for p in passages if p.name == edge.passage), room, edge.rooms[1 - side])
 
 
-def _shortest_path(edges: Iterable[PassageEdge], start: Component, goal: Component) -> list[tuple[str, int]]:
-    """Breadth-first search between connected nodes: (passage, side on which it begins) of each edge.
+def _shortest_path(edges: Iterable[PassageEdge], start: Component, goal: Component) -> list[tuple[PassageEdge, int]]:
+    """Breadth-first search between connected nodes: each edge with the side on which it begins.
 
     Not networkx: of equally short paths the one over the first edges must be found, whatever library version.
     """
-    ahead: dict[Component, list[tuple[Component, str, int]]] = {}
+    ahead: dict[Component, list[tuple[Component, PassageEdge, int]]] = {}
     for edge in edges:
         for side in (0, 1):
-            ahead.setdefault(edge.between[side], []).append((edge.between[1 - side], edge.passage, side))
-    came: dict[Component, tuple[Component, str, int]] = {start: (start, "", 0)}
+            ahead.setdefault(edge.between[side], []).append((edge.between[1 - side], edge, side))
+    came: dict[Component, tuple[Component, PassageEdge, int]] = {}
     todo = deque([start])
     while todo and goal not in came:
         here = todo.popleft()
-        for there, passage, side in ahead.get(here, ()):
-            if there not in came:
-                came[there] = (here, passage, side)
+        for there, edge, side in ahead.get(here, ()):
+            if there not in came and there != start:
+                came[there] = here, edge, side
                 todo.append(there)
-    path: list[tuple[str, int]] = []
+    path: list[tuple[PassageEdge, int]] = []
     while goal != start:
-        goal, passage, side = came[goal]
-        path.append((passage, side))
+        goal, edge, side = came[goal]
+        path.append((edge, side))
     return path[::-1]

@@ -36,7 +36,8 @@ create table thing (
     footprint blob not null, low_m real not null, high_m real not null, proud_m real, source text not null);
 create table arc (
     id integer primary key, container integer not null, passage text not null,
-    a integer not null, a_part integer not null, b integer not null, b_part integer not null);
+    a integer not null, a_part integer not null, a_room integer not null,
+    b integer not null, b_part integer not null, b_room integer not null);
 create table component (
     locale integer not null, number integer not null, above integer not null,
     primary key (locale, number)) without rowid;

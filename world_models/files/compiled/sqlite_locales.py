@@ -34,6 +34,10 @@ SLACK_M = 1e-6
 """The index is searched this much further, so that rounding leaves nothing out; the exact rectangles decide."""
 PACKET = "select la.name, lb.name, words, numbers from packet p" \
          " join locale la on la.id = p.locale left join locale lb on lb.id = p.neighbour"
+ARC = "select passage, la.name, a_part, ra.name, lb.name, b_part, rb.name from arc" \
+      " join locale la on la.id = a join locale ra on ra.id = a_room" \
+      " join locale lb on lb.id = b join locale rb on rb.id = b_room" \
+      " where container = (select id from locale where name = ?) order by arc.id"
 THING = "select t.name, la.name, t.kind, footprint, low_m, high_m, proud_m, t.source from thing t" \
         " join locale la on la.id = t.locale"
 
@@ -177,10 +181,8 @@ class SqliteLocales:
 
     def passage_edges(self, container: str) -> tuple[PassageEdge, ...]:
         return self._load_once("passages", container, lambda: tuple(
-            PassageEdge(passage, ((a, a_part), (b, b_part))) for passage, a, a_part, b, b_part in self._rows(
-                "select passage, la.name, a_part, lb.name, b_part from arc join locale la on la.id = a"
-                " join locale lb on lb.id = b where container = (select id from locale where name = ?) order by arc.id",
-                container)))
+            PassageEdge(passage, ((a, a_part), (b, b_part)), (a_room, b_room))
+            for passage, a, a_part, a_room, b, b_part, b_room in self._rows(ARC, container)))
 
     def components(self, locale: str) -> tuple[int, ...]:
         return self._load_once("components", locale, lambda: tuple(int(row[0]) for row in self._rows(

@@ -163,11 +163,11 @@ class WorldWriter:
         ids = self._ids
         graphs = build_passage_graphs({name: self._parents[name] for name in sorted(ids, key=ids.__getitem__)},
                                       self._passages)
-        edges = [(ids[container], edge.passage, ids[a], a_part, ids[b], b_part)
+        edges = [(ids[container], edge.passage, ids[a], a_part, ids[edge.rooms[0]], ids[b], b_part, ids[edge.rooms[1]])
                  for container, several in graphs.edges.items() for edge in several
                  for (a, a_part), (b, b_part) in [edge.between]]
-        self._file.executemany("insert into arc (container, passage, a, a_part, b, b_part) values (?, ?, ?, ?, ?, ?)",
-                               edges)
+        self._file.executemany("insert into arc (container, passage, a, a_part, a_room, b, b_part, b_room)"
+                               " values (?, ?, ?, ?, ?, ?, ?, ?)", edges)
         self._file.executemany("insert into component values (?, ?, ?)",
                                ((ids[name], part, above) for name, several in graphs.components.items()
                                 for part, above in enumerate(several)))
