@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from experiments.report import Cell, Report
 from experiments.scale.worlds.campus import Campus, write_campus
+from world_models.files.compiled.schema import FORMAT
 
 SIZES, QUICK_SIZES = (12, 1_000, 100_000), (12, 1_000)
 OPENINGS, QUICK_OPENINGS = 20, 3
@@ -38,7 +39,7 @@ COLUMNS = ("locales", "faces", "file MB", "open ms", "first action ms", "sketchi
 
 def run(quick: bool, seed: int) -> Report:
     """Write the worlds, once, into the temporary folder, and time the mission in all of them in turn."""
-    folder = Path(tempfile.gettempdir()) / "harvey-worlds-1"
+    folder = Path(tempfile.gettempdir()) / FORMAT.replace(" ", "-")
     worlds = [write_campus(size, folder) for size in (QUICK_SIZES if quick else SIZES)]
     goal = SHORT_GOAL if quick else LONG_GOAL
     repetitions = (QUICK_STARTS, QUICK_PLANS) if quick else (STARTS, PLANS)
