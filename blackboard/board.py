@@ -183,3 +183,46 @@ class View:
 
     def __len__(self) -> int:
         return len(self._board._current)
+
+
+class TracedView(View):
+    """A view that notes which revisions of some kinds are read.
+
+    Attributes:
+        used: their names.
+    """
+
+    __slots__ = ("_kinds", "used")
+
+    def __init__(self, board: Blackboard, kinds: Collection[type[Any]]) -> None:
+        super().__init__(board)
+        self._kinds = kinds
+        self.used: set[Ref] = set()
+
+    def get(self, id: str) -> Entry[Any] | None:
+        found = self._board._current.get(id)
+        return None if found is None else self._note(found)
+
+    def __getitem__(self, id: str) -> Entry[Any]:
+        return self._note(self._board._current[id])
+
+    def all(self, kind: type[T]) -> tuple[Entry[T], ...]:
+        return tuple(map(self._note, super().all(kind)))
+
+    def newest_first(self, kind: type[T]) -> Iterator[Entry[T]]:
+        return map(self._note, super().newest_first(kind))
+
+    def having(self, index: Index[T], key: Hashable) -> tuple[Entry[T], ...]:
+        return tuple(map(self._note, super().having(index, key)))
+
+    def newest(self, index: Index[T], key: Hashable) -> Entry[T] | None:
+        found = super().newest(index, key)
+        return None if found is None else self._note(found)
+
+    def since(self, kind: type[T], cycle: int) -> tuple[Entry[T], ...]:
+        return tuple(map(self._note, super().since(kind, cycle)))
+
+    def _note(self, entry: Entry[T]) -> Entry[T]:
+        if type(entry.value) in self._kinds:
+            self.used.add(entry.ref)
+        return entry

@@ -32,6 +32,20 @@ class Retract(NamedTuple):
 Effect = Post | Revise | Retract
 
 
+class MissingEntryError(Exception):
+    """Raised by an act, or by a rating: what it reads is not on the board yet.
+
+    The scheduler posts the request in the name of the knowledge source, and the act comes when it was answered.
+
+    Attributes:
+        request: the value that asks for what is missing: a kind of request.
+    """
+
+    def __init__(self, request: Any) -> None:
+        super().__init__(f"not on the board yet: {request}")
+        self.request = request
+
+
 def to_say(known: Entry[Any] | None, value: Any | None, because: tuple[Any, ...]) -> Effect | None:
     """What makes the board say ``value`` where it says what ``known`` says, or nothing; None where it does already."""
     if known is None:

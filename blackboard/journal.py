@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from blackboard.agenda import Activation, Obviated
 from blackboard.change import Change
-from blackboard.entry import Entry
+from blackboard.entry import Entry, Ref
 from blackboard.level import Level
 
 NOT_FINITE = frozenset(map(repr, (nan, inf, -inf)))
@@ -23,6 +23,8 @@ FLOATS = frozenset((float,))
 
 def plain(value: Any) -> Any:
     """A value as JSON types: dataclasses and mappings become objects, arrays lists, bytes their length and SHA-256.
+
+    A dataclass with a method ``journal_form`` stands in the journal as that says: by reference to where the rest is.
 
     Raises:
         ValueError: a value without a fixed order or form.
@@ -36,6 +38,8 @@ def plain(value: Any) -> Any:
     if isinstance(value, bytes):
         return {"bytes": len(value), "sha256": hashlib.sha256(value).hexdigest()}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        if hasattr(value, "journal_form"):
+            return plain(value.journal_form())
         return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
@@ -62,6 +66,7 @@ class Decision(NamedTuple):
         pending: how many were left.
         made: the changes of the act.
         refused: why an act was not applied (stale, raised, effect of a kind not its own), or "".
+        used: the revisions of traced kinds that the act read, in order of kind and number.
     """
 
     cycle: int
@@ -75,6 +80,7 @@ class Decision(NamedTuple):
     pending: int
     made: tuple[Change, ...] = ()
     refused: str = ""
+    used: tuple[Ref, ...] = ()
 
 
 Sink = Callable[[Decision], None]
@@ -115,7 +121,7 @@ def activation_record(a: Activation | None) -> dict[str, Any] | None:
 
 def decision_record(d: Decision) -> dict[str, Any]:
     """A decision as JSON types: every changed entry in full, everything else by name."""
-    return {
+    record = {
         "cycle": d.cycle,
         "focus": str(d.focus),
         "observed": [change_record(c) for c in d.observed],
@@ -128,6 +134,9 @@ def decision_record(d: Decision) -> dict[str, Any]:
         "made": [change_record(c) for c in d.made],
         "refused": d.refused,
     }
+    if d.used:
+        record["used"] = [str(ref) for ref in d.used]
+    return record
 
 
 def decision_line(d: Decision) -> str:

@@ -52,6 +52,7 @@ class Kind:
         when: of the older ones only those leave for which this holds; pure.
         unless: and of these, not those for which this holds of the view and the entry; pure.
         needs: ids of the entries that must stay in memory as long as one with this value does; pure.
+        traced: whether each decision names the revisions of this kind that its act read.
     """
 
     role: Role
@@ -59,25 +60,26 @@ class Kind:
     when: Callable[[Any], bool] = always
     unless: Callable[[Any, Any], bool] = never
     needs: Callable[[Any], Iterable[str]] = nothing
+    traced: bool = False
 
 
 class NotAKindError(TypeError):
     """A type that was put on the board, watched or written without being marked as a kind of entry."""
 
 
-def request(**retention: Any) -> Callable[[type[T]], type[T]]:
-    """Marks what ports act on; ``retention`` are the other attributes of :class:`Kind`."""
-    return _mark(Kind(Role.REQUEST, **retention))
+def request(**more: Any) -> Callable[[type[T]], type[T]]:
+    """Marks what ports act on; ``more`` are the other attributes of :class:`Kind`."""
+    return _mark(Kind(Role.REQUEST, **more))
 
 
-def observation(**retention: Any) -> Callable[[type[T]], type[T]]:
+def observation(**more: Any) -> Callable[[type[T]], type[T]]:
     """Marks what comes from outside."""
-    return _mark(Kind(Role.OBSERVATION, **retention))
+    return _mark(Kind(Role.OBSERVATION, **more))
 
 
-def inference(**retention: Any) -> Callable[[type[T]], type[T]]:
+def inference(**more: Any) -> Callable[[type[T]], type[T]]:
     """Marks what knowledge sources conclude."""
-    return _mark(Kind(Role.INFERENCE, **retention))
+    return _mark(Kind(Role.INFERENCE, **more))
 
 
 def kind_of(value_type: type[Any]) -> Kind:

@@ -27,8 +27,11 @@ class Retention:
         self._kinds = kinds
         self._needing = tuple(value_type for value_type, kind in kinds.items() if kind.needs is not nothing)
 
-    def sweep(self, seen: Iterable[Change], board: Blackboard, agenda: Agenda) -> None:
-        """Note what was posted, and remove what is due. Its time follows the number of changes."""
+    def sweep(self, seen: Iterable[Change], board: Blackboard, agenda: Agenda, *, hold: bool = False) -> None:
+        """Note what was posted, and remove what is due. Its time follows the number of changes.
+
+        With ``hold`` all stays: an act waits for what it asked for, and may need anything that is there.
+        """
         for change in seen:
             ages = self._ages.get(type(change.entry.value)) if isinstance(change, Posted) else None
             if ages is None:
@@ -37,7 +40,7 @@ class Retention:
                 entry = board.view.get(id)
                 if entry is None:
                     continue
-                if self._may_leave(entry, board, agenda):
+                if not hold and self._may_leave(entry, board, agenda):
                     board.forget(id)
                 else:
                     ages.put_back(id)

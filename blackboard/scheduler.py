@@ -4,6 +4,9 @@ Order of a cycle: changes of the last cycle -> obviate what they made stale -> a
 asking the best whether it still holds, and obviating it if not -> act -> apply -> journal -> ports. The journal has the
 decision before any port sees it, so that nothing reaches the motors that is not written down. What a cycle costs does
 not depend on how much is pending.
+
+An act that lacks something asks for it (:class:`~blackboard.effect.MissingEntryError`): that request is all that the
+cycle does, and the activation goes back to where it was, to be chosen again when a port has answered.
 """
 
 from __future__ import annotations
@@ -14,16 +17,19 @@ from itertools import chain
 from typing import Any, Protocol
 
 from blackboard.agenda import Activation, Agenda, Obviated
-from blackboard.board import Blackboard, StaleError, View
+from blackboard.board import Blackboard, StaleError, TracedView, View
 from blackboard.change import Change, Posted, Quiescence, Retracted
-from blackboard.effect import Effect, type_of
-from blackboard.entry import new_tuple
+from blackboard.effect import Effect, MissingEntryError, Post, type_of
+from blackboard.entry import Ref, new_tuple
 from blackboard.journal import Decision, Sink
-from blackboard.kinds import Kind, Registry, always, is_request
+from blackboard.kinds import Kind, Registry, always, is_request, kind_of
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.retention import Retention
 from blackboard.servoing import Discrepancy, Groups, Servoing
+
+MISSING_RATING = 1.0
+"""Rating of a source that lacks something to tell it: its act comes first, and asks."""
 
 RAISED = "raised: "
 """How the refusal of an act begins whose knowledge source raised an exception; its traceback follows."""
@@ -81,10 +87,12 @@ class Scheduler:
         self._agenda = Agenda()
         self.kinds = registry_of(sources, kinds)
         self._requests = frozenset(filter(is_request, self.kinds.values()))
+        self._traced = frozenset(kind for kind in self.kinds.values() if kind_of(kind).traced)
         self._retention = Retention(self.kinds.marks() if retention is None else retention)
         self._numbers = 0
         self._unseen: tuple[Change, ...] = ()
         self._observed: tuple[Change, ...] = ()
+        self._is_waiting = False
 
     def tell(self, effects: Iterable[Effect], author: str) -> tuple[Change, ...]:
         """Put something on the board from outside (a command, an observation); it is seen in the next cycle."""
@@ -103,13 +111,14 @@ class Scheduler:
         obviated: list[Obviated] = []
         activated: list[Activation] = []
         fault = self._hear_bids(seen, activated, obviated)
-        self._retention.sweep(seen, self.board, agenda)
+        self._retention.sweep(seen, self.board, agenda, hold=self._is_waiting)
+        self._is_waiting = False
         focus = self._servoing.focus(self.view)
         chosen, runner_up, fault = (None, None, fault) if fault else self._two_best(focus, obviated)
-        made, refused = self._execute(chosen) if chosen else ((), fault)
+        made, refused, used = self._execute(chosen) if chosen else ((), fault, ())
         decision = new_tuple(Decision, (
             self.cycle, seen, observed, focus, tuple(activated), tuple(obviated), chosen, runner_up, len(agenda), made,
-            refused,
+            refused, used,
         ))
         self._unseen = made
         for sink in self._sinks:
@@ -161,7 +170,7 @@ class Scheduler:
                 continue
             if not (source.still_valid(view, change) if source.has_own_word else stands):
                 continue
-            rating = source.rate(view, change)
+            rating = _rate(source, view, change)
             if rating is None:
                 continue
             if not 0.0 <= rating <= 1.0:
@@ -207,7 +216,7 @@ class Scheduler:
                 if not (source.still_valid(view, trigger) if source.has_own_word else self._stands(trigger)):
                     reason = self._staleness(trigger)
                 else:
-                    reason = "could not answer any more" if source.rate(view, trigger) is None else ""
+                    reason = "could not answer any more" if _rate(source, view, trigger) is None else ""
             finally:
                 if reason:
                     self._agenda.take(best)
@@ -216,18 +225,37 @@ class Scheduler:
                 return best
         return None
 
-    def _execute(self, chosen: Activation) -> tuple[tuple[Change, ...], str]:
-        source = chosen.source
+    def _execute(self, chosen: Activation) -> tuple[tuple[Change, ...], str, tuple[Ref, ...]]:
+        """The changes of an act, why it was refused, and which revisions of traced kinds it read."""
+        source, view = chosen.source, TracedView(self.board, self._traced)
         try:
-            effects = tuple(source.act(self.view, chosen.trigger))
-            alien = aliens(effects, source.writes)
-            if alien:
-                return (), f"{source.name} may not write {', '.join(alien)}"
-            return self.board.apply(effects, author=source.name, cycle=self.cycle), ""
+            try:
+                effects = tuple(source.act(view, chosen.trigger))
+                made, refused = self._apply(source, effects)
+            except MissingEntryError as missing:
+                made, refused = self._ask(chosen, missing.request)
+            return made, refused, tuple(sorted(view.used, key=_by_number))
         except StaleError as error:
-            return (), f"stale: {error}"
+            return (), f"stale: {error}", ()
         except Exception:
-            return (), RAISED + traceback.format_exc(limit=-4)
+            return (), RAISED + traceback.format_exc(limit=-4), ()
+
+    def _apply(self, source: KnowledgeSource, effects: tuple[Effect, ...]) -> tuple[tuple[Change, ...], str]:
+        alien = aliens(effects, source.writes)
+        if alien:
+            return (), f"{source.name} may not write {', '.join(alien)}"
+        return self.board.apply(effects, author=source.name, cycle=self.cycle), ""
+
+    def _ask(self, chosen: Activation, request: Any) -> tuple[tuple[Change, ...], str]:
+        """Post what an act asks for, and put its activation back; the same is not asked again before an answer."""
+        for asked in self.view.all(type(request)):
+            if asked.value == request:
+                return (), f"nobody answered {asked.ref}"
+        made, refused = self._apply(chosen.source, (Post(request, (chosen.trigger.entry,)),))
+        if made:
+            self._agenda.put_back(chosen)
+            self._is_waiting = True
+        return made, refused
 
     def _tell_ports(self, made: tuple[Change, ...]) -> None:
         """Only requests reach a port, and each is in the journal by now: sinks come first."""
@@ -247,6 +275,18 @@ def registry_of(
     """
     of_sources = ((*(watch.value_type for watch in s.watches), *s.writes) for s in sources)
     return Registry((Discrepancy, Quiescence, *kinds, *chain.from_iterable(of_sources)))
+
+
+def _rate(source: KnowledgeSource, view: View, trigger: Change) -> float | None:
+    try:
+        return source.rate(view, trigger)
+    except MissingEntryError:
+        return MISSING_RATING
+
+
+def _by_number(ref: Ref) -> tuple[str, int, int]:
+    kind, _, number = ref.id.rpartition("-")
+    return kind, int(number), ref.revision
 
 
 def aliens(effects: Iterable[Effect], writes: Collection[type[Any]]) -> list[str]:

@@ -21,7 +21,7 @@ from harvey.wiring import build, foreign_sources, knowledge_sources, servoing
 from harvey.without import SegmentHider, is_segment, parse_segments, remove_from_world
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import Settings
-from world_models.entries import KINDS
+from world_models.entries.kinds import KINDS
 from world_models.files.toml.settings import parse_value, suggest_keys
 from world_models.robot import RobotModel
 

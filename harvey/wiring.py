@@ -34,7 +34,7 @@ from knowledge_sources.plan.plan_adjuster import PlanAdjuster
 from knowledge_sources.plan.sketcher import Sketcher
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.entries import KINDS
+from world_models.entries.kinds import KINDS
 from world_models.files.toml.mission import Servo
 from world_models.plugins import SOURCES_GROUP, PluginError, load_plugin_classes
 from world_models.robot import RobotModel

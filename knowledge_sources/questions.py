@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-from blackboard.board import View
+from blackboard.board import Blackboard, View
 from blackboard.entry import Entry
 from blackboard.entry_store import Index
 from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
+from functools import lru_cache
+
 from knowledge_sources.settings.action import ActionSettings
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import Tracks
+from world_models.entries.robot import CameraState, Footprint, Wheels
 from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch
+from world_models.frame_building import FrameBuilding
 from world_models.robot import RobotModel
 
 HELD: Index[Hypothesis] = Index(Hypothesis, lambda h: h.is_held or None, "held")
 ACTIVE_GOAL: Index[Goal] = Index(Goal, lambda g: g.is_active or None, "active")
 OPEN_MILESTONE: Index[Milestone] = Index(Milestone, lambda m: m.is_open or None, "open")
 ACTIVE_SKETCH: Index[PlanSketch] = Index(PlanSketch, lambda s: s.goal if s.is_active else None, "active")
+NOWHERE = FrameBuilding(Blackboard().view)
+"""A building of which nothing is known."""
+
 OPEN_FAULT: Index[BodyFault] = Index(BodyFault, lambda f: f.is_open or None, "open")
 
 
@@ -27,10 +34,34 @@ def find_belief(view: View) -> Entry[Hypothesis] | None:
     return view.newest(HELD, True)
 
 
-def robot_in(view: View, robot: RobotModel, locale: str) -> RobotModel:
-    """The robot's model on the floor of a locale, with what is known to stand before its camera."""
+def find_robot(view: View) -> RobotModel:
+    """The robot as the board knows it, in the building as the board knows it.
+
+    Raises:
+        LookupError: nobody has told of its camera, wheels or footprint.
+    """
+    camera, wheels, footprint = view.latest(CameraState), view.latest(Wheels), view.latest(Footprint)
+    if camera is None or wheels is None or footprint is None:
+        raise LookupError("expected the robot's camera, wheels and footprint on the board, got not all of them")
+    return _build_robot(camera.value, wheels.value, footprint.value).in_building(FrameBuilding(view))
+
+
+@lru_cache(maxsize=8)
+def _build_robot(camera: CameraState, wheels: Wheels, footprint: Footprint) -> RobotModel:
+    """A robot in no building yet; the same cameras for the same state, as views are cached by them."""
+    return RobotModel(NOWHERE, camera.pinhole, camera.mount, wheels.actuator, footprint.radius_m, camera.lens,
+                      wheels.continuous)
+
+
+def find_robot_in(view: View, locale: str) -> RobotModel:
+    """The robot on the floor of a locale, with what is known to stand before its camera."""
     obstruction = view.latest(Obstruction)
-    return robot.with_obstruction(None if obstruction is None else obstruction.value).on_floor_of(locale)
+    return find_robot(view).with_obstruction(None if obstruction is None else obstruction.value).on_floor_of(locale)
+
+
+def find_building(view: View) -> FrameBuilding:
+    """The building as far as its frames are on the board; asking for more asks the world for it."""
+    return FrameBuilding(view)
 
 
 def has_followed(view: View, settings: ActionSettings) -> bool:

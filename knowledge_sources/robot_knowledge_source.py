@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from blackboard.knowledge_source import KnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.robot import RobotModel
+from world_models.entries.locale_frame import FrameRequest
 
 
 class RobotKnowledgeSource(KnowledgeSource):
-    """A knowledge source of a robot: beside the board it knows the robot's model and its settings, and nothing else."""
+    """A knowledge source of a robot: it has its settings, and reads everything else from the view.
 
-    def __init__(self, robot: RobotModel, settings: Settings = DEFAULT) -> None:
-        self._robot = robot
+    The building and the robot are entries too (:mod:`knowledge_sources.questions`). Where a locale frame is missing the
+    act is broken off, asks for it, and comes again when it is there; so each may write a FrameRequest.
+    """
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if FrameRequest not in cls.writes:
+            cls.writes = (*cls.writes, FrameRequest)
+
+    def __init__(self, settings: Settings = DEFAULT) -> None:
         self._settings = settings

@@ -7,10 +7,11 @@ means the point in it with the largest clearance from walls and obstacles.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from world_models.building.building import Building
 from world_models.building.memory_locales import words_of
 from world_models.building.outlines import distance_to_border, inside_polygon
 from world_models.building.world import World
@@ -37,8 +38,13 @@ def check_command(text: str) -> None:
         _parse_ends(text)
 
 
-def parse_command(text: str, world: World) -> tuple[Place, Place]:
+def read_places(
+    text: str, building: Building, find_rooms: Callable[[tuple[str, ...]], Sequence[str]]
+) -> tuple[Place, Place]:
     """Origin and destination of a command, in plain words or as ptrans.
+
+    Args:
+        find_rooms: the one room that answers to each phrase; raises ValueError where none, or more than one, does.
 
     Raises:
         ValueError: the text is not understood, or no room, or more than one, answers to its words.
@@ -46,10 +52,15 @@ def parse_command(text: str, world: World) -> tuple[Place, Place]:
     if text.lstrip().startswith("("):
         places = parse_ptrans(text)
         for place in places:
-            world.locale(place.locale)
+            building.locale(place.locale)
         return places
-    origin, destination = (find_room(words, world) for words in _parse_ends(text))
-    return find_open_point(world, origin), find_open_point(world, destination)
+    origin, destination = find_rooms(_parse_ends(text))
+    return find_open_point(building, origin), find_open_point(building, destination)
+
+
+def parse_command(text: str, world: World) -> tuple[Place, Place]:
+    """Origin and destination of a command in a world that is known whole. Raises ValueError."""
+    return read_places(text, world, lambda phrases: [find_room(words, world) for words in phrases])
 
 
 def _parse_ends(text: str) -> tuple[str, str]:
@@ -106,9 +117,9 @@ def _find_room_in(room_words: str, words: str, world: World, containers: Sequenc
                      f" {', '.join(rooms[:MAX_NAMED])}{more}")
 
 
-def find_open_point(world: World, room: str) -> Place:
+def find_open_point(building: Building, room: str) -> Place:
     """The point of a grid over a room with the largest clearance from walls and obstacles."""
-    outline, obstacles = world.outline(room), world.obstacles(room)
+    outline, obstacles = building.outline(room), building.obstacles(room)
     low, high = outline.min(axis=0), outline.max(axis=0)
     best, best_clearance_m = outline.mean(axis=0), -1.0
     for x in np.linspace(low[0], high[0], GRID_POINTS)[1:-1]:
@@ -118,4 +129,4 @@ def find_open_point(world: World, room: str) -> Place:
                 clearance_m = min(distance_to_border(point, border) for border in (outline, *obstacles))
                 if clearance_m > best_clearance_m + 1e-9:
                     best, best_clearance_m = point, clearance_m
-    return Place.of_world(world, room, float(best[0]), float(best[1]))
+    return Place.of_world(building, room, float(best[0]), float(best[1]))

@@ -1,14 +1,15 @@
-"""The robot model (§3): its world, camera and wheels, as knowledge sources know them."""
+"""The robot model (§3): building, camera and wheels, as the methods take them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import Any
 
 from world_models.actuator import ActuatorModel
-from world_models.building.world import World
+from world_models.building.building import Building
 from world_models.camera import Camera, CameraMount
 from world_models.entries.obstruction import Obstruction
+from world_models.entries.robot import CameraState, Footprint, Wheels
 from world_models.frames import Pose, Pose2
 
 _NO_LENS = Camera(1.0, 1.0, 0.0, 0.0, 1, 1)
@@ -17,10 +18,10 @@ _NO_LENS = Camera(1.0, 1.0, 0.0, 0.0, 1, 1)
 
 @dataclass(frozen=True, eq=False)
 class RobotModel:
-    """What a knowledge source knows beside the board.
+    """A robot in a building, to compute with.
 
     Attributes:
-        world: the model of the building (§3.4): accurate, but incomplete.
+        world: the building (§3.4): accurate, but incomplete. A knowledge source's is that of the frames on the board.
         camera, mount: the sensor model (§3.2). ``camera`` is a pinhole: all pixels on the board are rectified pixels.
         actuator: the actuator model (§3.2).
         radius_m: radius of the robot's disc.
@@ -28,7 +29,7 @@ class RobotModel:
         continuous: whether legs are driven without stopping at each increment, corrected by pictures on the move.
     """
 
-    world: World
+    world: Building
     camera: Camera
     mount: CameraMount
     actuator: ActuatorModel
@@ -39,7 +40,17 @@ class RobotModel:
     def __post_init__(self) -> None:
         if self.lens is _NO_LENS:
             object.__setattr__(self, "lens", self.camera)
-        object.__setattr__(self, "camera", self.lens.pinhole)
+        camera = self.lens.pinhole
+        object.__setattr__(self, "camera", camera)
+        object.__setattr__(self, "_cameras", {None: camera})  # by obstruction; views are cached by a camera's identity
+
+    def entries(self) -> tuple[CameraState, Wheels, Footprint]:
+        """What the robot knows of itself, as it lies on the board."""
+        return CameraState(self.lens, self.mount), Wheels(self.actuator, self.continuous), Footprint(self.radius_m)
+
+    def in_building(self, building: Building) -> RobotModel:
+        """The same robot in another building, or in the same one as known otherwise."""
+        return self._with(world=building)
 
     def on_floor_of(self, locale: str) -> RobotModel:
         """The robot on the floor of a locale.
@@ -49,32 +60,23 @@ class RobotModel:
         height_m = self.world.floor_m(locale)
         if height_m == 0.0:
             return self
-        if height_m not in self._raised:
-            raised = replace(self, mount=replace(self.mount, height_m=self.mount.height_m + height_m))
-            object.__setattr__(raised, "camera", self.camera)  # the same object: caches of views compare it by identity
-            self._raised[height_m] = raised
-        return self._raised[height_m]
+        return self._with(mount=replace(self.mount, height_m=self.mount.height_m + height_m))
 
     def with_obstruction(self, obstruction: Obstruction | None) -> RobotModel:
         """The robot with an obstruction before its camera: it expects to see nothing there."""
         if obstruction == self.camera.obstruction:
             return self
-        if obstruction not in self._obstructed:
-            obstructed = replace(self)
-            object.__setattr__(obstructed, "camera", replace(self.camera, obstruction=obstruction))
-            self._obstructed[obstruction] = obstructed
-        return self._obstructed[obstruction]
-
-    @cached_property
-    def _obstructed(self) -> dict[Obstruction | None, RobotModel]:
-        """The same robot with other obstructions."""
-        return {}
-
-    @cached_property
-    def _raised(self) -> dict[float, RobotModel]:
-        """The same robot on other floors, by their height [m]."""
-        return {}
+        cameras: dict[Obstruction | None, Camera] = self.__dict__["_cameras"]
+        if obstruction not in cameras:
+            cameras[obstruction] = replace(self.camera, obstruction=obstruction)
+        return self._with(camera=cameras[obstruction])
 
     def camera_from_world(self, world_from_robot: Pose2) -> Pose:
         """Camera pose for a robot pose on the plan z = 0."""
         return self.mount.camera_from_robot @ world_from_robot.lifted().inverse()
+
+    def _with(self, **changed: Any) -> RobotModel:
+        """A copy with other attributes; it shares the cameras."""
+        copy = object.__new__(RobotModel)
+        copy.__dict__.update(self.__dict__, **changed)
+        return copy

@@ -18,7 +18,7 @@ from harvey.simulation.run import build_robot_model, run_mission
 from harvey.wiring import knowledge_sources, servoing
 from sim.scenario import Scenario, load_scenario
 from sim.stage import build_stage
-from world_models.entries import KINDS
+from world_models.entries.kinds import KINDS
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,6 +73,7 @@ class DecisionRecord:
     pending: int
     made: tuple[EntryRecord, ...]
     refused: str
+    used: tuple[str, ...]
     data: Mapping[str, Any]
 
     @property
@@ -127,6 +128,7 @@ def decision_of(data: Any) -> DecisionRecord:
         pending=_get(data, "pending", int),
         made=tuple(_entry(item, cycle, False) for item in _get(data, "made", list)),
         refused=_get(data, "refused", str),
+        used=_texts(data, "used") if "used" in data else (),
         data=data,
     )
 

@@ -11,7 +11,7 @@ from harvey.errors import BadInput
 from harvey.run_files.observations import entry_of
 from harvey.run_files.records import EntryRecord
 from world_models import words
-from world_models.entries import KINDS
+from world_models.entries.kinds import KINDS
 
 T = TypeVar("T")
 OWN = Registry((*KINDS, Discrepancy, Quiescence))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from functools import lru_cache
 from statistics import median
 from typing import NamedTuple
 
@@ -21,24 +20,30 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.arrays import Image
-from knowledge_sources.methods.features.correlation import Template, extract_template
-from knowledge_sources.methods.features.rectification import Rectifier
+from knowledge_sources.methods.features.correlation import Template
+from knowledge_sources.methods.features.rectification import get_rectifier
 from knowledge_sources.methods.tracking.edge_alignment import align_to_edges
 from knowledge_sources.methods.tracking.template_tracking import (
     TrackUpdate,
     correct_pose,
+    cut_template,
     follow_landmarks,
     select_landmarks,
 )
-from knowledge_sources.questions import find_belief, open_discrepancy, robot_in, unmeasured_doubt
+from knowledge_sources.questions import (
+    find_belief,
+    find_building,
+    find_robot,
+    find_robot_in,
+    open_discrepancy,
+    unmeasured_doubt,
+)
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.tolerances import action_px
 from world_models.entries.body import Frame
 from world_models.entries.location import Hypothesis, covariance_tuple
 from world_models.entries.percepts import Anchor, Track, Tracks
-from world_models.entries.wheels import Drift
-from world_models.robot import RobotModel
+from world_models.entries.robot import Drift
 from world_models.visibility.lines_and_points import visible_lines
 
 
@@ -67,11 +72,6 @@ class CorrelatorTracker(RobotKnowledgeSource):
     )
     writes = (Tracks, Hypothesis, Drift, Discrepancy)
 
-    def __init__(self, robot: RobotModel, settings: Settings = DEFAULT) -> None:
-        super().__init__(robot, settings)
-        self._picture = Rectifier(robot.lens, robot.camera)
-        self._template = lru_cache(maxsize=4 * settings.tracking.max_tracks)(self._cut)
-
     def rate(self, view: View, trigger: Change) -> float | None:
         if find_belief(view) is None or view.latest(Frame) is None or open_discrepancy(view, Level.GOAL) is not None:
             return None
@@ -92,11 +92,11 @@ class CorrelatorTracker(RobotKnowledgeSource):
         self, view: View, frame: Entry[Frame], belief: Entry[Hypothesis], old: Entry[Tracks] | None
     ) -> Iterable[Effect]:
         """Follow the landmarks into a new frame; correct the belief, or post that tracking failed."""
-        image = self._picture(frame.value.jpeg)
+        image = _read_picture(view, frame)
         followed = self._follow(view, None if old is None else old.value, image, belief.value)
         seen = [f.track for f in followed if f.track.found_px is not None]
         because = (frame, belief) if old is None else (frame, belief, old)
-        corrected = self._correct(belief.value, seen, old.value.anchors) if seen and old is not None else None
+        corrected = self._correct(view, belief.value, seen, old.value.anchors) if seen and old is not None else None
         expected = sum(1 for f in followed if f.expected)
         agreeing = 0 if corrected is None else corrected.agreeing
         if self._has_failed(expected, agreeing):
@@ -128,12 +128,12 @@ class CorrelatorTracker(RobotKnowledgeSource):
         self, view: View, frame: Entry[Frame], belief: Entry[Hypothesis], old: Entry[Tracks] | None
     ) -> Iterable[Effect]:
         """Take all landmarks anew after a milestone or a relocalization."""
-        fresh = self._take_new(view, frame, self._picture(frame.value.jpeg), (), (), belief.value)
+        fresh = self._take_new(view, frame, _read_picture(view, frame), (), (), belief.value)
         tracks = _post_or_revise(old, fresh.tracks, (frame, belief))
         yield tracks
         drift = view.latest(Drift)
         if drift is not None:
-            heading = fresh.hypothesis.world_from_robot(self._robot.world).heading_rad
+            heading = fresh.hypothesis.world_from_robot(find_building(view)).heading_rad
             yield Revise(drift, drift.value.restart(heading), (tracks,))
         if fresh.hypothesis is not belief.value:
             yield Revise(belief, fresh.hypothesis, (frame, belief, tracks))
@@ -143,30 +143,30 @@ class CorrelatorTracker(RobotKnowledgeSource):
         drift = view.latest(Drift)
         if drift is None or drift.value.gone_m < self._settings.action.min_drift_stretch_m:
             return
-        heading = belief.world_from_robot(self._robot.world).heading_rad
-        learnt = drift.value.update(self._robot.actuator, heading, math.sqrt(2.0) * belief.sigma_rad)
+        robot = find_robot(view)
+        heading = belief.world_from_robot(robot.world).heading_rad
+        learnt = drift.value.update(robot.actuator, heading, math.sqrt(2.0) * belief.sigma_rad)
         yield Revise(drift, learnt, (drift, correction))
 
     def _follow(self, view: View, tracks: Tracks | None, image: Image, belief: Hypothesis) -> list[TrackUpdate]:
         if tracks is None:
             return []
-        world = self._robot.world
-        return follow_landmarks(robot_in(view, self._robot, belief.locale), tracks.items,
-                      lambda track: self._template(view[track.template_frame].value.jpeg, track.template_px), image,
-                      belief.world_from_robot(world), belief.covariance_world(world), self._settings)
+        robot, s = find_robot_in(view, belief.locale), self._settings
+        rectifier = get_rectifier(robot.lens, find_robot(view).camera)
 
-    def _cut(self, jpeg: bytes, at_px: tuple[float, float]) -> Template:
-        """The template round a pixel of a picture; kept in a cache, as it serves for many frames."""
-        s = self._settings
-        return extract_template(self._picture(jpeg), at_px, s.tracking.template_half_px, s.features)
+        def template_of(track: Track) -> Template:
+            jpeg = view[track.template_frame].value.jpeg
+            return cut_template(rectifier, jpeg, track.template_px, s.tracking.template_half_px, s.features)
 
-    def _correct(self, belief: Hypothesis, seen: list[Track], anchors: tuple[Anchor, ...]) -> Corrected:
+        return follow_landmarks(robot, tracks.items, template_of, image, belief.world_from_robot(robot.world),
+                                belief.covariance_world(robot.world), s)
+
+    def _correct(self, view: View, belief: Hypothesis, seen: list[Track], anchors: tuple[Anchor, ...]) -> Corrected:
         """The belief after the landmarks were found."""
-        world = self._robot.world
+        robot = find_robot(view).on_floor_of(belief.locale)
+        world = robot.world
         pose, covariance, agreeing = correct_pose(
-            self._robot.on_floor_of(belief.locale), seen, anchors, belief.world_from_robot(world),
-            belief.covariance_world(world), self._settings,
-        )
+            robot, seen, anchors, belief.world_from_robot(world), belief.covariance_world(world), self._settings)
         hypothesis = Hypothesis.of_world(world, belief.locale, pose, covariance, "tracks", motion=belief.motion)
         return Corrected(hypothesis, agreeing)
 
@@ -176,12 +176,12 @@ class CorrelatorTracker(RobotKnowledgeSource):
     ) -> Renewed:
         """Keep the landmarks that still serve, and take new ones where too few are left."""
         s, anchors = self._settings.action, () if old is None else old.value.anchors
-        near = self._find_near_frames(anchors, belief)
+        near = self._find_near_frames(view, anchors, belief)
         kept = tuple(f.track for f in followed if f.expected and f.track.misses < s.max_misses
                      and f.track.template_frame in near)
         taken = 0 if old is None else old.value.taken
         if len(kept) >= max(s.min_landmarks, min(s.enough_landmarks, s.min_remaining_part * taken)):
-            return Renewed(self._with_anchors(kept, anchors, frame, belief, taken), belief)
+            return Renewed(self._with_anchors(view, kept, anchors, frame, belief, taken), belief)
         return self._take_new(view, frame, image, kept, anchors, belief)
 
     def _take_new(
@@ -189,8 +189,9 @@ class CorrelatorTracker(RobotKnowledgeSource):
         belief: Hypothesis,
     ) -> Renewed:
         """Take new landmarks beside those that are kept, once the belief is aligned with the model's edges."""
-        world, s = self._robot.world, self._settings.action
-        robot, pose = robot_in(view, self._robot, belief.locale), belief.world_from_robot(world)
+        robot, s = find_robot_in(view, belief.locale), self._settings.action
+        world = robot.world
+        pose = belief.world_from_robot(world)
         lines = visible_lines(
             world, robot.camera, robot.camera_from_world(pose), min_length_px=s.min_edge_length_px,
             min_contrast=s.min_edge_contrast, max_distance_m=s.max_edge_distance_m,
@@ -201,21 +202,23 @@ class CorrelatorTracker(RobotKnowledgeSource):
             pose = found.world_from_robot
             belief = Hypothesis.of_world(world, belief.locale, pose, found.covariance, "tracks", motion=belief.motion)
         items = (*kept, *select_landmarks(robot, kept, frame.id, image, pose, self._settings))
-        return Renewed(self._with_anchors(items, anchors, frame, belief, len(items)), belief)
+        return Renewed(self._with_anchors(view, items, anchors, frame, belief, len(items)), belief)
 
-    def _find_near_frames(self, anchors: tuple[Anchor, ...], belief: Hypothesis) -> frozenset[str]:
+    def _find_near_frames(self, view: View, anchors: tuple[Anchor, ...], belief: Hypothesis) -> frozenset[str]:
         """The frames that were taken near enough to here for their templates to be used."""
-        here, s = belief.world_from_robot(self._robot.world), self._settings.action
-        far_m = s.max_template_distance_rolling_m if self._robot.continuous else s.max_template_distance_m
+        robot, s = find_robot(view), self._settings.action
+        here = belief.world_from_robot(robot.world)
+        far_m = s.max_template_distance_rolling_m if robot.continuous else s.max_template_distance_m
         return frozenset(a.frame for a in anchors if math.hypot(a.x_m - here.x_m, a.y_m - here.y_m) <= far_m)
 
     def _with_anchors(
-        self, items: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame], belief: Hypothesis,
-        taken: int,
+        self, view: View, items: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame],
+        belief: Hypothesis, taken: int,
     ) -> Tracks:
         """The tracks, with what was believed where their templates were cut."""
-        pose = belief.world_from_robot(self._robot.world)
-        here = Anchor(frame.id, pose.x_m, pose.y_m, covariance_tuple(belief.covariance_world(self._robot.world)))
+        building = find_building(view)
+        pose = belief.world_from_robot(building)
+        here = Anchor(frame.id, pose.x_m, pose.y_m, covariance_tuple(belief.covariance_world(building)))
         used = {t.template_frame for t in items}
         half_px = self._settings.tracking.template_half_px
         return Tracks(frame.id, half_px, items, tuple(a for a in (*anchors, here) if a.frame in used), taken)
@@ -225,11 +228,17 @@ class CorrelatorTracker(RobotKnowledgeSource):
         because: tuple[object, ...],
     ) -> Iterable[Effect]:
         points = np.array([track.point_world for track in tracks])
-        bounds = (action_px(self._robot, belief, points, self._settings), self._settings.plan.max_deviation_px)
+        bounds = (action_px(find_robot(view), belief, points, self._settings), self._settings.plan.max_deviation_px)
         found = Discrepancy(Level.ACTION, what, magnitude_px, bounds, "px")
         last = open_discrepancy(view, Level.ACTION)
         if last is None or not last.value.exceeds:  # one beyond its bound is the escalator's
             yield Post(found, because) if last is None else Revise(last, found, because)
+
+
+def _read_picture(view: View, frame: Entry[Frame]) -> Image:
+    """The rectified picture of a frame."""
+    robot = find_robot(view)
+    return get_rectifier(robot.lens, robot.camera)(frame.value.jpeg)
 
 
 def _post_or_revise(old: Entry[Tracks] | None, tracks: Tracks, because: tuple[object, ...]) -> Effect:

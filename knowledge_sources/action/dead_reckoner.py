@@ -13,11 +13,12 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.questions import find_belief
+from knowledge_sources.questions import find_belief, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.actuator import ActuatorModel
 from world_models.entries.body import BodyFault, Course, Look, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis
-from world_models.entries.wheels import Drift
+from world_models.entries.robot import Drift
 from world_models.frames import Pose2
 
 
@@ -40,8 +41,9 @@ class DeadReckoner(RobotKnowledgeSource):
         belief = find_belief(view)
         if belief is None:
             return
-        world, report = self._robot.world, trigger.entry.value
-        actuator, before = self._robot.actuator, belief.value.world_from_robot(world)
+        robot, report = find_robot(view), trigger.entry.value
+        world, actuator = robot.world, robot.actuator
+        before = belief.value.world_from_robot(world)
         known = view.latest(Drift)
         drift = Drift.unknown(actuator, before.heading_rad) if known is None else known.value
         request = view.get(trigger.entry.because[0].id)
@@ -53,7 +55,7 @@ class DeadReckoner(RobotKnowledgeSource):
         locale = there if there and world.is_room(there) else belief.value.locale  # in a doorway: still the old room
         fault = None if request is None else view.latest(BodyFault, lambda f: f.request == request.id)
         if request is not None and fault is not None:
-            missing = self._compute_missing_motion(request.value, report)
+            missing = _compute_missing_motion(request.value, report, actuator)
             covariance = covariance + _compute_partial_covariance(pose, *missing)
         moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=trigger.entry.id)
         step = Revise(belief, moved, (trigger.entry, belief) if fault is None else (trigger.entry, belief, fault))
@@ -71,11 +73,14 @@ class DeadReckoner(RobotKnowledgeSource):
             stopped = Discrepancy(Level.ACTION, what, math.inf, (bound_px, bound_px), "px")
             yield Post(stopped, (trigger.entry,))
 
-    def _compute_missing_motion(self, request: MotorCommand | Course, report: MotionReport) -> tuple[float, float]:
-        """What may have been driven beyond the report: (turn [rad], move [m])."""
-        if isinstance(request, Course):
-            return 0.0, self._robot.actuator.stopping_distance_m()
-        return request.turn_rad - report.turn_rad, request.move_m - report.move_m
+
+def _compute_missing_motion(
+    request: MotorCommand | Course, report: MotionReport, actuator: ActuatorModel
+) -> tuple[float, float]:
+    """What may have been driven beyond the report: (turn [rad], move [m])."""
+    if isinstance(request, Course):
+        return 0.0, actuator.stopping_distance_m()
+    return request.turn_rad - report.turn_rad, request.move_m - report.move_m
 
 
 def _compute_partial_covariance(pose: Pose2, turn_rad: float, move_m: float) -> NDArray[np.float64]:

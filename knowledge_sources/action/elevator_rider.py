@@ -15,13 +15,13 @@ from blackboard.level import Level
 from knowledge_sources.questions import (
     deepest_sketch,
     find_belief,
+    find_building,
     is_over,
     is_standing,
     open_discrepancy,
     open_fault,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.building.locales import Link
 from world_models.entries.body import BodyFault, Ride, RideReport
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import Tracks
@@ -56,13 +56,12 @@ class ElevatorRider(RobotKnowledgeSource):
             return
         wanted, belief = self._find_wanted_ride(view), find_belief(view)
         if wanted is not None and belief is not None:
-            sketch, link = wanted
-            s = sketch.value
-            there = s.subgoals[s.at].destination.locale
-            yield Post(Ride(sketch.id, s.at, link.name, link.other(there), there), (sketch, belief))
+            ride = wanted.value.subgoals[wanted.value.at]
+            here, there = ride.origin.locale, ride.destination.locale
+            yield Post(Ride(wanted.id, wanted.value.at, ride.passage, here, there), (wanted, belief))
 
-    def _find_wanted_ride(self, view: View) -> tuple[Entry[PlanSketch], Link] | None:
-        """The sketch whose next subgoal is a ride that was not asked for, if nothing is in doubt; and the elevator."""
+    def _find_wanted_ride(self, view: View) -> Entry[PlanSketch] | None:
+        """The sketch whose next subgoal is a ride that was not asked for, if nothing is in doubt."""
         sketch = deepest_sketch(view)
         if sketch is None or not sketch.value.verified or not is_standing(view) or open_fault(view) is not None:
             return None
@@ -71,17 +70,14 @@ class ElevatorRider(RobotKnowledgeSource):
         s = sketch.value
         if s.current is None or not s.current.is_ride:
             return None
-        passage = self._robot.world.passage(s.current.passage)
         asked = view.latest(Ride, lambda r: r.sketch == sketch.id and r.index == s.at)
-        return (sketch, passage) if asked is None and isinstance(passage, Link) else None
+        return sketch if asked is None else None
 
     def _take_over_belief(self, view: View, report: Entry[RideReport]) -> Iterable[Effect]:
         ride, belief = view.latest(Ride), find_belief(view)
         if ride is None or belief is None:
             return
-        link = self._robot.world.passage(ride.value.passage)
-        assert isinstance(link, Link)
-        there = Revise(belief, self._predict_hypothesis(belief.value, link, ride.value.destination), (report, belief))
+        there = Revise(belief, self._predict_hypothesis(view, belief.value, ride.value), (report, belief))
         yield there
         tracks = view.latest(Tracks)
         if tracks is not None:  # the landmarks are on the other floor
@@ -90,10 +86,11 @@ class ElevatorRider(RobotKnowledgeSource):
         if sketch is not None and sketch.value.is_active and sketch.value.at == ride.value.index:
             yield Revise(sketch, sketch.value.advanced(), (report, there))
 
-    def _predict_hypothesis(self, belief: Hypothesis, link: Link, destination: str) -> Hypothesis:
+    def _predict_hypothesis(self, view: View, belief: Hypothesis, ride: Ride) -> Hypothesis:
         """The belief after a ride: the pose relative to the car's stop is the same on both floors."""
-        world = self._robot.world
-        before, behind = (Pose2(*link.stop_of(name)) for name in (link.other(destination), destination))
+        world, destination = find_building(view), ride.destination
+        link = next(link for link in world.links_of(ride.origin) if link.name == ride.passage)
+        before, behind = (Pose2(*link.stop_of(name)) for name in (ride.origin, destination))
         pose = behind @ (before.inverse() @ belief.world_from_robot(world))
         turn = behind.heading_rad - before.heading_rad
         c, s = np.cos(turn), np.sin(turn)

@@ -23,6 +23,8 @@ from knowledge_sources.questions import (
     current_leg,
     deepest_sketch,
     find_belief,
+    find_building,
+    find_robot,
     is_in_doubt,
     is_over,
     is_standing,
@@ -32,10 +34,11 @@ from knowledge_sources.questions import (
     unmeasured_doubt,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.actuator import ActuatorModel
 from world_models.entries.body import BodyFault, MotorCommand
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Leg, Milestone, PlanSketch
-from world_models.entries.wheels import Drift
+from world_models.entries.robot import Drift
 from world_models.frames import Pose2, wrap_angle
 
 
@@ -75,7 +78,7 @@ class Motor(RobotKnowledgeSource):
         if belief is None:
             return
         if milestone is not None:
-            turn = self._limit_turn(self._look_error(view, milestone.value) or 0.0)
+            turn = _limit_turn(self._look_error(view, milestone.value) or 0.0, find_robot(view).actuator)
             yield Post(MotorCommand(turn, 0.0), (milestone, belief))
             return
         driving = current_leg(view)
@@ -89,7 +92,7 @@ class Motor(RobotKnowledgeSource):
         belief = find_belief(view)
         if belief is None:
             return None
-        here = belief.value.world_from_robot(self._robot.world)
+        here = belief.value.world_from_robot(find_building(view))
         error = wrap_angle(milestone.look_heading_rad - here.heading_rad)
         return error if abs(error) > self._settings.action.max_heading_error_rad else None
 
@@ -97,7 +100,7 @@ class Motor(RobotKnowledgeSource):
         sketch = _sketch_for_leg(view)
         if sketch is None or sketch.value.current is None:
             return
-        subgoal, world = sketch.value.current, self._robot.world
+        subgoal, world = sketch.value.current, find_building(view)
         here, end = belief.value.world_from_robot(world), subgoal.destination.in_world(world)
         planned = subgoal.origin.in_world(world)
         start = planned if planned.distance_to(here) <= self._settings.action.max_start_offset_m else here
@@ -106,9 +109,10 @@ class Motor(RobotKnowledgeSource):
         yield Post(leg, (sketch, belief))
 
     def _command_increment(self, view: View, leg: Entry[Leg], belief: Entry[Hypothesis]) -> Iterable[Effect]:
-        here = belief.value.world_from_robot(self._robot.world)
-        drift = view.latest(Drift)
-        command = self._plan_increment(leg.value, here, 0.0 if drift is None else drift.value.curvature_per_m)
+        robot, drift = find_robot(view), view.latest(Drift)
+        here = belief.value.world_from_robot(robot.world)
+        curvature_per_m = 0.0 if drift is None else drift.value.curvature_per_m
+        command = self._plan_increment(robot.actuator, leg.value, here, curvature_per_m)
         seen = update_leg(leg.value, here, self._aim(leg.value, here))
         discrepancy = open_discrepancy(view, Level.ACTION)
         corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
@@ -120,17 +124,18 @@ class Motor(RobotKnowledgeSource):
         yield step
         yield Post(command, (step, belief, *(() if drift is None else (drift,))))
 
-    def _plan_increment(self, leg: Leg, here: Pose2, curvature_per_m: float) -> MotorCommand | None:
+    def _plan_increment(
+        self, actuator: ActuatorModel, leg: Leg, here: Pose2, curvature_per_m: float
+    ) -> MotorCommand | None:
         """The next increment; None on arrival. A move is an arc whose chord points at the aim."""
         s, (along, left) = self._settings.action, measure_progress(leg, here)
         within_m = leg.tolerance_m * s.arrival_part
         away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
         if away <= within_m or (along <= 0.0 and abs(left) <= within_m):
-            return self._final_turn(leg, here)
+            return self._final_turn(leg, here, actuator)
         turn = compute_bearing(self._aim(leg, here), here)
         if abs(turn) > s.max_heading_error_rad:
-            return MotorCommand(self._limit_turn(turn), 0.0)
-        actuator = self._robot.actuator
+            return MotorCommand(_limit_turn(turn, actuator), 0.0)
         distance = min(actuator.increment_m, actuator.compute_command_m(away))
         turn = compute_chord_turn(turn, curvature_per_m, actuator.reach * distance)
         return MotorCommand(turn if abs(turn) > s.max_arrival_heading_error_rad / 10 else 0.0, distance)
@@ -142,17 +147,17 @@ class Motor(RobotKnowledgeSource):
             return leg.x1_m, leg.y1_m
         return find_aim_point(leg, along, self._settings.action.lookahead_m)
 
-    def _final_turn(self, leg: Leg, here: Pose2) -> MotorCommand | None:
+    def _final_turn(self, leg: Leg, here: Pose2, actuator: ActuatorModel) -> MotorCommand | None:
         if leg.heading_rad is None:
             return None
         turn = wrap_angle(leg.heading_rad - here.heading_rad)
         most = self._settings.action.max_arrival_heading_error_rad
-        return MotorCommand(self._limit_turn(turn), 0.0) if abs(turn) > most else None
+        return MotorCommand(_limit_turn(turn, actuator), 0.0) if abs(turn) > most else None
 
-    def _limit_turn(self, turn_rad: float) -> float:
-        """One increment of a turn; a long turn is divided equally, so that landmarks stay in view."""
-        largest = self._robot.actuator.turn_increment_rad
-        return turn_rad / max(1, math.ceil(abs(turn_rad) / largest))
+
+def _limit_turn(turn_rad: float, actuator: ActuatorModel) -> float:
+    """One increment of a turn; a long turn is divided equally, so that landmarks stay in view."""
+    return turn_rad / max(1, math.ceil(abs(turn_rad) / actuator.turn_increment_rad))
 
 
 def _ends_doubt(view: View, milestone: Entry[Milestone]) -> bool:

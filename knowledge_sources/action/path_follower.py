@@ -21,6 +21,8 @@ from knowledge_sources.methods.motion.pure_pursuit import (
 from knowledge_sources.questions import (
     current_leg,
     find_belief,
+    find_building,
+    find_robot,
     is_in_doubt,
     is_over,
     is_standing,
@@ -31,10 +33,11 @@ from knowledge_sources.questions import (
     rolling_course,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.actuator import ActuatorModel
 from world_models.entries.body import Course
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Leg, Milestone, PlanSketch
-from world_models.entries.wheels import Drift
+from world_models.entries.robot import Drift
 from world_models.frames import Pose2
 
 
@@ -75,7 +78,8 @@ class PathFollower(RobotKnowledgeSource):
         self, view: View, course: Entry[Course] | None, leg: Entry[Leg], belief: Entry[Hypothesis]
     ) -> Iterable[Effect]:
         """Steer an arc to the point of the line ahead, less the curvature that the wheels add."""
-        here, drift = belief.value.world_from_robot(self._robot.world), view.latest(Drift)
+        robot, drift = find_robot(view), view.latest(Drift)
+        here = belief.value.world_from_robot(robot.world)
         s, (along, _) = self._settings.action, measure_progress(leg.value, here)
         point = find_aim_point(leg.value, along, s.rolling_lookahead_m)
         discrepancy = open_discrepancy(view, Level.ACTION)
@@ -86,32 +90,33 @@ class PathFollower(RobotKnowledgeSource):
         yield step
         wanted = compute_curvature_to(point, here) - (0.0 if drift is None else drift.value.curvature_per_m)
         curvature = min(max(wanted, -s.max_curvature_per_m), s.max_curvature_per_m)
-        new = Course(leg.id, self._robot.actuator.speed_m_per_s, curvature)
+        new = Course(leg.id, robot.actuator.speed_m_per_s, curvature)
         because = (step, belief, *(() if drift is None else (drift,)))
         yield Post(new, because) if course is None else Revise(course, new, (course, *because))
 
     def _may_start(self, view: View) -> bool:
         """Whether the robot stands before a leg that is long enough, and faces along it."""
-        belief, driving = find_belief(view), current_leg(view)
-        if not self._robot.continuous or belief is None or driving is None:
+        belief, driving, robot = find_belief(view), current_leg(view), find_robot(view)
+        if not robot.continuous or belief is None or driving is None:
             return False
         if is_over(view) or not is_standing(view) or is_in_doubt(view) or open_milestone(view) is not None:
             return False
-        here = belief.value.world_from_robot(self._robot.world)
+        here = belief.value.world_from_robot(robot.world)
         leg, s = driving[0].value, self._settings.action
-        return self._is_long_enough(leg, here) and abs(self._aim_error(leg, here)) <= s.max_rolling_start_error_rad
+        return self._is_long_enough(leg, here, robot.actuator) and abs(self._aim_error(leg, here)) <= s.max_rolling_start_error_rad
 
     def _must_stop(self, view: View) -> bool:
         belief, driving = find_belief(view), current_leg(view)
         if belief is None or driving is None or is_over(view) or is_in_doubt(view) or open_milestone(view) is not None:
             return True
-        here = belief.value.world_from_robot(self._robot.world)
+        robot = find_robot(view)
+        here = belief.value.world_from_robot(robot.world)
         leg, s = driving[0].value, self._settings.action
-        return not self._is_long_enough(leg, here) or abs(self._aim_error(leg, here)) > s.max_rolling_error_rad
+        return not self._is_long_enough(leg, here, robot.actuator) or abs(self._aim_error(leg, here)) > s.max_rolling_error_rad
 
-    def _is_long_enough(self, leg: Leg, here: Pose2) -> bool:
+    def _is_long_enough(self, leg: Leg, here: Pose2, actuator: ActuatorModel) -> bool:
         """Whether the robot can drive and still stop before the end of the leg."""
-        least_m = self._robot.actuator.stopping_distance_m() + self._settings.action.min_rolling_leg_m
+        least_m = actuator.stopping_distance_m() + self._settings.action.min_rolling_leg_m
         return measure_progress(leg, here)[0] > least_m
 
     def _aim_error(self, leg: Leg, here: Pose2) -> float:

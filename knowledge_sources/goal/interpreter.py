@@ -9,10 +9,12 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
+from knowledge_sources.questions import find_building
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.commands import parse_command
+from world_models.commands import read_places
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.task import Command, Goal, Outcome
+from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 
 
@@ -30,7 +32,7 @@ class Interpreter(RobotKnowledgeSource):
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         command: Command = trigger.entry.value
         try:
-            origin, destination = self._read_places(command)
+            origin, destination = _read_places(find_building(view), command)
         except ValueError as error:
             yield Post(Outcome("failed", f"the command was not understood: {error}"), (trigger.entry,))
             return
@@ -38,6 +40,7 @@ class Interpreter(RobotKnowledgeSource):
         yield Post(Hypothesis(origin.locale, pose, command.start_covariance, "command"), (trigger.entry,))
         yield Post(Goal(origin, destination), (trigger.entry,))
 
-    def _read_places(self, command: Command) -> tuple[Place, Place]:
-        origin, destination = parse_command(command.text, self._robot.world)
-        return origin, replace(destination, heading_rad=command.arrival_heading_rad)
+
+def _read_places(building: FrameBuilding, command: Command) -> tuple[Place, Place]:
+    origin, destination = read_places(command.text, building, building.find_rooms)
+    return origin, replace(destination, heading_rad=command.arrival_heading_rad)

@@ -22,13 +22,24 @@ from knowledge_sources.methods.localization.global_localization import (
 )
 from knowledge_sources.methods.localization.obstructions import update_obstruction
 from knowledge_sources.methods.localization.views import CameraView, propagate_pose
-from knowledge_sources.questions import active_goal, find_belief, is_over, is_standing, open_discrepancy
+from knowledge_sources.questions import (
+    active_goal,
+    find_belief,
+    find_building,
+    find_robot,
+    is_over,
+    is_standing,
+    open_discrepancy,
+)
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.actuator import ActuatorModel
+from world_models.building.building import Building
 from world_models.entries.body import Look, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis, HypothesisStatus, Place, covariance_tuple
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import Glimpse, Panorama, Segments
 from world_models.entries.task import Goal, PlanSketch
+from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 
 
@@ -79,11 +90,11 @@ class Relocalizer(RobotKnowledgeSource):
     def _consider(
         self, view: View, segments: Entry[Segments], lost: Entry[Discrepancy], belief: Entry[Hypothesis]
     ) -> Iterable[Effect]:
-        before = _panorama_since(view, lost)
-        glimpses = self._collect_glimpses(view, segments, before)
+        before, robot = _panorama_since(view, lost), find_robot(view)
+        glimpses = _collect_glimpses(view, segments, before, robot.actuator)
         looks, hidden = [_to_view(view, g) for g in glimpses], view.latest(Obstruction)
         known, tuning = None if hidden is None else hidden.value, self._settings.localization
-        obstruction = update_obstruction(looks, self._robot.camera, known, settings=tuning)
+        obstruction = update_obstruction(looks, robot.camera, known, settings=tuning)
         if obstruction is not None:
             looks = [replace(g, segments_px=obstruction.without_its_own(g.segments_px)) for g in looks]
         because: tuple[object, ...] = (segments, lost)
@@ -91,11 +102,12 @@ class Relocalizer(RobotKnowledgeSource):
             yield change
         if obstruction is not None:
             because = (segments, lost, hidden if change is None else change)
-        robot = self._robot.with_obstruction(obstruction).on_floor_of(belief.value.locale)
-        result = localize(robot, looks, self._list_rooms(belief.value), self._settings)
+        building, rooms = find_building(view), self._list_rooms(view, belief.value)
+        looking = robot.with_obstruction(obstruction).on_floor_of(belief.value.locale)
+        result = localize(looking, looks, rooms, self._settings)
         is_last = len(glimpses) >= self._settings.goal.max_probes
         if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
-            result = self._prefer_reachable(result, belief.value.locale)
+            result = _prefer_reachable(building, result, belief.value.locale)
         for old in view.where(Hypothesis, lambda h: h.status == "candidate"):
             yield Retract(old, (segments,))
         panorama = Panorama(glimpses, _describe(result))
@@ -105,55 +117,35 @@ class Relocalizer(RobotKnowledgeSource):
             yield from self._adopt(view, (segments, seen), lost, belief, result.candidates[0])
             return
         for c in result.candidates:
-            yield Post(self._to_hypothesis(c, belief.value, "candidate", c.weight), (segments, seen, belief))
+            yield Post(_to_hypothesis(building, c, belief.value, "candidate", c.weight), (segments, seen, belief))
         if result.status is LocalizationStatus.PROBE and result.next_action is not None and not is_last:
             yield Post(MotorCommand(result.next_action.turn_rad, result.next_action.move_m), (segments, lost, seen))
 
-    def _prefer_reachable(self, result: LocalizationResult, locale: str) -> LocalizationResult:
-        """Of places that nothing more can tell apart the only one to which wheels lead from where the robot was.
-
-        Carried to another place of where it can drive to, it may look the same there: that stays ambiguous. But being
-        carried through a wall or up the stairs, to a place that looks just like one within reach, is not believed.
-        """
-        near = [c for c in result.candidates if self._robot.world.route(locale, c.room) is not None]
-        if result.status is LocalizationStatus.FOUND or len(near) != 1 or not near[0].is_accepted:
-            return result
-        return LocalizationResult(LocalizationStatus.FOUND, (replace(near[0], weight=1.0),))
-
-    def _collect_glimpses(
-        self, view: View, segments: Entry[Segments], before: Entry[Panorama] | None
-    ) -> tuple[Glimpse, ...]:
-        """The looks so far, as seen from where the robot is now, and the new one."""
-        old = () if before is None else before.value.glimpses
-        for report in () if before is None else view.since(MotionReport, before.cycle):
-            old = tuple(self._move(g, report.value) for g in old)
-        here = Glimpse(segments.id, Pose2(0.0, 0.0, 0.0), covariance_tuple(np.zeros((3, 3))))
-        return (*old, here)
-
-    def _move(self, glimpse: Glimpse, report: MotionReport) -> Glimpse:
-        actuator, claim = self._robot.actuator, (report.turn_rad, report.move_m)
-        step, spread = actuator.predict_motion(*claim), actuator.motion_covariance(*claim)
-        pose, covariance = propagate_pose(glimpse.now_from_then, np.array(glimpse.covariance), step, spread)
-        return replace(glimpse, now_from_then=pose, covariance=covariance_tuple(covariance))
-
-    def _list_rooms(self, belief: Hypothesis) -> list[str]:
+    def _list_rooms(self, view: View, belief: Hypothesis) -> list[str]:
         """The rooms of the floor, the nearest to the last belief first; other floors are not searched."""
-        world, here = self._robot.world, belief.world_from_robot(self._robot.world)
-        container, level_m = world.locale(belief.locale).parent or belief.locale, world.floor_m(belief.locale)
-        same_m = self._settings.goal.max_floor_difference_m
-        rooms = [name for name in world.rooms_in(container) if abs(world.floor_m(name) - level_m) < same_m]
-        while len(rooms) < 2 and (above := world.locale(container).parent) is not None:  # as from an elevator's car
+        building = find_building(view)
+        here, level_m = belief.world_from_robot(building), building.floor_m(belief.locale)
+        container = building.locale(belief.locale).parent or belief.locale
+        rooms = self._list_rooms_of_floor(building, container, level_m)
+        while len(rooms) < 2 and (above := building.locale(container).parent) is not None:  # as from an elevator's car
             container = above
-            rooms = [name for name in world.rooms_in(container) if abs(world.floor_m(name) - level_m) < same_m]
-        away = [(_distance(world.outline(name), here), name) for name in rooms]
+            rooms = self._list_rooms_of_floor(building, container, level_m)
+        away = [(_distance(building.outline(name), here), name) for name in rooms]
         return [name for _, name in sorted(away)[:self._settings.goal.max_rooms]]
+
+    def _list_rooms_of_floor(self, building: FrameBuilding, container: str, level_m: float) -> list[str]:
+        rooms = building.list_rooms_in(container, level_m, self._settings.goal.max_floor_difference_m)
+        building.require(rooms)
+        same_m = self._settings.goal.max_floor_difference_m
+        return [name for name in rooms if abs(building.floor_m(name) - level_m) < same_m]
 
     def _adopt(
         self, view: View, seen: tuple[Entry[Segments], Effect], lost: Entry[Discrepancy], belief: Entry[Hypothesis],
         candidate: Candidate,
     ) -> Iterable[Effect]:
         """The belief is corrected, and a new top-level goal takes the place of the old one (§2)."""
-        here = Revise(belief, self._to_hypothesis(candidate, belief.value, "held", 1.0), (*seen, lost, belief))
+        building = find_building(view)
+        here = Revise(belief, _to_hypothesis(building, candidate, belief.value, "held", 1.0), (*seen, lost, belief))
         yield here
         yield Revise(lost, lost.value.corrected(), (here,))
         for level in (Level.ACTION, Level.PLAN):
@@ -166,16 +158,47 @@ class Relocalizer(RobotKnowledgeSource):
         abandon = Revise(goal, replace(goal.value, status="abandoned"), (here,))
         yield abandon
         pose = candidate.world_from_robot
-        origin = Place.of_world(self._robot.world, candidate.room, pose.x_m, pose.y_m)
+        origin = Place.of_world(building, candidate.room, pose.x_m, pose.y_m)
         yield Post(Goal(origin, goal.value.destination), (here, abandon))
 
-    def _to_hypothesis(
-        self, candidate: Candidate, belief: Hypothesis, status: HypothesisStatus, weight: float
-    ) -> Hypothesis:
-        return Hypothesis.of_world(
-            self._robot.world, candidate.room, candidate.world_from_robot, candidate.covariance, "relocalization",
-            status=status, weight=weight, motion=belief.motion, evidence=str(candidate.likelihood),
-        )
+
+def _prefer_reachable(building: Building, result: LocalizationResult, locale: str) -> LocalizationResult:
+    """Of places that nothing more can tell apart the only one to which wheels lead from where the robot was.
+
+    Carried to another place of where it can drive to, it may look the same there: that stays ambiguous. But being
+    carried through a wall or up the stairs, to a place that looks just like one within reach, is not believed.
+    """
+    near = [c for c in result.candidates if building.route(locale, c.room) is not None]
+    if result.status is LocalizationStatus.FOUND or len(near) != 1 or not near[0].is_accepted:
+        return result
+    return LocalizationResult(LocalizationStatus.FOUND, (replace(near[0], weight=1.0),))
+
+
+def _collect_glimpses(
+    view: View, segments: Entry[Segments], before: Entry[Panorama] | None, actuator: ActuatorModel
+) -> tuple[Glimpse, ...]:
+    """The looks so far, as seen from where the robot is now, and the new one."""
+    old = () if before is None else before.value.glimpses
+    for report in () if before is None else view.since(MotionReport, before.cycle):
+        old = tuple(_move(g, report.value, actuator) for g in old)
+    here = Glimpse(segments.id, Pose2(0.0, 0.0, 0.0), covariance_tuple(np.zeros((3, 3))))
+    return (*old, here)
+
+
+def _move(glimpse: Glimpse, report: MotionReport, actuator: ActuatorModel) -> Glimpse:
+    claim = report.turn_rad, report.move_m
+    step, spread = actuator.predict_motion(*claim), actuator.motion_covariance(*claim)
+    pose, covariance = propagate_pose(glimpse.now_from_then, np.array(glimpse.covariance), step, spread)
+    return replace(glimpse, now_from_then=pose, covariance=covariance_tuple(covariance))
+
+
+def _to_hypothesis(
+    building: Building, candidate: Candidate, belief: Hypothesis, status: HypothesisStatus, weight: float
+) -> Hypothesis:
+    return Hypothesis.of_world(
+        building, candidate.room, candidate.world_from_robot, candidate.covariance, "relocalization",
+        status=status, weight=weight, motion=belief.motion, evidence=str(candidate.likelihood),
+    )
 
 
 def _has_just_ridden(view: View) -> bool:

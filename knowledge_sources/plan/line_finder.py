@@ -10,14 +10,12 @@ from blackboard.effect import Effect, Post
 from blackboard.level import Level
 from knowledge_sources.methods.features.images import compute_mean_and_deviation
 from knowledge_sources.methods.features.lines import find_lines
-from knowledge_sources.methods.features.rectification import Rectifier
-from knowledge_sources.questions import open_milestone
+from knowledge_sources.methods.features.rectification import get_rectifier
+from knowledge_sources.questions import find_robot, open_milestone
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.settings import DEFAULT, Settings
 from world_models.entries.body import Frame
 from world_models.entries.percepts import Segments
 from world_models.frames import frozen
-from world_models.robot import RobotModel
 
 
 class LineFinder(RobotKnowledgeSource):
@@ -30,16 +28,13 @@ class LineFinder(RobotKnowledgeSource):
     watches = (Watch(Frame, (Posted,), lambda f: f.purpose in ("milestone", "probe")),)
     writes = (Segments,)
 
-    def __init__(self, robot: RobotModel, settings: Settings = DEFAULT) -> None:
-        super().__init__(robot, settings)
-        self._picture = Rectifier(robot.lens, robot.camera)
-
     def rate(self, view: View, trigger: Change) -> float | None:
         return 0.8
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         frame = trigger.entry
-        image = self._picture(frame.value.jpeg)
+        robot = find_robot(view)
+        image = get_rectifier(robot.lens, robot.camera)(frame.value.jpeg)
         found = find_lines(image, min_length_px=self._settings.plan.min_segment_length_px,
                            settings=self._settings.features)
         brightness, contrast = compute_mean_and_deviation(image)

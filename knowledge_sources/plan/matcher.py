@@ -13,12 +13,13 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
 from knowledge_sources.methods.matching import FloorMatch, Match, match_lines, match_on_floor
-from knowledge_sources.questions import find_belief
+from knowledge_sources.questions import find_belief, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, Segments
 from world_models.entries.task import Milestone
 from world_models.frames import frozen
+from world_models.robot import RobotModel
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ class Matcher(RobotKnowledgeSource):
             yield Post(LineMatch(milestone.id, segments.id, none, frozen(lines_world), frozen(data_px[:0]), 0.0,
                                  frozen(np.zeros(0))), (segments, milestone, belief))
             return
-        found = self._match(m, lines_world, data_px, belief.value)
+        found = self._match(find_robot(view), m, lines_world, data_px, belief.value)
         pairs = np.asarray(found.pairs, np.int64).reshape(-1, 2)
         yield Post(
             LineMatch(
@@ -62,16 +63,15 @@ class Matcher(RobotKnowledgeSource):
         )
 
     def _match(
-        self, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
+        self, robot: RobotModel, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
     ) -> Match | FloorMatch:
         s = self._settings.plan
-        sigma_px = self._robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / s.rigid_distance_m)
+        sigma_px = robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / s.rigid_distance_m)
         if sigma_px <= s.max_rigid_sigma_px:
             model_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
             return match_lines(model_px, data_px, self._settings.matching)
-        robot = self._robot.on_floor_of(belief.locale)
         return match_on_floor(
-            lines_world, data_px, robot.camera, robot.mount.camera_from_robot,
-            belief.world_from_robot(self._robot.world), belief.covariance_world(self._robot.world),
+            lines_world, data_px, robot.camera, robot.on_floor_of(belief.locale).mount.camera_from_robot,
+            belief.world_from_robot(robot.world), belief.covariance_world(robot.world),
             self._settings.matching,
         )

@@ -11,7 +11,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
 from knowledge_sources.methods.pose import planar_from_lines
-from knowledge_sources.questions import find_belief
+from knowledge_sources.questions import find_belief, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.percepts import LineMatch, PoseFix
 from world_models.entries.task import Milestone
@@ -37,15 +37,15 @@ class MedRAndT(RobotKnowledgeSource):
         if belief is None or milestone is None:
             return
         m: Milestone = milestone.value
-        s = self._settings.plan
-        prior = s.prior_covariance_factor * belief.value.covariance_world(self._robot.world)
+        s, robot = self._settings.plan, find_robot(view).on_floor_of(belief.value.locale)
+        prior = s.prior_covariance_factor * belief.value.covariance_world(robot.world)
         prior = prior + np.diag([s.prior_sigma_m**2, s.prior_sigma_m**2, s.prior_sigma_rad**2])
         found = planar_from_lines(
             match.value.lines_world,
             match.value.segments_px,
-            self._robot.camera,
-            self._robot.on_floor_of(belief.value.locale).mount.camera_from_robot,
-            belief.value.world_from_robot(self._robot.world),
+            robot.camera,
+            robot.mount.camera_from_robot,
+            belief.value.world_from_robot(robot.world),
             prior_covariance=prior,
             landmark_ids=[m.landmark_of[i] for i in match.value.pairs[:, 0]],
             sigma_px=self._settings.features.sigma_across_px,

@@ -21,7 +21,7 @@ from knowledge_sources.methods.verification.line_check import LineCheck, check_l
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.methods.verification.pose_evidence import compute_evidence, compute_motion_tolerance_px
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
-from knowledge_sources.questions import find_belief, has_followed, open_discrepancy, robot_in
+from knowledge_sources.questions import find_belief, find_robot, find_robot_in, has_followed, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Frame
 from world_models.entries.location import Hypothesis
@@ -117,7 +117,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         segments: Segments = view[match.segments].value
         frame: Frame = view[segments.frame].value
         pose, belief = fix.world_from_robot, find_belief(view)
-        robot = self._robot if belief is None else robot_in(view, self._robot, belief.value.locale)
+        robot = find_robot(view) if belief is None else find_robot_in(view, belief.value.locale)
         before = pose if belief is None else belief.value.world_from_robot(robot.world)
         covariance = fix.covariance if belief is None else belief.value.covariance_world(robot.world)
         lines = np.array(milestone.expected, float).reshape(-1, 2, 3)

@@ -23,17 +23,19 @@ from knowledge_sources.methods.verification.view_quality import ViewQuality, com
 from knowledge_sources.questions import (
     deepest_sketch,
     find_belief,
+    find_building,
+    find_robot_in,
     has_followed,
     is_over,
     is_standing,
     open_discrepancy,
     open_milestone,
-    robot_in,
     unmeasured_doubt,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.plan import PlanSettings
+from world_models.building.building import Building
 from world_models.entries.body import Look
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstruction import Obstruction
@@ -84,7 +86,7 @@ class MilestoneSelector(RobotKnowledgeSource):
         elif waiting is None:
             yield from self._check_belief(view, task, belief)
         else:
-            here = replace(waiting.value, look_heading_rad=self._heading(belief.value))
+            here = replace(waiting.value, look_heading_rad=_find_heading(view, belief.value))
             yield from self._look_for(view, waiting, here, task, belief, _car_of(view.get(here.sketch), here.index))
 
     def _find_task(self, view: View) -> Entry[Any] | None:
@@ -98,19 +100,19 @@ class MilestoneSelector(RobotKnowledgeSource):
         if doubt is not None and (waiting is None or waiting.cycle < doubt.cycle):
             return doubt
         if waiting is not None:
-            return waiting if self._faces(belief.value, waiting.value) else None
+            return waiting if self._faces(view, belief.value, waiting.value) else None
         sketch = deepest_sketch(view)
         return sketch if sketch is not None and not sketch.value.verified else None
 
     def _check_belief(self, view: View, doubt: Entry[Discrepancy], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         """Check the belief in the present view; if that was not testable, in another one."""
         tried = _tried_headings(view, lambda m: m.cycle >= doubt.cycle)
-        check = Milestone("", -1, f"check of the belief, because {doubt.value.what}", self._heading(belief.value),
+        check = Milestone("", -1, f"check of the belief, because {doubt.value.what}", _find_heading(view, belief.value),
                           tried=tried)
         if not tried:
             yield from self._look_for(view, None, check, doubt, belief)
             return
-        robot, pose = self._robot_and_pose(view, belief.value)
+        robot, pose = _find_robot_and_pose(view, belief.value)
         headings = self._find_untried(self._turned_headings(pose), tried) or [pose.heading_rad]
         heading = choose_heading(robot, pose, headings, self._settings.plan.check_tolerance_m, settings=self._settings)
         yield Post(replace(check, look_heading_rad=heading), (doubt, belief))
@@ -122,18 +124,18 @@ class MilestoneSelector(RobotKnowledgeSource):
         waiting = _awaited_milestone(view)
         if waiting is None:
             return
-        m, (robot, pose) = waiting.value, self._robot_and_pose(view, belief.value)
+        m, (robot, pose) = waiting.value, _find_robot_and_pose(view, belief.value)
         seen = predict_milestone(robot, pose, m, _car_of(view.get(m.sketch), m.index), self._settings)
         yield Revise(waiting, seen, (hidden, waiting, belief))
 
     def _propose(self, view: View, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         """Propose the milestone before the sketch's next subgoal, seen in the first good direction."""
-        robot, pose = self._robot_and_pose(view, belief.value)
+        robot, pose = _find_robot_and_pose(view, belief.value)
         s = sketch.value
         tried = _tried_headings(view, lambda m: (m.value.sketch, m.value.index) == (sketch.id, s.at))
         heading = self._choose_direction(robot, s, pose, tried)
         milestone = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}", heading, tried=tried)
-        if self._faces(belief.value, milestone):
+        if self._faces(view, belief.value, milestone):
             yield from self._look_for(view, None, milestone, sketch, belief, _car_of(sketch, s.at))
         else:
             yield Post(milestone, (sketch, belief))
@@ -143,7 +145,7 @@ class MilestoneSelector(RobotKnowledgeSource):
         belief: Entry[Hypothesis], car: str = "",
     ) -> Iterable[Effect]:
         """Predict the landmarks from the believed pose, without those of an elevator's car, and ask for the picture."""
-        hidden, (robot, pose) = view.latest(Obstruction), self._robot_and_pose(view, belief.value)
+        hidden, (robot, pose) = view.latest(Obstruction), _find_robot_and_pose(view, belief.value)
         expected = predict_milestone(robot, pose, milestone, car, self._settings)
         if not has_followed(view, self._settings.action) or open_discrepancy(view, Level.PLAN) is not None:
             precompute_views(robot, belief.value.locale, pose, self._settings)  # the judge asks: another door?
@@ -154,17 +156,17 @@ class MilestoneSelector(RobotKnowledgeSource):
 
     def _choose_direction(self, robot: RobotModel, sketch: PlanSketch, pose: Pose2, tried: Sequence[float]) -> float:
         before = sketch.subgoals[sketch.at - 1] if sketch.at else None
-        headings = self._find_untried(self._candidate_headings(sketch, pose), tried)
+        headings = self._find_untried(self._candidate_headings(robot.world, sketch, pose), tried)
         tolerance_m = before.tolerance_m if before else self._settings.plan.check_tolerance_m
         return choose_heading(robot, pose, headings, tolerance_m, _car(sketch, sketch.at), self._settings)
 
-    def _candidate_headings(self, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
+    def _candidate_headings(self, building: Building, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
         wanted = sketch.subgoals[sketch.at - 1].destination if sketch.at else None
         if wanted is not None and wanted.heading_rad is not None:
-            yield wanted.in_world(self._robot.world).heading_rad
+            yield wanted.in_world(building).heading_rad
         yield pose.heading_rad
         if sketch.current is not None:
-            end = sketch.current.destination.in_world(self._robot.world)
+            end = sketch.current.destination.in_world(building)
             yield math.atan2(end.y_m - pose.y_m, end.x_m - pose.x_m)
         yield from self._turned_headings(pose)
 
@@ -177,16 +179,20 @@ class MilestoneSelector(RobotKnowledgeSource):
         least = self._settings.plan.min_look_difference_rad
         return [h for h in headings if all(abs(wrap_angle(h - other)) > least for other in tried)]
 
-    def _robot_and_pose(self, view: View, belief: Hypothesis) -> tuple[RobotModel, Pose2]:
-        """The robot's model on its floor, and the believed pose in the world."""
-        return robot_in(view, self._robot, belief.locale), belief.world_from_robot(self._robot.world)
-
-    def _heading(self, belief: Hypothesis) -> float:
-        return belief.world_from_robot(self._robot.world).heading_rad
-
-    def _faces(self, belief: Hypothesis, milestone: Milestone) -> bool:
-        error = wrap_angle(self._heading(belief) - milestone.look_heading_rad)
+    def _faces(self, view: View, belief: Hypothesis, milestone: Milestone) -> bool:
+        error = wrap_angle(_find_heading(view, belief) - milestone.look_heading_rad)
         return abs(error) <= self._settings.plan.max_look_error_rad
+
+
+def _find_robot_and_pose(view: View, belief: Hypothesis) -> tuple[RobotModel, Pose2]:
+    """The robot on its floor, and the believed pose in the world."""
+    robot = find_robot_in(view, belief.locale)
+    return robot, belief.world_from_robot(robot.world)
+
+
+def _find_heading(view: View, belief: Hypothesis) -> float:
+    """The believed heading [rad, world]."""
+    return belief.world_from_robot(find_building(view)).heading_rad
 
 
 def _awaited_milestone(view: View) -> Entry[Milestone] | None:
@@ -242,7 +248,7 @@ def predict_milestone(
     marks = sorted({int(i) for i in lines.landmark})
     return replace(
         milestone,
-        landmarks=tuple(robot.world.landmarks[i].name for i in marks),
+        landmarks=tuple(lines.marks[i].name for i in marks),
         expected=_to_tuples(lines.lines_world),
         expected_px=_to_tuples(lines.segments_px),
         landmark_of=tuple(marks.index(int(i)) for i in lines.landmark),
@@ -261,8 +267,8 @@ def _predict_clear_lines(robot: RobotModel, pose: Pose2, car: str, settings: Set
     """The clearest lines that should be seen from a pose, long ones with contrast, without those of ``car``."""
     lines = predict_lines(robot, pose, settings.verification)
     if car:
-        marks = robot.world.landmarks
-        lines = lines[np.array([car not in (marks[i].locale, marks[i].neighbour) for i in lines.landmark], bool)]
+        marks = [lines.marks[int(i)] for i in lines.landmark]
+        lines = lines[np.array([car not in (mark.locale, mark.neighbour) for mark in marks], bool)]
     s = settings.plan
     if len(lines) <= s.max_lines:
         return lines

@@ -14,7 +14,7 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.methods.localization.obstructions import update_obstruction
 from knowledge_sources.methods.localization.views import CameraView
-from knowledge_sources.questions import active_goal, unmeasured_doubt
+from knowledge_sources.questions import active_goal, find_robot, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import Settings
 from world_models.camera import Camera
@@ -52,7 +52,7 @@ class ObstructionFinder(RobotKnowledgeSource):
                  for s, heading_rad in looks]
         if len(views) < self._settings.plan.min_obstruction_looks:
             return None
-        now = _find_in_last_looks(views, self._robot.camera, None if known is None else known.value, self._settings)
+        now = _find_in_last_looks(views, find_robot(view).camera, None if known is None else known.value, self._settings)
         return to_say(known, now, (*(s for s, _ in looks), *(() if known is None else (known,))))
 
 

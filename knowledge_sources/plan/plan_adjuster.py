@@ -9,7 +9,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.questions import find_belief, open_discrepancy
+from knowledge_sources.questions import find_belief, find_building, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import PoseFix
@@ -34,7 +34,7 @@ class PlanAdjuster(RobotKnowledgeSource):
             return
         pose_fix: PoseFix = fix.value
         here = Hypothesis.of_world(
-            self._robot.world, belief.value.locale, pose_fix.world_from_robot, pose_fix.covariance, "milestone",
+            find_building(view), belief.value.locale, pose_fix.world_from_robot, pose_fix.covariance, "milestone",
             motion=belief.value.motion,
         )
         correction = Revise(belief, here, (trigger.entry, fix, belief))

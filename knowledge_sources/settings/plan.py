@@ -43,6 +43,9 @@ class PlanSettings:
         "engineering judgement")
     max_lost_per_mission: int = setting(
         12, "count", "So often the robot may be lost in one mission.", "engineering judgement")
+    max_walked_rooms: int = setting(
+        200, "count", "So many rooms are searched for a way that people can walk, to say so where wheels have none.",
+        "engineering judgement")
 
     # Milestone selector
     max_look_error_rad: float = setting(

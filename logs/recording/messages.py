@@ -6,7 +6,7 @@ from blackboard.change import Change, Retracted, Revised
 from world_models import words
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Leg, Milestone
-from world_models.entries.wheels import Drift
+from world_models.entries.robot import Drift
 
 
 class Messages:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import ChainMap
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,6 +33,7 @@ class Scene:
         surface_face: (M,) number in the world of the face that the surface is a region of.
         line_locales, corner_locales, surface_locales: (.., 2) indices in ``locales``; twice the same where only one.
         locales: names, sorted.
+        marks: the landmarks by their number in the world.
     """
 
     edges: Edges
@@ -48,6 +50,7 @@ class Scene:
     corner_locales: Ints
     surface_locales: Ints
     locales: tuple[str, ...]
+    marks: Mapping[int, Landmark]
 
 
 def build_scene(faces: Sequence[tuple[int, Face]], landmarks: Sequence[tuple[int, Landmark]]) -> Scene:
@@ -80,6 +83,7 @@ def build_scene(faces: Sequence[tuple[int, Face]], landmarks: Sequence[tuple[int
         corner_locales=np.repeat(mark_locales, points, axis=0),
         surface_locales=locale_pairs([face for _, face, _ in surfaces]),
         locales=tuple(names),
+        marks=dict(landmarks),
     )
 
 
@@ -116,6 +120,7 @@ def concatenate_scenes(parts: Sequence[Scene]) -> Scene:
         corner_locales=renumbered_locales("corner_locales")[corners],
         surface_locales=renumbered_locales("surface_locales")[surfaces],
         locales=names,
+        marks=dict(ChainMap(*(dict(part.marks) for part in parts))),
     )
 
 

@@ -8,13 +8,15 @@ chain of doorways opens to the camera are left out beforehand (§3.4: the locale
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from world_models.building.building import Building
+from world_models.building.landmarks import Landmark
 from world_models.building.scene import Scene
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose
@@ -32,9 +34,6 @@ from world_models.visibility.shadows import (
     visible_spans,
 )
 
-if TYPE_CHECKING:
-    from world_models.building.world import World
-
 Floats = NDArray[np.float64]
 
 MAX_VIEWS = 16
@@ -48,8 +47,9 @@ class VisibleLines:
     Attributes:
         segments_px: (n, 2, 2) projections.
         lines_world: (n, 2, 3) the visible pieces [m].
-        landmark, line: (n,) which line (``world.landmarks[landmark].lines_world[line]``).
+        landmark, line: (n,) which line (``marks[landmark].lines_world[line]``).
         contrast: (n,) expected brightness step across the line, 0..1.
+        marks: landmarks by their number in the world, these among them.
     """
 
     segments_px: Floats
@@ -57,6 +57,7 @@ class VisibleLines:
     landmark: NDArray[np.int64]
     line: NDArray[np.int64]
     contrast: Floats
+    marks: Mapping[int, Landmark]
 
     def __len__(self) -> int:
         return len(self.segments_px)
@@ -64,7 +65,7 @@ class VisibleLines:
     def __getitem__(self, keep: Any) -> VisibleLines:
         """Some of them, by mask or index array."""
         return VisibleLines(self.segments_px[keep], self.lines_world[keep], self.landmark[keep], self.line[keep],
-                            self.contrast[keep])
+                            self.contrast[keep], self.marks)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -74,8 +75,9 @@ class VisiblePoints:
     Attributes:
         points_px: (n, 2) projections.
         points_world: (n, 3) [m].
-        landmark, point: (n,) which corner (``world.landmarks[landmark].points_world[point]``).
+        landmark, point: (n,) which corner (``marks[landmark].points_world[point]``).
         contrast: (n,) second largest expected brightness step among the lines that meet there, 0..1.
+        marks: landmarks by their number in the world, these among them.
     """
 
     points_px: Floats
@@ -83,6 +85,7 @@ class VisiblePoints:
     landmark: NDArray[np.int64]
     point: NDArray[np.int64]
     contrast: Floats
+    marks: Mapping[int, Landmark]
 
     def __len__(self) -> int:
         return len(self.points_px)
@@ -90,11 +93,11 @@ class VisiblePoints:
     def __getitem__(self, keep: Any) -> VisiblePoints:
         """Some of them, by mask or index array."""
         return VisiblePoints(self.points_px[keep], self.points_world[keep], self.landmark[keep], self.point[keep],
-                             self.contrast[keep])
+                             self.contrast[keep], self.marks)
 
 
 def visible_lines(
-    world: World,
+    building: Building,
     camera: Camera,
     camera_from_world: Pose,
     *,
@@ -117,17 +120,17 @@ def visible_lines(
     wanted = None if locales is None else tuple(sorted(locales))
     key = (camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes(), wanted,
            min_length_px, min_contrast, min_separation_px, max_distance_m)
-    return world.cached(
+    return building.cached(
         "visible lines", MAX_VIEWS, key,
-        lambda: _visible_lines(world, camera, camera_from_world, locales, min_length_px, min_contrast,
+        lambda: _visible_lines(building, camera, camera_from_world, locales, min_length_px, min_contrast,
                                min_separation_px, max_distance_m))
 
 
 def _visible_lines(
-    world: World, camera: Camera, camera_from_world: Pose, locales: Collection[str] | None, min_length_px: float,
+    building: Building, camera: Camera, camera_from_world: Pose, locales: Collection[str] | None, min_length_px: float,
     min_contrast: float, min_separation_px: float, max_distance_m: float,
 ) -> VisibleLines:
-    view = _CameraView(world, camera, camera_from_world)
+    view = _CameraView(building, camera, camera_from_world)
     scene = view.scene
     contrast = scene.edges.contrasts(camera_from_world.inverse().translation)
     index = np.flatnonzero(_in_locales(scene, scene.line_locales, locales) & (contrast >= min_contrast))
@@ -143,7 +146,7 @@ def _visible_lines(
     index, lines = index[owner], cut_segments(lines[owner], span)
     segments = camera.project(lines)
     found = VisibleLines(segments, camera_from_world.inverse().apply(lines), scene.line_landmark[index],
-                         scene.line_index[index], contrast[index])
+                         scene.line_index[index], contrast[index], scene.marks)
     found = found[lengths_px(segments) >= min_length_px]
     if min_separation_px > 0:
         found = found[_suppress_close_lines(found, min_separation_px)]
@@ -151,7 +154,7 @@ def _visible_lines(
 
 
 def visible_points(
-    world: World,
+    building: Building,
     camera: Camera,
     camera_from_world: Pose,
     *,
@@ -165,7 +168,7 @@ def visible_points(
     A corner is visible where at least two model lines with ``min_contrast`` meet. For the other arguments see
     :func:`visible_lines`.
     """
-    view = _CameraView(world, camera, camera_from_world)
+    view = _CameraView(building, camera, camera_from_world)
     scene = view.scene
     centre = camera_from_world.inverse().translation
     steps = np.append(scene.edges.contrasts(centre), 0.0)[scene.corner_lines]
@@ -182,22 +185,22 @@ def visible_points(
         keep[keep] &= ~camera.obstruction.covers(pixels[keep])
     index = index[keep]
     return VisiblePoints(pixels[keep], scene.corners_world[index], scene.corner_landmark[index],
-                         scene.corner_index[index], contrast[index])
+                         scene.corner_index[index], contrast[index], scene.marks)
 
 
-def find_hidden(world: World, camera: Camera, camera_from_world: Pose, points_world: Any) -> NDArray[np.bool_]:
+def find_hidden(building: Building, camera: Camera, camera_from_world: Pose, points_world: Any) -> NDArray[np.bool_]:
     """(n,) which of the points (n, 3) [m, world] in front of the camera are hidden by surfaces of the model."""
-    return hidden_points(camera_from_world.apply(points_world), _CameraView(world, camera, camera_from_world).shadows())
+    return hidden_points(camera_from_world.apply(points_world), _CameraView(building, camera, camera_from_world).shadows())
 
 
 class _CameraView:
     """The locales and surfaces in view of one camera pose."""
 
-    def __init__(self, world: World, camera: Camera, camera_from_world: Pose) -> None:
+    def __init__(self, building: Building, camera: Camera, camera_from_world: Pose) -> None:
         self.camera_from_world = camera_from_world
-        self.window = _image_window(world, camera)
-        seen = find_visible_locales(world, self.window, camera_from_world)
-        self.scene: Scene = world.scene_of(seen)
+        self.window = image_window(camera)
+        seen = find_visible_locales(building, self.window, camera_from_world)
+        self.scene: Scene = building.scene_of(seen)
         nowhere: Window = (np.inf, np.inf, -np.inf, -np.inf)
         self.windows = np.array([seen.get(name, nowhere) for name in self.scene.locales]).reshape(-1, 4)
 
@@ -221,16 +224,6 @@ class _CameraView:
         planes = np.column_stack([scene.planes_world[index, :3] @ pose.rotation.T, scene.planes_world[index, 3]])
         planes[:, 3] += planes[:, :3] @ pose.translation
         return build_shadows(polygons, planes, windows)
-
-
-def _image_window(world: World, camera: Camera) -> Window:
-    """:func:`image_window`, cached in the world for its last cameras."""
-    known: list[tuple[Camera, Window]] = world.cache.setdefault("image windows", [])
-    for other, window in known:
-        if other is camera:
-            return window
-    known[:] = [(camera, image_window(camera)), *known[:3]]
-    return known[0][1]
 
 
 def _in_locales(scene: Scene, rooms: NDArray[np.int64], locales: Collection[str] | None) -> Any:

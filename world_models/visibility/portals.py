@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from world_models.building.building import Building
 from world_models.building.locales import Doorway
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose
-
-if TYPE_CHECKING:
-    from world_models.building.world import World
 
 Point = tuple[float, float, float]
 
@@ -31,10 +29,14 @@ MAX_DOORWAY_REACH_M = 2.0
 MAX_SIGHT_M = 40.0
 """Rooms further away are not seen by a camera outside all rooms."""
 
+MAX_PORTALS = 1024
+"""Size of the cache of portals, in locales."""
+
 WINDOW_MARGIN = 0.02
 """By how much a doorway's window is enlarged, in normalized image coordinates."""
 
 
+@lru_cache(maxsize=8)
 def image_window(camera: Camera) -> Window:
     """The largest window that the camera sees all of; the whole image where the lens does not distort."""
     u = np.linspace(-0.5, camera.width - 0.5, 33)
@@ -44,15 +46,15 @@ def image_window(camera: Camera) -> Window:
     return float(left.max()), float(top.max()), float(right.min()), float(bottom.min())
 
 
-def find_visible_locales(world: World, window: Window, camera_from_world: Pose) -> dict[str, Window]:
+def find_visible_locales(building: Building, window: Window, camera_from_world: Pose) -> dict[str, Window]:
     """The locales in view, each with its window; the camera's own locale has the whole image's ``window``."""
     centre = camera_from_world.inverse().translation
-    seen = dict.fromkeys(locales_at_camera(world, centre), window)
+    seen = dict.fromkeys(locales_at_camera(building, centre), window)
     view = _CameraView(camera_from_world, float(centre[0]), float(centre[1]))
     todo = list(seen)
     while todo:
         here = todo.pop(0)
-        for portal in portals_of(world, here):
+        for portal in portals_of(building, here):
             grown = _unite(seen.get(portal.there), _intersect(seen[here], view.window_of(portal)))
             if grown is not None and grown != seen.get(portal.there):
                 seen[portal.there] = grown
@@ -73,13 +75,14 @@ class Portal:
     corners: tuple[Point, ...]
 
 
-def portals_of(world: World, locale: str) -> tuple[Portal, ...]:
+def portals_of(building: Building, locale: str) -> tuple[Portal, ...]:
     """The open doorways of a locale; cached."""
-    known: dict[str, tuple[Portal, ...]] = world.cache.setdefault("portals", {})
-    if locale not in known:
-        floor_m = world.floor_m(locale)
-        known[locale] = tuple(_build_portal(doorway, locale, floor_m) for doorway in world.doorways_of(locale))
-    return known[locale]
+    return building.cached("portals", MAX_PORTALS, locale, lambda: _build_portals(building, locale))
+
+
+def _build_portals(building: Building, locale: str) -> tuple[Portal, ...]:
+    floor_m = building.floor_m(locale)
+    return tuple(_build_portal(doorway, locale, floor_m) for doorway in building.doorways_of(locale))
 
 
 def _build_portal(doorway: Doorway, locale: str, floor_m: float) -> Portal:
@@ -117,16 +120,16 @@ class _CameraView:
         return a, b, c
 
 
-def locales_at_camera(world: World, centre_world: NDArray[np.float64]) -> tuple[str, ...]:
+def locales_at_camera(building: Building, centre_world: NDArray[np.float64]) -> tuple[str, ...]:
     """The room that the camera is in; both rooms in a doorway; elsewhere all rooms within MAX_SIGHT_M."""
-    here = world.locale_at(centre_world)
-    if here is not None and world.is_room(here):
+    here = building.locale_at(centre_world)
+    if here is not None and building.is_room(here):
         return (here,)
-    for room in world.rooms_near(centre_world, MAX_DOORWAY_REACH_M):
-        for doorway in world.doorways_of(room):
+    for room in building.rooms_near(centre_world, MAX_DOORWAY_REACH_M):
+        for doorway in building.doorways_of(room):
             if np.linalg.norm(doorway.centre_world - centre_world[:2]) < doorway.width_m / 2 + doorway.depth_m:
                 return doorway.between
-    return world.rooms_near(centre_world, MAX_SIGHT_M)
+    return building.rooms_near(centre_world, MAX_SIGHT_M)
 
 
 def _clip_to_near_plane(polygon_camera: Sequence[Point]) -> list[Point]:

@@ -58,6 +58,12 @@ class Rectifier:
         return image
 
 
+@lru_cache(maxsize=4)
+def get_rectifier(lens: Camera, pinhole: Camera) -> Rectifier:
+    """The rectifier of a camera; the last few are kept."""
+    return Rectifier(lens, pinhole)
+
+
 def _build_map(lens: Camera, pinhole: Camera) -> tuple[Floats32, Floats32]:
     """Column and row (h, w) in the raw picture of each pixel of the rectified one [px]."""
     grid = np.stack(np.meshgrid(np.arange(pinhole.width), np.arange(pinhole.height)), axis=-1)

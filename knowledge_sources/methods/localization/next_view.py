@@ -14,7 +14,7 @@ from knowledge_sources.methods.localization.hypotheses import (
     are_distinguishable,
     compute_view_difference,
 )
-from knowledge_sources.methods.motion.routes import compute_free_space, is_clear
+from knowledge_sources.methods.motion.routes import find_free_space, is_clear
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.localization import LocalizationSettings
 from world_models.frames import Pose2, wrap_angle
@@ -92,15 +92,11 @@ def can_distinguish(
 
 def make_safety_check(robot: RobotModel, settings: LocalizationSettings = DEFAULT.localization) -> IsSafe:
     """Return a check whether an action's move keeps free of the walls and things of the hypothesis's room."""
-    free: dict[str, Any] = {}
+    clearance_m = robot.radius_m + settings.move_clearance_m
 
     def is_safe(hypothesis: PoseHypothesis, action: SensingAction) -> bool:
-        room, world = hypothesis.room, robot.world
-        if room not in free:
-            clearance_m = robot.radius_m + settings.move_clearance_m
-            free[room] = compute_free_space(world.outline(room), world.obstacles(room), clearance_m)
-        pose = hypothesis.world_from_robot
-        return is_clear(free[room], pose.position, action.apply_to(pose).position)
+        free, pose = find_free_space(robot.world, hypothesis.room, clearance_m), hypothesis.world_from_robot
+        return is_clear(free, pose.position, action.apply_to(pose).position)
 
     return is_safe
 

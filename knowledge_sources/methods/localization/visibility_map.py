@@ -1,6 +1,6 @@
 """The points of model lines that are visible from each position of a room, in any direction.
 
-Computed once for a room and kept with the world, so that many poses can be scored quickly.
+Computed once for a room and cached, so that many poses can be scored quickly.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ from knowledge_sources.methods.arrays import Floats, Ints, Mask
 from knowledge_sources.methods.motion.routes import compute_free_space
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.localization import LocalizationSettings
-from world_models.building.world import World
+from world_models.building.building import Building
+
+MAX_MAPS = 256
+"""Size of the cache of visibility maps."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -45,14 +48,11 @@ class VisibilityMap:
 
 
 def get_visibility_map(
-    world: World, room: str, eye_m: float, settings: LocalizationSettings = DEFAULT.localization
+    building: Building, room: str, eye_m: float, settings: LocalizationSettings = DEFAULT.localization
 ) -> VisibilityMap:
-    """Return the visibility map of a room for a camera at a height above the world's zero. Kept with the world."""
-    known: dict[object, VisibilityMap] = world.cache.setdefault("visibility maps", {})
-    key = room, eye_m, settings
-    if key not in known:
-        known[key] = _build(world, room, eye_m, settings)
-    return known[key]
+    """Return the visibility map of a room for a camera at a height above the world's zero. Cached."""
+    return building.cached("visibility maps", MAX_MAPS, (room, eye_m, settings),
+                           lambda: _build(building, room, eye_m, settings))
 
 
 def sample_lines(
@@ -70,13 +70,13 @@ def sample_lines(
     return lines[owner, 0] + t[:, None] * along[owner], unit[owner], owner
 
 
-def _build(world: World, room: str, eye_m: float, settings: LocalizationSettings) -> VisibilityMap:
-    positions = _find_positions(world, room, settings)
+def _build(building: Building, room: str, eye_m: float, settings: LocalizationSettings) -> VisibilityMap:
+    positions = _find_positions(building, room, settings)
     cells, cell = np.unique(
         np.floor(positions / settings.visibility_cell_m).astype(np.int64), axis=0, return_inverse=True)
     cell = cell.reshape(-1).astype(np.int64)
     eyes = _choose_eyes(positions, cell, cells, settings.visibility_cell_m)
-    scene = world.scene_of((room,))
+    scene = building.scene_of((room,))
     points, directions, owner = sample_lines(scene.edges.lines_world, settings)
     first, visible = [0], []
     for eye in np.column_stack([eyes, np.full(len(eyes), eye_m)]):
@@ -100,11 +100,11 @@ def _choose_eyes(positions: Floats, cell: Ints, cells: Ints, side_m: float) -> F
     return np.asarray(positions[order[np.searchsorted(cell[order], np.arange(len(cells)))]])
 
 
-def _find_positions(world: World, room: str, settings: LocalizationSettings) -> Floats:
+def _find_positions(building: Building, room: str, settings: LocalizationSettings) -> Floats:
     """(n, 2) grid points in a room's free space, and points of its open doorways up to their middle [m, world]."""
-    sills = [d.thresholds_world.mean(axis=1)[:: 1 if d.between[0] == room else -1] for d in world.doorways_of(room)]
+    sills = [d.thresholds_world.mean(axis=1)[:: 1 if d.between[0] == room else -1] for d in building.doorways_of(room)]
     in_doorways = np.array([point for own, other in sills for point in (own, 0.5 * (own + other))]).reshape(-1, 2)
-    free = compute_free_space(world.outline(room), world.obstacles(room), settings.position_clearance_m)
+    free = compute_free_space(building.outline(room), building.obstacles(room), settings.position_clearance_m)
     if free.is_empty:
         return in_doorways
     step = settings.position_step_m

@@ -15,9 +15,20 @@ import shapely
 from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats
+from world_models.building.building import Building
 
 SLACK_M = 1e-6
 """Distance below which two places are the same: rounding of shapely's geometry."""
+
+
+MAX_FREE_SPACES = 64
+"""Size of the cache of free spaces."""
+
+
+def find_free_space(building: Building, locale: str, clearance_m: float) -> shapely.Geometry:
+    """Where the robot's centre may be in a locale, ``clearance_m`` from walls and things; cached."""
+    return building.cached("free spaces", MAX_FREE_SPACES, (locale, clearance_m), lambda: compute_free_space(
+        building.outline(locale), building.obstacles(locale), clearance_m))
 
 
 def compute_free_space(outline: Any, obstacles: Sequence[Any], clearance_m: float) -> shapely.Geometry:

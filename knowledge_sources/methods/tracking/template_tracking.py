@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,18 +15,24 @@ from knowledge_sources.methods.features.correlation import (
     Template,
     compute_second_peak,
     correlate,
+    extract_template,
     lies_inside,
     measure_corner_strengths,
 )
+from knowledge_sources.methods.features.rectification import Rectifier
 from knowledge_sources.methods.pose.planar import compute_point_jacobian
 from knowledge_sources.methods.pose.planar_from_points import planar_from_points
 from knowledge_sources.settings import DEFAULT, Settings
+from knowledge_sources.settings.features import FeatureSettings
 from knowledge_sources.settings.tracking import TrackingSettings
 from world_models.camera import NEAR_PLANE_M
 from world_models.entries.percepts import Anchor, Track
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_points
+
+MAX_TEMPLATES = 256
+"""Size of the cache of templates."""
 
 
 class TrackUpdate(NamedTuple):
@@ -72,6 +79,14 @@ def follow_landmarks(
             found = correlate(template_of(track), image, at, search, scale=scale, settings=settings.features)
         out.append(TrackUpdate(_update_track(track, at, found, expected, s), expected))
     return out
+
+
+@lru_cache(maxsize=MAX_TEMPLATES)
+def cut_template(
+    rectifier: Rectifier, jpeg: bytes, at_px: tuple[float, float], half_px: int, settings: FeatureSettings
+) -> Template:
+    """The template round a pixel of a rectified picture; cached, as it serves for many frames."""
+    return extract_template(rectifier(jpeg), at_px, half_px, settings)
 
 
 def correct_pose(
@@ -126,7 +141,7 @@ def select_landmarks(
             continue
         if compute_second_peak(image, px, half_px, s.second_peak_window_px, settings.features) < s.max_second_peak:
             free &= _are_apart(points.points_px, px, s.min_spacing_px)
-            name = robot.world.landmarks[points.landmark[i]].name
+            name = points.marks[int(points.landmark[i])].name
             new.append(_begin_track(point, px, float(camera_from_world.apply(point)[2]), name, frame, s.min_sigma_px))
     return tuple(new)
 

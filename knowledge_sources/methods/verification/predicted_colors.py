@@ -26,15 +26,15 @@ MAX_CORNERS = 8
 """Corners that the array of polygons has room for; regions of more corners are left out."""
 RAYS = 5
 """Rays of a sample: the pixel itself and four around it."""
-SURFACES = "colored regions"
-"""Key of a world's cache under which the arrays of surfaces are kept."""
+MAX_PACKETS = 256
+"""Size of the cache of surfaces, in parts of locales."""
 WHITE = Finish((1.0, 1.0, 1.0))
 
 
 def predict_face_colors(
     robot: RobotModel, pose: Pose2, settings: VerificationSettings = DEFAULT.verification
 ) -> tuple[FaceColor, ...]:
-    """Predict the faces in view from a pose, the largest first. The last answers are kept with the world."""
+    """Predict the faces in view from a pose, the largest first. The last answers are cached."""
     camera, camera_from_world = robot.camera, robot.camera_from_world(pose)
     key = camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes(), settings
     return robot.world.cached("face colors", settings.cached_color_views, key,
@@ -49,7 +49,7 @@ def _predict(
     packets = {(p.locale, p.neighbour or ""): p for room in rooms for p in robot.world.locale_source.geometry(room)}
     if not packets:
         return ()
-    parts = [_build_surfaces(robot.world.cache, packets[key]) for key in sorted(packets)]
+    parts = [_build_surfaces(packets[key]) for key in sorted(packets)]
     corners, colors, normals = (np.concatenate([part[i] for part in parts]) for i in range(3))
     center = camera_from_world.inverse().translation
     facing = np.flatnonzero(np.einsum("ij,ij->i", normals, center - corners[:, 0]) > 1e-6)
@@ -109,20 +109,17 @@ def _to_face_color(color: Floats, points: Floats, max_points: int) -> FaceColor:
     return (red, green, blue), tuple(map(tuple, points[some].round(3).tolist()))
 
 
-def _build_surfaces(memo: dict[str, Any], packet: LocaleGeometry) -> tuple[Floats, Floats, Floats]:
-    """Corners (m, MAX_CORNERS, 3), shaded colors (m, 3) and normals (m, 3) of a packet's regions; built once."""
-    known: dict[object, tuple[Floats, Floats, Floats]] = memo.setdefault(SURFACES, {})
-    key = packet.locale, packet.neighbour
-    if key not in known:
-        regions = [region for _, face in packet.faces for region in (*face.front, *face.back)
-                   if len(region.polygon_world) <= MAX_CORNERS]
-        corners = np.array([[*r.polygon_world, *[r.polygon_world[-1]] * (MAX_CORNERS - len(r.polygon_world))]
-                            for r in regions]).reshape(-1, MAX_CORNERS, 3)
-        normals = np.array([area_vector(region.polygon_world) for region in regions]).reshape(-1, 3)
-        normals = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
-        light = np.array([expected_brightness(WHITE, normal) for normal in normals]).reshape(-1, 1)
-        known[key] = corners, np.array([region.colour for region in regions]).reshape(-1, 3) * light, normals
-    return known[key]
+@lru_cache(maxsize=MAX_PACKETS)
+def _build_surfaces(packet: LocaleGeometry) -> tuple[Floats, Floats, Floats]:
+    """Corners (m, MAX_CORNERS, 3), shaded colors (m, 3) and normals (m, 3) of a packet's regions; cached."""
+    regions = [region for _, face in packet.faces for region in (*face.front, *face.back)
+               if len(region.polygon_world) <= MAX_CORNERS]
+    corners = np.array([[*r.polygon_world, *[r.polygon_world[-1]] * (MAX_CORNERS - len(r.polygon_world))]
+                        for r in regions]).reshape(-1, MAX_CORNERS, 3)
+    normals = np.array([area_vector(region.polygon_world) for region in regions]).reshape(-1, 3)
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
+    light = np.array([expected_brightness(WHITE, normal) for normal in normals]).reshape(-1, 1)
+    return corners, np.array([region.colour for region in regions]).reshape(-1, 3) * light, normals
 
 
 def _bound(corners: Floats) -> Floats:

@@ -25,7 +25,7 @@ from logs import disk
 from logs.journal_file import JournalFile, read_journal
 from sim.scenario import load_scenario
 from strategies import Note, Scripted
-from world_models.entries import KINDS
+from world_models.entries.kinds import KINDS
 from world_models.words import sentence
 
 ALL = (*KINDS, Discrepancy, Quiescence)

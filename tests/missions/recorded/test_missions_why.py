@@ -31,7 +31,7 @@ from harvey.why.reach import check
 from harvey.why.story import describe_decision, lines_of, story
 from harvey.why.why_not import in_cycle
 from sim.made_up.short_missions import OFFICE, fault
-from world_models.entries import KINDS
+from world_models.entries.kinds import KINDS
 
 BUMPED = OFFICE + fault("bump", "allens-office", 3.0, left_m=0.3, turn_deg=10.0)
 KNOWN = registry_of((), KINDS)

@@ -1,14 +1,89 @@
-"""What is learnt of the wheels during a run (§3.2)."""
+"""What the robot knows of itself: camera and mounting, wheels, footprint (§3.2); what is learnt of them revises it."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
-from blackboard.kinds import inference
+from blackboard.kinds import inference, observation
 from world_models import words
 from world_models.actuator import MAX_INNOVATION_SIGMAS, ActuatorModel
+from world_models.camera import Camera, CameraMount
 from world_models.frames import wrap_angle
+
+
+@observation(traced=True)
+@dataclass(frozen=True)
+class CameraState:
+    """The sensor model (§3.2): the camera and how it is mounted, each with its standard deviation.
+
+    Attributes:
+        lens: the physical camera, with its distortion.
+        mount: where it is on the robot.
+        sigma_tilt_rad, sigma_height_m, sigma_forward_m, sigma_focal: standard deviations of the mounting and, as a part
+            of it, of the focal length; 0 where nobody has stated any: it is taken for exact.
+    """
+
+    lens: Camera
+    mount: CameraMount
+    sigma_tilt_rad: float = 0.0
+    sigma_height_m: float = 0.0
+    sigma_forward_m: float = 0.0
+    sigma_focal: float = 0.0
+
+    @cached_property
+    def pinhole(self) -> Camera:
+        """The camera of rectified pictures; the same object each time, as views are cached by it."""
+        return self.lens.pinhole
+
+    def sentence(self) -> str:
+        lens, mount = self.lens, self.mount
+        return (f"camera of {lens.width} x {lens.height} px, focal length {lens.fx:.1f} px, mounted"
+                f" {words.metres(mount.height_m)} above the floor, looking {words.degrees(mount.tilt_rad)} down;"
+                f" {words.metres(mount.forward_m)} ahead of the axis; {self._certainty()}")
+
+    def _certainty(self) -> str:
+        if not any((self.sigma_tilt_rad, self.sigma_height_m, self.sigma_forward_m, self.sigma_focal)):
+            return "taken for exact"
+        return (f"+-{math.degrees(self.sigma_tilt_rad):.2f} degrees, +-{1000 * self.sigma_height_m:.0f} mm up,"
+                f" +-{1000 * self.sigma_forward_m:.0f} mm ahead, focal length +-{self.sigma_focal:.2%}")
+
+
+@observation(traced=True)
+@dataclass(frozen=True, slots=True)
+class Wheels:
+    """The actuator model (§3.2), with the standard deviations of what the wheels do; :class:`Drift` is learnt of them.
+
+    Attributes:
+        actuator: motion model of the primitives TURN and MOVE.
+        continuous: whether legs are driven without stopping at each increment, corrected by pictures on the move.
+    """
+
+    actuator: ActuatorModel
+    continuous: bool = False
+
+    def sentence(self) -> str:
+        a = self.actuator
+        return (f"wheels that drive {a.reach:.3f} +- {a.reach_sigma:.3f} of the way commanded and drift by"
+                f" +-{math.degrees(a.curvature_sigma_per_m):.2f} degrees a metre;"
+                f" {'corrected on the move' if self.continuous else 'corrected after each increment'}")
+
+
+@observation(traced=True)
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """The robot's extent on the floor: a disc round its axis.
+
+    Attributes:
+        radius_m, sigma_m: of the disc, and its standard deviation.
+    """
+
+    radius_m: float
+    sigma_m: float = 0.0
+
+    def sentence(self) -> str:
+        return f"the robot's footprint is a disc with a radius of {words.metres(self.radius_m)}"
 
 
 @inference()

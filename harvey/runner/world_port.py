@@ -1,0 +1,29 @@
+"""The world's port: where the board meets the long-term model of the building (§3.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from blackboard.change import Change, Posted
+from blackboard.effect import Effect, Post, Revise
+from world_models.entries.locale_frame import FrameRequest
+from world_models.frame_store import FrameStore
+
+
+class WorldPort:
+    """Answers requests for locale frames from a frame store."""
+
+    name = "world"
+    acts_on = (FrameRequest,)
+
+    def __init__(self, store: FrameStore) -> None:
+        self._store = store
+
+    def answer(self, change: Change) -> Iterable[Effect]:
+        """The frames, and the request with what else was asked; a locale that there is not is an answer too."""
+        request = change.entry
+        if not isinstance(change, Posted) or not isinstance(request.value, FrameRequest):
+            return
+        frames, answered = self._store.answer(request.value)
+        yield from (Post(frame, (request,)) for frame in frames)
+        yield Revise(request, answered, (request,))

@@ -1,0 +1,133 @@
+"""Subgoals from place to place: through the passages between locales, and round the obstacles within one (§3.3)."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from shapely import Geometry, Point
+
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.motion.routes import (
+    find_free_space,
+    find_shortest_route,
+    is_clear,
+    measure_thing_distance_m,
+    measure_wall_distance_m,
+)
+from knowledge_sources.settings.plan import PlanSettings
+from world_models.building.locales import Link, Passage
+from world_models.entries.location import Hypothesis, Place
+from world_models.entries.task import Subgoal
+from world_models.robot import RobotModel
+
+
+class SubgoalPlanner:
+    """Plans the subgoals of a sketch, for one robot in the building as it is known now."""
+
+    def __init__(self, robot: RobotModel, settings: PlanSettings) -> None:
+        self._robot, self._building, self._settings = robot, robot.world, settings
+
+    def explain_unfit(self, there: Place) -> str:
+        """Why the robot cannot stand at a place, as far as it knows; "" where it can."""
+        building, name = self._building, there.locale
+        if not building.locale(name).contains((there.x_m, there.y_m)):
+            return f"is not within {name}"
+        point = there.in_world(building).position
+        openings = [np.concatenate(doorway.thresholds_world) for doorway in building.doorways_of(name)]
+        near = [(measure_wall_distance_m(building.outline(name), openings, point), "a wall")]
+        near += [(measure_thing_distance_m(t.footprint_world, point), t.name)
+                 for t in building.things_of(name) if t.is_obstacle]
+        distance_m, what = min(near)
+        radius_m, margin_m = self._robot.radius_m, self._settings.clearances_m[-1]
+        if distance_m >= radius_m + margin_m:
+            return ""
+        return (f"is {distance_m:.2f} m from {what}: the robot cannot stand there, with a radius of {radius_m:.2f} m"
+                f" and the {margin_m:.2f} m that it keeps round itself")
+
+    def plan_between_locales(self, here: Place, destination: Place, tolerance_m: float) -> tuple[Subgoal, ...] | None:
+        """Subgoals through each passage to the destination, at the highest level where they differ (Figure 9)."""
+        route = self._building.route(here.locale, destination.locale)
+        if route is None:
+            return None
+        subgoals: list[Subgoal] = []
+        for step in route.steps:
+            before = self._find_place_before(step.passage, step.origin)
+            behind = self._find_place_before(step.passage, step.destination)
+            if before is None or behind is None:
+                return None
+            subgoals.append(self._build_subgoal(here, before, self._way_tolerance_m(step.passage)))
+            on_wheels = not isinstance(step.passage, Link)  # else it is a ride: there is nothing to drive
+            subgoals.append(Subgoal(before, behind, on_wheels, step.passage.name, self._settings.way_tolerance_m))
+            here = behind
+        subgoals.append(self._build_subgoal(here, destination, tolerance_m))
+        return tuple(subgoals)
+
+    def _way_tolerance_m(self, passage: Passage) -> float:
+        """Tolerance at the place before a passage, so that the robot passes it straight without contact."""
+        if isinstance(passage, Link):
+            return self._settings.way_tolerance_m
+        beside = passage.width_m / 2 - self._robot.radius_m
+        if beside >= self._settings.min_doorway_clearance_m:
+            return self._settings.way_tolerance_m
+        return max(beside, self._settings.clearances_m[-1])
+
+    def _find_place_before(self, passage: Passage, locale: str) -> Place | None:
+        """The place from which a passage is passed straight; None where something is in the way."""
+        if isinstance(passage, Link):
+            x, y, heading = passage.stop_of(locale)
+            return Place.of_world(self._building, locale, float(x), float(y), float(heading))
+        middle, outward = passage.threshold_of(locale).mean(axis=0), passage.outward_from(locale)
+        free = self._free_space(locale, self._settings.clearances_m[-1])
+        distances = self._settings.doorway_distances_m
+        away = next((m for m in distances if free.covers(Point(middle - m * outward))), distances[0])
+        x, y = middle - away * outward
+        if not is_clear(self._free_space(locale, -self._robot.radius_m), middle, (x, y)):
+            return None
+        return Place.of_world(self._building, locale, float(x), float(y))
+
+    def _build_subgoal(self, origin: Place, destination: Place, tolerance_m: float) -> Subgoal:
+        """A subgoal, primitive where a straight line leads there; between locales a later sketch refines it."""
+        if origin.locale != destination.locale:
+            return Subgoal(origin, destination, False, tolerance_m=tolerance_m)
+        a, b = origin.in_world(self._building), destination.in_world(self._building)
+        free = self._free_space(destination.locale, self._settings.clearances_m[-1])
+        straight = a.distance_to(b) <= self._settings.max_leg_m and is_clear(free, a.position, b.position)
+        return Subgoal(origin, destination, straight, tolerance_m=tolerance_m)
+
+    def plan_across(self, subgoal: Subgoal, belief: Hypothesis) -> tuple[Subgoal, ...] | None:
+        """Straight legs round the obstacles of one locale, none longer than ``max_leg_m``."""
+        locale = subgoal.destination.locale
+        here, there = belief.world_from_robot(self._building), subgoal.destination.in_world(self._building)
+
+        def floor() -> Geometry:
+            return self._free_space(locale, -self._robot.radius_m)
+
+        for clearance in self._settings.clearances_m:
+            route = find_shortest_route(self._free_space(locale, clearance), here.position, there.position, floor)
+            if route is not None:
+                break
+        else:
+            return None
+        points = _divide(route, self._settings.max_leg_m)
+        places = [Place.of_world(self._building, locale, float(x), float(y)) for x, y in points]
+        places[-1] = subgoal.destination
+        last = len(places) - 2
+        return tuple(
+            Subgoal(a, b, True, tolerance_m=subgoal.tolerance_m if i == last else self._settings.way_tolerance_m)
+            for i, (a, b) in enumerate(pairwise(places))
+        )
+
+    def _free_space(self, locale: str, margin_m: float) -> Geometry:
+        """Where the robot's centre may be with a margin round the robot; cached."""
+        return find_free_space(self._building, locale, self._robot.radius_m + margin_m)
+
+
+def _divide(route: list[Floats], max_leg_m: float) -> list[Floats]:
+    """The same route with way points in between, so that no leg is longer than ``max_leg_m``."""
+    points = route[:1]
+    for a, b in pairwise(route):
+        parts = max(1, math.ceil(float(np.linalg.norm(b - a)) / max_leg_m))
+        points += [a + (b - a) * (i / parts) for i in range(1, parts + 1)]
+    return points

@@ -1,0 +1,216 @@
+"""Locale frames (§3.4): what the robot knows of a locale, as an entry, and the request that brings it to the board.
+
+The long-term model of the building is a network of frames in a file. What matters for the task at hand is instantiated
+from it on the board: a knowledge source that lacks a frame asks for it, and the world's port answers. Whoever learns
+better revises the frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+from blackboard.board import View
+from blackboard.entry import Entry
+from blackboard.entry_store import Index
+from blackboard.kinds import observation, request
+from blackboard.level import Level
+from blackboard.servoing import OPEN
+from world_models import words
+from world_models.building.changes import remove_element, remove_thing, shut_door
+from world_models.building.extents import LocaleExtent
+from world_models.building.locale_source import LocaleGeometry, PassageEdge
+from world_models.building.locales import Doorway, Link, Locale, Passage
+from world_models.building.things import Thing
+from world_models.entries.location import Hypothesis
+from world_models.entries.task import Goal, PlanSketch
+
+ChangeKind = Literal["shut", "gone", "removed"]
+RequestStatus = Literal["asked", "answered"]
+
+LAST_FRAMES = 32
+"""The newest frames that stay on the board whether or not anything on it names them."""
+LAST_REQUESTS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class FrameChange:
+    """What is believed of a locale otherwise than its file says.
+
+    Attributes:
+        what: shut (a door), gone (a thing), or removed (a landmark's lines, or a face).
+        name: of the door, thing, landmark or face.
+        by: who said so.
+    """
+
+    what: ChangeKind
+    name: str
+    by: str
+
+    def sentence(self) -> str:
+        said = {"shut": "is shut", "gone": "is gone", "removed": "is left out"}[self.what]
+        return f"{self.name} {said} ({self.by})"
+
+
+def is_as_filed(frame: LocaleFrame) -> bool:
+    return not frame.changes
+
+
+def is_in_use(view: View, entry: Entry[LocaleFrame]) -> bool:
+    """Whether something on the board names a frame's locale or one in it; while the robot is lost, any may be needed."""
+    if Level.GOAL in view.keys(OPEN):
+        return True
+    return entry.value.name in _named_locales(view)
+
+
+def _named_locales(view: View) -> set[str]:
+    """The locales of hypotheses, goals and active sketches, with the locales that contain them."""
+    named = {entry.value.locale for entry in view.all(Hypothesis)}
+    places = [place for entry in view.all(Goal) for place in (entry.value.origin, entry.value.destination)]
+    places += [place for entry in view.all(PlanSketch) if entry.value.is_active
+               for subgoal in entry.value.subgoals for place in (subgoal.origin, subgoal.destination)]
+    return {step for name in named | {place.locale for place in places} for step in _path(view, name)}
+
+
+def _path(view: View, name: str | None) -> Iterator[str]:
+    """A locale and those that contain it, as far as their frames are on the board."""
+    while name is not None:
+        yield name
+        frame = view.newest(FRAME_OF, name)
+        name = None if frame is None else frame.value.locale.parent
+
+
+@observation(keep=LAST_FRAMES, when=is_as_filed, unless=is_in_use, traced=True)
+@dataclass(frozen=True, eq=False)
+class LocaleFrame:
+    """What is known of a locale: its own frame (§3.4, Figures 5 to 8).
+
+    How well it is known stands in ``locale`` (the standard deviations of its survey) and in ``changes`` (who said what).
+
+    Attributes:
+        world: fingerprint of the file that it comes from.
+        locale: its name, kind, container, place in the container, outline, and file:line of its description.
+        extent: where it lies in the world.
+        children: where the locales lie that it contains directly.
+        doorways, links: its open doors, elevators and stairs; ``filed_doorways`` has those that were found shut too.
+        parts: its faces with their regions and its landmarks, and those that it shares with each neighbour.
+        things: furniture and the like.
+        edges, passages: between the locales that it contains directly (Figure 8).
+        components: for each component of it the component of its container.
+        changes: what is believed otherwise than the file says.
+        memo: results that were computed from this frame and others; no part of what is known.
+    """
+
+    world: str
+    locale: Locale
+    extent: LocaleExtent
+    children: tuple[LocaleExtent, ...]
+    doorways: tuple[Doorway, ...]
+    links: tuple[Link, ...]
+    parts: tuple[LocaleGeometry, ...]
+    things: tuple[Thing, ...]
+    edges: tuple[PassageEdge, ...]
+    passages: tuple[Passage, ...]
+    components: tuple[int, ...]
+    changes: tuple[FrameChange, ...] = ()
+    filed: LocaleFrame | None = field(default=None, repr=False)
+    memo: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def name(self) -> str:
+        return self.locale.name
+
+    @property
+    def shut(self) -> frozenset[str]:
+        """The doors that are believed shut."""
+        return frozenset(change.name for change in self.changes if change.what == "shut")
+
+    def changed(self, change: FrameChange) -> LocaleFrame:
+        """The frame with one thing believed otherwise. Raises ValueError where it has nothing of that name."""
+        filed, changes = self.filed or self, (*self.changes, change)
+        if change.what == "shut":
+            door = next((d for d in self.doorways if d.name == change.name), None)
+            if door is None:
+                raise ValueError(f"expected an open door of {self.name}, got {change.name!r}")
+            parts = shut_door(self.parts, door, self.extent.reach[2])
+            doorways = tuple(d for d in self.doorways if d is not door)
+            return replace(self, parts=parts, doorways=doorways, changes=changes, filed=filed, memo={})
+        if change.what == "gone":
+            parts, things = remove_thing(self.parts, self.things, change.name)
+            return replace(self, parts=parts, things=things, changes=changes, filed=filed, memo={})
+        parts = remove_element(self.parts, change.name)
+        return replace(self, parts=parts, changes=changes, filed=filed, memo={})
+
+    def with_changes(self, changes: Iterable[FrameChange]) -> LocaleFrame:
+        """The frame as filed, with these changes, one after the other. Raises ValueError as :meth:`changed` does."""
+        frame = self.filed or self
+        for change in changes:
+            frame = frame.changed(change)
+        return frame
+
+    def journal_form(self) -> dict[str, Any]:
+        """By reference to the world's file; only what differs from it stands in the journal."""
+        return {"world": self.world, "locale": self.name, "changes": self.changes}
+
+    def sentence(self) -> str:
+        changed = "".join(f"; {change.sentence()}" for change in self.changes)
+        parent = f" in {self.locale.parent}" if self.locale.parent else ""
+        held = (f"{words.count(len(self.children), 'locale')} in it" if self.children else
+                f"{words.count(len(self.doorways), 'open door')}, {words.count(len(self.things), 'thing')}")
+        return f"what is known of {self.name}{parent}: {held}{changed}; from {self.locale.source}"
+
+
+FRAME_OF: Index[LocaleFrame] = Index(LocaleFrame, lambda frame: frame.name, "frame")
+"""Frames by the name of their locale."""
+ROOT: Index[LocaleFrame] = Index(LocaleFrame, lambda frame: frame.locale.parent is None or None, "root")
+CHANGED: Index[LocaleFrame] = Index(LocaleFrame, lambda frame: bool(frame.changes) or None, "changed")
+
+
+def has_answer(frame_request: FrameRequest) -> bool:
+    return frame_request.status == "answered"
+
+
+@dataclass(frozen=True, slots=True)
+class FrameAnswer:
+    """What the world says to a name or a phrase.
+
+    Attributes:
+        asked: the name or phrase.
+        locales: those that are meant.
+        error: in words why there are none, or too many; "" otherwise.
+    """
+
+    asked: str
+    locales: tuple[str, ...]
+    error: str = ""
+
+
+@request(keep=LAST_REQUESTS, when=has_answer)
+@dataclass(frozen=True, slots=True)
+class FrameRequest:
+    """Asks the long-term model of the building for locale frames, or which locale is meant.
+
+    Attributes:
+        locales: whose frames are wanted; "" for the root.
+        called: phrases for a room, as ``Allen's office``.
+        elements: names of doors, elevators, things, landmarks or faces: in which locales are they?
+        status: asked, or answered.
+        answers: to ``called`` and ``elements``, and to ``locales`` that there are not.
+    """
+
+    locales: tuple[str, ...] = ()
+    called: tuple[str, ...] = ()
+    elements: tuple[str, ...] = ()
+    status: RequestStatus = "asked"
+    answers: tuple[FrameAnswer, ...] = ()
+
+    def sentence(self) -> str:
+        frames = words.listed([name or "the whole building" for name in self.locales], 6)
+        asked = [f"what is known of {frames}"] if frames else []
+        asked += [f"where {words.listed(list((*self.called, *self.elements)), 6)} is"] * bool(self.called or self.elements)
+        said = [answer.error or f"{answer.asked} is in {' and '.join(answer.locales)}" for answer in self.answers]
+        return f"asks {' and '.join(asked)}" + f"; answered{': ' * bool(said)}{', '.join(said)}" * has_answer(self)
+
+
+ANSWERED: Index[FrameRequest] = Index(FrameRequest, lambda r: has_answer(r) or None, "answered")

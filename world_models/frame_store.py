@@ -1,0 +1,103 @@
+"""The frame store: the long-term model of the building (§3.4), from which locale frames are instantiated on request."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from typing import Any
+
+from world_models.building.world import World
+from world_models.commands import find_room
+from world_models.entries.locale_frame import FrameAnswer, FrameChange, FrameRequest, LocaleFrame
+
+MAX_FRAMES = 4096
+"""So many frames are kept as they are, so that results computed from them serve the next mission too."""
+MAX_SUGGESTED = 6
+
+
+class FrameStore:
+    """Frames of the locales of a world.
+
+    Attributes:
+        world: from which they come.
+        fingerprint: of the world's file.
+    """
+
+    def __init__(self, world: World, fingerprint: str = "") -> None:
+        self.world, self.fingerprint = world, fingerprint
+
+    def frame(self, name: str) -> LocaleFrame:
+        """The frame of a locale as the file describes it; "" is the root. Raises ValueError where there is none."""
+        name = name or self.world.root
+        return self.world.cached("frames", MAX_FRAMES, (self.fingerprint, name), lambda: self._build(name))
+
+    def _build(self, name: str) -> LocaleFrame:
+        locale, source = self.world.locale(name), self.world.locale_source
+        edges = source.passage_edges(name)
+        return LocaleFrame(
+            world=self.fingerprint,
+            locale=locale,
+            extent=source.extent(name),
+            children=source.extents_in(name),
+            doorways=source.doorways(name),
+            links=source.links(name),
+            parts=source.geometry(name),
+            things=source.things(name),
+            edges=edges,
+            passages=tuple(self.world.passage(passage) for passage in dict.fromkeys(edge.passage for edge in edges)),
+            components=source.components(name),
+        )
+
+    def answer(self, request: FrameRequest) -> tuple[tuple[LocaleFrame, ...], FrameRequest]:
+        """The frames that a request asks for, and the request with the answers to its other questions."""
+        frames, answers = [], []
+        for name in request.locales:
+            try:
+                frames.append(self.frame(name))
+            except ValueError as error:
+                answers.append(FrameAnswer(name, (), str(error)))
+        answers += [self._find_called(phrase) for phrase in request.called]
+        answers += [self._find_element(name) for name in request.elements]
+        return tuple(frames), replace(request, status="answered", answers=tuple(answers))
+
+    def _find_called(self, phrase: str) -> FrameAnswer:
+        try:
+            return FrameAnswer(phrase, (find_room(phrase, self.world),))
+        except ValueError as error:
+            return FrameAnswer(phrase, (), str(error))
+
+    def _find_element(self, name: str) -> FrameAnswer:
+        """The locales that have a door, elevator, thing, landmark or face of this name."""
+        passage = self.world.locale_source.passage(name)
+        if passage is not None:
+            return FrameAnswer(name, passage.between)
+        locale = name.partition("/")[0]
+        try:
+            frame = self.frame(locale) if locale else None
+        except ValueError:
+            frame = None
+        if frame is not None and name in elements_of(frame):
+            return FrameAnswer(name, (locale,))
+        near = () if frame is None else get_close_matches(name, sorted(elements_of(frame)), MAX_SUGGESTED)
+        expected = ", ".join(near) or f"a door, thing, landmark or face of {self.world.name}"
+        return FrameAnswer(name, (), f"expected {expected}, got {name!r}")
+
+    def restore(self, reference: Mapping[str, Any], changes: Sequence[FrameChange]) -> LocaleFrame:
+        """The frame that a journal refers to. Raises ValueError where this world is another, or has no such locale."""
+        if reference.get("world") != self.fingerprint:
+            raise ValueError(f"expected a frame of the world {self.fingerprint!r}, got one of "
+                             f"{reference.get('world')!r}")
+        return self.frame(str(reference.get("locale"))).with_changes(changes)
+
+
+def elements_of(frame: LocaleFrame) -> frozenset[str]:
+    """The names of a frame's doors, things, landmarks and faces."""
+    return frozenset(_names(frame))
+
+
+def _names(frame: LocaleFrame) -> Iterator[str]:
+    yield from (passage.name for passage in (*frame.doorways, *frame.links))
+    yield from (thing.name for thing in frame.things)
+    for part in frame.parts:
+        yield from (item.name for _, item in (*part.landmarks, *part.faces))
