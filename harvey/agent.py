@@ -21,14 +21,16 @@ from harvey.wiring import build, foreign_sources, knowledge_sources, servoing
 from harvey.without import SegmentHider, is_segment, parse_segments, remove_from_world
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import Settings
+from world_models.building.world import World
 from world_models.entries.kinds import KINDS
 from world_models.files.toml.settings import parse_value, suggest_keys
+from world_models.frame_store import FrameStore
 from world_models.robot import RobotModel
 
 SERVO = "servo."
 SERVO_KEYS = tuple(f"{SERVO}{level}" for level in ("action", "plan", "goal"))
 
-Sources = Callable[[RobotModel, Settings], Sequence[KnowledgeSource]]
+Sources = Callable[[Settings], Sequence[KnowledgeSource]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +38,16 @@ class Agent:
     """Who decides, and by which model.
 
     Attributes:
-        robot: the model.
+        world: the building as its file describes it, from which the board gets its locale frames.
+        robot: what the robot knows of itself at the start, in that building.
+        store: of the locale frames.
         sources: the knowledge sources; settings: their numbers.
         servoing: the servo levels that are on.
     """
 
+    world: World
     robot: RobotModel
+    store: FrameStore
     sources: tuple[KnowledgeSource, ...]
     servoing: Servoing
     settings: Settings
@@ -65,18 +71,18 @@ def build_agent(head: RunHead, sources: Sources = knowledge_sources) -> Agent:
     names = [name for name in head.without if not is_segment(name)]
     segments = parse_segments(head.without)
     settings = settings_of(head)
-    model = head.model()
-    given = sources(model, settings)
+    given = sources(settings)
     foreign = _foreign(head, {source.name for source in given})
     known = [*(source.name for source in given), *(source.called() for source in foreign)]
-    robot = replace(model, world=remove_from_world(model.world, [n for n in names if n not in known], known))
+    world = remove_from_world(head.load_world(), [n for n in names if n not in known], known)
     levels = {key.removeprefix(SERVO): value for key, value in head.constants if key.startswith(SERVO)}
-    everyone = (*sources(robot, settings), *(build(source, robot, settings) for source in foreign))
+    everyone = (*given, *(build(source, settings) for source in foreign))
     chosen = tuple(source for source in everyone if source.name not in names)
     if segments:
         chosen = tuple(
-            SegmentHider(robot, settings, segments) if isinstance(s, LineFinder) else s for s in chosen)
-    return Agent(robot, chosen, _servoing(head, levels), settings)
+            SegmentHider(settings, segments) if isinstance(s, LineFinder) else s for s in chosen)
+    store = FrameStore(world, head.world_sha256)
+    return Agent(world, head.model(world), store, chosen, _servoing(head, levels), settings)
 
 
 def settings_of(head: RunHead) -> Settings:

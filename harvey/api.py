@@ -52,7 +52,6 @@ from world_models.entries.location import Hypothesis
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import load_world, read_world
 from world_models.frames import Pose2
-from world_models.robot import RobotModel
 
 T = TypeVar("T")
 
@@ -114,8 +113,8 @@ def open_run(path: str | Path, *, knowledge_sources: Sequence[type[KnowledgeSour
 
 def with_sources(more: Sequence[type[KnowledgeSource]]) -> Sources:
     """The project's knowledge sources and some more."""
-    def build_all(robot: RobotModel, settings: Settings) -> tuple[KnowledgeSource, ...]:
-        return (*wiring.knowledge_sources(robot, settings), *(wiring.build(one, robot, settings) for one in more))
+    def build_all(settings: Settings) -> tuple[KnowledgeSource, ...]:
+        return (*wiring.knowledge_sources(settings), *(wiring.build(one, settings) for one in more))
 
     return build_all
 
@@ -221,7 +220,7 @@ class RecordedRun:
 
     def believed_track(self) -> Sequence[TrackPoint]:
         """Where the robot believed it was: one point for each revision of the held pose hypothesis."""
-        world = self.head.model().world
+        world = self.head.load_world()
         held = (entry for entry in self.entries(Hypothesis) if entry.value.is_held)
         return [TrackPoint(entry.cycle, entry.value.world_from_robot(world)) for entry in held]
 

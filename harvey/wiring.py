@@ -37,7 +37,6 @@ from knowledge_sources.settings import DEFAULT, Settings
 from world_models.entries.kinds import KINDS
 from world_models.files.toml.mission import Servo
 from world_models.plugins import SOURCES_GROUP, PluginError, load_plugin_classes
-from world_models.robot import RobotModel
 
 KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     Interpreter,
@@ -62,14 +61,14 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
 """Every knowledge source. The order does not matter: control comes from triggers, ratings and levels."""
 
 
-def knowledge_sources(robot: RobotModel, settings: Settings = DEFAULT) -> tuple[KnowledgeSource, ...]:
-    """The project's knowledge sources for a robot."""
-    return tuple(build(source, robot, settings) for source in KNOWLEDGE_SOURCES)
+def knowledge_sources(settings: Settings = DEFAULT) -> tuple[KnowledgeSource, ...]:
+    """The project's knowledge sources."""
+    return tuple(build(source, settings) for source in KNOWLEDGE_SOURCES)
 
 
-def build(source: type[KnowledgeSource], robot: RobotModel, settings: Settings) -> KnowledgeSource:
-    """A knowledge source with the robot's model and the settings; one that needs neither is built without."""
-    return source(robot, settings) if issubclass(source, RobotKnowledgeSource) else source()
+def build(source: type[KnowledgeSource], settings: Settings) -> KnowledgeSource:
+    """A knowledge source with the settings; one that needs none is built without."""
+    return source(settings) if issubclass(source, RobotKnowledgeSource) else source()
 
 
 @cache

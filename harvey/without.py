@@ -22,7 +22,6 @@ from world_models.building.locale_source import LocaleGeometry, WorldSource
 from world_models.building.world import World
 from world_models.entries.percepts import Segments
 from world_models.frames import frozen
-from world_models.robot import RobotModel
 from world_models.words import listed
 
 SEGMENT = re.compile(r"frame[- ](\d{1,9})[ ,-]+segment[- ](\d{1,9})", re.IGNORECASE | re.ASCII)
@@ -60,9 +59,9 @@ def remove_from_world(world: World, names: Sequence[str], sources: Sequence[str]
 class SegmentHider(LineFinder):
     """The line finder, with some segments of some pictures left out."""
 
-    def __init__(self, robot: RobotModel, settings: Settings, segments: Sequence[tuple[int, int]]) -> None:
+    def __init__(self, settings: Settings, segments: Sequence[tuple[int, int]]) -> None:
         """``segments``: (number of the Frame entry, segment) to be left out."""
-        super().__init__(robot, settings)
+        super().__init__(settings)
         self._segments = tuple(segments)
 
     @property

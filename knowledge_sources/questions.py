@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from blackboard.board import Blackboard, View
 from blackboard.entry import Entry
 from blackboard.entry_store import Index
 from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
-from functools import lru_cache
-
 from knowledge_sources.settings.action import ActionSettings
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis

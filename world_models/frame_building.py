@@ -11,7 +11,7 @@ from blackboard.effect import MissingEntryError
 from world_models.building.building import FLOOR_MARGIN_M, Building
 from world_models.building.extents import LocaleExtent
 from world_models.building.locale_source import LocaleGeometry, PassageEdge
-from world_models.building.locales import Doorway, Link, Locale, Passage
+from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.things import Thing
 from world_models.entries.locale_frame import ANSWERED, CHANGED, FRAME_OF, ROOT, FrameRequest, LocaleFrame
 
@@ -89,7 +89,10 @@ class FrameBuilding(Building):
         reached, ahead = {origin}, [origin]
         while ahead and destination not in reached and len(reached) <= max_rooms:
             self.require(ahead)
-            beyond = (p.other(room) for room in ahead for p in (*self.doorways_of(room), *self.links_of(room)))
+            beyond: list[str] = []
+            for room in ahead:
+                beyond += [doorway.other(room) for doorway in self.doorways_of(room)]
+                beyond += [link.other(room) for link in self.links_of(room)]
             ahead = list(dict.fromkeys(room for room in beyond if room not in reached))
             reached.update(ahead)
         return destination in reached
@@ -101,7 +104,6 @@ class FrameLocales:
     def __init__(self, view: View) -> None:
         self._view = view
         self._notes: list[dict[str, LocaleFrame]] = []
-        self._passages: dict[str, Passage] = {}
 
     def frame(self, name: str) -> LocaleFrame:
         """The frame of a locale.
@@ -220,16 +222,10 @@ class FrameLocales:
         return self.frame(locale).things
 
     def passage_edges(self, container: str) -> tuple[PassageEdge, ...]:
-        frame = self.frame(container)
-        self._passages |= {passage.name: passage for passage in frame.passages}
-        return frame.edges
+        return self.frame(container).edges
 
     def components(self, locale: str) -> tuple[int, ...]:
         return self.frame(locale).components
-
-    def passage(self, name: str) -> Passage | None:
-        """A passage of a container whose edges were read before."""
-        return self._passages.get(name)
 
     def shut(self) -> frozenset[str]:
         """The doors that are believed shut; a frame that says so never leaves the board."""

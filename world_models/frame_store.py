@@ -7,6 +7,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any
 
+from world_models.building.changes.removals import element_names
 from world_models.building.world import World
 from world_models.commands import find_room
 from world_models.entries.locale_frame import FrameAnswer, FrameChange, FrameRequest, LocaleFrame
@@ -34,7 +35,6 @@ class FrameStore:
 
     def _build(self, name: str) -> LocaleFrame:
         locale, source = self.world.locale(name), self.world.locale_source
-        edges = source.passage_edges(name)
         return LocaleFrame(
             world=self.fingerprint,
             locale=locale,
@@ -44,8 +44,7 @@ class FrameStore:
             links=source.links(name),
             parts=source.geometry(name),
             things=source.things(name),
-            edges=edges,
-            passages=tuple(self.world.passage(passage) for passage in dict.fromkeys(edge.passage for edge in edges)),
+            edges=source.passage_edges(name),
             components=source.components(name),
         )
 
@@ -97,7 +96,7 @@ def elements_of(frame: LocaleFrame) -> frozenset[str]:
 
 
 def _names(frame: LocaleFrame) -> Iterator[str]:
-    yield from (passage.name for passage in (*frame.doorways, *frame.links))
+    yield from (doorway.name for doorway in frame.doorways)
+    yield from (link.name for link in frame.links)
     yield from (thing.name for thing in frame.things)
-    for part in frame.parts:
-        yield from (item.name for _, item in (*part.landmarks, *part.faces))
+    yield from element_names(frame.parts)

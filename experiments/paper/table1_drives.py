@@ -72,7 +72,7 @@ def run_drive(drive: Drive, out: Path | None = None) -> DriveResult:
     ends: list[Truth] = []
     agent = build_agent(head)
     files = None if out is None else RunDirectory(out)
-    recorder = RunRecorder(files, head, agent.robot)
+    recorder = RunRecorder(files, head, agent.world, agent.robot)
     with SimulatedRun(stage, head, agent, recorder, (_log_ends_of_moves(ends, lambda: run),)) as run:
         result = run.drive(files)
     body = run.simulated_body

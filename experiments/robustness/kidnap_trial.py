@@ -30,8 +30,8 @@ from sim.made_up.generated_floors import Floor, generated_floor
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.kinds import KINDS
 from world_models.entries.body import BodyFault, Frame
+from world_models.entries.kinds import KINDS
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.percepts import Panorama
 from world_models.frames import Pose2

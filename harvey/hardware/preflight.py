@@ -104,7 +104,7 @@ class Preflight:
         if world is not None and seen is not None:
             m = self._mission
             self.robot = RobotModel(world, *seen, m.actuator, m.base.radius_m)
-            yield from self._plan(self.robot)
+            yield from self._plan(world, self.robot)
         if self._mission.motion.continuous:
             yield Check("motion", "these bases cannot be steered on the move", "motion.continuous = false")
         yield from self._base()
@@ -139,13 +139,13 @@ class Preflight:
             "calibration", f"{camera.width} x {camera.height} px, f {camera.fx:.0f} px, {bent}; "
                            f"{mount.height_m:.2f} m above the floor")
 
-    def _plan(self, robot: RobotModel) -> Iterator[Check]:
+    def _plan(self, world: World, robot: RobotModel) -> Iterator[Check]:
         try:
-            origin, destination = parse_command(self._mission.goal, robot.world)
+            origin, destination = parse_command(self._mission.goal, world)
         except ValueError as error:
             yield Check("goal", str(error), "name one room for each end: harvey world show")
             return
-        lost = [p for p in (origin, destination) if not _is_inside(robot.world, p)]
+        lost = [p for p in (origin, destination) if not _is_inside(world, p)]
         if lost:
             todo = "feet, in the locale's own frame: harvey world show"
             yield Check("goal", f"{lost[0]} is not within its locale", todo)

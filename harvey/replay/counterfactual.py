@@ -92,7 +92,7 @@ def what_if(
     check_segments(player.records, without, then.without)
     if out is not None:
         make_room(out.path, head.name, head.seed)
-    recorder = RunRecorder(out, head, agent.robot)
+    recorder = RunRecorder(out, head, agent.world, agent.robot)
     if head.kind != SIMULATOR:
         scheduler = agent.scheduler(sinks=(*recorder.sinks, player.compare))
         try:

@@ -25,7 +25,7 @@ def redraw(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
     decisions = find_remains(run).decisions
     head, part = RunHead.read(run.path), run.recording.with_name("recording.rrd.part")
     agent = build_agent(head)
-    recorder = RunRecorder(None, head, agent.robot, drawing=part)
+    recorder = RunRecorder(None, head, agent.world, agent.robot, drawing=part)
     try:
         if head.kind == SIMULATOR:
             with SimulatedRun(rebuild_stage(head), head, agent, recorder, sinks) as simulated:

@@ -131,12 +131,15 @@ class RunHead:
             return f"was calculated on another processor ({self.arithmetic}, and this is {here.arithmetic})"
         return ""
 
-    def model(self) -> RobotModel:
-        """What the robot knows. Raises BadInput where the world file has changed since, or a value cannot be used."""
+    def load_world(self) -> World:
+        """The world that the robot believes in. Raises BadInput where its file has changed since."""
         path = ROOT / self.world
         if _sha256_or_none(path) != self.world_sha256:
             raise BadInput(f"{path}: expected the world file as it was when the run was made, got another or none")
-        world = _world(path, self.world_sha256)
+        return _world(path, self.world_sha256)
+
+    def model(self, world: World) -> RobotModel:
+        """The robot as it knows itself, in a world. Raises BadInput where a value cannot be used."""
         return _build("robot", lambda: RobotModel(world, **self._robot_fields()))
 
     def task(self) -> Command:

@@ -17,6 +17,7 @@ from logs.camera_file import CameraFile
 from logs.disk import sync_folder
 from logs.journal_file import JournalFile
 from logs.recording.writer import RecordingWriter
+from world_models.building.world import World
 from world_models.entries.body import Frame
 from world_models.entries.location import Place
 from world_models.frames import Pose2
@@ -40,7 +41,7 @@ class RunRecorder:
     """
 
     def __init__(
-        self, run: RunDirectory | None, head: RunHead, robot: RobotModel, *,
+        self, run: RunDirectory | None, head: RunHead, world: World, robot: RobotModel, *,
         live: bool = False, whole: Extent | None = None, drawing: Path | None = None,
     ) -> None:
         """Begin the files of a run.
@@ -64,7 +65,7 @@ class RunRecorder:
             if run is not None:
                 self._open(run, head, whole, opened)
             if drawing is not None or live:
-                self._recording_writer = _recording_writer(drawing, head, robot, live, self._journal)
+                self._recording_writer = _recording_writer(drawing, head, world, robot, live, self._journal)
                 opened.callback(self._recording_writer.close)
             self._opened = opened.pop_all()
 
@@ -133,10 +134,10 @@ class RecordedPort:
 
 
 def _recording_writer(
-    path: Path | None, head: RunHead, robot: RobotModel, live: bool, journal: JournalFile | None
+    path: Path | None, head: RunHead, world: World, robot: RobotModel, live: bool, journal: JournalFile | None
 ) -> RecordingWriter:
     return RecordingWriter(
-        path, world=robot.world, camera=robot.lens, mount=robot.mount, live=live,
+        path, world=world, camera=robot.lens, mount=robot.mount, live=live,
         title=f"harvey {head.name}", recording_id=f"{head.name}-{head.seed}",
         line_of=decision_line if journal is None else journal.line,
     )

@@ -20,6 +20,7 @@ from harvey.run_files.run_head import RunHead
 from harvey.run_files.run_recorder import RunRecorder
 from harvey.runner.ports import Body, BodyPort
 from harvey.runner.result import UNFINISHED, MissionResult, RunCounts
+from harvey.runner.world_port import WorldPort, tell_robot
 from logs.disk import CannotWriteError
 from logs.errors import RecordingError
 from world_models.entries.location import Hypothesis
@@ -54,7 +55,7 @@ class Run:
 
     Attributes:
         head: how it begins.
-        port: the body's, without the recorder; recorded_port: the same, as the agent has it.
+        port: the body's, without the recorder; recorded_port: the same, as the agent has it; world_port: the world's.
         scheduler: the agent at work.
         before_cycle: called before each cycle.
     """
@@ -71,19 +72,21 @@ class Run:
             referee: who knows the truth; None on hardware.
             sinks: called with every decision.
         """
-        self._began_s = time.perf_counter()
+        self._began_s, self._robot = time.perf_counter(), agent.robot
         self.head, self.body, self.recorder = head, body, recorder
         self._limits, self._clock, self._referee = limits, clock, referee
         self.before_cycle = before_cycle
         self.port = BodyPort(body)
         self.recorded_port = recorder.record_port(self.port)
+        self.world_port = recorder.record_port(WorldPort(agent.store))
         self._counts = RunCounts()
         truth = () if referee is None else (referee,)
         self.scheduler: Scheduler = agent.scheduler(
-            ports=(self.recorded_port,), sinks=(*recorder.sinks, self._counts, *truth, *sinks))
+            ports=(self.recorded_port, self.world_port), sinks=(*recorder.sinks, self._counts, *truth, *sinks))
 
     def begin(self) -> Outcome:
         """From the command to the outcome."""
+        tell_robot(self.scheduler, self._robot)
         self.scheduler.tell([Post(self.head.task())], "user")
         return self.go_on()
 

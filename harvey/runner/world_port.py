@@ -6,8 +6,10 @@ from collections.abc import Iterable
 
 from blackboard.change import Change, Posted
 from blackboard.effect import Effect, Post, Revise
+from blackboard.scheduler import Scheduler
 from world_models.entries.locale_frame import FrameRequest
 from world_models.frame_store import FrameStore
+from world_models.robot import RobotModel
 
 
 class WorldPort:
@@ -27,3 +29,8 @@ class WorldPort:
         frames, answered = self._store.answer(request.value)
         yield from (Post(frame, (request,)) for frame in frames)
         yield Revise(request, answered, (request,))
+
+
+def tell_robot(scheduler: Scheduler, robot: RobotModel) -> None:
+    """Put what a robot knows of itself on the board: the first thing that it is told."""
+    scheduler.tell([Post(entry) for entry in robot.entries()], "robot")

@@ -10,11 +10,11 @@ from harvey.simulation.contacts import ContactWatch
 from sim.body.simulated_body import SimulatedBody
 from sim.stage import Stage
 from sim.truth import cross_track_m
+from world_models.building.world import World
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate, Leg
 from world_models.frames import Pose2, wrap_angle
-from world_models.robot import RobotModel
 
 MAX_TRUE_ERROR_M = 0.15
 """A milestone is accepted falsely when the robot is further than this from the pose that was certified."""
@@ -25,14 +25,14 @@ MAX_TRUE_ERROR_RAD = 0.06
 class Referee:
     """A sink that compares what is believed with the truth; the board never hears of it."""
 
-    def __init__(self, robot: RobotModel, stage: Stage, body: SimulatedBody) -> None:
-        self._robot, self._stage, self._body = robot, stage, body
+    def __init__(self, world: World, stage: Stage, body: SimulatedBody) -> None:
+        self._world, self._stage, self._body = world, stage, body
         self._false_accepts = 0
         self._max_cross_track_m = 0.0
         self._leg: Leg | None = None
         self._fix: Pose2 | None = None
         self._followed = 0
-        self._contact_watch = ContactWatch(robot.world, body)
+        self._contact_watch = ContactWatch(world, body)
         self._contacts: list[Contact] = []
 
     def __call__(self, decision: Decision) -> None:
@@ -93,4 +93,4 @@ class Referee:
         if wanted_rad is not None or belief is None:
             return wanted_rad or 0.0
         true = self._body.truth.world_from_robot
-        return wrap_angle(belief.world_from_robot(self._robot.world).heading_rad - true.heading_rad)
+        return wrap_angle(belief.world_from_robot(self._world).heading_rad - true.heading_rad)

@@ -65,7 +65,7 @@ def run_mission(
     head = head or build_head(stage, seed, body)
     files = None if out is None else RunDirectory(out)
     agent = build_agent(head, sources)
-    recorder = RunRecorder(files, head, agent.robot, live=live)
+    recorder = RunRecorder(files, head, agent.world, agent.robot, live=live)
     with SimulatedRun(stage, head, agent, recorder, sinks, around) as run:
         return run.drive(files)
 
@@ -87,7 +87,7 @@ def resume_mission(
     head = RunHead.read(files.path)
     stage = stage or rebuild_stage(head)
     agent = build_agent(head)
-    recorder = RunRecorder(files, head, agent.robot, live=live, whole=remains.extent)
+    recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, whole=remains.extent)
     with SimulatedRun(stage, head, agent, recorder, sinks, around) as run:
         return run.drive(files, lambda: continue_run(files, run, run.body_replay))
 
@@ -133,11 +133,11 @@ class SimulatedRun(Run):
         around: Around = unchanged,
     ) -> None:
         self.simulated_body = body = stage.body(head.seed)
-        self._line, self._contact_watch = ExitStack(), ContactWatch(agent.robot.world, body)
+        self._line, self._contact_watch = ExitStack(), ContactWatch(agent.world, body)
         reached = around(self._line.enter_context(open_body(body, head.body)), lambda: recorder.replaying)
         super().__init__(
             head, agent, reached, recorder, limits=stage.scenario.limits, clock=lambda: body.truth.time_s,
-            referee=Referee(agent.robot, stage, body), sinks=sinks,
+            referee=Referee(agent.world, stage, body), sinks=sinks,
             before_cycle=self._draw_truth)
         self.body_replay = BodyReplay(self.port, body, head.seed, stage.scenario.actuator)
 

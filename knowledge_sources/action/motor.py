@@ -37,8 +37,8 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import BodyFault, MotorCommand
 from world_models.entries.location import Hypothesis
-from world_models.entries.task import Leg, Milestone, PlanSketch
 from world_models.entries.robot import Drift
+from world_models.entries.task import Leg, Milestone, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 
 

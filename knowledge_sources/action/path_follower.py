@@ -21,7 +21,6 @@ from knowledge_sources.methods.motion.pure_pursuit import (
 from knowledge_sources.questions import (
     current_leg,
     find_belief,
-    find_building,
     find_robot,
     is_in_doubt,
     is_over,
@@ -36,8 +35,8 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import Course
 from world_models.entries.location import Hypothesis
-from world_models.entries.task import Leg, Milestone, PlanSketch
 from world_models.entries.robot import Drift
+from world_models.entries.task import Leg, Milestone, PlanSketch
 from world_models.frames import Pose2
 
 

@@ -77,8 +77,11 @@ class LocaleSource(Protocol):
     def extents_in(self, name: str, /) -> tuple[LocaleExtent, ...]:
         """Where the locales lie that this one contains directly, in the order of ``children``."""
 
-    def near(self, x_m: float, y_m: float, margin_m: float, /) -> Sequence[str]:
-        """Locales whose bounding rectangle, grown by a margin, holds a point [m, world]; in the order of the file."""
+    def near(self, x_m: float, y_m: float, margin_m: float, z_m: float | None = None, /) -> Sequence[str]:
+        """Locales whose bounding rectangle, grown by a margin, holds a point [m, world]; in the order of the file.
+
+        With ``z_m`` those that are on other floors than that height may be left out.
+        """
 
     def doorways(self, locale: str, /) -> tuple[Doorway, ...]:
         """Its open doorways, in order."""

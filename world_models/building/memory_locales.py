@@ -49,7 +49,7 @@ class MemoryLocales:
     def is_room(self, name: str) -> bool:
         return name in self.locales and name not in self._children
 
-    def near(self, x_m: float, y_m: float, margin_m: float) -> Sequence[str]:
+    def near(self, x_m: float, y_m: float, margin_m: float, z_m: float | None = None) -> Sequence[str]:
         names, low, high = self._rectangles
         p = np.array([x_m, y_m])
         return [names[i] for i in np.flatnonzero(np.all((low - margin_m <= p) & (p <= high + margin_m), axis=1))]

@@ -1,6 +1,6 @@
 """The world (§3.4): the whole building as a file describes it; the attributes name everything in it.
 
-The robot does not know it: it knows the locale frames that it asked for. Files, drawings and the simulator use the whole.
+Files, drawings and the simulator use the whole. The robot knows the locale frames that it asked for.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ def _in_order(numbered: Iterable[tuple[int, T]]) -> tuple[T, ...]:
 class _Locales(Mapping[str, Locale]):
     """Locales by name, each loaded when asked for."""
 
-    def __init__(self, locale_source: LocaleSource) -> None:
+    def __init__(self, locale_source: WorldSource) -> None:
         self._locale_source = locale_source
 
     def __getitem__(self, name: str) -> Locale:

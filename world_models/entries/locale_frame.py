@@ -18,10 +18,11 @@ from blackboard.kinds import observation, request
 from blackboard.level import Level
 from blackboard.servoing import OPEN
 from world_models import words
-from world_models.building.changes import remove_element, remove_thing, shut_door
+from world_models.building.changes.removals import remove_element, remove_thing
+from world_models.building.changes.shut_doors import shut_door
 from world_models.building.extents import LocaleExtent
 from world_models.building.locale_source import LocaleGeometry, PassageEdge
-from world_models.building.locales import Doorway, Link, Locale, Passage
+from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.things import Thing
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, PlanSketch
@@ -58,7 +59,7 @@ def is_as_filed(frame: LocaleFrame) -> bool:
 
 
 def is_in_use(view: View, entry: Entry[LocaleFrame]) -> bool:
-    """Whether something on the board names a frame's locale or one in it; while the robot is lost, any may be needed."""
+    """Whether something on the board names a frame's locale or one in it; a lost robot may need any."""
     if Level.GOAL in view.keys(OPEN):
         return True
     return entry.value.name in _named_locales(view)
@@ -93,10 +94,10 @@ class LocaleFrame:
         locale: its name, kind, container, place in the container, outline, and file:line of its description.
         extent: where it lies in the world.
         children: where the locales lie that it contains directly.
-        doorways, links: its open doors, elevators and stairs; ``filed_doorways`` has those that were found shut too.
+        doorways, links: its open doors, elevators and stairs; doors that are believed shut stand in ``changes``.
         parts: its faces with their regions and its landmarks, and those that it shares with each neighbour.
         things: furniture and the like.
-        edges, passages: between the locales that it contains directly (Figure 8).
+        edges: of the passage graph between the locales that it contains directly (Figure 8).
         components: for each component of it the component of its container.
         changes: what is believed otherwise than the file says.
         memo: results that were computed from this frame and others; no part of what is known.
@@ -111,7 +112,6 @@ class LocaleFrame:
     parts: tuple[LocaleGeometry, ...]
     things: tuple[Thing, ...]
     edges: tuple[PassageEdge, ...]
-    passages: tuple[Passage, ...]
     components: tuple[int, ...]
     changes: tuple[FrameChange, ...] = ()
     filed: LocaleFrame | None = field(default=None, repr=False)
@@ -208,9 +208,10 @@ class FrameRequest:
     def sentence(self) -> str:
         frames = words.listed([name or "the whole building" for name in self.locales], 6)
         asked = [f"what is known of {frames}"] if frames else []
-        asked += [f"where {words.listed(list((*self.called, *self.elements)), 6)} is"] * bool(self.called or self.elements)
+        asked += [f"where {words.listed([*self.called, *self.elements], 6)} is"] * bool(self.called or self.elements)
         said = [answer.error or f"{answer.asked} is in {' and '.join(answer.locales)}" for answer in self.answers]
-        return f"asks {' and '.join(asked)}" + f"; answered{': ' * bool(said)}{', '.join(said)}" * has_answer(self)
+        answered = f"; answered{': ' * bool(said)}{', '.join(said)}" * has_answer(self)
+        return f"asks {' and '.join(asked)}{answered}"
 
 
 ANSWERED: Index[FrameRequest] = Index(FrameRequest, lambda r: has_answer(r) or None, "answered")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.localization.hypotheses import (

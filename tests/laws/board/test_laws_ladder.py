@@ -37,8 +37,8 @@ from knowledge_sources.questions import (
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario, with_settings
-from world_models.entries.kinds import KINDS
 from world_models.entries.body import Course, Frame, Look, MotionReport, MotorCommand
+from world_models.entries.kinds import KINDS
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch

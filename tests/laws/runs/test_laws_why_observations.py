@@ -20,8 +20,8 @@ from blackboard.scheduler import registry_of
 from harvey.errors import BadInput
 from harvey.run_files.observations import effect_of, value_of
 from harvey.run_files.records import EntryRecord
-from world_models.entries.kinds import KINDS
 from world_models.entries.body import Frame, MotionReport, RideReport
+from world_models.entries.kinds import KINDS
 from world_models.entries.task import Command, Outcome
 
 KNOWN = registry_of((), KINDS)

@@ -132,7 +132,7 @@ class SqliteLocales:
         return self._load_once("is room", name, lambda: bool(self._rows(
             "select 1 from locale where name = ? and leaf", name)))
 
-    def near(self, x_m: float, y_m: float, margin_m: float) -> Sequence[str]:
+    def near(self, x_m: float, y_m: float, margin_m: float, z_m: float | None = None) -> Sequence[str]:
         with self._world_errors():
             return [row[0] for row in self._rows(NEAR, x_m, y_m, margin_m, margin_m + SLACK_M)]
 
