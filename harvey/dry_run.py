@@ -14,18 +14,22 @@ import numpy as np
 from blackboard.board import View
 from blackboard.change import Change, Posted, Quiescence, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
+from blackboard.journal import Sink
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import RAISED, Scheduler
+from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.verification.milestone_preview import find_alias, predict_p_false
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.methods.verification.view_quality import compute_view_quality
-from knowledge_sources.questions import find_belief
+from knowledge_sources.questions import find_belief, find_robot
 from knowledge_sources.settings import DEFAULT, Settings
+from world_models.building.world import World
 from world_models.entries.body import MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.task import Command, Milestone, Outcome, PlanSketch
+from world_models.frame_store import FrameStore
 from world_models.robot import RobotModel
 
 PLANNING_SOURCES = ("interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "elevator_rider",
@@ -94,12 +98,10 @@ class IdealBodyPort:
 
 
 def dry_run(
-    robot: RobotModel, task: Command, settings: Settings = DEFAULT
+    world: World, robot: RobotModel, task: Command, settings: Settings = DEFAULT
 ) -> tuple[tuple[MilestonePreview, ...], Outcome]:
     """The milestones in the order in which they will come, and how the dry run of the mission ends."""
-    robot = replace(robot, continuous=False)
-    sources = [source for source in knowledge_sources(robot, settings) if source.name in PLANNING_SOURCES]
-    scheduler = Scheduler([*sources, AcceptEveryMilestone()], ports=(IdealBodyPort(),))
+    scheduler = build_dry_run(world, robot, settings)
     scheduler.tell([Post(replace(task, start_covariance=diagonal(FIX_SIGMA_M, FIX_SIGMA_RAD)))], "user")
     previews: list[MilestonePreview] = []
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < MAX_CYCLES:
@@ -109,13 +111,24 @@ def dry_run(
         elif decision.refused.startswith(RAISED):
             return tuple(previews), Outcome("failed", decision.refused.strip().splitlines()[-1])
         else:
-            previews += _previews(robot, scheduler.view, decision.made, settings)
+            previews += _previews(scheduler.view, decision.made, settings)
     outcome = scheduler.view.latest(Outcome)
     return tuple(previews), outcome.value if outcome else Outcome("failed", f"not there after {MAX_CYCLES} cycles")
 
 
+def build_dry_run(
+    world: World, robot: RobotModel, settings: Settings = DEFAULT, sinks: Sequence[Sink] = ()
+) -> Scheduler:
+    """The planning knowledge sources round a board that knows the robot and can ask for the building."""
+    sources = [source for source in knowledge_sources(settings) if source.name in PLANNING_SOURCES]
+    ports = IdealBodyPort(), WorldPort(FrameStore(world))
+    scheduler = Scheduler([*sources, AcceptEveryMilestone()], ports=ports, sinks=sinks)
+    tell_robot(scheduler, replace(robot, continuous=False))
+    return scheduler
+
+
 def _previews(
-    robot: RobotModel, view: View, made: Sequence[Change], settings: Settings
+    view: View, made: Sequence[Change], settings: Settings
 ) -> list[MilestonePreview]:
     """Previews of the milestones that were just verified."""
     belief = find_belief(view)
@@ -123,7 +136,7 @@ def _previews(
         return []
     values = (change.entry.value for change in made)
     milestones = (v for v in values if isinstance(v, Milestone) and v.status == "verified")
-    return [_preview(robot, view, belief.value, milestone, settings) for milestone in milestones]
+    return [_preview(find_robot(view), view, belief.value, milestone, settings) for milestone in milestones]
 
 
 def _preview(

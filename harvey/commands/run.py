@@ -63,9 +63,12 @@ def _check(task: Task) -> int:
     from harvey.campaign.summary import format_previews, summarize_dry_run
     from harvey.dry_run import dry_run
     from harvey.simulation.run import build_robot_model
+    from world_models.files.world_files import load_world
 
     scenario = stage.scenario
-    ahead, outcome = dry_run(build_robot_model(scenario), scenario.command, build_settings(task.agent_settings))
+    world = load_world(scenario.world)
+    robot = build_robot_model(scenario, world)
+    ahead, outcome = dry_run(world, robot, scenario.command, build_settings(task.agent_settings))
     print(format_previews(ahead))
     told, bodes_well = summarize_dry_run(ahead, outcome)
     print(f"\nthe dry run of {scenario.name} {told}")

@@ -151,7 +151,7 @@ class Preflight:
             yield Check("goal", f"{lost[0]} is not within its locale", todo)
             return
         yield Check("goal", f"from {origin} to {destination}")
-        self.previews, outcome = dry_run(robot, self._mission.command, self._settings)
+        self.previews, outcome = dry_run(world, robot, self._mission.command, self._settings)
         if outcome.kind != "reached":
             yield Check("plan", outcome.reason, "another start or goal, or a world with a way between them")
             return

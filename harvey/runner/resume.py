@@ -114,7 +114,8 @@ def continue_run(files: RunDirectory, run: Run, body: ResumedBody) -> Outcome:
         return run.begin()
     for change in last.made:
         if not is_command(change):
-            run.scheduler.tell(run.recorded_port.answer(change), run.port.name)
+            for port in run.ports:
+                run.scheduler.tell(port.answer(change), port.name)
     return run.go_on(last)
 
 

@@ -55,7 +55,8 @@ class Run:
 
     Attributes:
         head: how it begins.
-        port: the body's, without the recorder; recorded_port: the same, as the agent has it; world_port: the world's.
+        port: the body's, without the recorder; recorded_port: the same, as the agent has it.
+        ports: that one and the world's, as the agent has them.
         scheduler: the agent at work.
         before_cycle: called before each cycle.
     """
@@ -78,11 +79,11 @@ class Run:
         self.before_cycle = before_cycle
         self.port = BodyPort(body)
         self.recorded_port = recorder.record_port(self.port)
-        self.world_port = recorder.record_port(WorldPort(agent.store))
+        self.ports = self.recorded_port, recorder.record_port(WorldPort(agent.store))
         self._counts = RunCounts()
         truth = () if referee is None else (referee,)
         self.scheduler: Scheduler = agent.scheduler(
-            ports=(self.recorded_port, self.world_port), sinks=(*recorder.sinks, self._counts, *truth, *sinks))
+            ports=self.ports, sinks=(*recorder.sinks, self._counts, *truth, *sinks))
 
     def begin(self) -> Outcome:
         """From the command to the outcome."""

@@ -144,7 +144,7 @@ class Building(ABC):
         if p.shape not in ((2,), (3,)):
             raise ValueError(f"expected a point (2,) or (3,), got shape {p.shape}")
         best: tuple[int, str] | None = None
-        for name in self.locale_source.near(*p.tolist()[:2], 0.0, _height(p)):
+        for name in self._near(p, 0.0):
             world_from_locale, locale_from_world = self._poses_of(name)
             lifted = p if p.size == 3 else np.array([*p, world_from_locale.translation[2]])
             depth = len(self.path_of(name))
@@ -155,9 +155,12 @@ class Building(ABC):
     def rooms_near(self, point_world: Any, margin_m: float) -> tuple[str, ...]:
         """The rooms whose bounding rectangle is at most ``margin_m`` from a point (2,) or (3,) [m, world]."""
         p = np.asarray(point_world, float)
-        near = self.locale_source.near(*p.tolist()[:2], margin_m, _height(p))
-        rooms = (name for name in near if self.is_room(name))
+        rooms = (name for name in self._near(p, margin_m) if self.is_room(name))
         return tuple(name for name in rooms if p.size == 2 or self._reaches(name, float(p[2])))
+
+    def _near(self, point: NDArray[np.float64], margin_m: float) -> Sequence[str]:
+        z_m = float(point[2]) if point.size == 3 else None
+        return self.locale_source.near(float(point[0]), float(point[1]), margin_m, z_m)
 
     def _reaches(self, name: str, z_m: float) -> bool:
         """Whether a height is between floor and ceiling of a locale, within FLOOR_MARGIN_M."""
@@ -185,8 +188,3 @@ class Building(ABC):
     def _geometry_of(self, locales: Iterable[str]) -> dict[tuple[str, str | None], LocaleGeometry]:
         """The geometry of several locales, each part once, by (locale, neighbour)."""
         return {(part.locale, part.neighbour): part for name in locales for part in self.locale_source.geometry(name)}
-
-
-def _height(point: NDArray[np.float64]) -> float | None:
-    """The height of a point (3,); None for a point (2,) on the floor."""
-    return float(point[2]) if point.size == 3 else None
