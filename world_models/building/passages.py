@@ -9,20 +9,21 @@ a search looks at one container, however large the campus is.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import networkx as nx
 
+from world_models.building.changes.open_passages import Component, OpenEdge, OpenPassages
 from world_models.building.locale_source import PassageEdge
 from world_models.building.locales import Doorway, Link
 
 if TYPE_CHECKING:
     from world_models.building.locale_source import LocaleSource
 
-Component = tuple[str, int]
-"""A locale and the number of one of its components."""
+Numbered = tuple[str, int]
+"""A locale and the number of one of its components, all passages open."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,31 +96,22 @@ class _Hierarchy:
             a, b = (above, b) if deeper is a else (a, above)
         return a
 
-    def component_below(self, room: str, container: str, components: Mapping[str, tuple[int, ...]]) -> Component:
+    def component_below(self, room: str, container: str, components: Mapping[str, tuple[int, ...]]) -> Numbered:
         """The component directly in ``container`` that a room belongs to."""
-        component: Component = (room, 0)
+        component: Numbered = (room, 0)
         while (parent := self._parents[component[0]]) != container:
             assert parent is not None
             component = parent, components[component[0]][component[1]]
         return component
 
 
-def _number_components(nodes: list[Component], edges: list[PassageEdge]) -> dict[Component, int]:
+def _number_components(nodes: list[Numbered], edges: list[PassageEdge]) -> dict[Numbered, int]:
     """The connected component of each node, numbered in the order of the nodes."""
     graph: nx.Graph = nx.Graph()
     graph.add_nodes_from(nodes)
     graph.add_edges_from(edge.between for edge in edges)
     numbers = {node: number for number, members in enumerate(nx.connected_components(graph)) for node in members}
     return {node: numbers[node] for node in nodes}
-
-
-def components_above(source: LocaleSource, room: str) -> list[Component]:
-    """The components that a room belongs to, from itself up to the root."""
-    chain: list[Component] = [(room, 0)]
-    while (locale := source.locale(chain[-1][0])) is not None and locale.parent is not None:
-        name, component = chain[-1]
-        chain.append((locale.parent, source.components(name)[component]))
-    return chain
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,17 +136,23 @@ class Route:
     steps: tuple[Step, ...]
 
 
-def find_route(source: LocaleSource, origin: str, destination: str) -> Route | None:
-    """The route with the fewest passages in the smallest locale that holds one; None where no passage leads there."""
+def find_route(
+    source: LocaleSource, origin: str, destination: str, shut: Collection[Doorway | Link] = ()
+) -> Route | None:
+    """The route with the fewest passages in the smallest locale that holds one; None where no passage leads there.
+
+    Args:
+        shut: passages that cannot be used.
+    """
     if origin == destination:
         return Route(origin, ())
-    up, down = components_above(source, origin), components_above(source, destination)
-    below = {component[0]: component for component in down}
-    for depth, (name, number) in enumerate(up):
-        if depth and below.get(name) == (name, number):
-            start, goal = up[depth - 1], down[down.index((name, number)) - 1]
-            path = _shortest_path(source.passage_edges(name), start, goal)
-            return Route(name, tuple(_build_step(source, edge, side) for edge, side in path))
+    passages = OpenPassages(source, shut)
+    up, down = passages.components_above(origin), passages.components_above(destination)
+    for depth, component in enumerate(up):
+        if depth and component in down:
+            start, goal = up[depth - 1], down[down.index(component) - 1]
+            path = _shortest_path(passages.edges(component[0]), start, goal)
+            return Route(component[0], tuple(_build_step(source, edge, side) for edge, side in path))
     return None
 
 
@@ -164,15 +162,15 @@ def _build_step(source: LocaleSource, edge: PassageEdge, side: int) -> Step:
     return Step(next(p for p in passages if p.name == edge.passage), room, edge.rooms[1 - side])
 
 
-def _shortest_path(edges: Iterable[PassageEdge], start: Component, goal: Component) -> list[tuple[PassageEdge, int]]:
+def _shortest_path(edges: Iterable[OpenEdge], start: Component, goal: Component) -> list[tuple[PassageEdge, int]]:
     """Breadth-first search between connected nodes: each edge with the side on which it begins.
 
     Not networkx: of equally short paths the one over the first edges must be found, whatever library version.
     """
     ahead: dict[Component, list[tuple[Component, PassageEdge, int]]] = {}
-    for edge in edges:
+    for item in edges:
         for side in (0, 1):
-            ahead.setdefault(edge.between[side], []).append((edge.between[1 - side], edge, side))
+            ahead.setdefault(item.between[side], []).append((item.between[1 - side], item.edge, side))
     came: dict[Component, tuple[Component, PassageEdge, int]] = {}
     todo = deque([start])
     while todo and goal not in came:

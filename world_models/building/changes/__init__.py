@@ -1,7 +1,8 @@
-"""What is believed otherwise than the world file says: pure functions on the geometry of a locale.
+"""What is believed otherwise than the world file says: pure functions on geometry, things and passages.
 
 In reading order:
 
 * :mod:`.shut_doors`: a doorway found shut.
 * :mod:`.removals`: a thing, a landmark or a face that is gone.
+* :mod:`.open_passages`: passage graphs without the passages that are shut.
 """
