@@ -35,7 +35,7 @@ from harvey.run_files.observations import entry_of
 from harvey.run_files.records import DecisionRecord, EntryRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
-from harvey.runner.replay import open_pictures
+from harvey.runner.replay import open_originals, open_pictures
 from harvey.runner.replay import replay as replay_run
 from harvey.runner.result import MissionResult
 from harvey.simulation.run import build_head, run_mission
@@ -256,7 +256,7 @@ class RecordedRun:
             BadInput: an observation cannot be read.
         """
         agent = build_agent(self.head, with_sources(self._sources))
-        decided = replay_run(self._files, open_pictures(self._files), agent.scheduler())
+        decided = replay_run(self._files, open_originals(self._files, agent.store), agent.scheduler())
         return next((one.recorded.cycle for one in decided if not one.same), None)
 
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from difflib import get_close_matches
-from typing import Any
 
 from world_models.building.changes.removals import element_names
 from world_models.building.world import World
 from world_models.commands import find_room
-from world_models.entries.locale_frame import FrameAnswer, FrameChange, FrameRequest, LocaleFrame
+from world_models.entries.locale_frame import FrameAnswer, FrameReference, FrameRequest, LocaleFrame
 
 MAX_FRAMES = 4096
 """So many frames are kept as they are, so that results computed from them serve the next mission too."""
@@ -82,12 +81,11 @@ class FrameStore:
         expected = ", ".join(near) or f"a door, thing, landmark or face of {self.world.name}"
         return FrameAnswer(name, (), f"expected {expected}, got {name!r}")
 
-    def restore(self, reference: Mapping[str, Any], changes: Sequence[FrameChange]) -> LocaleFrame:
+    def restore(self, reference: FrameReference) -> LocaleFrame:
         """The frame that a journal refers to. Raises ValueError where this world is another, or has no such locale."""
-        if reference.get("world") != self.fingerprint:
-            raise ValueError(f"expected a frame of the world {self.fingerprint!r}, got one of "
-                             f"{reference.get('world')!r}")
-        return self.frame(str(reference.get("locale"))).with_changes(changes)
+        if reference.world != self.fingerprint:
+            raise ValueError(f"expected a frame of the world {self.fingerprint!r}, got one of {reference.world!r}")
+        return self.frame(reference.locale).with_changes(reference.changes)
 
 
 def elements_of(frame: LocaleFrame) -> frozenset[str]:

@@ -17,7 +17,7 @@ from harvey.campaign.campaign import Task
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
 from harvey.runner.ports import Body
-from harvey.runner.replay import open_pictures, replay
+from harvey.runner.replay import open_originals, replay
 from harvey.runner.resume import find_remains
 from harvey.simulation.run import Around, resume_mission, run_mission
 from world_models.entries.body import BodyFault, MotionReport, MotorCommand
@@ -58,7 +58,7 @@ def main(argv: list[str]) -> int:
     run = RunDirectory(Path(argv[1]))
     result = resume_mission(run, find_remains(run), around=logging_to(Path(argv[2])))
     agent = build_agent(RunHead.read(run.path))
-    same = all(step.same for step in replay(run, open_pictures(run), agent.scheduler()))
+    same = all(step.same for step in replay(run, open_originals(run, agent.store), agent.scheduler()))
     print(json.dumps({"outcome": result.outcome, "reason": result.reason, "same": same,
                       "error_m": result.error_m, "decisions": result.decisions}))
     return 0

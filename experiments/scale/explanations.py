@@ -96,10 +96,10 @@ def _count_same(run: RunDirectory) -> int:
     """Count the decisions that a replay decides the same."""
     from harvey.agent import build_agent
     from harvey.run_files.run_head import RunHead
-    from harvey.runner.replay import open_pictures, replay
+    from harvey.runner.replay import open_originals, replay
 
     agent = build_agent(RunHead.read(run.path))
-    return sum(1 for step in replay(run, open_pictures(run), agent.scheduler()) if step.same)
+    return sum(1 for step in replay(run, open_originals(run, agent.store), agent.scheduler()) if step.same)
 
 
 def _time_why(run: Path, *more: str) -> tuple[float, float]:

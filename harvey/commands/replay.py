@@ -66,13 +66,14 @@ def _again(run: RunDirectory) -> int:
     """Decide it again as it was."""
     from harvey.agent import build_agent
     from harvey.run_files.run_head import RunHead
-    from harvey.runner.replay import open_pictures, replay
+    from harvey.runner.replay import open_originals, replay
 
-    pictures, agreed, head = open_pictures(run), 0, RunHead.read(run.path)
+    agreed, head = 0, RunHead.read(run.path)
     elsewhere = head.decided_elsewhere()
     agent = build_agent(head)
+    originals = open_originals(run, agent.store)
     try:
-        for decision in with_progress(replay(run, pictures, agent.scheduler())):
+        for decision in with_progress(replay(run, originals, agent.scheduler())):
             if not decision.same:
                 print(f"{_perhaps(head, elsewhere)}\n\n{_difference(agreed, decision)}")
                 return 1
@@ -81,7 +82,7 @@ def _again(run: RunDirectory) -> int:
         raise BadInput(f"{error}; the run {elsewhere}" if elsewhere else str(error)) from None
     if not agreed:
         raise BadInput(f"{run.journal}: expected at least one decision, got none")
-    frames = count(len(pictures), "frame")
+    frames = count(len(originals.pictures), "frame")
     print(f"{count(agreed, 'decision')} decided again from {frames}: all the same, byte for byte")
     if elsewhere:
         print(f"note: the run {elsewhere}")

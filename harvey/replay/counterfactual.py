@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from blackboard.change import Change
 from blackboard.effect import Post
 from blackboard.journal import Decision, decision_line, decision_record, plain
-from blackboard.kinds import Registry, Role, is_request
 from blackboard.scheduler import Scheduler
-from harvey.agent import build_agent
+from harvey.agent import Agent, build_agent
 from harvey.campaign.campaign import make_room
 from harvey.run_files.observations import effect_of
 from harvey.run_files.records import DecisionRecord, EntryRecord, as_line, decision_of, read_records
@@ -23,10 +22,11 @@ from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import SIMULATOR, RunHead
 from harvey.run_files.run_recorder import RunRecorder
 from harvey.runner.ports import BodyPort
-from harvey.runner.replay import Live, ignore, open_pictures
+from harvey.runner.replay import Live, ignore, open_originals
 from harvey.runner.result import UNFINISHED, MissionResult
 from harvey.runner.resume import RESUME
 from harvey.runner.run import Over, run_to_outcome
+from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.simulation.run import SimulatedRun, rebuild_stage
 from harvey.without import check_segments
 from world_models.entries.task import Outcome
@@ -88,28 +88,29 @@ def what_if(
     then = RunHead.read(run.path)
     head = replace(then.here(), without=(*then.without, *without), constants=(*then.constants, *constants))
     agent = build_agent(head)
-    player = _Player(run, agent.kinds)
+    player = _Player(run, agent)
     check_segments(player.records, without, then.without)
     if out is not None:
         make_room(out.path, head.name, head.seed)
     recorder = RunRecorder(out, head, agent.world, agent.robot)
     if head.kind != SIMULATOR:
-        scheduler = agent.scheduler(sinks=(*recorder.sinks, player.compare))
+        ports = (WorldPort(agent.store),)
+        scheduler = agent.scheduler(ports=ports, sinks=(*recorder.sinks, player.compare))
         try:
-            return player.answer(player.play(scheduler, head, recorder), None)
+            return player.answer(player.play(scheduler, agent, head, recorder), None)
         finally:
             recorder.close()
     with SimulatedRun(rebuild_stage(head), head, agent, recorder, (player.compare,)) as simulated:
-        result = simulated.drive(out, lambda: _run_changed(simulated, player, go_on))
+        result = simulated.drive(out, lambda: _run_changed(simulated, agent, player, go_on))
     return player.answer(Outcome(result.outcome, result.reason), result)
 
 
-def _run_changed(run: SimulatedRun, player: _Player, go_on: bool) -> Outcome:
+def _run_changed(run: SimulatedRun, agent: Agent, player: _Player, go_on: bool) -> Outcome:
     """By the record as far as it answers; then by the simulated robot, if it is to go on."""
     run.recorded_port.closed = True
-    with run.body_replay.replay(player.pictures) as live:
+    with run.body_replay.replay(player.originals.pictures) as live:
         outcome = player.play(
-            run.scheduler, run.head, run.recorder, live=live, before=run.before_cycle, over=run.over)
+            run.scheduler, agent, run.head, run.recorder, live=live, before=run.before_cycle, over=run.over)
     if player.parting is None or not go_on:
         return outcome
     run.recorded_port.closed = False
@@ -130,10 +131,10 @@ class _Step:
 class _Player:
     """Answers an agent by the record of a run, as long as it requests the same."""
 
-    def __init__(self, run: RunDirectory, kinds: Registry) -> None:
-        self.pictures = open_pictures(run)
+    def __init__(self, run: RunDirectory, agent: Agent) -> None:
+        self.originals = open_originals(run, agent.store)
         self.records = list(read_records(run.journal))
-        self._requests = frozenset(kind.__name__ for kind in kinds.of_role(Role.REQUEST))
+        self._requests = frozenset(kind.__name__ for kind in BodyPort.acts_on)
         self._steps = _steps(self.records, self._requests)
         self._agreed, self._differs = 0, False
         self._first: tuple[DecisionRecord | None, DecisionRecord] | None = None
@@ -144,7 +145,7 @@ class _Player:
 
     def compare(self, decision: Decision) -> None:
         """Sink: compares with the record until the first difference."""
-        self.last, self.open = decision, tuple(change for change in decision.made if is_port_request(change))
+        self.last, self.open = decision, tuple(change for change in decision.made if is_body_request(change))
         if self._first is None:
             recorded = self.records[self._agreed] if self._agreed < len(self.records) else None
             if recorded is not None and recorded.line == decision_line(decision):
@@ -153,10 +154,11 @@ class _Player:
                 self._first = recorded, decision_of(decision_record(decision))
 
     def play(
-        self, scheduler: Scheduler, head: RunHead, recorder: RunRecorder, *, live: Live = ignore,
+        self, scheduler: Scheduler, agent: Agent, head: RunHead, recorder: RunRecorder, *, live: Live = ignore,
         before: Callable[[], None] = lambda: None, over: Over = lambda _scheduler: None,
     ) -> Outcome:
         """Decide until the end, or until the record no longer answers."""
+        tell_robot(scheduler, agent.robot)
         scheduler.tell([Post(head.task())], "user")
 
         def observe() -> None:
@@ -189,14 +191,14 @@ class _Player:
         self._answered += 1
         live(made, step.answers)
         for record in step.answers:
-            effect = effect_of(record, self.pictures, scheduler.view, scheduler.kinds)
+            effect = effect_of(record, self.originals, scheduler.view, scheduler.kinds)
             recorder.record_picture(effect)
             scheduler.tell([effect], record.author)
 
 
-def is_port_request(change: Change) -> bool:
-    """Whether a port acts on a change."""
-    return is_request(type(change.entry.value))
+def is_body_request(change: Change) -> bool:
+    """Whether the body acts on a change. What is asked of the world is answered by the world, now as then."""
+    return isinstance(change.entry.value, BodyPort.acts_on)
 
 
 def _steps(records: Sequence[DecisionRecord], requests: Set[str]) -> list[_Step]:

@@ -10,7 +10,7 @@ from harvey.agent import build_agent
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import SIMULATOR, RunHead
 from harvey.run_files.run_recorder import RunRecorder
-from harvey.runner.replay import check_same, open_pictures, replay
+from harvey.runner.replay import check_same, open_originals, replay
 from harvey.runner.resume import find_remains, replay_run
 from harvey.simulation.run import SimulatedRun, rebuild_stage
 
@@ -32,7 +32,7 @@ def redraw(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
                 replay_run(run, simulated, simulated.body_replay)
         else:
             scheduler = agent.scheduler(sinks=(*recorder.sinks, *sinks))
-            for decision in replay(run, open_pictures(run), scheduler):
+            for decision in replay(run, open_originals(run, agent.store), scheduler):
                 check_same(run, decision)
         recorder.close()
         os.replace(part, run.recording)

@@ -1,9 +1,10 @@
-"""What was observed, as values again: from the journal's JSON and, for pictures, the camera's bytes."""
+"""What was observed, as values again: from the journal's JSON, the camera's bytes and the world's file."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from blackboard.board import View
@@ -14,13 +15,27 @@ from harvey.errors import BadInput
 from harvey.run_files.decoding import decode
 from harvey.run_files.records import EntryRecord
 from logs.camera_file import Pictures
+from world_models.entries.locale_frame import FrameReference, LocaleFrame
+from world_models.frame_store import FrameStore
 
 
-def effect_of(record: EntryRecord, frames: Mapping[int, bytes], view: View, kinds: Registry) -> Effect:
+@dataclass(frozen=True, slots=True)
+class Originals:
+    """What the journal names only by reference.
+
+    Attributes:
+        pictures: number -> JPEG bytes.
+        frames: of the world's locales.
+    """
+
+    pictures: Mapping[int, bytes]
+    frames: FrameStore
+
+
+def effect_of(record: EntryRecord, originals: Originals, view: View, kinds: Registry) -> Effect:
     """The effect behind an observed change.
 
     Args:
-        frames: number -> JPEG bytes of the pictures.
         view: the board as it is before the effect.
         kinds: the kinds of entries of that board.
 
@@ -29,21 +44,23 @@ def effect_of(record: EntryRecord, frames: Mapping[int, bytes], view: View, kind
     """
     because = refs_of(record.because)
     if record.change == "Posted":
-        return Post(value_of(record, frames, kinds), because)
+        return Post(value_of(record, originals, kinds), because)
     entry = view.get(record.id)
     if entry is None:
         raise BadInput(f"{record.ref}: expected an entry on the board, got none")
     if record.change == "Retracted":
         return Retract(entry, refs_of(record.retracted_because))
-    return Revise(entry, value_of(record, frames, kinds), because)
+    return Revise(entry, value_of(record, originals, kinds), because)
 
 
-def value_of(record: EntryRecord, frames: Mapping[int, bytes], kinds: Registry) -> Any:
+def value_of(record: EntryRecord, originals: Originals, kinds: Registry) -> Any:
     """The value itself. Raises BadInput as :func:`effect_of` does."""
+    if record.type == LocaleFrame.__name__:
+        return restore_frame(record, originals.frames)
     kind = find_kind(record, kinds)
     value = dict(record.value) if isinstance(record.value, dict) else record.value
     if record.type == "Frame" and isinstance(value, dict):
-        value["jpeg"] = _picture(record, value, frames)
+        value["jpeg"] = _picture(record, value, originals.pictures)
     try:
         return decode(value, kind)
     except (ValueError, TypeError) as error:
@@ -61,6 +78,15 @@ def _picture(record: EntryRecord, value: Mapping[str, Any], frames: Mapping[int,
         raise BadInput(f"{where}{record.ref}: expected the picture that the journal saw, got another one for number "
                        f"{number}")
     return jpeg
+
+
+def restore_frame(record: EntryRecord, store: FrameStore) -> LocaleFrame:
+    """The locale frame that a record refers to. Raises BadInput where the world has no such frame."""
+    try:
+        reference = decode(record.value, FrameReference)
+        return store.restore(reference)
+    except (ValueError, TypeError) as error:
+        raise BadInput(f"{record.ref}: {error}") from None
 
 
 def find_kind(record: EntryRecord, kinds: Registry) -> type[Any]:

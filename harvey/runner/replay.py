@@ -14,11 +14,12 @@ from blackboard.change import Change
 from blackboard.journal import Decision, decision_line
 from blackboard.scheduler import Scheduler
 from harvey.errors import BadInput
-from harvey.run_files.observations import effect_of
+from harvey.run_files.observations import Originals, effect_of
 from harvey.run_files.records import DecisionRecord, EntryRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
 from logs.camera_file import Pictures
 from logs.reader import read_frames
+from world_models.frame_store import FrameStore
 
 Live = Callable[[Sequence[Change], Sequence[EntryRecord]], None]
 """Hears of the changes that a decision made and of what was observed next."""
@@ -47,7 +48,7 @@ class ReplayedDecision:
 
 
 def replay(
-    run: RunDirectory, pictures: Mapping[int, bytes], scheduler: Scheduler, *,
+    run: RunDirectory, originals: Originals, scheduler: Scheduler, *,
     live: Live = ignore, before: Callable[[], None] = lambda: None,
 ) -> Iterator[ReplayedDecision]:
     """Each decision beside its record.
@@ -63,7 +64,7 @@ def replay(
     for recorded, line in zip(read_records(run.journal), _lines(run), strict=False):
         live(made, recorded.observed)
         for observation in recorded.observed:
-            scheduler.tell([effect_of(observation, pictures, scheduler.view, scheduler.kinds)], observation.author)
+            scheduler.tell([effect_of(observation, originals, scheduler.view, scheduler.kinds)], observation.author)
         before()
         decision = scheduler.step()
         made = () if decision is None else decision.made
@@ -76,6 +77,11 @@ def check_same(run: RunDirectory, decision: ReplayedDecision) -> ReplayedDecisio
         raise BadInput(f"{run.journal}: cycle {decision.recorded.cycle} is not decided again as it was (harvey replay "
                        f"{run.path} tells how); it takes the program that made the run")
     return decision
+
+
+def open_originals(run: RunDirectory, store: FrameStore) -> Originals:
+    """What the journal of a run names only by reference. Raises BadInput and RecordingError as for its pictures."""
+    return Originals(open_pictures(run), store)
 
 
 def open_pictures(run: RunDirectory) -> Mapping[int, bytes]:

@@ -21,7 +21,7 @@ from harvey.errors import BadInput
 from harvey.run_files.records import read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_recorder import Extent
-from harvey.runner.replay import Live, camera_bytes, check_same, open_pictures, replay
+from harvey.runner.replay import Live, camera_bytes, check_same, open_originals, open_pictures, replay
 from harvey.runner.run import Run
 from logs.camera_file import Pictures
 from world_models.entries.body import Course, MotorCommand
@@ -97,9 +97,9 @@ def replay_run(files: RunDirectory, run: Run, body: ResumedBody) -> Decision | N
     Raises:
         BadInput: a decision, or an answer of the body, is not what it was.
     """
-    pictures, last = open_pictures(files), None
-    with body.replay(pictures) as live:
-        for decision in replay(files, pictures, run.scheduler, live=live, before=run.before_cycle):
+    originals, last = open_originals(files, run.store), None
+    with body.replay(originals.pictures) as live:
+        for decision in replay(files, originals, run.scheduler, live=live, before=run.before_cycle):
             last = check_same(files, decision).now
     return last
 

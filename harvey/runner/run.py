@@ -58,6 +58,7 @@ class Run:
         port: the body's, without the recorder; recorded_port: the same, as the agent has it.
         ports: that one and the world's, as the agent has them.
         scheduler: the agent at work.
+        store: of the locale frames.
         before_cycle: called before each cycle.
     """
 
@@ -73,7 +74,7 @@ class Run:
             referee: who knows the truth; None on hardware.
             sinks: called with every decision.
         """
-        self._began_s, self._robot = time.perf_counter(), agent.robot
+        self._began_s, self._robot, self.store = time.perf_counter(), agent.robot, agent.store
         self.head, self.body, self.recorder = head, body, recorder
         self._limits, self._clock, self._referee = limits, clock, referee
         self.before_cycle = before_cycle

@@ -102,7 +102,8 @@ class PathFollower(RobotKnowledgeSource):
             return False
         here = belief.value.world_from_robot(robot.world)
         leg, s = driving[0].value, self._settings.action
-        return self._is_long_enough(leg, here, robot.actuator) and abs(self._aim_error(leg, here)) <= s.max_rolling_start_error_rad
+        is_long = self._is_long_enough(leg, here, robot.actuator)
+        return is_long and abs(self._aim_error(leg, here)) <= s.max_rolling_start_error_rad
 
     def _must_stop(self, view: View) -> bool:
         belief, driving = find_belief(view), current_leg(view)
@@ -111,7 +112,8 @@ class PathFollower(RobotKnowledgeSource):
         robot = find_robot(view)
         here = belief.value.world_from_robot(robot.world)
         leg, s = driving[0].value, self._settings.action
-        return not self._is_long_enough(leg, here, robot.actuator) or abs(self._aim_error(leg, here)) > s.max_rolling_error_rad
+        is_long = self._is_long_enough(leg, here, robot.actuator)
+        return not is_long or abs(self._aim_error(leg, here)) > s.max_rolling_error_rad
 
     def _is_long_enough(self, leg: Leg, here: Pose2, actuator: ActuatorModel) -> bool:
         """Whether the robot can drive and still stop before the end of the leg."""

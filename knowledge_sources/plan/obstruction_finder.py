@@ -52,7 +52,8 @@ class ObstructionFinder(RobotKnowledgeSource):
                  for s, heading_rad in looks]
         if len(views) < self._settings.plan.min_obstruction_looks:
             return None
-        now = _find_in_last_looks(views, find_robot(view).camera, None if known is None else known.value, self._settings)
+        camera = find_robot(view).camera
+        now = _find_in_last_looks(views, camera, None if known is None else known.value, self._settings)
         return to_say(known, now, (*(s for s, _ in looks), *(() if known is None else (known,))))
 
 

@@ -11,7 +11,7 @@ from harvey.agent import build_agent
 from harvey.run_files.records import read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
-from harvey.runner.replay import open_pictures, replay
+from harvey.runner.replay import open_originals, replay
 from harvey.runner.resume import find_remains
 from harvey.simulation.run import resume_mission, run_mission
 from sim.scenario import parse_scenario, with_settings
@@ -51,7 +51,7 @@ def run(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
 
 def decided_again(run: RunDirectory) -> bool:
     agent = build_agent(RunHead.read(run.path))
-    return all(told.same for told in replay(run, open_pictures(run), agent.scheduler()))
+    return all(told.same for told in replay(run, open_originals(run, agent.store), agent.scheduler()))
 
 
 def test_each_picture_on_the_move_corrects_the_course_and_all_of_it_is_decided_again_to_the_byte(

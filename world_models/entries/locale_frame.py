@@ -54,6 +54,21 @@ class FrameChange:
         return f"{self.name} {said} ({self.by})"
 
 
+@dataclass(frozen=True, slots=True)
+class FrameReference:
+    """A locale frame as the journal has it.
+
+    Attributes:
+        world: fingerprint of the file that it comes from.
+        locale: its name.
+        changes: what is believed otherwise than that file says.
+    """
+
+    world: str
+    locale: str
+    changes: tuple[FrameChange, ...]
+
+
 def is_as_filed(frame: LocaleFrame) -> bool:
     return not frame.changes
 
@@ -87,7 +102,7 @@ def _path(view: View, name: str | None) -> Iterator[str]:
 class LocaleFrame:
     """What is known of a locale: its own frame (§3.4, Figures 5 to 8).
 
-    How well it is known stands in ``locale`` (the standard deviations of its survey) and in ``changes`` (who said what).
+    How well it is known stands in ``locale`` (standard deviations of its survey) and in ``changes`` (who said what).
 
     Attributes:
         world: fingerprint of the file that it comes from.
@@ -149,9 +164,9 @@ class LocaleFrame:
             frame = frame.changed(change)
         return frame
 
-    def journal_form(self) -> dict[str, Any]:
+    def journal_form(self) -> FrameReference:
         """By reference to the world's file; only what differs from it stands in the journal."""
-        return {"world": self.world, "locale": self.name, "changes": self.changes}
+        return FrameReference(self.world, self.name, self.changes)
 
     def sentence(self) -> str:
         changed = "".join(f"; {change.sentence()}" for change in self.changes)

@@ -190,7 +190,8 @@ def visible_points(
 
 def find_hidden(building: Building, camera: Camera, camera_from_world: Pose, points_world: Any) -> NDArray[np.bool_]:
     """(n,) which of the points (n, 3) [m, world] in front of the camera are hidden by surfaces of the model."""
-    return hidden_points(camera_from_world.apply(points_world), _CameraView(building, camera, camera_from_world).shadows())
+    view = _CameraView(building, camera, camera_from_world)
+    return hidden_points(camera_from_world.apply(points_world), view.shadows())
 
 
 class _CameraView:

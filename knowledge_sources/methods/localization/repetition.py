@@ -15,7 +15,8 @@ from world_models.frames import Pose2
 
 
 def find_repetitions(
-    building: Building, room: str, pose: Pose2, rooms: Sequence[str], settings: LocalizationSettings = DEFAULT.localization
+    building: Building, room: str, pose: Pose2, rooms: Sequence[str],
+    settings: LocalizationSettings = DEFAULT.localization,
 ) -> Iterator[tuple[str, Pose2]]:
     """Yield room and pose of every place in ``rooms`` that looks like ``pose`` in ``room`` by walls and doors alone.
 

@@ -19,7 +19,7 @@ from harvey.replay.repair import redraw
 from harvey.run_files.records import DecisionRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
-from harvey.runner.replay import open_pictures, replay
+from harvey.runner.replay import open_originals, open_pictures, replay
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
 from harvey.simulation.run import resume_mission, run_mission
@@ -57,7 +57,7 @@ def go_on(run: RunDirectory, stage: Stage) -> MissionResult:
 def decided_again(run: RunDirectory) -> bool:
     """Whether the whole journal, the crash included, comes out again byte for byte."""
     agent = build_agent(RunHead.read(run.path))
-    return all(told.same for told in replay(run, open_pictures(run), agent.scheduler()))
+    return all(told.same for told in replay(run, open_originals(run, agent.store), agent.scheduler()))
 
 
 def made_by(records: list[DecisionRecord], kind: str, which: int) -> int:
