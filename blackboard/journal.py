@@ -67,6 +67,7 @@ class Decision(NamedTuple):
         made: the changes of the act.
         refused: why an act was not applied (stale, raised, effect of a kind not its own), or "".
         used: the revisions of traced kinds that the act read, in order of kind and number.
+        left: what left memory (:mod:`blackboard.retention`). It follows from the rest, so no journal has it.
     """
 
     cycle: int
@@ -81,6 +82,7 @@ class Decision(NamedTuple):
     made: tuple[Change, ...] = ()
     refused: str = ""
     used: tuple[Ref, ...] = ()
+    left: tuple[Ref, ...] = ()
 
 
 Sink = Callable[[Decision], None]

@@ -15,7 +15,7 @@ from typing import Any
 from blackboard.agenda import Agenda
 from blackboard.board import Blackboard
 from blackboard.change import Change, Posted
-from blackboard.entry import Entry
+from blackboard.entry import Entry, Ref
 from blackboard.kinds import Kind, nothing
 
 
@@ -27,11 +27,14 @@ class Retention:
         self._kinds = kinds
         self._needing = tuple(value_type for value_type, kind in kinds.items() if kind.needs is not nothing)
 
-    def sweep(self, seen: Iterable[Change], board: Blackboard, agenda: Agenda, *, hold: bool = False) -> None:
-        """Note what was posted, and remove what is due. Its time follows the number of changes.
+    def sweep(
+        self, seen: Iterable[Change], board: Blackboard, agenda: Agenda, *, hold: bool = False
+    ) -> tuple[Ref, ...]:
+        """Note what was posted, and remove what is due; its last revisions. The time follows the number of changes.
 
         With ``hold`` all stays: an act waits for what it asked for, and may need anything that is there.
         """
+        left: list[Ref] = []
         for change in seen:
             ages = self._ages.get(type(change.entry.value)) if isinstance(change, Posted) else None
             if ages is None:
@@ -42,8 +45,10 @@ class Retention:
                     continue
                 if not hold and self._may_leave(entry, board, agenda):
                     board.forget(id)
+                    left.append(entry.ref)
                 else:
                     ages.put_back(id)
+        return tuple(left)
 
     def _may_leave(self, entry: Entry[Any], board: Blackboard, agenda: Agenda) -> bool:
         kind, view = self._kinds[type(entry.value)], board.view

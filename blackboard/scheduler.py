@@ -111,14 +111,14 @@ class Scheduler:
         obviated: list[Obviated] = []
         activated: list[Activation] = []
         fault = self._hear_bids(seen, activated, obviated)
-        self._retention.sweep(seen, self.board, agenda, hold=self._is_waiting)
+        left = self._retention.sweep(seen, self.board, agenda, hold=self._is_waiting)
         self._is_waiting = False
         focus = self._servoing.focus(self.view)
         chosen, runner_up, fault = (None, None, fault) if fault else self._two_best(focus, obviated)
         made, refused, used = self._execute(chosen) if chosen else ((), fault, ())
         decision = new_tuple(Decision, (
             self.cycle, seen, observed, focus, tuple(activated), tuple(obviated), chosen, runner_up, len(agenda), made,
-            refused, used,
+            refused, used, left,
         ))
         self._unseen = made
         for sink in self._sinks:

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from blackboard.board import View
 from blackboard.change import Change, Posted, Retracted, Revised
 from blackboard.effect import Effect, Post, Retract, Revise
+from blackboard.entry import Ref
 from blackboard.entry_store import Index
-from blackboard.journal import decision_line, entry_record
+from blackboard.journal import Decision, decision_line, entry_record
 from blackboard.kinds import Kind, Role
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
@@ -83,6 +84,42 @@ def test_decisions_are_the_same_with_it_and_without(program: list[Rule], notes_k
     lines, rest = run_board(program, {Note: keeping(notes_kept), Tally: keeping(tallies_kept)})
     assert lines == without
     assert len(rest.view) <= len(all_of_it.view)
+
+
+@settings(deadline=None, max_examples=40)
+@given(program=rules, notes_kept=keeps, tallies_kept=keeps)
+def test_a_decision_tells_what_left_memory_and_the_journal_does_not(
+    program: list[Rule], notes_kept: int, tallies_kept: int
+) -> None:
+    """Following the changes of each decision and what left gives the board, revision by revision."""
+    on_board: dict[str, Ref] = {}
+    decisions: list[Decision] = []
+
+    def follow(decision: Decision) -> None:
+        decisions.append(decision)
+        for change in decision.observed:
+            _follow(on_board, change)
+        for ref in decision.left:
+            assert on_board.pop(ref.id) == ref
+        for change in decision.made:
+            _follow(on_board, change)
+
+    scheduler = Scheduler(
+        [source_of(i, rule) for i, rule in enumerate(program)], sinks=[follow],
+        retention={Note: keeping(notes_kept), Tally: keeping(tallies_kept)},
+    )
+    for text in "abc":
+        scheduler.tell([Post(Note(text)), Post(Tally(len(text)))], "user")
+        run(scheduler, MOST_CYCLES // 3)
+        assert set(on_board.values()) == {entry.ref for kind in (Note, Tally) for entry in scheduler.view.all(kind)}
+    assert all(decision_line(d) == decision_line(d._replace(left=())) for d in decisions)
+
+
+def _follow(on_board: dict[str, Ref], change: Change) -> None:
+    if isinstance(change, Retracted):
+        on_board.pop(change.entry.id, None)
+    else:
+        on_board[change.entry.id] = change.entry.ref
 
 
 def chatter(retention: Mapping[type[Any], Kind], cycles: int, *, patient: bool = False) -> Scheduler:
