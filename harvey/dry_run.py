@@ -18,7 +18,7 @@ from blackboard.journal import Sink
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.scheduler import RAISED, Scheduler
-from harvey.runner.world_port import WorldPort, tell_robot
+from harvey.runner.world_port import build_scheduler
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.verification.milestone_preview import find_alias, predict_p_false
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
@@ -29,7 +29,6 @@ from world_models.building.world import World
 from world_models.entries.body import MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.task import Command, Milestone, Outcome, PlanSketch
-from world_models.frame_store import FrameStore
 from world_models.robot import RobotModel
 
 PLANNING_SOURCES = ("interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "elevator_rider",
@@ -121,10 +120,8 @@ def build_dry_run(
 ) -> Scheduler:
     """The planning knowledge sources round a board that knows the robot and can ask for the building."""
     sources = [source for source in knowledge_sources(settings) if source.name in PLANNING_SOURCES]
-    ports = IdealBodyPort(), WorldPort(FrameStore(world))
-    scheduler = Scheduler([*sources, AcceptEveryMilestone()], ports=ports, sinks=sinks)
-    tell_robot(scheduler, replace(robot, continuous=False))
-    return scheduler
+    return build_scheduler([*sources, AcceptEveryMilestone()], world, replace(robot, continuous=False),
+                           ports=(IdealBodyPort(),), sinks=sinks)
 
 
 def _previews(

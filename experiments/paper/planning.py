@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import replace
 
 import numpy as np
 from tqdm import tqdm
@@ -16,16 +15,13 @@ from tqdm import tqdm
 from blackboard.change import Quiescence
 from blackboard.effect import Post
 from blackboard.journal import Decision
-from blackboard.scheduler import Scheduler
 from experiments.report import Report
-from harvey.dry_run import PLANNING_SOURCES, AcceptEveryMilestone, IdealBodyPort
+from harvey.dry_run import build_dry_run
 from harvey.simulation.run import build_robot_model
-from harvey.wiring import knowledge_sources
-from knowledge_sources.methods.verification.predicted_colors import SURFACES
 from sim.scenario import Scenario, load_scenario
 from world_models.building.world import World
 from world_models.entries.task import Milestone, Outcome, PlanSketch
-from world_models.robot import RobotModel
+from world_models.files.world_files import load_world
 
 PAPER_MS = 5 * 60 * 1000.0
 MAX_MS = 100.0
@@ -64,11 +60,11 @@ class Clock:
 def run(quick: bool, seed: int) -> Report:
     """Plan the mission many times, each with a new agent and a world without cached views."""
     scenario = load_scenario("lab-to-allens-office")
-    robot = build_robot_model(scenario)
-    _plan_afresh(robot, scenario)
+    world = load_world(scenario.world)
+    _plan_afresh(world, scenario)
     turns = range(QUICK_REPETITIONS if quick else REPETITIONS)
     shown = tqdm(turns, file=sys.stderr, disable=not sys.stderr.isatty(), leave=False)
-    clocks = [_plan_afresh(robot, scenario) for _ in shown]
+    clocks = [_plan_afresh(world, scenario) for _ in shown]
     totals = [clock.total_ms for clock in clocks]
     best = clocks[int(np.argmin(totals))]
     rows = [("sketches", 3, best.sketches), ("milestones", 21, best.milestones),
@@ -91,15 +87,13 @@ def run(quick: bool, seed: int) -> Report:
     )
 
 
-def _plan_afresh(known: RobotModel, scenario: Scenario) -> Clock:
-    world = World(known.world.locale_source)
-    world.cache[SURFACES] = known.world.cache.setdefault(SURFACES, {})  # surfaces in arrays, laid out once
-    return plan(replace(known, world=world), scenario)
+def _plan_afresh(known: World, scenario: Scenario) -> Clock:
+    return plan(World(known.locale_source), scenario)  # results are kept with the frames of a world
 
 
-def plan(robot: RobotModel, scenario: Scenario) -> Clock:
+def plan(world: World, scenario: Scenario) -> Clock:
     """Dry-run a scenario's mission."""
-    mission = DryMission(robot, scenario)
+    mission = DryMission(world, scenario)
     while mission.step():
         pass
     return mission.clock
@@ -112,10 +106,9 @@ class DryMission:
         clock: time of the planners, and number of sketches and milestones.
     """
 
-    def __init__(self, robot: RobotModel, scenario: Scenario) -> None:
-        sources = [source for source in knowledge_sources(robot) if source.name in PLANNING_SOURCES]
+    def __init__(self, world: World, scenario: Scenario) -> None:
         self.clock = Clock()
-        self._scheduler = Scheduler([*sources, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(self.clock,))
+        self._scheduler = build_dry_run(world, build_robot_model(scenario, world), sinks=(self.clock,))
         self._scheduler.tell([Post(scenario.command)], "user")
 
     def step(self) -> bool:

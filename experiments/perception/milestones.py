@@ -186,9 +186,8 @@ def _worst(judged: Sequence[JudgedCase]) -> list[JudgedCase]:
 
 
 def _draw_worst(judged: JudgedCase, folder: Path) -> None:
-    robot = get_site(judged.floor).robot
     case = next(iter(generate_cases(judged.floor, judged.number, 1)))
-    draw_case(robot, case, folder / f"floor-{judged.floor}-case-{judged.number}.png")
+    draw_case(get_site(judged.floor), case, folder / f"floor-{judged.floor}-case-{judged.number}.png")
 
 
 def _draw_reliability(bins: Sequence[Bin], path: Path) -> None:

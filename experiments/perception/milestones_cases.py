@@ -206,7 +206,7 @@ def _draw_at_doors(here: Site, rng: np.random.Generator) -> tuple[Pose2, Pose2]:
 def _build_door_frames(here: Site) -> list[Pose2]:
     """Build a frame for each door of a corridor, with its y axis out of the wall."""
     frames = []
-    world = here.robot.world
+    world = here.floor.world
     for mark in world.landmarks:
         if mark.kind in ("door", "doorway") and mark.locale in here.floor.corridors:
             middle = mark.lines_world.reshape(-1, 3).mean(axis=0)

@@ -7,25 +7,24 @@ from pathlib import Path
 import numpy as np
 
 from experiments.chart import OURS, PEER
-from experiments.perception.milestones_cases import Case
+from experiments.perception.milestones_cases import Case, Site
 from experiments.perception.milestones_trials import certify
 from knowledge_sources.methods.features.images import decode_colour
 from knowledge_sources.methods.verification.line_check import check_lines
 from world_models.entries.percepts import PoseFix, Segments
 from world_models.entries.task import Certificate
-from world_models.robot import RobotModel
 
 
-def draw_case(robot: RobotModel, case: Case, path: Path) -> None:
+def draw_case(site: Site, case: Case, path: Path) -> None:
     """Draw matched lines in blue and the others in orange (PNG)."""
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
-    view = certify(robot, case)
+    view = certify(site, case)
     certificate, fix, segments = view.latest(Certificate), view.latest(PoseFix), view.latest(Segments)
     assert certificate is not None and fix is not None and segments is not None
     lines = np.array(case.milestone.expected, float).reshape(-1, 2, 3)
-    agreed = check_lines(robot, lines, segments.value.segments_px, fix.value.world_from_robot)
+    agreed = check_lines(site.robot, lines, segments.value.segments_px, fix.value.world_from_robot)
     figure = Figure(figsize=(6.0, 6.4), dpi=110, layout="constrained")
     axes = figure.add_subplot()
     axes.imshow(decode_colour(case.jpeg))

@@ -10,8 +10,8 @@ import numpy as np
 
 from blackboard.board import View
 from blackboard.effect import Effect, Post
-from blackboard.scheduler import Scheduler
-from experiments.perception.milestones_cases import MIN_DIFFERENCE, Case, generate_cases, get_site
+from experiments.perception.milestones_cases import MIN_DIFFERENCE, Case, Site, generate_cases, get_site
+from harvey.runner.world_port import build_scheduler
 from knowledge_sources.methods.verification.color_check import check_colors, decode_small_color
 from knowledge_sources.methods.verification.line_check import check_lines
 from knowledge_sources.methods.verification.pose_evidence import compute_evidence
@@ -19,11 +19,11 @@ from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.plan.matcher import Matcher
 from knowledge_sources.plan.med_r_and_t import MedRAndT
 from knowledge_sources.plan.milestone_judge import MilestoneJudge
+from knowledge_sources.settings import DEFAULT
 from world_models.entries.body import Frame
 from world_models.entries.percepts import PoseFix, Segments
 from world_models.entries.task import Certificate
 from world_models.frames import wrap_angle
-from world_models.robot import RobotModel
 
 MAX_SIGMAS, MARGIN_M, MARGIN_RAD = 3.0, 0.05, math.radians(0.6)
 """A pose is wrong if its error exceeds this many of its standard deviations plus the margin."""
@@ -77,15 +77,16 @@ class TrialResult:
 
 def judge_trial(trial: Trial) -> TrialResult:
     """Judge every case of a trial."""
-    robot = get_site(trial.floor).robot
-    out = [_judge_case(robot, trial.floor, number, case)
+    site = get_site(trial.floor)
+    out = [_judge_case(site, trial.floor, number, case)
            for number, case in enumerate(generate_cases(trial.floor, trial.first, trial.count), trial.first)]
     return TrialResult([{name: getattr(j, name) for name in JudgedCase.__slots__} for j in out])
 
 
-def certify(robot: RobotModel, case: Case) -> View:
+def certify(site: Site, case: Case) -> View:
     """Judge a case; returned is the board with its certificate."""
-    scheduler = Scheduler([LineFinder(robot), Matcher(robot), MedRAndT(robot), MilestoneJudge(robot)])
+    sources = [LineFinder(DEFAULT), Matcher(DEFAULT), MedRAndT(DEFAULT), MilestoneJudge(DEFAULT)]
+    scheduler = build_scheduler(sources, site.floor.world, site.robot)
     effects: list[Effect] = [Post(case.belief), Post(case.milestone), Post(Frame(case.jpeg, 0, 0.0, "milestone"))]
     scheduler.tell([Post(case.alternative), *effects] if case.alternative else effects, "case")
     while scheduler.view.latest(Certificate) is None:
@@ -95,8 +96,8 @@ def certify(robot: RobotModel, case: Case) -> View:
     return scheduler.view
 
 
-def _judge_case(robot: RobotModel, floor: int, number: int, case: Case) -> JudgedCase:
-    view = certify(robot, case)
+def _judge_case(site: Site, floor: int, number: int, case: Case) -> JudgedCase:
+    robot, view = site.robot, certify(site, case)
     certificate, fix, segments = view.latest(Certificate), view.latest(PoseFix), view.latest(Segments)
     assert certificate is not None and fix is not None and segments is not None
     c, pose, covariance = certificate.value, fix.value.world_from_robot, np.asarray(fix.value.covariance)

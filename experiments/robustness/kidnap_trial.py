@@ -10,12 +10,14 @@ from functools import lru_cache
 import numpy as np
 import shapely
 
+from blackboard.board import Blackboard
 from blackboard.effect import Post
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy, Servoing
 from harvey.runner.ports import BodyPort
 from harvey.runner.run import run_to_outcome
+from harvey.runner.world_port import build_scheduler
 from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.goal.relocalizer import Relocalizer
@@ -34,6 +36,8 @@ from world_models.entries.body import BodyFault, Frame
 from world_models.entries.kinds import KINDS
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.percepts import Panorama
+from world_models.frame_building import FrameBuilding
+from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 from world_models.units import FOOT_M
@@ -110,9 +114,17 @@ def _scene(floor: Floor) -> Scene:
     robot = RobotModel(floor.world, camera, CameraMount(1.0, 0.1, 0.0), ActuatorModel())
     real = floor.building
     building = Building.of_faces(real.faces, lambda pose: real.locale_at(pose.position) or "", 8)
-    for room in robot.world.rooms:
-        get_visibility_map(robot.world, room, robot.mount.height_m)
+    frames = _frames_of(floor.world)
+    for room in floor.world.rooms:
+        get_visibility_map(frames, room, robot.mount.height_m)
     return Scene(floor, robot, building)
+
+
+def _frames_of(world: World) -> FrameBuilding:
+    """Put all frames of a world on a board; what is computed from them is kept with them."""
+    board, store = Blackboard(), FrameStore(world)
+    board.apply([Post(store.frame(name)) for name in world.locales], author="world", cycle=0)
+    return FrameBuilding(board.view)
 
 
 def run_kidnap(trial: Kidnap) -> KidnapResult:
@@ -121,7 +133,7 @@ def run_kidnap(trial: Kidnap) -> KidnapResult:
     room, there, belief = _draw_poses(trial, scene.floor)
     body = SimulatedBody(scene.building, there, scene.robot.camera, scene.robot.mount, seed=trial.number)
     timed = _TimedBody(body)
-    scheduler = _build_lost_agent(scene.robot, timed, belief)
+    scheduler = _build_lost_agent(scene, timed, belief)
     began = time.process_time()
     run_to_outcome(scheduler, over=lambda s: "found" if _is_found(s) else None)
     cpu_s = time.process_time() - began - timed.cpu_s
@@ -155,10 +167,11 @@ class _TimedBody(FaultyBody):
             self.cpu_s += time.process_time() - began
 
 
-def _build_lost_agent(robot: RobotModel, body: FaultyBody, belief: Place) -> Scheduler:
+def _build_lost_agent(scene: Scene, body: FaultyBody, belief: Place) -> Scheduler:
     """Build a scheduler whose goal level is in doubt."""
-    sources = (LineFinder(robot), DeadReckoner(robot), Relocalizer(robot), MissionMonitor(robot))
-    scheduler = Scheduler(sources, ports=(BodyPort(body),), servoing=Servoing(), kinds=KINDS)
+    sources = (LineFinder(DEFAULT), DeadReckoner(DEFAULT), Relocalizer(DEFAULT), MissionMonitor(DEFAULT))
+    scheduler = build_scheduler(sources, scene.floor.world, scene.robot, ports=(BodyPort(body),), servoing=Servoing(),
+                                kinds=KINDS)
     held = Hypothesis(belief.locale, Pose2(belief.x_m, belief.y_m, belief.heading_rad or 0.0), diagonal(0.05, 0.02),
                       "milestone")
     bound_px = DEFAULT.plan.max_deviation_px

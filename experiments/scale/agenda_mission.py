@@ -8,17 +8,21 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from blackboard.board import View
-from blackboard.change import Change
-from blackboard.effect import Effect, Post
+from blackboard.change import Change, Posted
+from blackboard.effect import Effect, Post, Revise
 from blackboard.journal import Decision, decision_line
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Scheduler
 from experiments.wrappers import WrappedSource
-from harvey.simulation.run import build_robot_model, run_mission
+from harvey.simulation.run import run_mission
 from harvey.wiring import knowledge_sources, servoing
+from knowledge_sources.settings import DEFAULT
 from sim.scenario import Scenario, load_scenario
 from sim.stage import build_stage
 from world_models.entries.kinds import KINDS
+from world_models.entries.locale_frame import LocaleFrame
+from world_models.files.world_files import load_world
+from world_models.frame_store import FrameStore
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,12 +84,13 @@ def mission_cost(cycles: int | None, seed: int) -> Cost:
 
 
 def _time_replay(scenario: Scenario, recorded: list[Decision]) -> Cost:
-    timed = [_Timed(source) for source in knowledge_sources(build_robot_model(scenario))]
+    timed = [_Timed(source) for source in knowledge_sources(DEFAULT)]
     scheduler = Scheduler(timed, servoing=servoing(scenario.servo), kinds=KINDS)
+    store = FrameStore(load_world(scenario.world))
     lines_s, steps_s = 0.0, 0.0
     for decision in recorded:
         for change in decision.observed:
-            scheduler.tell([Post(change.entry.value, change.entry.because)], change.entry.author)
+            scheduler.tell([_effect_of(change, scheduler.view, store)], change.entry.author)
         began_s = time.process_time()
         again = scheduler.step()
         steps_s += time.process_time() - began_s
@@ -99,3 +104,10 @@ def _time_replay(scenario: Scenario, recorded: list[Decision]) -> Cost:
         len(recorded), sum(len(d.activated) for d in recorded), sum(len(d.obviated) for d in recorded),
         sources_s, steps_s - sources_s, lines_s, max(d.pending for d in recorded), len(scheduler.view),
     )
+
+
+def _effect_of(observed: Change, view: View, store: FrameStore) -> Effect:
+    """What makes the same change; frames come without what the recorded mission computed from them."""
+    entry = observed.entry
+    value = store.frame(entry.value.name) if isinstance(entry.value, LocaleFrame) else entry.value
+    return Post(value, entry.because) if isinstance(observed, Posted) else Revise(view[entry.id], value, entry.because)

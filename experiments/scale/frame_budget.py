@@ -19,7 +19,6 @@ from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario
 from sim.stage import build_stage
 from world_models.entries.body import Frame
-from world_models.robot import RobotModel
 
 SCENARIOS, QUICK_SCENARIOS = ("forty-foot-hallway", "lab-to-allens-office"), ("forty-foot-hallway",)
 DRIVES = 6
@@ -90,8 +89,8 @@ def _time_acts(scenario: str, seed: int) -> Times:
     times: Times = {}
     timed = frozenset((TRACK, *MILESTONE))
 
-    def sources(robot: RobotModel, settings: Settings) -> Sequence[KnowledgeSource]:
-        return [_Timed(ks, times) if ks.name in timed else ks for ks in knowledge_sources(robot, settings)]
+    def sources(settings: Settings) -> Sequence[KnowledgeSource]:
+        return [_Timed(ks, times) if ks.name in timed else ks for ks in knowledge_sources(settings)]
 
     run_mission(build_stage(load_scenario(scenario)), seed, sources=sources)
     return times

@@ -20,6 +20,7 @@ from logs.recording.writer import RecordingWriter, logger_classes
 from sim.body.simulated_body import SimulatedBody
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
+from world_models.files.world_files import load_world
 from world_models.frames import Pose2
 
 SCENARIOS, QUICK_SCENARIOS = ("lab-to-allens-office", "bump", "hallway-kidnap"), ("forty-foot-hallway",)
@@ -147,12 +148,13 @@ class _Bench:
 
     def __init__(self, stage: Stage, folder: Path) -> None:
         folder.mkdir()
-        robot, self._line = build_robot_model(stage.scenario), ""
+        world, self._line = load_world(stage.scenario.world), ""
+        robot = build_robot_model(stage.scenario, world)
         self._recorders = []
         for name in (REST, FRAMES, ALL):
             wanted = [one for one in logger_classes() if name == ALL or (one is Frames) == (name == FRAMES)]
             self._recorders.append(RecordingWriter(
-                folder / f"{name}.rrd", world=robot.world, camera=robot.camera, mount=robot.mount, title=name,
+                folder / f"{name}.rrd", world=world, camera=robot.camera, mount=robot.mount, title=name,
                 recording_id=name, line_of=lambda _decision: self._line, loggers=wanted))
         self._times_ms: list[list[float]] = [[] for _ in self._recorders]
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 from blackboard.change import Change, Posted
 from blackboard.effect import Effect, Post, Revise
-from blackboard.scheduler import Scheduler
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.scheduler import Port, Scheduler
+from world_models.building.world import World
 from world_models.entries.locale_frame import FrameRequest
 from world_models.frame_store import FrameStore
 from world_models.robot import RobotModel
@@ -34,3 +37,16 @@ class WorldPort:
 def tell_robot(scheduler: Scheduler, robot: RobotModel) -> None:
     """Put what a robot knows of itself on the board: the first thing that it is told."""
     scheduler.tell([Post(entry) for entry in robot.entries()], "robot")
+
+
+def build_scheduler(
+    sources: Sequence[KnowledgeSource], world: World, robot: RobotModel, *, ports: Sequence[Port] = (), **more: Any
+) -> Scheduler:
+    """Knowledge sources round a board that knows the robot and can ask for the building.
+
+    Args:
+        ports: to the body; more: as for :class:`blackboard.scheduler.Scheduler`.
+    """
+    scheduler = Scheduler(sources, ports=(*ports, WorldPort(FrameStore(world))), **more)
+    tell_robot(scheduler, robot)
+    return scheduler

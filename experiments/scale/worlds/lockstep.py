@@ -14,15 +14,18 @@ import time
 from collections.abc import Callable, Sequence
 
 from blackboard.effect import Post
-from blackboard.scheduler import Scheduler
 from experiments.paper.planning import DryMission
 from experiments.scale.worlds.probe import build_probe_stage
 from harvey.runner.ports import BodyPort
+from harvey.runner.world_port import build_scheduler
 from harvey.simulation.run import build_robot_model
 from harvey.wiring import knowledge_sources, servoing
+from knowledge_sources.settings import DEFAULT
 from sim.body.faulty_body import FaultyBody
 from sim.stage import Stage
 from world_models.entries.body import MotorCommand
+from world_models.entries.kinds import KINDS
+from world_models.files.world_files import load_world
 
 Step = Callable[[], bool]
 """Makes one decision; False when done."""
@@ -35,16 +38,17 @@ def main(goal: str, seed: str, starts: str, plans: str, *paths: str) -> None:
         agents = [_start(stage, int(seed)) for stage in stages]
         print(json.dumps({"start": decide_in_turn(agents, turn)}), flush=True)
     for turn in range(int(plans)):
-        missions = [DryMission(build_robot_model(stage.scenario), stage.scenario) for stage in stages]
+        missions = [DryMission(load_world(stage.scenario.world), stage.scenario) for stage in stages]
         decide_in_turn([mission.step for mission in missions], turn)
         print(json.dumps({"plan": [mission.clock.steps_ms for mission in missions]}), flush=True)
 
 
 def _start(stage: Stage, seed: int) -> Step:
     """Build a new agent with its body; it is done at its first motor command."""
-    robot = build_robot_model(stage.scenario)
-    scheduler = Scheduler(knowledge_sources(robot), ports=(BodyPort(FaultyBody(stage.body(seed))),),
-                          servoing=servoing(stage.scenario.servo))
+    world = load_world(stage.scenario.world)
+    scheduler = build_scheduler(
+        knowledge_sources(DEFAULT), world, build_robot_model(stage.scenario, world),
+        ports=(BodyPort(FaultyBody(stage.body(seed))),), servoing=servoing(stage.scenario.servo), kinds=KINDS)
     scheduler.tell([Post(stage.scenario.command)], "user")
 
     def step() -> bool:

@@ -15,16 +15,19 @@ from typing import Any
 
 from blackboard.effect import Post
 from blackboard.journal import Decision, decision_line
-from blackboard.scheduler import Scheduler
 from harvey.runner.ports import BodyPort
 from harvey.runner.run import run_to_outcome
+from harvey.runner.world_port import build_scheduler
 from harvey.simulation.run import build_robot_model
 from harvey.wiring import knowledge_sources, servoing
+from knowledge_sources.settings import DEFAULT
 from sim.body.faulty_body import FaultyBody
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from world_models.building.world import World
+from world_models.entries.kinds import KINDS
 from world_models.files.compiled.sqlite_locales import SqliteLocales
+from world_models.files.world_files import load_world
 
 SCENARIO = """
 world = "{world}"
@@ -81,7 +84,7 @@ def peak_mb() -> float:
 
 def _open(stage: Stage) -> dict[str, Any]:
     began = time.process_time()
-    world = build_robot_model(stage.scenario).world
+    world = load_world(stage.scenario.world)
     open_ms = 1000.0 * (time.process_time() - began)
     return {"open_ms": open_ms, "far_ms": _time_far_route_ms(world)}
 
@@ -100,12 +103,14 @@ def _time_far_route_ms(world: World) -> float:
 
 
 def _drive(stage: Stage, seed: int) -> dict[str, Any]:
-    watcher, robot = _Watcher(), build_robot_model(stage.scenario)
-    scheduler = Scheduler(knowledge_sources(robot), ports=(BodyPort(FaultyBody(stage.body(seed))),),
-                          servoing=servoing(stage.scenario.servo), sinks=(watcher,))
+    watcher, world = _Watcher(), load_world(stage.scenario.world)
+    scheduler = build_scheduler(
+        knowledge_sources(DEFAULT), world, build_robot_model(stage.scenario, world),
+        ports=(BodyPort(FaultyBody(stage.body(seed))),), servoing=servoing(stage.scenario.servo), sinks=(watcher,),
+        kinds=KINDS)
     scheduler.tell([Post(stage.scenario.command)], "user")
     outcome = run_to_outcome(scheduler)
-    frames = robot.world.locale_source
+    frames = world.locale_source
     assert isinstance(frames, SqliteLocales)
     return {"outcome": outcome.kind, "journal": watcher.journal, "decisions": watcher.decisions,
             "touched": len(frames.touched), "frames": frames.touched}
