@@ -48,9 +48,11 @@ from sim.scenario import FORMAT, Scenario, ScenarioError, load_scenario, with_se
 from sim.stage import build_stage
 from world_models.building.world import World
 from world_models.entries.body import Frame
+from world_models.entries.locale_frame import LocaleFrame
 from world_models.entries.location import Hypothesis
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import load_world, read_world
+from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
 
 T = TypeVar("T")
@@ -181,6 +183,10 @@ class RecordedRun:
     def _kinds(self) -> Registry:
         return registry_of(self._sources, wiring.load_kinds().values())
 
+    @cached_property
+    def _store(self) -> FrameStore:
+        return FrameStore(self.head.load_world(), self.head.world_sha256)
+
     @property
     def result(self) -> Mapping[str, Any]:
         """``result.json``; empty where the run was cut off. Raises BadInput."""
@@ -208,7 +214,8 @@ class RecordedRun:
         """
         for record in self.records():
             if record.change != "Retracted" and (kind is None or record.type == kind.__name__):
-                yield entry_of(record, self._kinds)
+                store = self._store if record.type == LocaleFrame.__name__ else None
+                yield entry_of(record, self._kinds, store)
 
     def pictures(self) -> Iterator[Picture]:
         """The camera's pictures, in order. Raises BadInput where they are missing."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from blackboard.board import View
 from blackboard.effect import Effect, Post, Retract, Revise
@@ -16,7 +16,9 @@ from harvey.run_files.decoding import decode
 from harvey.run_files.records import EntryRecord
 from logs.camera_file import Pictures
 from world_models.entries.locale_frame import FrameReference, LocaleFrame
-from world_models.frame_store import FrameStore
+
+if TYPE_CHECKING:  # an explanation starts fast only where no world is imported that it does not need
+    from world_models.frame_store import FrameStore
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,17 +99,24 @@ def find_kind(record: EntryRecord, kinds: Registry) -> type[Any]:
     return kinds[record.type]
 
 
-def entry_of(record: EntryRecord, kinds: Registry) -> Entry[Any]:
+def entry_of(record: EntryRecord, kinds: Registry, store: FrameStore | None = None) -> Entry[Any]:
     """An entry as it stood on the board, but for the bytes of a picture, which the journal does not keep.
+
+    A locale frame comes from the store; without a store, the reference to it that the journal keeps is the value.
 
     Raises:
         BadInput: the value is of a kind that is not known, or does not fit it.
     """
     value = {**record.value, "jpeg": b""} if record.type == "Frame" and isinstance(record.value, dict) else record.value
-    try:
-        restored = decode(value, find_kind(record, kinds))
-    except (ValueError, TypeError) as error:
-        raise BadInput(f"{record.ref}: expected a {record.type} as this version has it, got another: {error}") from None
+    kind = find_kind(record, kinds)
+    if kind is LocaleFrame and store is not None:
+        restored: Any = restore_frame(record, store)
+    else:
+        try:
+            restored = decode(value, FrameReference if kind is LocaleFrame else kind)
+        except (ValueError, TypeError) as error:
+            what = f"expected a {record.type} as this version has it, got another"
+            raise BadInput(f"{record.ref}: {what}: {error}") from None
     ref = ref_of(record.ref)
     return Entry(ref.id, ref.revision, restored, record.author, cycle_of_writing(record), refs_of(record.because))
 

@@ -11,6 +11,9 @@ from typing import Any
 from harvey.errors import BadInput
 from logs.journal_file import JournalError, read_journal
 
+REQUEST = "FrameRequest"
+"""The type of what an act asks for that lacks a locale frame."""
+
 
 @dataclass(frozen=True, slots=True)
 class EntryRecord:
@@ -73,8 +76,14 @@ class DecisionRecord:
     pending: int
     made: tuple[EntryRecord, ...]
     refused: str
-    used: tuple[str, ...]
     data: Mapping[str, Any]
+    used: tuple[str, ...] = ()
+
+    @property
+    def asks(self) -> EntryRecord | None:
+        """What the act lacked and asked for, where that was all that it did: it comes again when it is answered."""
+        is_request = len(self.made) == 1 and self.made[0].type == REQUEST and self.made[0].change == "Posted"
+        return self.made[0] if is_request else None
 
     @property
     def line(self) -> str:
@@ -128,8 +137,8 @@ def decision_of(data: Any) -> DecisionRecord:
         pending=_get(data, "pending", int),
         made=tuple(_entry(item, cycle, False) for item in _get(data, "made", list)),
         refused=_get(data, "refused", str),
-        used=_texts(data, "used") if "used" in data else (),
         data=data,
+        used=_texts(data, "used") if "used" in data else (),
     )
 
 

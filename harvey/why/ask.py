@@ -11,7 +11,7 @@ from typing import Any
 
 from blackboard.board import Blackboard, View
 from blackboard.change import Change, Posted, Retracted, Revised
-from blackboard.effect import Effect, Post, Retract, Revise
+from blackboard.effect import Effect, MissingEntryError, Post, Retract, Revise
 from blackboard.entry import Entry
 from blackboard.entry_store import Index
 from blackboard.kinds import Registry, always
@@ -22,23 +22,26 @@ from harvey.run_files.observations import cycle_of_writing, entry_of, refs_of
 from harvey.run_files.records import EntryRecord
 from harvey.why.history import History
 from harvey.why.links import words
+from world_models.frame_store import FrameStore
 from world_models.words import sentence
 
 CHANGES: Mapping[str, type[Change]] = {"Posted": Posted, "Revised": Revised, "Retracted": Retracted}
 
 
-def why_absent(history: History, source: KnowledgeSource, cycle: int, kinds: Registry) -> Iterator[str]:
+def why_absent(
+    history: History, source: KnowledgeSource, cycle: int, kinds: Registry, store: FrameStore
+) -> Iterator[str]:
     """Why a knowledge source was not among those that could act in a cycle, in sentences.
 
     Raises:
         BadInput: the run has no such cycle, or a value of the journal is not of its type.
     """
-    seen = changes(history, cycle, kinds)
+    seen = changes(history, cycle, kinds, store)
     woken = [change for change in seen if any(watch.sees(change) for watch in source.watches)]
     if not woken:
         yield from _tell_why_not_triggered(source, seen, cycle)
         return
-    board = board_at(history, cycle, kinds)
+    board = board_at(history, cycle, kinds, store)
     for change in woken:
         yield from _ask_rating(source, board, change)
 
@@ -66,7 +69,12 @@ def _ask_rating(source: KnowledgeSource, board: Blackboard, change: Change) -> I
         yield f"{ref} would have woken the {name}, but was {f'{now.ref} already' if now else 'withdrawn already'}."
         return
     view = AskedView(board)
-    rating = source.rate(view, change)
+    try:
+        rating = source.rate(view, change)
+    except MissingEntryError as missing:
+        yield (f"{ref} woke the {name}; asked again, it lacks something to tell whether it could act:"
+               f" it {sentence(missing.request)}.")
+        return
     if rating is not None:
         yield f"{ref} woke the {name}; asked again, it says that it could have acted, rated {rating:.2f}."
         return
@@ -129,15 +137,15 @@ def _by(index: Index[Any], key: Any) -> str:
     return f"{what} ({key} level)" if isinstance(key, Level) else f"{what} ({key})"
 
 
-def changes(history: History, cycle: int, kinds: Registry) -> tuple[Change, ...]:
+def changes(history: History, cycle: int, kinds: Registry, store: FrameStore) -> tuple[Change, ...]:
     """What a cycle took up: what the one before had made, and what came from outside. Raises BadInput."""
     decision = history.decision(cycle)
     outside = {r.ref for r in decision.observed}
     before = [r for r in history.written_by(cycle - 1) if r.ref in decision.seen and r.ref not in outside]
-    return tuple(CHANGES.get(r.change, Posted)(entry_of(r, kinds)) for r in (*before, *decision.observed))
+    return tuple(CHANGES.get(r.change, Posted)(entry_of(r, kinds, store)) for r in (*before, *decision.observed))
 
 
-def board_at(history: History, cycle: int, kinds: Registry) -> Blackboard:
+def board_at(history: History, cycle: int, kinds: Registry, store: FrameStore) -> Blackboard:
     """The board as knowledge sources saw it when they were asked in a cycle. Raises BadInput."""
     told: list[EntryRecord] = []
     for one in history.cycles:
@@ -147,7 +155,7 @@ def board_at(history: History, cycle: int, kinds: Registry) -> Blackboard:
         told += (*decision.observed, *(decision.made if one < cycle else ()))
     last = {record.id: record for record in told}
     # older revisions cannot be seen any more, so each value is made once
-    values = {id: entry_of(record, kinds).value for id, record in last.items()}
+    values = {id: entry_of(record, kinds, store).value for id, record in last.items()}
     board = Blackboard()
     for record in told:
         board.apply([_effect(board, record, values[record.id])], author=record.author, cycle=cycle_of_writing(record))

@@ -77,13 +77,13 @@ class History(ABC):
             BadInput: the run has no such cycle.
         """
         decision = self.decision(cycle)
-        wanted = decision.pending + (decision.chosen is not None)
+        wanted = decision.pending + (decision.chosen is not None and decision.asks is None)
         gone: set[int] = set()
         found: dict[int, Candidate] = {}
         for one in reversed(self.cycles[: bisect_right(self.cycles, cycle)]):
             past = self.decision(one)
             gone.update(c.number for c in past.obviated)
-            if past.chosen is not None and one != cycle:
+            if past.chosen is not None and past.asks is None and one != cycle:
                 gone.add(past.chosen.number)
             found.update((c.number, c) for c in past.activated if c.number not in gone)
             if len(found) >= wanted:

@@ -33,7 +33,8 @@ class Trace:
             candidates.pop(dropped.number, None)
         chosen = decision.chosen
         yield from cycle_lines(decision, _rank(candidates.values(), chosen))
-        self._pending = {n: c for n, c in candidates.items() if chosen is None or n != chosen.number}
+        gone = chosen.number if chosen is not None and decision.asks is None else None
+        self._pending = {number: c for number, c in candidates.items() if number != gone}
 
 
 def cycle_lines(decision: DecisionRecord, candidates: Iterable[Candidate]) -> Iterator[str]:

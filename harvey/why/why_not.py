@@ -30,6 +30,7 @@ class Fate(Enum):
     """What became of a knowledge source in a cycle."""
 
     ACTED = "acted"
+    ASKED = "asked for what it lacked"
     REFUSED = "acted, and was refused"
     DROPPED = "was dropped"
     OUTRANKED = "was not chosen"
@@ -66,6 +67,8 @@ def in_cycle(history: History, source: str, cycle: int) -> tuple[Occasion, ...]:
             found.append(Occasion(cycle, Fate.OUTRANKED, c.trigger, _tell_ranking(c, decision)))
         elif decision.refused:
             found.append(Occasion(cycle, Fate.REFUSED, c.trigger, _tell_refusal(decision)))
+        elif decision.asks is not None:
+            found.append(Occasion(cycle, Fate.ASKED, c.trigger, _tell_question(decision.asks)))
         else:
             found.append(Occasion(cycle, Fate.ACTED, c.trigger, f"it was the best there was, rated {c.rating:.2f}"))
     return tuple(found)
@@ -83,7 +86,7 @@ def in_run(history: History, source: str) -> tuple[Occasion, ...]:
             if open_.pop(c.number, None) is not None:
                 ended.append(Occasion(last, Fate.DROPPED, c.trigger, _tell_drop(c)))
         chosen = decision.chosen
-        if chosen is not None and open_.pop(chosen.number, None) is not None:
+        if decision.asks is None and chosen is not None and open_.pop(chosen.number, None) is not None:
             fate, why = (Fate.REFUSED, _tell_refusal(decision)) if decision.refused else (Fate.ACTED, _did(decision))
             ended.append(Occasion(last, fate, chosen.trigger, why))
     ended += [Occasion(last, Fate.OUTRANKED, c.trigger, "it was still waiting when the run ended")
@@ -99,6 +102,10 @@ def _tell_drop(c: Candidate) -> str:
 
 def _did(decision: DecisionRecord) -> str:
     return f"it made {', '.join(r.ref for r in decision.made) or 'nothing'}"
+
+
+def _tell_question(request: EntryRecord) -> str:
+    return f"its act waited for the answer to {request.ref}: {sentence(request)}"
 
 
 def _tell_refusal(decision: DecisionRecord) -> str:
@@ -189,7 +196,11 @@ def _use(history: History, record: EntryRecord) -> Iterator[str]:
         fates += [f"  cycle {decision.cycle}: it woke the {words(c.source)}, which was dropped: {_tell_drop(c)}."
                   for c in decision.obviated if c.trigger == record.ref]
         if decision.chosen is not None and decision.chosen.trigger == record.ref:
+            who = words(decision.chosen.source)
+            if decision.asks is not None:
+                fates.append(f"  cycle {decision.cycle}: it woke the {who}, and {_tell_question(decision.asks)}.")
+                continue
             how = _tell_refusal(decision) if decision.refused else _did(decision)
-            fates.append(f"  cycle {decision.cycle}: it woke the {words(decision.chosen.source)}, which acted: {how}.")
+            fates.append(f"  cycle {decision.cycle}: it woke the {who}, which acted: {how}.")
     yield from fates or ["  It woke nobody who then acted."]
     yield f"Resting on it: {', '.join(dict.fromkeys(resting))}." if resting else "Nothing rests on it."

@@ -35,7 +35,7 @@ def answers(run: RunDirectory, history: History, name: str, cycle: int | None) -
             yield f"In cycle {cycle} the {words(source)} {one.fate.value} on {one.trigger}: {one.why}."
     else:
         yield from _ask_again(run, history, source, cycle)
-    yield from _instead(history, cycle, any(one.fate is Fate.ACTED for one in found))
+    yield from _instead(history, cycle, any(one.fate in (Fate.ACTED, Fate.ASKED) for one in found))
 
 
 def _instead(history: History, cycle: int, acted: bool) -> Iterator[str]:
@@ -74,7 +74,7 @@ def _ask_again(run: RunDirectory, history: History, source: str, cycle: int) -> 
     if not agent.servoing.allows(named.closes):
         yield f"The {named.closes} level of servoing was off, and the {words(source)} closes it."
     else:
-        yield from why_absent(history, named, cycle, agent.kinds)
+        yield from why_absent(history, named, cycle, agent.kinds, agent.store)
 
 
 def _find(source: str, sources: tuple[KnowledgeSource, ...]) -> KnowledgeSource:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 MIN_AREA_M2, MIN_SIDE_M, MIN_GAP_M = 1e-4, 0.01, 1e-3
@@ -52,6 +51,8 @@ def is_simple(outline: NDArray[np.float64]) -> bool:
 
     Sides that share no corner must be 1 mm apart, and no corner may lie within 1 mm of the side before last.
     """
+    import shapely  # slow to import, and of all that entries need only used here
+
     ahead = np.roll(outline, -1, axis=0)
     area = 0.5 * float(np.sum(outline[:, 0] * ahead[:, 1] - outline[:, 1] * ahead[:, 0]))
     if area < MIN_AREA_M2 or np.linalg.norm(ahead - outline, axis=1).min() < MIN_SIDE_M:

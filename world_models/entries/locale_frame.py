@@ -68,6 +68,13 @@ class FrameReference:
     locale: str
     changes: tuple[FrameChange, ...]
 
+    def sentence(self) -> str:
+        return f"what is known of {self.locale}{_tell_changes(self.changes)}"
+
+
+def _tell_changes(changes: Iterable[FrameChange]) -> str:
+    return "".join(f"; {change.sentence()}" for change in changes)
+
 
 def is_as_filed(frame: LocaleFrame) -> bool:
     return not frame.changes
@@ -169,11 +176,10 @@ class LocaleFrame:
         return FrameReference(self.world, self.name, self.changes)
 
     def sentence(self) -> str:
-        changed = "".join(f"; {change.sentence()}" for change in self.changes)
         parent = f" in {self.locale.parent}" if self.locale.parent else ""
         held = (f"{words.count(len(self.children), 'locale')} in it" if self.children else
                 f"{words.count(len(self.doorways), 'open door')}, {words.count(len(self.things), 'thing')}")
-        return f"what is known of {self.name}{parent}: {held}{changed}; from {self.locale.source}"
+        return f"what is known of {self.name}{parent}: {held}{_tell_changes(self.changes)}; from {self.locale.source}"
 
 
 FRAME_OF: Index[LocaleFrame] = Index(LocaleFrame, lambda frame: frame.name, "frame")
@@ -220,13 +226,17 @@ class FrameRequest:
     status: RequestStatus = "asked"
     answers: tuple[FrameAnswer, ...] = ()
 
-    def sentence(self) -> str:
+    def wanted(self) -> str:
+        """What is asked: ``what is known of hallway``."""
         frames = words.listed([name or "the whole building" for name in self.locales], 6)
         asked = [f"what is known of {frames}"] if frames else []
         asked += [f"where {words.listed([*self.called, *self.elements], 6)} is"] * bool(self.called or self.elements)
+        return " and ".join(asked)
+
+    def sentence(self) -> str:
         said = [answer.error or f"{answer.asked} is in {' and '.join(answer.locales)}" for answer in self.answers]
         answered = f"; answered{': ' * bool(said)}{', '.join(said)}" * has_answer(self)
-        return f"asks {' and '.join(asked)}{answered}"
+        return f"asks {self.wanted()}{answered}"
 
 
 ANSWERED: Index[FrameRequest] = Index(FrameRequest, lambda r: has_answer(r) or None, "answered")
