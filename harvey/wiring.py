@@ -18,8 +18,10 @@ from knowledge_sources.action.correlator_tracker import CorrelatorTracker
 from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.action.elevator_rider import ElevatorRider
 from knowledge_sources.action.fault_handler import FaultHandler
+from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.action.motor import Motor
 from knowledge_sources.action.path_follower import PathFollower
+from knowledge_sources.action.withdrawer import Withdrawer
 from knowledge_sources.goal.interpreter import Interpreter
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.goal.relocalizer import Relocalizer
@@ -56,6 +58,8 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     Escalator,
     Relocalizer,
     FaultHandler,
+    ModelReviser,
+    Withdrawer,
     MissionMonitor,
 )
 """Every knowledge source. The order does not matter: control comes from triggers, ratings and levels."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 
 from blackboard.board import Blackboard, View
@@ -11,6 +12,7 @@ from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
 from knowledge_sources.settings.action import ActionSettings
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand
+from world_models.entries.locale_frame import FRAME_OF, LocaleFrame
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import Tracks
@@ -62,6 +64,13 @@ def find_robot_in(view: View, locale: str) -> RobotModel:
 def find_building(view: View) -> FrameBuilding:
     """The building as far as its frames are on the board; asking for more asks the world for it."""
     return FrameBuilding(view)
+
+
+def find_frames(view: View, locales: Iterable[str]) -> tuple[Entry[LocaleFrame], ...]:
+    """The frames of locales, by name. Raises MissingEntryError for those that are not on the board."""
+    names = sorted(set(locales))
+    find_building(view).require(names)
+    return tuple(entry for name in names if (entry := view.newest(FRAME_OF, name)) is not None)
 
 
 def has_followed(view: View, settings: ActionSettings) -> bool:

@@ -60,6 +60,9 @@ class FrameBuilding(Building):
     def locale(self, name: str) -> Locale:
         return self.locale_source.frame(name).locale
 
+    def shut_doorways(self) -> tuple[Doorway, ...]:
+        return self.locale_source.shut_doorways()
+
     def require(self, names: Iterable[str]) -> None:
         """Ask for the frames of several locales at once, where any is not there. Raises MissingEntryError."""
         self.locale_source.require(names)
@@ -83,6 +86,14 @@ class FrameBuilding(Building):
             MissingEntryError: the world was not asked yet; ValueError: no room, or more than one, answers to one.
         """
         return self.locale_source.find_rooms(phrases)
+
+    def find_elements(self, name: str) -> tuple[str, ...]:
+        """The locales that have a door, elevator, thing, landmark or face of a name.
+
+        Raises:
+            MissingEntryError: the world was not asked yet; ValueError: there is none.
+        """
+        return self.locale_source.find_elements(name)
 
     def is_walkable(self, origin: str, destination: str, max_rooms: int) -> bool:
         """Whether people can walk there by doors and stairs, as far as a search of ``max_rooms`` rooms tells."""
@@ -227,10 +238,20 @@ class FrameLocales:
     def components(self, locale: str) -> tuple[int, ...]:
         return self.frame(locale).components
 
-    def shut(self) -> frozenset[str]:
-        """The doors that are believed shut; a frame that says so never leaves the board."""
+    def shut_doorways(self) -> tuple[Doorway, ...]:
+        """The doorways that are believed shut; a frame that says so never leaves the board."""
         frames = (self._note(entry.value) for entry in self._view.having(CHANGED, True))
-        return frozenset(name for frame in frames for name in frame.shut)
+        return tuple({doorway.name: doorway for frame in frames for doorway in frame.shut_doorways}.values())
+
+    def find_elements(self, name: str) -> tuple[str, ...]:
+        """See :meth:`FrameBuilding.find_elements`."""
+        for request in self._view.having(ANSWERED, True):
+            for answer in request.value.answers:
+                if answer.asked == name and name in request.value.elements:
+                    if answer.error:
+                        raise ValueError(answer.error)
+                    return answer.locales
+        raise MissingEntryError(FrameRequest(elements=(name,)))
 
 
 def _reaches_height(extent: LocaleExtent, z_m: float, margin_m: float) -> bool:

@@ -70,7 +70,7 @@ def _hardware_run(
         agent = build_agent(head)
         with stop_key(body.stop_for_good), Heartbeat(base) as heartbeat:
             recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, whole=whole)
-            yield Run(head, agent, body, recorder, limits=mission.limits, clock=clock, sinks=sinks,
+            yield Run(head, agent, body, recorder, limits=mission.limits, clock=clock, sinks=sinks, told=mission.told,
                       before_cycle=heartbeat.tick)
     finally:
         base.close()

@@ -20,12 +20,13 @@ from harvey.run_files.run_head import RunHead
 from harvey.run_files.run_recorder import RunRecorder
 from harvey.runner.ports import Body, BodyPort
 from harvey.runner.result import UNFINISHED, MissionResult, RunCounts
+from harvey.runner.teller import Teller
 from harvey.runner.world_port import WorldPort, tell_robot
 from logs.disk import CannotWriteError
 from logs.errors import RecordingError
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, Outcome
-from world_models.files.toml.mission import Limits
+from world_models.files.toml.mission import Limits, Telling
 
 MIN_FREE_BYTES = 1 << 18
 """A disk with less room than this is full."""
@@ -59,13 +60,12 @@ class Run:
         ports: that one and the world's, as the agent has them.
         scheduler: the agent at work.
         store: of the locale frames.
-        before_cycle: called before each cycle.
     """
 
     def __init__(
         self, head: RunHead, agent: Agent, body: Body, recorder: RunRecorder, *, limits: Limits,
         clock: Callable[[], float], referee: Referee | None = None, sinks: Sequence[Sink] = (),
-        before_cycle: Callable[[], None] = lambda: None,
+        told: Sequence[Telling] = (), before_cycle: Callable[[], None] = lambda: None,
     ) -> None:
         """Put a run together.
 
@@ -73,11 +73,13 @@ class Run:
             limits: when to give up; clock: the body's time, by which that is judged [s].
             referee: who knows the truth; None on hardware.
             sinks: called with every decision.
+            told: what somebody tells it on the way.
+            before_cycle: called before each cycle.
         """
         self._began_s, self._robot, self.store = time.perf_counter(), agent.robot, agent.store
         self.head, self.body, self.recorder = head, body, recorder
         self._limits, self._clock, self._referee = limits, clock, referee
-        self.before_cycle = before_cycle
+        self._teller, self._before = Teller(told, clock), before_cycle
         self.port = BodyPort(body)
         self.recorded_port = recorder.record_port(self.port)
         self.ports = self.recorded_port, recorder.record_port(WorldPort(agent.store))
@@ -95,6 +97,12 @@ class Run:
     def go_on(self, last: Decision | None = None) -> Outcome:
         """To the outcome, from wherever the board is; ``last`` is the last decision of a run that was cut off."""
         return run_to_outcome(self.scheduler, over=self.over, before=self.before_cycle, last=last)
+
+    def before_cycle(self) -> None:
+        """What comes before each cycle; while a run is only replayed, the journal says what was told."""
+        self._before()
+        if not self.recorder.replaying:
+            self._teller.tell(self.scheduler)
 
     def over(self, scheduler: Scheduler) -> str | None:
         """Why it has to end now, if it has."""

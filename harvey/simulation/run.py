@@ -138,7 +138,7 @@ class SimulatedRun(Run):
         super().__init__(
             head, agent, reached, recorder, limits=stage.scenario.limits, clock=lambda: body.truth.time_s,
             referee=Referee(agent.world, stage, body), sinks=sinks,
-            before_cycle=self._draw_truth)
+            told=stage.scenario.told, before_cycle=self._draw_truth)
         self.body_replay = BodyReplay(self.port, body, head.seed, stage.scenario.actuator)
 
     def _draw_truth(self) -> None:

@@ -24,6 +24,7 @@ from knowledge_sources.questions import (
     deepest_sketch,
     find_belief,
     find_building,
+    find_frames,
     find_robot_in,
     has_followed,
     is_over,
@@ -126,7 +127,8 @@ class MilestoneSelector(RobotKnowledgeSource):
             return
         m, (robot, pose) = waiting.value, _find_robot_and_pose(view, belief.value)
         seen = predict_milestone(robot, pose, m, _car_of(view.get(m.sketch), m.index), self._settings)
-        yield Revise(waiting, seen, (hidden, waiting, belief))
+        frames = find_frames(view, _list_locales(robot, pose, belief.value, self._settings))
+        yield Revise(waiting, seen, (hidden, waiting, belief, *frames))
 
     def _propose(self, view: View, sketch: Entry[PlanSketch], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         """Propose the milestone before the sketch's next subgoal, seen in the first good direction."""
@@ -149,7 +151,8 @@ class MilestoneSelector(RobotKnowledgeSource):
         expected = predict_milestone(robot, pose, milestone, car, self._settings)
         if not has_followed(view, self._settings.action) or open_discrepancy(view, Level.PLAN) is not None:
             precompute_views(robot, belief.value.locale, pose, self._settings)  # the judge asks: another door?
-        because = (task, belief) if hidden is None else (task, belief, hidden)
+        frames = find_frames(view, _list_locales(robot, pose, belief.value, self._settings))
+        because = (task, belief, *frames) if hidden is None else (task, belief, hidden, *frames)
         wish = Post(expected, because) if old is None else Revise(old, expected, because)
         yield wish
         yield Post(Look("milestone"), (wish,))
@@ -188,6 +191,13 @@ def _find_robot_and_pose(view: View, belief: Hypothesis) -> tuple[RobotModel, Po
     """The robot on its floor, and the believed pose in the world."""
     robot = find_robot_in(view, belief.locale)
     return robot, belief.world_from_robot(robot.world)
+
+
+def _list_locales(robot: RobotModel, pose: Pose2, belief: Hypothesis, settings: Settings) -> set[str]:
+    """The believed locale, and those of the landmarks that should be seen from a pose."""
+    lines = predict_lines(robot, pose, settings.verification)
+    marks = [lines.marks[int(i)] for i in np.unique(lines.landmark)]
+    return {belief.locale, *(name for mark in marks for name in (mark.locale, mark.neighbour) if name)}
 
 
 def _find_heading(view: View, belief: Hypothesis) -> float:

@@ -11,7 +11,7 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
-from knowledge_sources.questions import find_belief, find_building, find_robot
+from knowledge_sources.questions import ACTIVE_SKETCH, find_belief, find_building, find_frames, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch, Subgoal
@@ -22,7 +22,7 @@ class Sketcher(RobotKnowledgeSource):
     """Draws (M0 (ptrans a b) M1 ... Mg) for a goal, then for the current subgoal, until that is primitive (Figure 9).
 
     It acts on a new goal, a verified milestone (go on, refine, or repeat a subgoal whose end was missed), a leg that
-    has arrived, and a sketch that is done.
+    has arrived, a sketch that is done, and one that was withdrawn (then it draws anew, from where the robot is).
     """
 
     level = Level.PLAN
@@ -31,6 +31,7 @@ class Sketcher(RobotKnowledgeSource):
         Watch(Milestone, (Revised,), lambda m: m.status == "verified" and m.sketch != ""),
         Watch(Leg, (Revised,), lambda leg: leg.status == "arrived"),
         Watch(PlanSketch, (Revised,), lambda sketch: sketch.status == "done"),
+        Watch(PlanSketch, (Revised,), lambda sketch: sketch.status == "superseded" and not sketch.path),
     )
     writes = (PlanSketch, Goal, Outcome)
 
@@ -38,12 +39,18 @@ class Sketcher(RobotKnowledgeSource):
         value = trigger.entry.value
         if isinstance(value, Goal):
             return 0.8 if find_belief(view) else None
+        if isinstance(value, PlanSketch) and value.status == "superseded":
+            return 0.8 if _find_goal_without_sketch(view, value) is not None and find_belief(view) else None
         return 0.6 if self._sketch_of(view, value) else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         value = trigger.entry.value
         if isinstance(value, Goal):
             yield from self._begin(view, trigger.entry)
+        elif isinstance(value, PlanSketch) and value.status == "superseded":
+            goal = _find_goal_without_sketch(view, value)
+            if goal is not None:
+                yield from self._begin(view, goal, trigger.entry)
         elif isinstance(value, PlanSketch):
             yield from self._close(view, trigger.entry)
         else:
@@ -62,24 +69,27 @@ class Sketcher(RobotKnowledgeSource):
             return None
         return entry
 
-    def _begin(self, view: View, goal: Entry[Goal]) -> Iterable[Effect]:
+    def _begin(
+        self, view: View, goal: Entry[Goal], withdrawn: Entry[PlanSketch] | None = None
+    ) -> Iterable[Effect]:
         """The first level: from locale to locale; sketches for earlier goals are superseded (§2)."""
         for old in view.where(PlanSketch, lambda s: s.is_active):
             yield Revise(old, replace(old.value, status="superseded"), (goal,))
         belief = find_belief(view)
         if belief is None:
             return
+        because = (goal, belief) if withdrawn is None else (goal, belief, withdrawn)
         here, planner = _place_of(belief.value), self._planner(view)
         unfit = planner.explain_unfit(goal.value.destination)
         if unfit:
-            yield Post(Outcome("blocked", f"the goal {goal.value.destination} {unfit}"), (goal, belief))
+            yield Post(Outcome("blocked", f"the goal {goal.value.destination} {unfit}"), because)
             return
         subgoals = planner.plan_between_locales(here, goal.value.destination, self._settings.plan.goal_tolerance_m)
         if subgoals is None:
             why = self._explain_no_way(view, here.locale, goal.value.destination.locale)
-            yield Post(Outcome("blocked", why), (goal, belief))
+            yield Post(Outcome("blocked", why), because)
         else:
-            yield Post(PlanSketch(goal.id, (), "", subgoals), (goal, belief))
+            yield Post(PlanSketch(goal.id, (), "", subgoals), (*because, *find_frames(view, _list_locales(subgoals))))
 
     def _continue(self, view: View, milestone: Entry[Milestone], sketch: Entry[PlanSketch]) -> Iterable[Effect]:
         """Go on after a verified milestone: adjust, finish, or begin the next subgoal, refined if not primitive."""
@@ -135,7 +145,8 @@ class Sketcher(RobotKnowledgeSource):
         if parts is None:
             yield Post(Outcome("blocked", f"no way through {locale} to {subgoal.destination}"), (go,))
         else:
-            yield Post(PlanSketch(s.goal, (*s.path, s.at), locale, parts), (go, belief))
+            frames = find_frames(view, _list_locales(parts))
+            yield Post(PlanSketch(s.goal, (*s.path, s.at), locale, parts), (go, belief, *frames))
 
     def _close(self, view: View, done: Entry[PlanSketch]) -> Iterable[Effect]:
         """A sketch is done: so is the subgoal of its parent, or the goal itself."""
@@ -155,8 +166,23 @@ class Sketcher(RobotKnowledgeSource):
         building = find_building(view)
         if building.route(here, there) is not None:
             return f"something stands before a passage on the way from {here} to {there}"
+        shut = "".join(f"; {doorway.name} is shut" for doorway in building.shut_doorways())
         by_stairs = building.is_walkable(here, there, self._settings.plan.max_walked_rooms)
-        return f"no passage for wheels leads from {here} to {there}" + "; people can walk there, by stairs" * by_stairs
+        stairs = "; people can walk there, by stairs" * by_stairs
+        return f"no passage for wheels leads from {here} to {there}{shut}{stairs}"
+
+
+def _list_locales(subgoals: Iterable[Subgoal]) -> set[str]:
+    """The locales through which subgoals lead."""
+    return {place.locale for subgoal in subgoals for place in (subgoal.origin, subgoal.destination)}
+
+
+def _find_goal_without_sketch(view: View, superseded: PlanSketch) -> Entry[Goal] | None:
+    """The active goal of a sketch, as long as nobody has drawn another one for it."""
+    goal = view.get(superseded.goal)
+    if goal is None or not goal.value.is_active or view.having(ACTIVE_SKETCH, goal.id):
+        return None
+    return goal
 
 
 def _place_of(belief: Hypothesis) -> Place:

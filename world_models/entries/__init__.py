@@ -3,5 +3,6 @@
 ``locale_frame``: what is known of the building, one locale at a time, and the requests that bring it. ``robot``: what
 the robot knows of its camera, wheels and footprint. ``body``: requests to the robot's body and its answers. ``task``:
 command, goal, plan sketch, leg, milestone, certificate, outcome. ``percepts``: tracks, segments, matches, pose fixes.
-``location``: pose hypotheses. ``obstruction``: what stands before the camera. ``kinds``: all of them.
+``told``: what somebody says of the building. ``location``: pose hypotheses. ``obstruction``: what stands before the
+camera. ``kinds``: all of them.
 """

@@ -7,7 +7,7 @@ better revises the frame.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -28,6 +28,8 @@ from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, PlanSketch
 
 ChangeKind = Literal["shut", "gone", "removed"]
+UNDONE: Mapping[str, ChangeKind] = {"open": "shut", "there": "gone"}
+"""What takes back which change."""
 RequestStatus = Literal["asked", "answered"]
 
 LAST_FRAMES = 32
@@ -144,9 +146,10 @@ class LocaleFrame:
         return self.locale.name
 
     @property
-    def shut(self) -> frozenset[str]:
-        """The doors that are believed shut."""
-        return frozenset(change.name for change in self.changes if change.what == "shut")
+    def shut_doorways(self) -> tuple[Doorway, ...]:
+        """The doorways that the file has open and that are believed shut."""
+        shut = {change.name for change in self.changes if change.what == "shut"}
+        return tuple(doorway for doorway in (self.filed or self).doorways if doorway.name in shut)
 
     def changed(self, change: FrameChange) -> LocaleFrame:
         """The frame with one thing believed otherwise. Raises ValueError where it has nothing of that name."""
@@ -163,6 +166,10 @@ class LocaleFrame:
             return replace(self, parts=parts, things=things, changes=changes, filed=filed, memo={})
         parts = remove_element(self.parts, change.name)
         return replace(self, parts=parts, changes=changes, filed=filed, memo={})
+
+    def restored(self, what: ChangeKind, name: str) -> LocaleFrame:
+        """The frame without a change of an element: as the file says again."""
+        return self.with_changes(change for change in self.changes if (change.what, change.name) != (what, name))
 
     def with_changes(self, changes: Iterable[FrameChange]) -> LocaleFrame:
         """The frame as filed, with these changes, one after the other. Raises ValueError as :meth:`changed` does."""

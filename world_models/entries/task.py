@@ -14,7 +14,7 @@ GoalStatus = Literal["active", "reached", "abandoned"]
 SketchStatus = Literal["active", "done", "superseded"]
 LegStatus = Literal["moving", "arrived", "halted"]
 MilestoneVerdict = Literal["verified", "refuted", "not testable"]
-MilestoneStatus = Literal["turning", "expected", "verified", "refuted", "not testable"]
+MilestoneStatus = Literal["turning", "expected", "verified", "refuted", "not testable", "withdrawn"]
 
 
 def is_inactive(task: Goal | PlanSketch) -> bool:
@@ -212,7 +212,8 @@ class Milestone:
         landmark_of: for each line, its index in ``landmarks``.
         looks: the faces that should be seen, each as its colour (red, green, blue; 0..1) and points of it [m, world].
         tried: headings from which it was looked for before, and could not be told [rad, world].
-        status: turning (not yet looking there), expected, verified, refuted or not testable.
+        status: turning (not yet looking there), expected, verified, refuted, not testable, or withdrawn (what is
+            known of the building has changed, and it rested on that).
     """
 
     sketch: str

@@ -9,12 +9,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 from world_models.bounds import Bounds, check_bounds
 from world_models.commands import check_command
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command
+from world_models.entries.told import Told, ToldState
 from world_models.files.compiled.schema import SUFFIXES
 from world_models.files.toml.includes import WORLDS
 from world_models.files.toml.settings import (
@@ -63,6 +64,34 @@ class Arrival:
 
 
 @dataclass(frozen=True, slots=True)
+class Telling:
+    """What somebody tells the robot of the building on the way: one of the file's ``[[told]]``.
+
+    Attributes:
+        at_s: when, by the time of the run.
+        what: name of a door or thing, as ``library-door`` or ``allens-office/desk``.
+        state: shut or open (a door), gone or there (a thing).
+    """
+
+    at_s: float = 0.0
+    what: str = ""
+    state: str = ""
+
+    def __post_init__(self) -> None:
+        check_bounds(self, {"at_s": Bounds(0.0, MAX_NUMBER)})
+        if not self.what:
+            raise ValueError("expected what = the name of a door or thing, got none")
+        if self.state not in get_args(ToldState):
+            raise ValueError(f"expected state = one of {', '.join(get_args(ToldState))}, got {self.state!r}")
+
+    @property
+    def entry(self) -> Told:
+        """What comes to the board."""
+        state: ToldState = next(state for state in get_args(ToldState) if state == self.state)
+        return Told(self.what, state)
+
+
+@dataclass(frozen=True, slots=True)
 class Servo:
     """Which levels of perceptual servoing (Figure 2) are on."""
 
@@ -104,6 +133,7 @@ class Mission:
         name: the file's, without its ending.
         world: the world file that the robot believes in.
         goal: in words, or in conceptual-dependency form with coordinates in feet.
+        told: what the robot is told of the building on the way, in the order of time.
         folder: where the file is; file names in it are relative to it.
         source: the file, with the settings that replaced some of its values.
     """
@@ -117,6 +147,7 @@ class Mission:
     servo: Servo
     motion: Motion
     limits: Limits
+    told: tuple[Telling, ...] = ()
     folder: Path
     source: Source = field(repr=False)
 
@@ -161,9 +192,11 @@ class MissionFormat:
 
     def read(self, source: Source, name: str, folder: Path) -> dict[str, Any]:
         """The attributes of a :class:`Mission`, and the other tables of the format. Raises WorldError."""
-        node = source.root.table(("world", "goal"), ("description", *self.others, *self.tables))
+        node = source.root.table(("world", "goal"), ("description", "told", *self.others, *self.tables))
         tables = {key: read_settings(node[key], kind) if key in node else kind() for key, kind in self.tables.items()}
+        told = [read_settings(item, Telling) for item in node["told"].items()] if "told" in node else []
         return {
+            "told": tuple(sorted(told, key=lambda telling: telling.at_s)),
             "name": name, "description": node["description"].text() if "description" in node else "",
             "world": named_file(node["world"].text(), WORLDS, folder), "goal": _goal(node["goal"]),
             "folder": folder, "source": source, **tables,

@@ -1,0 +1,61 @@
+"""Model reviser (§3.4): what the robot is told of the building revises the frames of the locales that it concerns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from knowledge_sources.questions import find_building, find_frames
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.locale_frame import UNDONE, FrameChange, LocaleFrame
+from world_models.entries.told import DOOR_STATES, Told
+
+
+class ModelReviser(RobotKnowledgeSource):
+    """Revises the frames that have a door or a thing of which somebody told the robot that it is otherwise.
+
+    A door is in the frames of both its rooms. What cannot be taken up, because the model has nothing of that name, is
+    answered, and nothing is revised. It acts at once, before the next increment: the door may be just ahead.
+    """
+
+    level = Level.ACTION
+    watches = (Watch(Told, (Posted,)),)
+    writes = (LocaleFrame, Told)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        return 1.0
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        told: Entry[Told] = trigger.entry
+        try:
+            frames = find_frames(view, find_building(view).find_elements(told.value.what))
+            revised = [(frame, _revise(frame.value, told)) for frame in frames]
+        except ValueError as error:
+            yield Revise(told, replace(told.value, answer=f"which cannot be: {error}"), (told,))
+            return
+        changed = [(frame, value) for frame, value in revised if value.changes != frame.value.changes]
+        answer = "" if changed else "as it was known"
+        yield Revise(told, replace(told.value, answer=answer or "and took it over"), (told,))
+        for frame, value in changed:
+            yield Revise(frame, value, (told, frame))
+
+
+def _revise(frame: LocaleFrame, told: Entry[Told]) -> LocaleFrame:
+    """The frame as it is now known. Raises ValueError where it has nothing that could be so."""
+    what, state = told.value.what, told.value.state
+    known = {(change.what, change.name) for change in frame.changes}
+    filed = frame.filed or frame
+    names = [door.name for door in filed.doorways] if state in DOOR_STATES else [thing.name for thing in filed.things]
+    if what not in names:
+        kind = "an open door" if state in DOOR_STATES else "a thing"
+        raise ValueError(f"expected {kind} of {frame.name} ({', '.join(names) or 'it has none'}), got {what!r}")
+    if state in UNDONE:
+        return frame.restored(UNDONE[state], what)
+    if (state, what) in known:
+        return frame
+    return frame.changed(FrameChange("shut" if state == "shut" else "gone", what, told.author))

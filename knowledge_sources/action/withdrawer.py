@@ -1,0 +1,99 @@
+"""Withdrawer (§3.4): what rested on a locale frame that was revised is withdrawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from blackboard.board import View
+from blackboard.change import Change, Revised, Watch
+from blackboard.effect import Effect, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from knowledge_sources.questions import active_goal
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.locale_frame import LocaleFrame
+from world_models.entries.percepts import Tracks
+from world_models.entries.task import Milestone, PlanSketch
+
+
+class Withdrawer(RobotKnowledgeSource):
+    """Withdraws milestones, plan sketches and tracks that rested on what a frame no longer says.
+
+    A milestone that waits to be judged is withdrawn where its prediction rested on the frame; one that was verified,
+    where a landmark of it is gone: its place in the sketch must be verified anew. A sketch that led through a door that
+    is now shut, or round a thing that is now gone, is superseded; the sketcher draws it anew.
+    """
+
+    level = Level.ACTION
+    watches = (Watch(LocaleFrame, (Revised,)),)
+    writes = (Milestone, PlanSketch, Tracks)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        return 1.0 if any(True for _ in _withdrawals(view, trigger.entry)) else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        yield from _withdrawals(view, trigger.entry)
+
+
+def _withdrawals(view: View, frame: Entry[LocaleFrame]) -> Iterable[Effect]:
+    """What is to be withdrawn after a frame was revised."""
+    superseded = _find_misled(view, frame)
+    unverified: set[str] = set()
+    for milestone in view.all(Milestone):
+        m = milestone.value
+        is_overtaken = m.is_open and (_rests_on(milestone, frame) or m.sketch in superseded)
+        if is_overtaken or (m.status == "verified" and _is_any_gone(m.landmarks, frame.value)):
+            yield Revise(milestone, replace(m, status="withdrawn"), (frame,))
+            unverified |= {m.sketch} if m.status == "verified" and _holds(view, m) else set()
+    for id in superseded:
+        sketch = view[id]
+        yield Revise(sketch, replace(sketch.value, status="superseded"), (frame,))
+    for id in sorted(unverified - set(superseded)):
+        sketch = view[id]
+        yield Revise(sketch, replace(sketch.value, verified=False), (frame,))
+    tracks = view.latest(Tracks)
+    if tracks is not None:
+        kept = tuple(track for track in tracks.value.items if not _is_any_gone((track.landmark,), frame.value))
+        if len(kept) < len(tracks.value.items):
+            yield Revise(tracks, replace(tracks.value, items=kept), (frame,))
+
+
+def _rests_on(entry: Entry[Milestone], frame: Entry[LocaleFrame]) -> bool:
+    """Whether a milestone was predicted from an earlier revision of a frame."""
+    return any(ref.id == frame.id and ref.revision < frame.revision for ref in entry.because)
+
+
+def _is_any_gone(landmarks: Iterable[str], frame: LocaleFrame) -> bool:
+    """Whether one of the landmarks is a part of what a frame no longer has."""
+    gone = [change.name for change in frame.changes if change.what in ("gone", "removed")]
+    return any(name == thing or name.startswith(f"{thing}/") for name in landmarks for thing in gone)
+
+
+def _holds(view: View, milestone: Milestone) -> bool:
+    """Whether an active sketch goes on from a verified milestone."""
+    sketch = view.get(milestone.sketch)
+    if sketch is None or not isinstance(sketch.value, PlanSketch):
+        return False
+    s = sketch.value
+    return s.is_active and s.verified and s.at == milestone.index
+
+
+def _find_misled(view: View, frame: Entry[LocaleFrame]) -> dict[str, None]:
+    """The ids of the active sketches, all of them, where one leads through what has changed."""
+    if active_goal(view) is None:
+        return {}
+    active = view.where(PlanSketch, lambda sketch: sketch.is_active)
+    misled = any(_leads_there(sketch.value, frame.value) for sketch in active)
+    return dict.fromkeys(sketch.id for sketch in active) if misled else {}
+
+
+def _leads_there(sketch: PlanSketch, frame: LocaleFrame) -> bool:
+    """Whether what is left of a sketch leads through a door that is shut, or across a room that has changed."""
+    left = sketch.subgoals[sketch.at:]
+    shut = {doorway.name for doorway in frame.shut_doorways}
+    if any(subgoal.passage in shut for subgoal in left):
+        return True
+    crosses = any(frame.name in (subgoal.origin.locale, subgoal.destination.locale) for subgoal in left)
+    is_rearranged = not frame.changes or any(change.what == "gone" for change in frame.changes)
+    return crosses and is_rearranged
