@@ -17,7 +17,7 @@ from harvey.errors import BadInput
 from harvey.run_files.records import DecisionRecord
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import Settings
-from world_models.building.landmarks import Edges
+from world_models.building.geometry.landmarks import Edges
 from world_models.building.locale_source import LocaleGeometry, WorldSource
 from world_models.building.world import World
 from world_models.entries.percepts import Segments

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.bounds import Bounds, check_bounds
-from world_models.building.faces import Face
-from world_models.building.regions import Region
+from world_models.building.geometry.faces import Face
+from world_models.building.geometry.regions import Region
 
 
 @dataclass(frozen=True, slots=True)

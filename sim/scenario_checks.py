@@ -11,8 +11,8 @@ from sim.body.collision import ROBOT_RADIUS_M
 from sim.faults.fault import Fault
 from sim.moved_things import belongs_to, move_things
 from sim.scenario import Scenario
-from world_models.building.faces import Face
-from world_models.building.outlines import inside_polygon
+from world_models.building.geometry.faces import Face
+from world_models.building.geometry.outlines import inside_polygon
 from world_models.building.world import World
 from world_models.entries.location import Place
 from world_models.entries.told import DOOR_STATES

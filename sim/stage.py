@@ -16,9 +16,9 @@ from sim.render.renderer import Renderer
 from sim.scenario import Scenario
 from sim.scenario_checks import check_names, check_room, find_named_locales, move_scenario_things
 from sim.truth import Score, Truth, score
-from world_models.building.faces import Face
+from world_models.building.geometry.faces import Face
+from world_models.building.geometry.outlines import inside_polygon
 from world_models.building.locales import Link
-from world_models.building.outlines import inside_polygon
 from world_models.building.world import World
 from world_models.commands import parse_command
 from world_models.entries.location import Place

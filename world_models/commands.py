@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from world_models.building.building import Building
+from world_models.building.geometry.outlines import distance_to_border, inside_polygon
 from world_models.building.memory_locales import words_of
-from world_models.building.outlines import distance_to_border, inside_polygon
 from world_models.building.world import World
 from world_models.entries.location import Place
 from world_models.ptrans import parse_ptrans

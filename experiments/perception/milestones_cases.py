@@ -23,7 +23,7 @@ from sim.render.occluder import Occluder
 from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
-from world_models.building.outlines import inside_polygon
+from world_models.building.geometry.outlines import inside_polygon
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Milestone
 from world_models.frames import Pose2, wrap_angle

@@ -19,7 +19,7 @@ from sim.made_up.generated_house import generate_house
 from sim.render.mesh import build_mesh
 from sim.render.projection import Pinhole, project_mesh
 from sim.render.rasterizer import find_visible_patches, sample_offsets
-from world_models.building.outlines import inside_polygon
+from world_models.building.geometry.outlines import inside_polygon
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.source import Source

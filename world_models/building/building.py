@@ -13,10 +13,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from world_models.building.geometry.scene import Scene, build_scene, concatenate_scenes
 from world_models.building.locale_source import LocaleGeometry, LocaleSource
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.passages import Route, find_route
-from world_models.building.scene import Scene, build_scene, concatenate_scenes
 from world_models.building.things import Thing
 from world_models.frames import Pose, frozen
 

@@ -12,10 +12,10 @@ from functools import cached_property
 from typing import Protocol
 
 from world_models.building.extents import LocaleExtent
-from world_models.building.faces import Face
-from world_models.building.landmarks import Landmark
+from world_models.building.geometry.faces import Face
+from world_models.building.geometry.landmarks import Landmark
+from world_models.building.geometry.scene import Scene, build_scene
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.scene import Scene, build_scene
 from world_models.building.things import Finding, Thing
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.outlines import inside_polygon
+from world_models.building.geometry.outlines import inside_polygon
 from world_models.frames import Pose, Pose2, frozen
 
 

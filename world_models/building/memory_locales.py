@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.extents import LocaleExtent, bounding_box, bounding_rectangle, compute_reaches
-from world_models.building.faces import Face
-from world_models.building.landmarks import Landmark
+from world_models.building.geometry.faces import Face
+from world_models.building.geometry.landmarks import Landmark
 from world_models.building.locale_source import LocaleGeometry, PassageEdge
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.passages import PassageGraphs, build_passage_graphs, drivable_passages

@@ -10,7 +10,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.faces import Face
+from world_models.building.geometry.faces import Face
 from world_models.building.things import STEP_M
 from world_models.building.world import World
 

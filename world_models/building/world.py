@@ -12,11 +12,11 @@ from typing import Any, TypeVar
 import networkx as nx
 
 from world_models.building.building import Building
-from world_models.building.faces import Face
-from world_models.building.landmarks import Landmark
+from world_models.building.geometry.faces import Face
+from world_models.building.geometry.landmarks import Landmark
+from world_models.building.geometry.scene import Scene, build_scene, concatenate_scenes
 from world_models.building.locale_source import WorldSource
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.scene import Scene, build_scene, concatenate_scenes
 from world_models.building.things import Finding, Thing
 
 T = TypeVar("T")

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.building import Building
-from world_models.building.landmarks import Landmark
-from world_models.building.scene import Scene
+from world_models.building.geometry.landmarks import Landmark
+from world_models.building.geometry.scene import Scene
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose
 from world_models.visibility.portals import Window, find_visible_locales, image_window

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from world_models.building.faces import Face, build_barrier
-from world_models.building.landmarks import Edges, Landmark
+from world_models.building.geometry.faces import Face, build_barrier
+from world_models.building.geometry.landmarks import Edges, Landmark
+from world_models.building.geometry.regions import Finish, expected_brightness
 from world_models.building.locale_source import LocaleGeometry
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.regions import Finish, expected_brightness
 from world_models.building.world import World
 from world_models.files.compiled.serialization import pack_array, pack_geometry
 from world_models.files.compiled.writer import WorldWriter

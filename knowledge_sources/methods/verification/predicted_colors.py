@@ -11,9 +11,9 @@ from numba import njit
 from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.verification import VerificationSettings
-from world_models.building.faces import area_vector
+from world_models.building.geometry.faces import area_vector
+from world_models.building.geometry.regions import Finish, expected_brightness
 from world_models.building.locale_source import LocaleGeometry
-from world_models.building.regions import Finish, expected_brightness
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel

@@ -12,10 +12,10 @@ from knowledge_sources.methods.verification.predicted_colors import predict_face
 from sim.made_up.generated_house import generate_house
 from world_models.actuator import ActuatorModel
 from world_models.building.changes.shut_doors import build_shut_faces, shut_door
+from world_models.building.geometry.outlines import inside_polygon
 from world_models.building.locale_source import LocaleGeometry
 from world_models.building.locales import Doorway
 from world_models.building.memory_locales import MemoryLocales
-from world_models.building.outlines import inside_polygon
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.source import Source

@@ -7,7 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from world_models.building.outlines import inside_polygon
+from world_models.building.geometry.outlines import inside_polygon
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose, Pose2

@@ -6,9 +6,9 @@ import pytest
 from logs.recording.loggers.building import _meshes
 from world_models.building.changes.removals import element_names, remove_element, remove_thing
 from world_models.building.changes.shut_doors import build_shut_faces, shut_door
-from world_models.building.faces import area_vector
+from world_models.building.geometry.faces import area_vector
+from world_models.building.geometry.regions import UNKNOWN, expected_brightness
 from world_models.building.memory_locales import MemoryLocales
-from world_models.building.regions import UNKNOWN, expected_brightness
 from world_models.building.world import World
 from world_models.files.world_files import WORLDS, load_world
 

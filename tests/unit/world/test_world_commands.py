@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from world_models.building.outlines import distance_to_border, inside_polygon
+from world_models.building.geometry.outlines import distance_to_border, inside_polygon
 from world_models.commands import check_command, find_open_point, find_room, parse_command
 from world_models.files.world_files import WORLDS, load_world
 

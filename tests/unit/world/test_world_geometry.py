@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from world_models.building.faces import area_vector
-from world_models.building.intervals import subtract_intervals
-from world_models.building.outlines import convex_pieces
-from world_models.building.regions import Finish
-from world_models.building.solids import Box, Solid, Surface
+from world_models.building.geometry.faces import area_vector
+from world_models.building.geometry.intervals import subtract_intervals
+from world_models.building.geometry.outlines import convex_pieces
+from world_models.building.geometry.regions import Finish
+from world_models.building.geometry.solids import Box, Solid, Surface
 from world_models.building.world import World
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose

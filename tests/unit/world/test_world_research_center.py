@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from world_models.building.outlines import distance_to_border, inside_polygon
+from world_models.building.geometry.outlines import distance_to_border, inside_polygon
 from world_models.building.plan_view import plan_svg
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from world_models.building.landmarks import Edges
+from world_models.building.geometry.landmarks import Edges
 from world_models.building.locale_source import LocaleGeometry
 from world_models.building.things import Thing
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.faces import Face, build_barrier
+from world_models.building.geometry.faces import Face, build_barrier
+from world_models.building.geometry.regions import UNKNOWN
 from world_models.building.locale_source import LocaleGeometry
 from world_models.building.locales import Doorway
-from world_models.building.regions import UNKNOWN
 
 SAME_PLACE_M = 1e-3
 """Corners no further apart than this on the plan are the same."""

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.faces import Face
-from world_models.building.landmarks import Edges, Landmark
+from world_models.building.geometry.faces import Face
+from world_models.building.geometry.landmarks import Edges, Landmark
+from world_models.building.geometry.regions import Region
 from world_models.building.locale_source import LocaleGeometry
-from world_models.building.regions import Region
 from world_models.frames import frozen
 
 Floats = NDArray[np.float64]

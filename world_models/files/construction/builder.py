@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.faces import Face
-from world_models.building.landmarks import Landmark
+from world_models.building.geometry.faces import Face
+from world_models.building.geometry.landmarks import Landmark
+from world_models.building.geometry.solids import Solid
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.memory_locales import MemoryLocales
-from world_models.building.solids import Solid
 from world_models.building.things import ROBOT_TOP_M, Finding, Thing
 from world_models.building.world import World
 from world_models.files.construction.doors import LEAF_DEPTH_M, DoorSide, build_closed_door, build_open_door

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from world_models.building.outlines import is_simple
+from world_models.building.geometry.outlines import is_simple
 from world_models.files.importers.polygons import Floats
 
 JAMB_M = 0.06

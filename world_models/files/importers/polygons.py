@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from world_models.building.outlines import is_simple
+from world_models.building.geometry.outlines import is_simple
 
 Floats = NDArray[np.float64]
 

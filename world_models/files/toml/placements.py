@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from world_models.building.solids import Box
+from world_models.building.geometry.solids import Box
 from world_models.files.toml.shared_parts import SharedParts
 from world_models.files.toml.source import Node
 

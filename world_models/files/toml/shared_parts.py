@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from world_models.building.regions import TEXTURES, Finish
-from world_models.building.solids import Box, Range
+from world_models.building.geometry.regions import TEXTURES, Finish
+from world_models.building.geometry.solids import Box, Range
 from world_models.files.toml.source import Node
 from world_models.units import FOOT_M
 

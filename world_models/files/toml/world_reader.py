@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations, count
 from pathlib import Path
 
-from world_models.building.regions import Finish
+from world_models.building.geometry.regions import Finish
 from world_models.files.construction.specs import DoorSpec, LinkSpec, LocaleSpec, ThingSpec, WorldSpec
 from world_models.files.toml.includes import find_named_file, read_included
 from world_models.files.toml.locale_reader import LOCALE_KEYS, LocaleReader, pose_at, read_properties

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.regions import Finish, Region, build_region
+from world_models.building.geometry.regions import Finish, Region, build_region
 from world_models.frames import frozen
 
 FaceKind = Literal["barrier", "doorway"]
