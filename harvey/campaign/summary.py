@@ -44,7 +44,8 @@ def format_result(r: MissionResult, out: Path | None) -> str:
         *(f"  {point.kind:<12}  cycle {point.cycle}: {point.text}" for point in r.turning_points),
         *(f"  amiss         {text}" for text in r.amiss),
         f"  way           {r.path_length_m:.1f} m in {r.sim_time_s:.0f} s of the robot's time",
-        f"  took          {r.wall_time_s:.1f} s for {count(r.decisions, 'cycle')} and {count(r.frames, 'frame')}",
+        f"  took          {r.wall_time_s:.1f} s for {count(r.cycles, 'cycle')} and {count(r.frames, 'picture')}, with"
+        f" {count(r.waits, 'more cycle')} to ask for locale frames",
     ]
     if out is not None:
         lines += [f"  recording     {out / 'recording.rrd'}", "",
@@ -105,7 +106,7 @@ def _counts(r: MissionResult) -> tuple[int, ...]:
 
 
 def _ways(r: MissionResult) -> tuple[float, ...]:
-    return r.path_length_m, r.sim_time_s, r.decisions, r.wall_time_s
+    return r.path_length_m, r.sim_time_s, r.cycles, r.wall_time_s
 
 
 def _total(results: Sequence[MissionResult]) -> tuple[str, ...]:

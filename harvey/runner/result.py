@@ -10,6 +10,7 @@ from typing import Any
 from blackboard.journal import Decision
 from logs.turning_points import TurningPoint, TurningPointFinder
 from world_models.entries.body import Frame, MotionReport
+from world_models.entries.locale_frame import FrameRequest
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch
 
@@ -40,6 +41,7 @@ class MissionResult:
         outcome: reached, lost, blocked or failed; reason: why.
         final_heading_error_rad: from the wanted heading; where none is wanted, from what the robot believed.
         path_length_m, sim_time_s: true in the simulator; on hardware as the wheels claim.
+        decisions: how many there were; waits: in how many of them an act only asked for locale frames, and waited.
         milestones: how many were verified, refuted, not testable and (by the truth) accepted falsely.
         replans: sketches adjusted or drawn anew; relocalizations: how often it found itself again.
         sketches: how many plan sketches were drawn.
@@ -70,6 +72,12 @@ class MissionResult:
     amiss: Sequence[str] = ()
     contacts: Sequence[Contact] = ()
     turning_points: Sequence[TurningPoint] = ()
+    waits: int = 0
+
+    @property
+    def cycles(self) -> int:
+        """The decisions in which something was done beside asking for locale frames."""
+        return self.decisions - self.waits
 
     @property
     def error_m(self) -> float:
@@ -98,7 +106,7 @@ class RunCounts:
     """A sink that counts what was decided, and adds up what the wheels claim."""
 
     def __init__(self) -> None:
-        self.decisions = self.replans = self.relocalizations = self.sketches = self.frames = 0
+        self.decisions = self.waits = self.replans = self.relocalizations = self.sketches = self.frames = 0
         self.milestones = {"verified": 0, "refuted": 0, "not_testable": 0}
         self.path_m = self.time_s = 0.0
         self.turning_points: list[TurningPoint] = []
@@ -106,6 +114,7 @@ class RunCounts:
 
     def __call__(self, decision: Decision) -> None:
         self.decisions += 1
+        self.waits += bool(decision.made) and all(isinstance(c.entry.value, FrameRequest) for c in decision.made)
         self.turning_points += [point for point in self._finder.find(decision) if point.is_told]
         for change in decision.observed:
             value = change.entry.value
@@ -133,5 +142,5 @@ class RunCounts:
             wall_time_s=wall_time_s, frames=self.frames, decisions=self.decisions,
             milestones={**self.milestones, "false_accepts": None}, replans=self.replans,
             relocalizations=self.relocalizations, sketches=self.sketches, collisions=None, max_cross_track_m=None,
-            turning_points=tuple(self.turning_points),
+            turning_points=tuple(self.turning_points), waits=self.waits,
         )
