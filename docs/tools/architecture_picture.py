@@ -24,13 +24,13 @@ QUESTIONS = {
     Level.ACTION: ("Is each landmark where it should be?", "the next increment is steered"),
 }
 ROLES = {
-    Role.REQUEST: "requests to the body",
+    Role.REQUEST: "requests to the ports",
     Role.OBSERVATION: "observations",
     Role.INFERENCE: "inferences",
 }
 SCHEDULER = ("take up the changes; drop what no longer holds", "ask who could act, and how well",
              "choose: level in focus, then rating, then age", "one acts: all its effects, or none",
-             "write the decision down", "only then ask the port")
+             "write the decision down", "only then ask the ports")
 STYLE = """
     .room { fill: #ffffff; stroke: #35405a; stroke-width: 1.5 }
     .board { fill: #f3f5fa; stroke: #35405a; stroke-width: 3 }
@@ -42,7 +42,7 @@ STYLE = """
 HEAD = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" \
 font-family="Helvetica, Arial, 'DejaVu Sans', sans-serif" font-size="14">
   <title>Harvey: knowledge sources of three servo levels round a blackboard; scheduler, run recorder, ports, \
-simulator or robot</title>
+simulator or robot, building model</title>
   <style>{style}</style>
   <defs><marker id="a" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="8" markerHeight="8" \
 orient="auto-start-reverse">
@@ -120,11 +120,14 @@ def draw_architecture(sources: Iterable[type[KnowledgeSource]], kinds: Registry)
     canvas.box("room", right_x, below + scheduler_height - 56, SIDE_WIDTH, 56, body)
     canvas.arrow(right_middle, below + 68, right_middle, below + scheduler_height - 60)
 
-    world_y = below + scheduler_height + 30
-    canvas.box("room", MARGIN, world_y, WIDTH - 2 * MARGIN, 48, [
-        ("", "world model: locales, faces, landmarks, camera, wheels; every knowledge source reads it, none writes it"),
+    world_y = below + scheduler_height + GAP
+    canvas.box("room", MARGIN, world_y, WIDTH - 2 * MARGIN, 64, [
+        ("head", "the world's port: the long-term model of the building, in a file"),
+        ("small", "a locale's frame comes to the board when a knowledge source asks for it; what is learnt revises it there"),
     ])
-    head = HEAD.format(width=WIDTH, height=world_y + 48 + MARGIN, style=STYLE)
+    canvas.arrow(middle, below + scheduler_height + 4, middle, world_y - 4)
+    canvas.text("small left", middle + 12, world_y - GAP // 2 + 4, "requests for frames; frames")
+    head = HEAD.format(width=WIDTH, height=world_y + 64 + MARGIN, style=STYLE)
     return head + "\n".join(canvas.elements) + "\n</svg>\n"
 
 

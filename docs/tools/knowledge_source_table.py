@@ -10,6 +10,10 @@ from collections.abc import Iterable
 from blackboard.change import Watch
 from blackboard.knowledge_source import KnowledgeSource
 from harvey.wiring import KNOWLEDGE_SOURCES, foreign_sources
+from world_models.entries.locale_frame import FrameRequest
+
+EVERYBODY_WRITES = (FrameRequest,)
+"""Left out of the table: each knowledge source of a robot may ask for a locale frame."""
 
 
 def rows(sources: Iterable[type[KnowledgeSource]]) -> list[str]:
@@ -21,7 +25,7 @@ def rows(sources: Iterable[type[KnowledgeSource]]) -> list[str]:
 def _row(source: type[KnowledgeSource]) -> str:
     what = (source.__doc__ or "").strip().split("\n\n")[0]
     wakes = ", ".join(dict.fromkeys(_watch(watch) for watch in source.watches))
-    writes = ", ".join(kind.__name__ for kind in source.writes)
+    writes = ", ".join(kind.__name__ for kind in source.writes if kind not in EVERYBODY_WRITES)
     closes = "" if source.closes is None else str(source.closes)
     name = source.__module__.rpartition(".")[2]
     return f"| `{name}` | {source.level} | {closes} | {wakes} | {writes} | {' '.join(what.split())} |"
