@@ -1,6 +1,6 @@
 """The agent of a run: its knowledge sources, model, settings and servo levels, as its run head says.
 
-``without`` takes away a knowledge source, a landmark or a face of the model, or one segment of one picture;
+``without`` takes away a knowledge source, a landmark or a face (:mod:`harvey.what_if`), or one segment of one picture;
 ``constants`` replaces servo levels and settings (``harvey settings``).
 """
 
@@ -16,9 +16,10 @@ from blackboard.scheduler import Scheduler, registry_of
 from blackboard.servoing import Servoing
 from harvey.agent_settings import build_settings
 from harvey.errors import BadInput
+from harvey.hidden_segments import SegmentHider, is_segment, parse_segments
 from harvey.run_files.run_head import RunHead
+from harvey.what_if import WhatIf, check_removals
 from harvey.wiring import build, foreign_sources, knowledge_sources, servoing
-from harvey.without import SegmentHider, is_segment, parse_segments, remove_from_world
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import Settings
 from world_models.building.world import World
@@ -43,6 +44,7 @@ class Agent:
         store: of the locale frames.
         sources: the knowledge sources; settings: their numbers.
         servoing: the servo levels that are on.
+        what_if: revises before each cycle what the run is to be without.
     """
 
     world: World
@@ -51,6 +53,7 @@ class Agent:
     sources: tuple[KnowledgeSource, ...]
     servoing: Servoing
     settings: Settings
+    what_if: WhatIf
 
     @property
     def kinds(self) -> Registry:
@@ -74,15 +77,16 @@ def build_agent(head: RunHead, sources: Sources = knowledge_sources) -> Agent:
     given = sources(settings)
     foreign = _foreign(head, {source.name for source in given})
     known = [*(source.name for source in given), *(source.called() for source in foreign)]
-    world = remove_from_world(head.load_world(), [n for n in names if n not in known], known)
+    world = head.load_world()
+    store, removed = FrameStore(world, head.world_sha256), [name for name in names if name not in known]
+    check_removals(removed, store, known)
     levels = {key.removeprefix(SERVO): value for key, value in head.constants if key.startswith(SERVO)}
     everyone = (*given, *(build(source, settings) for source in foreign))
     chosen = tuple(source for source in everyone if source.name not in names)
     if segments:
         chosen = tuple(
             SegmentHider(settings, segments) if isinstance(s, LineFinder) else s for s in chosen)
-    store = FrameStore(world, head.world_sha256)
-    return Agent(world, head.model(world), store, chosen, _servoing(head, levels), settings)
+    return Agent(world, head.model(world), store, chosen, _servoing(head, levels), settings, WhatIf(removed))
 
 
 def settings_of(head: RunHead) -> Settings:

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, replace
+from functools import partial
 
 from blackboard.change import Change
 from blackboard.effect import Post
-from blackboard.journal import Decision, decision_line, decision_record, plain
+from blackboard.journal import Decision, decision_record, plain
 from blackboard.scheduler import Scheduler
 from harvey.agent import Agent, build_agent
 from harvey.campaign.campaign import make_room
+from harvey.hidden_segments import check_segments
+from harvey.replay.as_recorded import AsRecorded
 from harvey.run_files.observations import effect_of
 from harvey.run_files.records import DecisionRecord, EntryRecord, as_line, decision_of, read_records
 from harvey.run_files.run_directory import RunDirectory
@@ -28,7 +31,6 @@ from harvey.runner.resume import RESUME
 from harvey.runner.run import Over, run_to_outcome
 from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.simulation.run import SimulatedRun, rebuild_stage
-from harvey.without import check_segments
 from world_models.entries.task import Outcome
 
 
@@ -49,8 +51,10 @@ class Answer:
     """What would have been.
 
     Attributes:
-        agreed: how many decisions are the same, to the byte, before the first that is not.
+        agreed: how many decisions are the same, to the byte, before the first that is not. What was only told to ask
+            the question is no difference (:mod:`harvey.replay.as_recorded`).
         then, now: that one, as recorded and as decided; None where there is none.
+        revised: what was revised to ask the question, as ``LocaleFrame-3.1``.
         answered: how many decisions had their requests to the body answered by the record.
         parting: where the record could no longer answer; None where it could to the end.
         outcome: how it ends; kind ``unfinished`` where it was left at the parting.
@@ -60,6 +64,7 @@ class Answer:
     agreed: int
     then: DecisionRecord | None
     now: DecisionRecord | None
+    revised: tuple[str, ...]
     answered: int
     parting: Parting | None
     outcome: Outcome
@@ -97,7 +102,8 @@ def what_if(
         ports = (WorldPort(agent.store),)
         scheduler = agent.scheduler(ports=ports, sinks=(*recorder.sinks, player.compare))
         try:
-            return player.answer(player.play(scheduler, agent, head, recorder), None)
+            outcome = player.play(scheduler, agent, head, recorder, before=partial(agent.what_if, scheduler))
+            return player.answer(outcome, None)
         finally:
             recorder.close()
     with SimulatedRun(rebuild_stage(head), head, agent, recorder, (player.compare,)) as simulated:
@@ -136,7 +142,8 @@ class _Player:
         self.records = list(read_records(run.journal))
         self._requests = frozenset(kind.__name__ for kind in BodyPort.acts_on)
         self._steps = _steps(self.records, self._requests)
-        self._agreed, self._differs = 0, False
+        self._agreed = 0
+        self._as_recorded, self._as_decided = AsRecorded(), AsRecorded()
         self._first: tuple[DecisionRecord | None, DecisionRecord] | None = None
         self._answered = 0
         self.last: Decision | None = None
@@ -147,11 +154,13 @@ class _Player:
         """Sink: compares with the record until the first difference."""
         self.last, self.open = decision, tuple(change for change in decision.made if is_body_request(change))
         if self._first is None:
-            recorded = self.records[self._agreed] if self._agreed < len(self.records) else None
-            if recorded is not None and recorded.line == decision_line(decision):
+            then = self.records[self._agreed] if self._agreed < len(self.records) else None
+            then = None if then is None else self._as_recorded(then)
+            now = self._as_decided(decision_of(decision_record(decision)))
+            if then is not None and then.line == now.line:
                 self._agreed += 1
             else:
-                self._first = recorded, decision_of(decision_record(decision))
+                self._first = then, now
 
     def play(
         self, scheduler: Scheduler, agent: Agent, head: RunHead, recorder: RunRecorder, *, live: Live = ignore,
@@ -175,7 +184,7 @@ class _Player:
         then, now = self._first or (None, None)
         if self._first is None and self._agreed < len(self.records):
             then = self.records[self._agreed]
-        return Answer(self._agreed, then, now, self._answered, self.parting, outcome, result)
+        return Answer(self._agreed, then, now, self._as_decided.revised, self._answered, self.parting, outcome, result)
 
     def _answer(self, scheduler: Scheduler, recorder: RunRecorder, live: Live) -> None:
         """What the record observed, if the last decision asked for what it asked for; ends the run if not."""

@@ -11,14 +11,16 @@ from harvey.run_files.records import DecisionRecord
 from harvey.run_files.run_directory import RunDirectory
 from harvey.runner.result import UNFINISHED
 from harvey.why.sentences import sentence
-from world_models.words import count
+from world_models.words import count, listed
 
 
 def describe_answer(answer: Answer, run: RunDirectory, changes: Sequence[str]) -> Iterator[str]:
     """The first decision that differs, what changed, and how it ends; ``changes`` as ``without line_finder``."""
     yield f"{run.path}, {' and '.join(changes)}:"
     if answer.then is None and answer.now is None:
-        yield f"nothing would have changed: all of its {count(answer.agreed, 'decision')} are the same, byte for byte."
+        but = f", but for {listed(answer.revised)}, by which it was asked" if answer.revised else ""
+        yield (f"nothing would have changed: all of its {count(answer.agreed, 'decision')} are the same, byte for"
+               f" byte{but}.")
         return
     yield "first: as recorded; second: as it would have been"
     yield from describe(answer.agreed, answer.then, answer.now)

@@ -79,7 +79,7 @@ class Run:
         self._began_s, self._robot, self.store = time.perf_counter(), agent.robot, agent.store
         self.head, self.body, self.recorder = head, body, recorder
         self._limits, self._clock, self._referee = limits, clock, referee
-        self._teller, self._before = Teller(told, clock), before_cycle
+        self._teller, self._what_if, self._before = Teller(told, clock), agent.what_if, before_cycle
         self.port = BodyPort(body)
         self.recorded_port = recorder.record_port(self.port)
         self.ports = self.recorded_port, recorder.record_port(WorldPort(agent.store))
@@ -102,6 +102,7 @@ class Run:
         """What comes before each cycle; while a run is only replayed, the journal says what was told."""
         self._before()
         if not self.recorder.replaying:
+            self._what_if(self.scheduler)
             self._teller.tell(self.scheduler)
 
     def over(self, scheduler: Scheduler) -> str | None:

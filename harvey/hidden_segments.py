@@ -1,12 +1,10 @@
-"""Without: landmarks and faces removed from a model, and segments from pictures, to see what a run would have done."""
+"""Hidden segments: line segments left out of pictures, to see what a run would have done without them."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
-from typing import Any, cast
 
 import numpy as np
 
@@ -17,15 +15,11 @@ from harvey.errors import BadInput
 from harvey.run_files.records import DecisionRecord
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import Settings
-from world_models.building.geometry.landmarks import Edges
-from world_models.building.locale_source import LocaleGeometry, WorldSource
-from world_models.building.world import World
 from world_models.entries.percepts import Segments
 from world_models.frames import frozen
 from world_models.words import listed
 
 SEGMENT = re.compile(r"frame[- ](\d{1,9})[ ,-]+segment[- ](\d{1,9})", re.IGNORECASE | re.ASCII)
-MAX_SUGGESTED, MIN_SIMILARITY = 6, 0.5
 MAX_LISTED = 12
 """So many frames are listed."""
 
@@ -38,22 +32,6 @@ def is_segment(name: str) -> bool:
 def parse_segments(names: Iterable[str]) -> tuple[tuple[int, int], ...]:
     """(frame, segment) of the names that are of segments."""
     return tuple((int(m[1]), int(m[2])) for name in names if (m := SEGMENT.fullmatch(name)))
-
-
-def remove_from_world(world: World, names: Sequence[str], sources: Sequence[str]) -> World:
-    """The model without some of its landmarks and faces; the building itself stays as it is.
-
-    Raises:
-        BadInput: the model has none of a name; near names are listed, those of knowledge sources too.
-    """
-    if not names:
-        return world
-    geometry = list(world.locale_source.all_geometry())
-    known = {mark.name for g in geometry for _, mark in g.landmarks} | {f.name for g in geometry for _, f in g.faces}
-    for name in names:
-        if name not in known:
-            raise BadInput(f"--without {name}: expected {_suggest(name, sources, known)}, got {name!r}")
-    return World(cast(WorldSource, _ReducedSource(world.locale_source, frozenset(names))))
 
 
 class SegmentHider(LineFinder):
@@ -101,37 +79,6 @@ def check_segments(records: Sequence[DecisionRecord], names: Sequence[str], hidd
         total = counts[name] + len({pair for pair in already if pair[0] == frame})
         if segment >= total:
             raise BadInput(f"{where} a segment of {name}, {_ends(range(total))}, got {segment}")
-
-
-def _suggest(name: str, sources: Sequence[str], elements: Set[str]) -> str:
-    """The names that the user may have meant."""
-    known = sorted({*sources, *elements}, key=lambda known: (known.count("/"), known))
-    meant = [text for text in known if name.lower() in text.lower()]
-    meant = meant or get_close_matches(name, known, MAX_SUGGESTED, MIN_SIMILARITY)
-    names = ", ".join(meant[:MAX_SUGGESTED]) or f"a knowledge source ({', '.join(sources)}), a landmark or a face"
-    return f"{names}, or as 'Frame-88 segment 12'"
-
-
-class _ReducedSource:
-    """Locales without some of their faces. A landmark that is removed keeps its number, but has no lines any more."""
-
-    def __init__(self, source: WorldSource, names: frozenset[str]) -> None:
-        self._source, self._names = source, names
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._source, name)
-
-    def geometry(self, locale: str) -> tuple[LocaleGeometry, ...]:
-        return tuple(self._reduce(geometry) for geometry in self._source.geometry(locale))
-
-    def all_geometry(self) -> Iterator[LocaleGeometry]:
-        return (self._reduce(geometry) for geometry in self._source.all_geometry())
-
-    def _reduce(self, geometry: LocaleGeometry) -> LocaleGeometry:
-        no_edges = Edges.from_rows(())
-        landmarks = ((n, replace(m, edges=no_edges) if m.name in self._names else m) for n, m in geometry.landmarks)
-        faces = (pair for pair in geometry.faces if pair[1].name not in self._names)
-        return replace(geometry, faces=tuple(faces), landmarks=tuple(landmarks))
 
 
 def _hide(found: Segments, hidden: Sequence[int]) -> Segments:

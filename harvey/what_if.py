@@ -1,0 +1,86 @@
+"""What if: what a robot knows, revised with the author "what if", to see what it would have done.
+
+Landmarks and faces that are taken away are no part of the locale frames any more; the building itself stays as it is.
+The revisions are observations like any other: they stand in the journal, and a replay takes them from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence, Set
+from difflib import get_close_matches
+
+from blackboard.board import View
+from blackboard.effect import Effect, Revise
+from blackboard.entry import Entry
+from blackboard.scheduler import Scheduler
+from harvey.errors import BadInput
+from world_models.building.changes.removals import element_names
+from world_models.building.world import World
+from world_models.entries.locale_frame import FrameChange, FrameRequest, LocaleFrame
+from world_models.frame_store import FrameStore
+
+AUTHOR = "what if"
+MAX_SUGGESTED, MIN_SIMILARITY = 6, 0.5
+
+
+class WhatIf:
+    """Revises what is on a board where it is not as it is to be; called before each cycle.
+
+    A frame comes to the board at the end of a cycle, so no act reads it before it is revised here. What is revised
+    already, as in a run that is replayed, stays as it is.
+    """
+
+    def __init__(self, removed: Sequence[str] = ()) -> None:
+        """``removed``: names of landmarks, whose lines go, and of faces."""
+        self._removals = tuple(FrameChange("removed", name, AUTHOR) for name in dict.fromkeys(removed))
+        self._checked: tuple[Entry[LocaleFrame], ...] = ()
+
+    def __call__(self, scheduler: Scheduler) -> None:
+        """Tell a scheduler what its board is to be revised by, if anything."""
+        if effects := list(self._revise_frames(scheduler.view)):
+            scheduler.tell(effects, AUTHOR)
+
+    def _revise_frames(self, view: View) -> Iterator[Effect]:
+        if not self._removals:
+            return
+        checked, self._checked = set(map(id, self._checked)), view.all(LocaleFrame)
+        for entry in self._checked:
+            if id(entry) in checked:
+                continue
+            frame, names = entry.value, element_names(entry.value.parts)
+            for change in self._removals:
+                if change.name in names and change not in frame.changes:
+                    frame = frame.changed(change)
+            if frame is not entry.value:
+                yield Revise(entry, frame, (entry,))
+
+
+def check_removals(names: Sequence[str], store: FrameStore, sources: Sequence[str]) -> None:
+    """Validate the names of landmarks and faces.
+
+    Raises:
+        BadInput: the world has none of a name; near names are listed, those of knowledge sources too.
+    """
+    for name in names:
+        if not _is_in_its_locale(name, store) and name not in (known := _list_elements(store.world)):
+            raise BadInput(f"--without {name}: expected {_suggest(name, sources, known)}, got {name!r}")
+
+
+def _is_in_its_locale(name: str, store: FrameStore) -> bool:
+    """Whether the locale that a name tells has this landmark or face; no other is read."""
+    _, answered = store.answer(FrameRequest(elements=(name,)))
+    locales = answered.answers[0].locales
+    return any(name in element_names(store.frame(locale).parts) for locale in locales)
+
+
+def _list_elements(world: World) -> frozenset[str]:
+    return element_names(tuple(world.locale_source.all_geometry()))
+
+
+def _suggest(name: str, sources: Sequence[str], elements: Set[str]) -> str:
+    """The names that the user may have meant."""
+    known = sorted({*sources, *elements}, key=lambda known: (known.count("/"), known))
+    meant = [text for text in known if name.lower() in text.lower()]
+    meant = meant or get_close_matches(name, known, MAX_SUGGESTED, MIN_SIMILARITY)
+    names = ", ".join(meant[:MAX_SUGGESTED]) or f"a knowledge source ({', '.join(sources)}), a landmark or a face"
+    return f"{names}, or as 'Frame-88 segment 12'"

@@ -1,0 +1,97 @@
+"""What if: what is taken away or set is a revision on the board with the author "what if", and nothing else."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from harvey.cli import main
+from harvey.replay.counterfactual import Answer, what_if
+from harvey.run_files.records import EntryRecord, read_records
+from harvey.run_files.run_directory import RunDirectory
+from harvey.runner.resume import find_remains
+from harvey.simulation.run import resume_mission, run_mission
+from sim.stage import Stage
+
+DESK = "allens-office/desk"
+
+
+@pytest.fixture(scope="module")
+def run(short_stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
+    out = tmp_path_factory.mktemp("runs") / "run"
+    assert run_mission(short_stage, 3, out=out).outcome == "reached"
+    return RunDirectory(out)
+
+
+@pytest.fixture(scope="module")
+def without(run: RunDirectory, tmp_path_factory: pytest.TempPathFactory) -> tuple[RunDirectory, Answer]:
+    """The run without the desk, and what it answered."""
+    out = RunDirectory(tmp_path_factory.mktemp("runs") / "without")
+    return out, what_if(run, [DESK], (), out=out)
+
+
+def told(run: RunDirectory) -> list[EntryRecord]:
+    """What the run was told by what if."""
+    return [entry for record in read_records(run.journal) for entry in record.observed if entry.author == "what if"]
+
+
+def is_replayed(run: RunDirectory, capsys: pytest.CaptureFixture[str]) -> bool:
+    assert main(["replay", str(run.path)]) == 0
+    return "all the same, byte for byte" in capsys.readouterr().out
+
+
+def test_a_landmark_that_is_taken_away_is_a_revision_of_its_locales_frame(
+    run: RunDirectory, without: tuple[RunDirectory, Answer]
+) -> None:
+    """Told in the cycle in which the frame comes; no other frame is revised, and the desk is expected nowhere."""
+    other, answer = without
+    (revision,) = told(other)
+    frame, _, number = revision.ref.rpartition(".")
+    assert (revision.type, revision.change, number) == ("LocaleFrame", "Revised", "1")
+    assert revision.because == (f"{frame}.0",) and answer.revised == (revision.ref,)
+    assert revision.value["locale"] == "allens-office"
+    assert revision.value["changes"] == [{"what": "removed", "name": DESK, "by": "what if"}]
+    observed = next(r.observed for r in read_records(other.journal) if revision in r.observed)
+    assert f"{frame}.0" in [entry.ref for entry in observed]
+    expects = [json.dumps(e.value) for r in read_records(other.journal) for e in r.made if e.type == "Milestone"]
+    assert expects and not any(DESK in text for text in expects)
+    assert not told(run)
+
+
+def test_acts_use_the_revision_and_never_the_frame_before_it(without: tuple[RunDirectory, Answer]) -> None:
+    (revision,) = told(without[0])
+    used = {ref for record in read_records(without[0].journal) for ref in record.used}
+    assert revision.ref in used and f"{revision.id}.0" not in used
+
+
+def test_it_is_replayed_without_being_told_again(
+    without: tuple[RunDirectory, Answer], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert is_replayed(without[0], capsys)
+
+
+@pytest.mark.parametrize("decisions", [0, 1, 20])
+def test_it_is_resumed(
+    without: tuple[RunDirectory, Answer], short_stage: Stage, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    decisions: int,
+) -> None:
+    """Cut off before the frame was there, after it was asked for, and long after that."""
+    whole, cut = without[0], RunDirectory(tmp_path / "cut")
+    cut.path.mkdir()
+    pictures = sum(entry.value["jpeg"]["bytes"] for record in list(read_records(whole.journal))[:decisions]
+                   for entry in record.observed if entry.type == "Frame")
+    (cut.path / "run.json").write_bytes((whole.path / "run.json").read_bytes())
+    (cut.path / "camera.mjpeg").write_bytes((whole.path / "camera.mjpeg").read_bytes()[:pictures])
+    cut.journal.write_bytes(b"".join(whole.journal.read_bytes().splitlines(keepends=True)[:decisions]))
+    assert resume_mission(cut, find_remains(cut), stage=short_stage).outcome == "reached"
+    assert [(e.ref, e.value) for e in told(cut)] == [(e.ref, e.value) for e in told(whole)]
+    assert is_replayed(cut, capsys)
+
+
+def test_another_question_is_asked_of_it(without: tuple[RunDirectory, Answer]) -> None:
+    """What was taken away already stays away, and is no difference."""
+    answer = what_if(without[0], ["allens-office/bookshelf-1"], (), go_on=False)
+    assert (answer.then, answer.now, answer.outcome.kind) == (None, None, "reached")
+    assert answer.agreed == len(list(read_records(without[0].journal)))
