@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from harvey.commands.command import Command, whole
@@ -13,6 +13,8 @@ from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory, open_run
 from harvey.why.history import History
 from harvey.why.journal import JournalHistory
+from harvey.why.model.element import element_story, is_element
+from harvey.why.model.world_file import WorldFile
 from harvey.why.on_the_way import levels_off, on_the_way
 from harvey.why.story import LEGEND, Story, lines_of, tell_stories
 from harvey.why.trace import cycle_lines
@@ -22,8 +24,9 @@ from logs.disk import is_being_written
 
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN", help="a run directory")
-    parser.add_argument("entry", metavar="ENTRY", nargs="?",
-                        help="as MotorCommand-12 (its last revision) or Leg-3.2; without one: how the mission ended")
+    parser.add_argument("entry", metavar="NAME", nargs="?",
+                        help="as MotorCommand-12 (its last revision) or Leg-3.2, or a landmark, door or room as"
+                             " allens-office/desk; without one: how the mission ended")
     parser.add_argument("--at", metavar="CYCLE", type=whole, help="explain what this cycle did")
     parser.add_argument("--milestone", metavar="NAME", help="tell a milestone's story: Milestone-3, or M1 of hallway")
     parser.add_argument("--not", metavar="KS|ENTRY", dest="not_",
@@ -39,7 +42,7 @@ def _run(args: Namespace) -> int:
     asked = [name for name in ("entry", "milestone", "not_") if getattr(args, name) is not None]
     asked += ["--check"] * args.check
     if len(asked) + (args.at is not None and not args.not_) > 1:
-        raise BadInput("expected one of ENTRY, --at, --milestone, --not and --check; --not also goes with --at")
+        raise BadInput("expected one of NAME, --at, --milestone, --not and --check; --not also goes with --at")
     run = open_run(args.run)
     history = JournalHistory(run.journal)
     if args.check:
@@ -47,15 +50,17 @@ def _run(args: Namespace) -> int:
     if args.not_ is not None:
         _print_not(run, history, args)
         return 0
-    refs = [] if args.milestone is not None else find_refs(history, args.entry if args.at is None else args.at)
+    is_told_otherwise = args.milestone is not None or (args.entry is not None and is_element(history, args.entry))
+    refs = [] if is_told_otherwise else find_refs(history, args.entry if args.at is None else args.at)
+    stories = list(_stories(run, history, args, refs))
     if not asked and args.at is None and history.cut_off is not None:
         print(_describe_unfinished(run, history.cut_off), file=sys.stderr if args.json else sys.stdout)
     if args.json:
-        print(json.dumps([_record(one) for one in _stories(history, args, refs)], indent=2))
+        print(json.dumps([_record(one) for one in stories], indent=2))
     else:
         if not asked and args.at is None:
             print("\n".join([*levels_off(run), *on_the_way(history, run.read_result()), ""]))
-        print("\n".join(_paragraphs(history, args, refs)))
+        print("\n".join(_paragraphs(history, args, refs, stories)))
     return 0
 
 
@@ -68,19 +73,23 @@ def _describe_unfinished(run: RunDirectory, cycle: int) -> str:
             "The last thing that its journal tells of:\n")
 
 
-def _stories(history: History, args: Namespace, refs: Iterable[str]) -> Iterator[Story]:
+def _stories(run: RunDirectory, history: History, args: Namespace, refs: Sequence[str]) -> Iterator[Story]:
+    """Of what is asked for by name the lines of the world's file are told too; the short account is to come fast."""
+    world = WorldFile(run)
+    if args.entry is not None and not refs:
+        yield element_story(history, args.entry, world)
     if args.milestone is not None:
         from harvey.why.milestone import milestone_story, milestones
 
-        yield from (milestone_story(history, id) for id in milestones(history, args.milestone))
-    yield from tell_stories(history, refs)
+        yield from (milestone_story(history, id, world) for id in milestones(history, args.milestone))
+    yield from tell_stories(history, refs, None if args.entry is None and args.at is None else world)
 
 
-def _paragraphs(history: History, args: Namespace, refs: list[str]) -> Iterator[str]:
+def _paragraphs(history: History, args: Namespace, refs: list[str], stories: list[Story]) -> Iterator[str]:
     if args.at is not None:
         yield from cycle_lines(history.decision(args.at), history.candidates(args.at))
         yield ""
-    for number, one in enumerate(_stories(history, args, refs)):
+    for number, one in enumerate(stories):
         yield from ("",) * (number > 0)
         yield from lines_of(one)
     if args.depth is not None and refs:
@@ -124,6 +133,7 @@ COMMAND = Command(
     (
         ("harvey why runs/lab-to-allens-office-0", "what happened on the way, how the mission ended, and why"),
         ("harvey why runs/lab-to-allens-office-0 MotorCommand-12", "why it turned there"),
+        ("harvey why runs/lab-to-allens-office-0 allens-office/desk", "who expected it, from which frame and line"),
         ("harvey why runs/lab-to-allens-office-0 --at 88", "what cycle 88 did, and why"),
         ("harvey why runs/lab-to-allens-office-0 --milestone 'M1 of hallway'", "what was expected, seen and judged"),
         ("harvey why runs/lab-to-allens-office-0 --not relocalizer --at 88", "why a knowledge source did not act then"),

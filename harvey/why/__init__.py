@@ -1,6 +1,7 @@
-"""Why: explanations of a run from its journal alone, in sentences that name their entries.
+"""Why: explanations of a run from its journal, in sentences that name their entries.
 
-In reading order: ``history`` and ``journal`` (entries by name), ``links`` (what rests on what), ``sentences`` and
-``facts`` (in words), ``story``, ``milestone``, ``on_the_way`` (what is told), ``walk``, ``trace``, ``reach``
-(the whole web), ``why_not``, ``ask``, ``why_not_answers`` (what did not happen).
+In reading order: ``history`` and ``journal`` (entries by name), ``links`` (what rests on what), ``sentences``,
+``facts`` and ``decisions`` (in words), ``model/`` (frames, and the world's file), ``story``, ``milestone``,
+``on_the_way`` (what is told), ``walk``, ``trace``, ``reach`` (the whole web), ``why_not``, ``ask``,
+``why_not_answers`` (what did not happen).
 """

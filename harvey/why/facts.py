@@ -107,7 +107,7 @@ def describe_line_match(history: History, record: EntryRecord) -> str:
     if match is None:
         return f"The pose was solved from {fix.match}."
     seen = reason(history, match, "Segments")
-    by_name = _by_landmark(history, fix, match)
+    by_name = by_landmark(history, fix, match)
     where = f" in {picture(None if seen is None else reason(history, seen, 'Frame'), 'a picture')}"
     agreeing = int(fix.inliers.sum())
     if not by_name:
@@ -125,14 +125,14 @@ def best_pairs(history: History, record: EntryRecord, match: EntryRecord) -> str
     """The segments of the landmark with most of them: ``segments 12, 31 and 40 in Frame-88 against ...``."""
     fix, seen = value_of(record, PoseFix), reason(history, match, "Segments")
     where = picture(None if seen is None else reason(history, seen, "Frame"))
-    by_name = _by_landmark(history, fix, match)
+    by_name = by_landmark(history, fix, match)
     if not by_name:
         return f"{count(int(fix.inliers.sum()), 'pair')} in {where}"
     best, numbers = by_name[0]
     return f"{_segments(numbers)} in {where} against {landmark(best)}"
 
 
-def _by_landmark(history: History, fix: PoseFix, match: EntryRecord) -> list[tuple[str, list[int]]]:
+def by_landmark(history: History, fix: PoseFix, match: EntryRecord) -> list[tuple[str, list[int]]]:
     """Landmarks with the segments that agree with the pose, those with most segments first."""
     expected = reason(history, match, "Milestone")
     if expected is None:

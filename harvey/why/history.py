@@ -120,15 +120,22 @@ class History(ABC):
         Raises:
             BadInput: the run has no such entry; near ones are named.
         """
+        found = self.find(text)
+        if found is not None:
+            return found
+        self.verify()
+        raise BadInput(f"expected an entry of the run, as {', '.join(self.near(text)) or 'none'}, got {text!r}")
+
+    def find(self, text: str) -> str | None:
+        """As :meth:`resolve`; None where the run has no such entry."""
         low = text.lower()
         for names in (self.newest, self.refs):
             for name in names:
                 if name.lower() == low:
                     return self.newest.get(name, name)
-        self.verify()
-        raise BadInput(f"expected an entry of the run, as {', '.join(self._near(text)) or 'none'}, got {text!r}")
+        return None
 
-    def _near(self, text: str) -> list[str]:
+    def near(self, text: str) -> list[str]:
         """Names like one that is not there: of the same kind with near numbers, else of a kind that is spelt alike."""
         kinds = {id.rpartition("-")[0].lower(): id.rpartition("-")[0] for id in self.newest}
         kind, _, rest = text.rpartition("-")

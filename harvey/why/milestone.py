@@ -9,10 +9,13 @@ from blackboard.servoing import Discrepancy
 from harvey.errors import BadInput
 from harvey.run_files.records import EntryRecord
 from harvey.why import facts
+from harvey.why.decisions import describe_decision
 from harvey.why.history import History
 from harvey.why.links import STRANGE, reason, words
+from harvey.why.model.frames import tell_model_lines
+from harvey.why.model.world_file import WorldFile
 from harvey.why.sentences import sentence, value_of
-from harvey.why.story import Step, Story, describe_decision
+from harvey.why.story import Step, Story
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Certificate, Milestone, PlanSketch
 
@@ -61,26 +64,29 @@ def _last(history: History, id: str) -> EntryRecord:
     return found
 
 
-def milestone_story(history: History, id: str) -> Story:
+def milestone_story(history: History, id: str, world: WorldFile | None = None) -> Story:
     """Everything about one milestone, in the order in which it happened.
+
+    Args:
+        world: tells from which file and line model lines come; None where that is not asked for.
 
     Raises:
         BadInput: its entries have other fields than those known here.
     """
     last = _last(history, id)
     try:
-        return _story(history, id, last)
+        return _story(history, id, last, world)
     except STRANGE as error:
         what = "expected a milestone and its evidence as this version writes them, got others"
         raise BadInput(f"{id}: {what} ({error!r})") from None
 
 
-def _story(history: History, id: str, last: EntryRecord) -> Story:
+def _story(history: History, id: str, last: EntryRecord, world: WorldFile | None) -> Story:
     first = history.entry(f"{id}.0") or last
     certificate = reason(history, last, "Certificate")
     steps = [*_tell_origin(history, first), *_tell_expectation(history, last, certificate)]
     if certificate is not None:
-        steps += _tell_verdict(history, certificate)
+        steps += _tell_verdict(history, certificate, world)
         steps += _tell_consequences(history, certificate)
     else:
         steps.append(Step("judged", f"It was never judged: when the run ended it was {last.value['status']}.",
@@ -108,7 +114,7 @@ def _tell_expectation(history: History, last: EntryRecord, certificate: EntryRec
     yield Step("expected", facts.expectation(value_of(looked, Milestone)), (looked.ref,))
 
 
-def _tell_verdict(history: History, certificate: EntryRecord) -> Iterator[Step]:
+def _tell_verdict(history: History, certificate: EntryRecord, world: WorldFile | None) -> Iterator[Step]:
     fix, milestone = reason(history, certificate, "PoseFix"), reason(history, certificate, "Milestone")
     match = None if fix is None else reason(history, fix, "LineMatch")
     segments = None if match is None else reason(history, match, "Segments")
@@ -116,6 +122,7 @@ def _tell_verdict(history: History, certificate: EntryRecord) -> Iterator[Step]:
     if fix is not None:
         refs = tuple(r.ref for r in (fix, match, segments, frame) if r is not None)
         yield Step("seen", facts.describe_line_match(history, fix), refs)
+        yield from (Step("model", *told) for told in tell_model_lines(history, fix, world))
     judged = None if milestone is None else value_of(milestone, Milestone)
     said = facts.verdict(value_of(certificate, Certificate), judged)
     yield Step("judged", said[0].upper() + said[1:], (certificate.ref,))

@@ -11,7 +11,9 @@ from harvey.why.history import History
 
 GOAL, MODEL, SENSOR = "goal", "model", "sensor"
 KINDS = (GOAL, MODEL, SENSOR)
-"""What an explanation may end in: what was asked for, what is known of the building, what the camera saw."""
+"""What an explanation may end in: what was asked for, what is known of building and robot, what the camera saw."""
+KNOWN = frozenset({"LocaleFrame", "CameraState", "Wheels", "Footprint"})
+"""The kinds of entries that are a part of the model."""
 Kind = Callable[[EntryRecord], str | None]
 
 
@@ -53,6 +55,8 @@ def kind_of(record: EntryRecord) -> str | None:
         return GOAL
     if record.type == "Frame":
         return SENSOR
+    if record.type in KNOWN:
+        return MODEL
     return MODEL if _names_the_model(record.type, value) else None
 
 

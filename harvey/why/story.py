@@ -7,18 +7,19 @@ kind of thing once, at the place nearest to what is explained, and says by name 
 from __future__ import annotations
 
 import itertools
-import math
-from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from textwrap import fill
 
 from blackboard.servoing import Discrepancy
 from harvey.errors import BadInput
-from harvey.run_files.records import Candidate, EntryRecord
+from harvey.run_files.records import EntryRecord
 from harvey.why import facts
+from harvey.why.decisions import describe_decision, tell_answer
 from harvey.why.history import History
-from harvey.why.links import STRANGE, anchor_of, nearest, reason, tracks_of, within, words
+from harvey.why.links import STRANGE, anchor_of, nearest, reason, tracks_of, within
+from harvey.why.model import frames
+from harvey.why.model.world_file import WorldFile, tell_source
 from harvey.why.sentences import sentence, value_of
 from world_models import words as vocabulary
 from world_models.entries.body import Look, MotionReport
@@ -29,8 +30,6 @@ from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone
 MOST = 24
 """So many things are told at the most."""
 MOST_PLAIN, MOST_MET = 12, 200
-TIMED_WITHIN = 100
-"""A time is looked for in so many decisions, backwards."""
 WIDTH = 120
 
 
@@ -69,24 +68,28 @@ class Story:
 LEGEND = """\
 Places are in metres in each room's own frame, headings counter-clockwise from its x axis; pixels count right and
 down from the top left. Model lines are edges that the map of the building says can be seen. Names in brackets are
-entries of the journal: ask on with harvey why RUN NAME."""
+entries of the journal: ask on with harvey why RUN NAME, and of a landmark, door or room by its name too."""
 
 
-def tell_stories(history: History, refs: Iterable[str]) -> Iterator[Story]:
+def tell_stories(history: History, refs: Iterable[str], world: WorldFile | None = None) -> Iterator[Story]:
     """The story of each of some entries. Raises BadInput where the journal does not say how one came about."""
     for ref in refs:
         record = history.entry(ref)
         if record is None:
             history.verify()
             raise BadInput(f"{history.source}: expected {ref} in the journal, which does not say how it came about")
-        yield story(history, record)
+        yield story(history, record, world)
 
 
-def story(history: History, record: EntryRecord) -> Story:
-    """The story of one entry; where values have other fields than those known here, told by the entries as they are."""
-    teller = _Teller(history)
+def story(history: History, record: EntryRecord, world: WorldFile | None = None) -> Story:
+    """The story of one entry; where values have other fields than those known here, told by the entries as they are.
+
+    Args:
+        world: tells from which file and line model lines come; None where that is not asked for.
+    """
+    teller = _Teller(history, world)
     try:
-        steps = [*teller.reasons(record), *teller.context(record)]
+        steps = [*teller.own(record), *teller.reasons(record), *teller.used(record), *teller.context(record)]
         head = facts.in_one_sentence(history, record) or headline(record)
     except STRANGE:
         steps, head = list(_plain_steps(history, record)), _plainly(history, record)
@@ -117,51 +120,25 @@ def _describe_belief(hypothesis: Hypothesis) -> str:
     return f"It believed that it stood at {facts.pose(hypothesis)}."
 
 
-def describe_decision(history: History, record: EntryRecord) -> str:
-    """By whom, when and against what."""
-    when = f"cycle {record.cycle}" + _time(history, record)
-    if record.observed:
-        return f"It came from outside, from {record.author}, and was taken up in {when.rstrip(',')}."
-    decision = history.decision(record.cycle)
-    text = f"Decided in {when} by the {words(record.author)}"
-    if decision.chosen is None:
-        return text + "."
-    next_best = decision.runner_up
-    second = f"; next best was {describe_candidate(next_best)}" if next_best else "; nobody else could act"
-    return f"{text}, woken by {decision.chosen.trigger}, rated {decision.chosen.rating:.2f}{second}."
-
-
-def describe_candidate(c: Candidate) -> str:
-    return f"the {words(c.source)}, rated {c.rating:.2f}"
-
-
-def _time(history: History, record: EntryRecord) -> str:
-    """The newest time that anything from outside told when the entry came about, which need not rest on that."""
-    cycles = history.cycles
-    for cycle in reversed(cycles[: bisect_right(cycles, record.cycle)][-TIMED_WITHIN:]):
-        told = [found for found in map(_time_of, history.decision(cycle).observed) if found is not None]
-        if told:
-            return f", {max(told):.1f} s into the run,"
-    return ""
-
-
-def _time_of(record: EntryRecord) -> float | None:
-    if not isinstance(record.value, Mapping):
-        return None
-    value = record.value.get("sim_time_s", record.value.get("when_s"))
-    since, waited = record.value.get("since_s"), record.value.get("waited_s")
-    if isinstance(since, int | float) and isinstance(waited, int | float):
-        value = since + waited
-    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
-
-
 @dataclass(slots=True)
 class _Teller:
     """Tells steps; ``told`` are the keys of those that were told already, ``met`` the entries that were come to."""
 
     history: History
+    world: WorldFile | None = None
     told: set[str] = field(default_factory=set)
     met: set[str] = field(default_factory=set)
+
+    def own(self, record: EntryRecord) -> Iterator[Step]:
+        """What is said of an entry itself, beside its headline."""
+        if record.type == "FrameRequest":
+            yield from (Step("answered", *told) for told in tell_answer(self.history, record))
+        elif record.type == "LocaleFrame" and self.world is not None:
+            yield Step("described", tell_source(self.world, frames.reference_of(record).locale), (record.ref,))
+
+    def used(self, record: EntryRecord) -> Iterator[Step]:
+        """By what the act went that made an entry."""
+        yield from (Step("known", *told) for told in frames.tell_used(self.history, record))
 
     def reasons(self, record: EntryRecord) -> Iterator[Step]:
         """What an entry rests on, below the entry itself."""
@@ -290,6 +267,10 @@ class _Teller:
         match = reason(self.history, fix, "LineMatch")
         segments = None if match is None else reason(self.history, match, "Segments")
         yield from self._one(fix.id, "matched", facts.describe_line_match(self.history, fix), fix, match, segments)
+        for text, refs in frames.tell_model_lines(self.history, fix, self.world):
+            if text not in self.told:
+                self.told.add(text)
+                yield Step("model", text, refs)
 
 
 def _plainly(_history: History, record: EntryRecord) -> str:
@@ -317,7 +298,8 @@ LABELS: Mapping[str, str] = {
     "Course": "motion",
     "Look": "look", "Segments": "seen", "Panorama": "thought", "BodyFault": "fault", "Recovery": "recovery",
     "Ride": "ride", "RideReport": "ride", "Obstruction": "hidden", "Quiescence": "stillness", "Outcome": "the end",
-    "Resumed": "resumed", "Drift": "wheels",
+    "Resumed": "resumed", "Drift": "wheels", "LocaleFrame": "known", "FrameRequest": "asked", "CameraState": "camera",
+    "Wheels": "wheels", "Footprint": "body",
 }
 FOLDED = frozenset({"PoseFix", "LineMatch", "Segments", "Certificate"})
 """Told by the sentences of what rests on them."""
@@ -350,10 +332,12 @@ FOLLOW: Mapping[str, tuple[str, ...]] = {
 def lines_of(told: Story) -> Iterator[str]:
     """A story as paragraphs: label, sentences and the entries that say so."""
     yield _wrap(f"{told.headline}  [{told.ref}]")
-    yield _wrap(told.decided)
+    if told.decided:
+        yield _wrap(told.decided)
     width = max((len(step.label) for step in told.steps), default=0)
     for step in told.steps:
-        yield _wrap(f"{step.text}  [{', '.join(step.refs)}]", f"  {step.label.ljust(width)}  ")
+        named = f"  [{', '.join(step.refs)}]" if step.refs else ""
+        yield _wrap(step.text + named, f"  {step.label.ljust(width)}  ")
 
 
 def _wrap(text: str, head: str = "") -> str:

@@ -9,9 +9,9 @@ from textwrap import fill
 
 from harvey.diff.first_difference import differing_leaves
 from harvey.run_files.records import DecisionRecord, EntryRecord
+from harvey.why.decisions import describe_decision
 from harvey.why.history import History
 from harvey.why.sentences import sentence
-from harvey.why.story import describe_decision
 from world_models.words import count
 
 WIDTH = 120

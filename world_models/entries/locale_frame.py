@@ -233,17 +233,13 @@ class FrameRequest:
     status: RequestStatus = "asked"
     answers: tuple[FrameAnswer, ...] = ()
 
-    def wanted(self) -> str:
-        """What is asked: ``what is known of hallway``."""
+    def sentence(self) -> str:
         frames = words.listed([name or "the whole building" for name in self.locales], 6)
         asked = [f"what is known of {frames}"] if frames else []
         asked += [f"where {words.listed([*self.called, *self.elements], 6)} is"] * bool(self.called or self.elements)
-        return " and ".join(asked)
-
-    def sentence(self) -> str:
         said = [answer.error or f"{answer.asked} is in {' and '.join(answer.locales)}" for answer in self.answers]
         answered = f"; answered{': ' * bool(said)}{', '.join(said)}" * has_answer(self)
-        return f"asks {self.wanted()}{answered}"
+        return f"asks {' and '.join(asked)}{answered}"
 
 
 ANSWERED: Index[FrameRequest] = Index(FrameRequest, lambda r: has_answer(r) or None, "answered")

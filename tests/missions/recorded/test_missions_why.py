@@ -21,12 +21,13 @@ from harvey.cli import main
 from harvey.diff.cause import grounds, parting, same
 from harvey.run_files.run_head import RunHead
 from harvey.why.ask import AskedView, board_at, changes, why_absent
+from harvey.why.decisions import describe_decision
 from harvey.why.history import History
 from harvey.why.journal import JournalHistory
 from harvey.why.links import reason
 from harvey.why.milestone import milestone_story, milestones
 from harvey.why.reach import check
-from harvey.why.story import describe_decision, lines_of, story
+from harvey.why.story import lines_of, story
 from harvey.why.why_not import in_cycle
 from sim.made_up.short_missions import OFFICE, fault
 from world_models.entries.kinds import KINDS

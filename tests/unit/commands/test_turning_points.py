@@ -23,9 +23,10 @@ from harvey.run_files.records import DecisionRecord, decision_of
 from harvey.run_files.run_directory import RunDirectory
 from harvey.runner.result import Contact, MissionResult
 from harvey.simulation.contacts import ContactWatch
+from harvey.why.decisions import describe_decision
 from harvey.why.history import MemoryHistory
 from harvey.why.on_the_way import levels_off, on_the_way
-from harvey.why.story import describe_decision, headline, story
+from harvey.why.story import headline, story
 from logs.turning_points import TurningPoint, TurningPointFinder
 from scripted_mission import house
 from sim.body.simulated_body import SimulatedBody
