@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping
+from itertools import chain
 from typing import Any
 
 from blackboard.agenda import Agenda
@@ -25,6 +26,7 @@ class Retention:
     def __init__(self, kinds: Mapping[type[Any], Kind]) -> None:
         self._ages = {value_type: _Ages(kind.keep) for value_type, kind in kinds.items() if kind.keep is not None}
         self._kinds = kinds
+        self._held: tuple[Change, ...] = ()
         self._needing = tuple(value_type for value_type, kind in kinds.items() if kind.needs is not nothing)
 
     def sweep(
@@ -32,10 +34,14 @@ class Retention:
     ) -> tuple[Ref, ...]:
         """Note what was posted, and remove what is due; its last revisions. The time follows the number of changes.
 
-        With ``hold`` all stays: an act waits for what it asked for, and may need anything that is there.
+        With ``hold`` all stays: an act waits for what it asked for, and may need anything that is there. What would
+        have been due then is due afterwards.
         """
+        if hold:
+            self._held += tuple(seen)
+            return ()
         left: list[Ref] = []
-        for change in seen:
+        for change in chain(self._held, seen):
             ages = self._ages.get(type(change.entry.value)) if isinstance(change, Posted) else None
             if ages is None:
                 continue
@@ -43,11 +49,12 @@ class Retention:
                 entry = board.view.get(id)
                 if entry is None:
                     continue
-                if not hold and self._may_leave(entry, board, agenda):
+                if self._may_leave(entry, board, agenda):
                     board.forget(id)
                     left.append(entry.ref)
                 else:
                     ages.put_back(id)
+        self._held = ()
         return tuple(left)
 
     def _may_leave(self, entry: Entry[Any], board: Blackboard, agenda: Agenda) -> bool:

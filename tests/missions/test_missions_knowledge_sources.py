@@ -17,15 +17,20 @@ from blackboard.journal import Decision, plain
 from blackboard.kinds import inference
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from harvey.simulation.run import build_robot_model, run_mission
+from harvey.simulation.run import run_mission
 from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources
 from knowledge_sources.settings import Settings
 from sim.body.simulated_body import SimulatedBody
 from sim.stage import Stage
 from sim.truth import Truth
+from world_models.actuator import ActuatorModel
+from world_models.building.building import Building
+from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotionReport
 from world_models.robot import RobotModel
 
+FROM_VIEW = Building | RobotModel | Camera | CameraMount | ActuatorModel | View
+"""What a knowledge source knows only from the view that it is given."""
 NAMES = [source.__module__.rpartition(".")[2] for source in KNOWLEDGE_SOURCES]
 NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "fault_handler", "path_follower",
               "elevator_rider", "obstruction_finder"}
@@ -37,8 +42,8 @@ the move, ride in elevators, or find what is before the camera."""
 def test_without_any_one_of_them_the_outcome_is_clear(short_stage: Stage, missing: str) -> None:
     refusals: list[str] = []
 
-    def sources(robot: RobotModel, settings: Settings) -> Sequence[KnowledgeSource]:
-        return [ks for ks in knowledge_sources(robot, settings) if ks.name != missing]
+    def sources(settings: Settings) -> Sequence[KnowledgeSource]:
+        return [ks for ks in knowledge_sources(settings) if ks.name != missing]
 
     result = run_mission(short_stage, 3, sources=sources, sinks=[lambda d: refusals.append(d.refused)])
     assert result.outcome in {"reached", "lost", "blocked", "failed"}
@@ -74,16 +79,17 @@ def test_adding_one_takes_one_line(short_stage: Stage) -> None:
         said.extend(c.entry.value.text for c in decision.made if c.entry.author == "odometer")
 
     result = run_mission(
-        short_stage, 3, sources=lambda *known: (*knowledge_sources(*known), Odometer()), sinks=[listen])
+        short_stage, 3, sources=lambda known: (*knowledge_sources(known), Odometer()), sinks=[listen])
     assert result.outcome == "reached"
     assert said
 
 
 def test_no_expert_holds_the_truth(short_stage: Stage) -> None:
-    """Nothing of the simulator can be reached from what a knowledge source is built with."""
+    """Neither the simulator nor the building or the robot can be reached from what a knowledge source holds."""
     body = short_stage.body(3)
-    for source in knowledge_sources(build_robot_model(short_stage.scenario)):
-        assert not any(isinstance(thing, Truth | SimulatedBody | Stage) for thing in _reachable(source)), source.name
+    for source in knowledge_sources():
+        held = [thing for thing in _reachable(source) if isinstance(thing, Truth | SimulatedBody | Stage | FROM_VIEW)]
+        assert held == [], source.name
     assert any(isinstance(thing, Truth) for thing in _reachable(body))  # the walk does find it where it is
 
 
@@ -131,7 +137,7 @@ def test_rating_and_acting_are_pure(short_stage: Stage) -> None:
             assert len(view) == size
             return first
 
-    result = run_mission(short_stage, 3, sources=lambda *known: [Asked(ks) for ks in knowledge_sources(*known)])
+    result = run_mission(short_stage, 3, sources=lambda known: [Asked(ks) for ks in knowledge_sources(known)])
     assert result.outcome == "reached", result.reason
     assert checked > 100
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, cast
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -21,7 +21,6 @@ from knowledge_sources.settings import DEFAULT
 from strategies import Note, Scripted
 from world_models.entries.body import STOP_KEY, BodyFault, Frame, Look, MotionReport, MotorCommand, Recovery
 from world_models.entries.task import Outcome
-from world_models.robot import RobotModel
 
 S = DEFAULT.action
 MOST_CYCLES = 2000
@@ -70,7 +69,7 @@ def drive(requests: list[str], body: ScriptedBody) -> tuple[Scheduler, list[Any]
         told.extend(change.entry for change in (*decision.observed, *decision.made))
 
     scheduler = Scheduler(
-        [FaultHandler(cast(RobotModel, None)), Scripted("asker", Note, asking, writes=(MotorCommand, Look))],
+        [FaultHandler(), Scripted("asker", Note, asking, writes=(MotorCommand, Look))],
         ports=(BodyPort(body),), sinks=(listen,),
     )
     for request in requests:

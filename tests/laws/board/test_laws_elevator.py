@@ -11,10 +11,8 @@ from hypothesis import strategies as st
 from blackboard.change import Quiescence
 from blackboard.effect import Post
 from blackboard.journal import Decision
-from blackboard.scheduler import Scheduler
 from experiments.perception.visibility import CAMERA, MOUNT
-from harvey.dry_run import PLANNING_SOURCES, AcceptEveryMilestone, IdealBodyPort
-from harvey.wiring import knowledge_sources
+from harvey.dry_run import build_dry_run
 from towers import tower
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
@@ -48,8 +46,7 @@ def drive(world: World, origin: str, destination: str) -> tuple[list[object], Ou
         made.extend(change.entry.value for change in decision.made)
 
     robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel())
-    planners = [source for source in knowledge_sources(robot) if source.name in PLANNING_SOURCES]
-    scheduler = Scheduler([*planners, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(note,))
+    scheduler = build_dry_run(world, robot, sinks=(note,))
     goal = f"(ptrans ({origin} (12,4.5,0)) ({destination} (14,4.2,0)))"
     scheduler.tell([Post(Command(goal, 0.5, None, diagonal(0.003, 0.001)))], "user")
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < 4_000:

@@ -22,13 +22,14 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry, Ref
 from blackboard.journal import Decision
 from blackboard.level import Level
-from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
+from harvey.runner.world_port import build_scheduler
 from harvey.simulation.run import build_robot_model
 from harvey.wiring import KNOWLEDGE_SOURCES
 from knowledge_sources.questions import (
     active_goal,
     find_belief,
+    find_building,
     open_discrepancy,
     open_milestone,
     rolling_course,
@@ -37,11 +38,13 @@ from knowledge_sources.questions import (
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario, with_settings
+from world_models.building.world import World
 from world_models.entries.body import Course, Frame, Look, MotionReport, MotorCommand
 from world_models.entries.kinds import KINDS
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch
+from world_models.files.world_files import load_world
 from world_models.robot import RobotModel
 
 ACTION_PX, PLAN_PX = 6.0, DEFAULT.plan.max_deviation_px
@@ -95,7 +98,7 @@ class ScriptedJudge(RobotKnowledgeSource):
         assert belief is not None and milestone is not None
         px = figure(trigger.entry)
         verdict = "not testable" if px == UNTOLD else "verified" if px <= PLAN_PX else "refuted"
-        here, nothing = belief.value.world_from_robot(self._robot.world), np.zeros((0, 2))
+        here, nothing = belief.value.world_from_robot(find_building(view)), np.zeros((0, 2))
         fix = Post(PoseFix("", here, np.array(SURE), nothing[:, 0] > 0, nothing, ()), (trigger.entry,))
         yield fix
         told = Certificate(milestone.id, _next_fix(view), verdict, "", 9, 9, 9, 1.0, 0.5, 0.0, 0.0, px, PLAN_PX, 0.0)
@@ -166,22 +169,27 @@ class ScriptedBody:
 
 
 @cache
+def world() -> World:
+    return load_world(load_scenario("lab-to-allens-office").world)
+
+
+@cache
 def robot(continuous: bool) -> RobotModel:
     goal = {"goal": "(ptrans (allens-office (7,4,0)) (allens-office (13,12,0)))", "motion.continuous": continuous}
-    return build_robot_model(with_settings(load_scenario("lab-to-allens-office"), goal))
+    return build_robot_model(with_settings(load_scenario("lab-to-allens-office"), goal), world())
 
 
 class Ladder:
     """A mission of the real knowledge sources with scripted measurements; each decision is held against the laws."""
 
     def __init__(self, continuous: bool = False) -> None:
-        model = robot(continuous)
-        real = [source(model) for source in KNOWLEDGE_SOURCES]
-        scripted = [ScriptedTracker(model), ScriptedJudge(model), ScriptedRelocalizer(model)]
+        real = [source() for source in KNOWLEDGE_SOURCES]
+        scripted = [ScriptedTracker(), ScriptedJudge(), ScriptedRelocalizer()]
         self.body = ScriptedBody()
         self.seen: dict[Ref, Discrepancy] = {}
-        self.scheduler = Scheduler(
-            [*(s for s in real if s.name not in PERCEIVERS), *scripted], ports=[self.body], kinds=KINDS)
+        self.scheduler = build_scheduler(
+            [*(s for s in real if s.name not in PERCEIVERS), *scripted], world(), robot(continuous), ports=[self.body],
+            kinds=KINDS)
         task = with_settings(load_scenario("lab-to-allens-office"), {
             "goal": "(ptrans (allens-office (7,4,0)) (allens-office (13,12,0)))"}).command
         self.scheduler.tell([Post(task)], "user")

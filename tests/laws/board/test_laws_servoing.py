@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import cast
 
 import pytest
 from hypothesis import given, settings
@@ -21,7 +20,6 @@ from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
 from knowledge_sources.plan.escalator import Escalator
 from strategies import Note, Scripted, levels, magnitudes, run
-from world_models.robot import RobotModel
 
 bounds = st.tuples(st.floats(0.0, 5.0), st.floats(0.0, 8.0))
 
@@ -70,11 +68,6 @@ def measure(_view: View, trigger: Change) -> Iterable[Effect]:
     yield Revise(trigger.entry, Discrepancy(value.level, value.what, float(value.what), value.bounds, value.unit))
 
 
-def escalator() -> Escalator:
-    """It asks nothing of the robot that it is built with."""
-    return Escalator(cast(RobotModel, None))
-
-
 def corrector(level: Level) -> Scripted:
     return Scripted(
         f"{level}_corrector", Discrepancy, correct, level=level, writes=(Discrepancy,),
@@ -101,7 +94,7 @@ class ServoMachine(RuleBasedStateMachine):
         self.decisions: list[Decision] = []
         self.found: dict[Ref, Discrepancy] = {}
         self.scheduler = Scheduler(
-            [*map(worker, Level), *map(corrector, Level), *map(measurer, (Level.PLAN, Level.GOAL)), escalator()],
+            [*map(worker, Level), *map(corrector, Level), *map(measurer, (Level.PLAN, Level.GOAL)), Escalator()],
             sinks=[self.decisions.append],
         )
 
@@ -171,7 +164,7 @@ def test_action_work_goes_before_plan_work_while_only_action_discrepancies_are_o
     plan = Scripted("planner", Note, level=Level.PLAN, rate=1.0)
     act = Scripted("driver", Discrepancy, correct, level=Level.ACTION, rate=0.1, writes=(Discrepancy,),
                  where=lambda d: d.is_open)
-    scheduler = Scheduler([plan, act, escalator()])
+    scheduler = Scheduler([plan, act, Escalator()])
     small = Discrepancy(Level.ACTION, "slightly off", 1.0, (2.0, 3.0), "px")
     scheduler.tell([Post(Note("a")), Post(small)], "user")
     decisions = run(scheduler)
@@ -180,7 +173,7 @@ def test_action_work_goes_before_plan_work_while_only_action_discrepancies_are_o
 
 
 def test_an_action_discrepancy_beyond_its_bound_brings_the_plan_level_into_focus_once_it_is_raised() -> None:
-    scheduler = Scheduler([corrector(Level.PLAN), measurer(Level.PLAN), escalator()])
+    scheduler = Scheduler([corrector(Level.PLAN), measurer(Level.PLAN), Escalator()])
     scheduler.tell([Post(Discrepancy(Level.ACTION, "2.5", 2.5, (2.0, 3.0), "px"))], "user")
     decisions = run(scheduler)
     assert [(str(d.focus), d.chosen and d.chosen.source.name) for d in decisions] == [

@@ -10,10 +10,8 @@ from hypothesis import strategies as st
 from blackboard.change import Quiescence
 from blackboard.effect import Post
 from blackboard.journal import Decision
-from blackboard.scheduler import Scheduler
 from experiments.perception.visibility import CAMERA, MOUNT
-from harvey.dry_run import PLANNING_SOURCES, AcceptEveryMilestone, IdealBodyPort
-from harvey.wiring import knowledge_sources
+from harvey.dry_run import build_dry_run
 from sim.made_up.generated_house import generate_house
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
@@ -33,8 +31,7 @@ def plan_sketches(world: World) -> tuple[list[PlanSketch], Outcome]:
         sketches.extend(c.entry.value for c in decision.made if isinstance(c.entry.value, PlanSketch))
 
     robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel())
-    planners = [source for source in knowledge_sources(robot) if source.name in PLANNING_SOURCES]
-    scheduler = Scheduler([*planners, AcceptEveryMilestone()], ports=(IdealBodyPort(),), sinks=(note,))
+    scheduler = build_dry_run(world, robot, sinks=(note,))
     ends = [world.locale(name).outline.mean(axis=0) / FOOT_M * part
             for name, part in ((world.rooms[0], 0.35), (world.rooms[-1], 0.35))]
     first, last = (f"({room} ({x:.2f},{y:.2f},0))" for room, (x, y) in

@@ -18,6 +18,7 @@ from harvey.simulation.run import build_robot_model
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.actuator import ActuatorModel
+from world_models.files.world_files import load_world
 
 DOCS = Path(__file__).parents[3] / "docs"
 TEXT = (DOCS / "hardware.md").read_text(encoding="utf-8")
@@ -48,7 +49,7 @@ def test_its_flat_is_a_world_without_faults_and_its_mission_is_planned_with_ever
     mission, scenario = load_mission(FLAT / "mission.toml", {}), load_scenario(FLAT / "flat-sim.toml")
     assert mission.goal == scenario.goal and mission.world == scenario.world
     assert mission.start == scenario.start
-    previews, outcome = dry_run(build_robot_model(scenario), mission.command)
+    previews, outcome = dry_run(load_world(scenario.world), build_robot_model(scenario), mission.command)
     assert outcome.kind == "reached" and {p.verdict for p in previews} == {"clear"}
     said, can_be_driven = summarize_dry_run(previews, outcome)
     assert can_be_driven and f"{len(previews)} milestones, {said}" in TEXT

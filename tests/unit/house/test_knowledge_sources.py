@@ -20,11 +20,10 @@ from blackboard.journal import plain
 from blackboard.kinds import Role
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from harvey.simulation.run import build_robot_model, run_mission
+from harvey.simulation.run import run_mission
 from harvey.wiring import knowledge_sources, load_kinds
 from sim.scenario import load_scenario
 from sim.stage import build_stage
-from world_models.robot import RobotModel
 
 FOLDER = Path(__file__).parents[3] / "knowledge_sources"
 FILES = {path.stem: path for level in Level for path in sorted((FOLDER / str(level)).glob("[!_]*.py"))}
@@ -54,7 +53,7 @@ def test_it_stands_in_the_folder_of_its_level() -> None:
 
 
 def test_every_knowledge_source_is_wired() -> None:
-    assert {type(source) for source in knowledge_sources(a_robot())} == set(KNOWLEDGE_SOURCES.values())
+    assert {type(source) for source in knowledge_sources()} == set(KNOWLEDGE_SOURCES.values())
 
 
 @each_source
@@ -77,10 +76,10 @@ def test_what_is_watched_is_written_by_somebody() -> None:
 
 
 @each_source
-def test_it_receives_the_robots_model_of_itself_and_settings_and_nothing_else(source: type[KnowledgeSource]) -> None:
-    """So no body and no truth can be handed to it."""
+def test_it_receives_settings_and_nothing_else(source: type[KnowledgeSource]) -> None:
+    """So no building, no robot, no body and no truth can be handed to it."""
     given = list(inspect.signature(source).parameters.values())
-    assert [p.annotation for p in given] in ([], ["RobotModel"], ["RobotModel", "Settings"])
+    assert [p.annotation for p in given] in ([], ["Settings"])
 
 
 @pytest.mark.parametrize("stem", KNOWLEDGE_SOURCES)
@@ -99,10 +98,6 @@ def test_it_keeps_no_memory_but_the_board(stem: str) -> None:
 def test_it_knows_no_other_knowledge_source(stem: str) -> None:
     modules = {n.module for n in ast.walk(TREES[stem]) if isinstance(n, ast.ImportFrom)}
     assert not modules & {f"knowledge_sources.{other}" for other in KNOWLEDGE_SOURCES}
-
-
-def a_robot() -> RobotModel:
-    return build_robot_model(load_scenario("lab-to-allens-office"))
 
 
 def effect_record(effect: Effect) -> list[Any]:
@@ -146,6 +141,6 @@ def test_ratings_and_acts_are_pure() -> None:
     scenario = load_scenario("lab-to-allens-office")
     stage = build_stage(replace(scenario, limits=replace(scenario.limits, max_cycles=90)))
     impure: list[str] = []
-    result = run_mission(stage, 1, sources=lambda *known: [asked_twice(s, impure) for s in knowledge_sources(*known)])
+    result = run_mission(stage, 1, sources=lambda known: [asked_twice(s, impure) for s in knowledge_sources(known)])
     assert "90 cycles" in result.reason and result.frames > 2
     assert impure == []

@@ -27,9 +27,10 @@ FURNISHED = HOUSE.replace("[locales.kitchen]\n", TABLE)
 
 def outcome(x_m: float, y_m: float, radius_m: float = 0.35) -> Outcome:
     """How a mission to a place in the kitchen ends in a dry run."""
-    robot = RobotModel(read_world(Source.parse(FURNISHED, "house.toml")), CAMERA, MOUNT, ActuatorModel(), radius_m)
+    world = read_world(Source.parse(FURNISHED, "house.toml"))
+    robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel(), radius_m)
     places = [f"(kitchen ({x / FOOT_M:.4f},{y / FOOT_M:.4f},0))" for x, y in ((2.0, 2.0), (x_m, y_m))]
-    return dry_run(robot, Command(f"(ptrans {' '.join(places)})", 0.0, None, diagonal(0.01, 0.01)))[1]
+    return dry_run(world, robot, Command(f"(ptrans {' '.join(places)})", 0.0, None, diagonal(0.01, 0.01)))[1]
 
 
 @pytest.mark.parametrize(("x_m", "y_m", "told"), [
