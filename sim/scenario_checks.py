@@ -15,8 +15,6 @@ from world_models.building.geometry.faces import Face
 from world_models.building.geometry.outlines import inside_polygon
 from world_models.building.world import World
 from world_models.entries.location import Place
-from world_models.entries.told import DOOR_STATES
-from world_models.files.toml.mission import Telling
 from world_models.files.toml.settings import suggest_keys
 from world_models.units import FOOT_M
 
@@ -45,7 +43,8 @@ def check_names(scenario: Scenario, world: World) -> None:
                 near = suggest_keys(name, world.locales)
                 raise scenario.refused(("faults", i, key), f"expected {near}, got {name!r}")
     for i, telling in enumerate(scenario.told):
-        _check_telling(scenario, world, i, telling)
+        if why := telling.find_fault(world):
+            raise scenario.refused(("told", i, "what"), why)
     if not scenario.rides:
         return
     rides = {link.name: link.between for link in world.links if link.kind == "elevator"}
@@ -54,17 +53,6 @@ def check_names(scenario: Scenario, world: World) -> None:
         for key, name, known in (("passage", helper.passage, list(rides)), ("presses", helper.presses, landings)):
             if name and name not in known:
                 raise scenario.refused(("rides", i, key), f"expected {suggest_keys(name, known)}, got {name!r}")
-
-
-def _check_telling(scenario: Scenario, world: World, index: int, telling: Telling) -> None:
-    """Raises ScenarioError where the building has no such door or thing."""
-    if telling.entry.state in DOOR_STATES:
-        known, kind = [doorway.name for doorway in world.doorways], "an open door"
-    else:
-        known, kind = [thing.name for thing in world.things], "a thing"
-    if telling.what not in known:
-        near = suggest_keys(telling.what, known)
-        raise scenario.refused(("told", index, "what"), f"expected {kind}, {near}, got {telling.what!r}")
 
 
 def move_scenario_things(scenario: Scenario, world: World, faces: Sequence[Face]) -> Sequence[Face]:

@@ -145,6 +145,8 @@ class Preflight:
         except ValueError as error:
             yield Check("goal", str(error), "name one room for each end: harvey world show")
             return
+        for fault in filter(None, (telling.find_fault(world) for telling in self._mission.told)):
+            yield Check("told", fault, "name a door or a thing of the world: harvey world show")
         lost = [p for p in (origin, destination) if not _is_inside(world, p)]
         if lost:
             todo = "feet, in the locale's own frame: harvey world show"

@@ -16,8 +16,8 @@ class Teller:
     """Puts what is due on the board. How much was told the board itself says, so a run that goes on tells the rest."""
 
     def __init__(self, told: Sequence[Telling], clock: Callable[[], float]) -> None:
-        """``told``: in the order of time; ``clock``: the body's time [s]."""
-        self._told, self._clock = tuple(told), clock
+        """``told``: in any order; ``clock``: the body's time [s]."""
+        self._told, self._clock = sorted(told, key=lambda telling: telling.at_s), clock
 
     def tell(self, scheduler: Scheduler) -> None:
         """Tell what is due and was not told yet."""

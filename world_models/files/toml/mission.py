@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from world_models.bounds import Bounds, check_bounds
+from world_models.building.world import World
 from world_models.commands import check_command
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command
-from world_models.entries.told import Told, ToldState
+from world_models.entries.told import DOOR_STATES, Told, ToldState
 from world_models.files.compiled.schema import SUFFIXES
 from world_models.files.toml.includes import WORLDS
 from world_models.files.toml.settings import (
@@ -90,6 +91,14 @@ class Telling:
         state: ToldState = next(state for state in get_args(ToldState) if state == self.state)
         return Told(self.what, state)
 
+    def find_fault(self, world: World) -> str:
+        """What is wrong where a world has no such door or thing, in words; "" where it has."""
+        if self.state in DOOR_STATES:
+            kind, known = "an open door", [doorway.name for doorway in world.doorways]
+        else:
+            kind, known = "a thing", [thing.name for thing in world.things]
+        return "" if self.what in known else f"expected {kind}, {suggest_keys(self.what, known)}, got {self.what!r}"
+
 
 @dataclass(frozen=True, slots=True)
 class Servo:
@@ -133,7 +142,7 @@ class Mission:
         name: the file's, without its ending.
         world: the world file that the robot believes in.
         goal: in words, or in conceptual-dependency form with coordinates in feet.
-        told: what the robot is told of the building on the way, in the order of time.
+        told: what the robot is told of the building on the way.
         folder: where the file is; file names in it are relative to it.
         source: the file, with the settings that replaced some of its values.
     """
@@ -196,7 +205,7 @@ class MissionFormat:
         tables = {key: read_settings(node[key], kind) if key in node else kind() for key, kind in self.tables.items()}
         told = [read_settings(item, Telling) for item in node["told"].items()] if "told" in node else []
         return {
-            "told": tuple(sorted(told, key=lambda telling: telling.at_s)),
+            "told": tuple(told),
             "name": name, "description": node["description"].text() if "description" in node else "",
             "world": named_file(node["world"].text(), WORLDS, folder), "goal": _goal(node["goal"]),
             "folder": folder, "source": source, **tables,
