@@ -123,7 +123,7 @@ def draw_architecture(sources: Iterable[type[KnowledgeSource]], kinds: Registry)
     world_y = below + scheduler_height + GAP
     canvas.box("room", MARGIN, world_y, WIDTH - 2 * MARGIN, 64, [
         ("head", "the world's port: the long-term model of the building, in a file"),
-        ("small", "a locale's frame comes to the board when a knowledge source asks for it; what is learnt revises it there"),
+        ("small", "a frame comes to the board when a knowledge source asks for it; what is learnt revises it there"),
     ])
     canvas.arrow(middle, below + scheduler_height + 4, middle, world_y - 4)
     canvas.text("small left", middle + 12, world_y - GAP // 2 + 4, "requests for frames; frames")

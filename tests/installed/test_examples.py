@@ -19,6 +19,7 @@ SAYS = {
     "compare_seeds": "drawn in",
     "hearsay": "heard: go to the kitchen\nbecause of Word-",
     "read_a_run": "the belief was off by",
+    "revise_a_frame": "reached; replayed the same",
     "run_a_mission": "reached: every milestone",
     "solve_a_pose": "ok: True, 20 of 30 lines agree",
 }
