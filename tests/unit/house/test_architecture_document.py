@@ -5,14 +5,16 @@ from __future__ import annotations
 import re
 import shlex
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
 from harvey.cli import parser
-from sim.scenario import parse_scenario
+from sim.scenario import load_scenario, parse_scenario
 from world_models import plugins
 from world_models.building.checks import check_world
+from world_models.files.toml.mission import Telling
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 
@@ -83,6 +85,22 @@ def test_the_example_of_a_knowledge_source_is_the_one_in_the_package() -> None:
     assert shown
     lines = [line for text in shown for line in text.splitlines() if "RunningShort.\"" not in line]
     assert [line for line in lines if line.strip(' "') not in example] == []
+
+
+def test_the_example_of_locale_frames_is_the_one_that_is_run() -> None:
+    text = (ROOT / "docs/locale-frames.md").read_text(encoding="utf-8")
+    example = (ROOT / "examples/revise_a_frame.py").read_text(encoding="utf-8")
+    shown = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    assert shown
+    assert [one for one in shown if one not in example] == []
+
+
+def test_what_is_told_in_the_document_of_locale_frames_is_told() -> None:
+    text = (ROOT / "docs/locale-frames.md").read_text(encoding="utf-8")
+    told, = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    mission = parse_scenario(f'world = "two_ways"\ngoal = "(ptrans (reception (9,8,0)) (archive (9,6,0)))"\n{told}')
+    assert mission.told == load_scenario("shut-door").told
+    assert {field.name for field in fields(Telling)} == set(tomllib.loads(told)["told"][0])
 
 
 def test_entry_points_are_those_of_the_plugins_table() -> None:
