@@ -17,8 +17,9 @@ from world_models import words
 from world_models.entries.body import BodyFault
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch, Resumed
+from world_models.entries.told import Told
 
-TOLD = ("refuted", "not testable", "lost", "found", "fault", "resumed")
+TOLD = ("refuted", "not testable", "lost", "found", "fault", "resumed", "told")
 """Kinds that a short account of a run must not leave out."""
 REMEMBERED = 8
 """The newest entries of a type that are looked back for."""
@@ -33,7 +34,7 @@ class TurningPoint:
 
     Attributes:
         cycle: when.
-        kind: goal, plan, a verdict, doubt, lost, found, fault, resumed or the end.
+        kind: goal, plan, a verdict, doubt, lost, found, fault, resumed, told or the end.
         text: what happened, without a full stop.
     """
 
@@ -91,6 +92,8 @@ def turning_points(change: Change, cycle: int, get: Get, belief: Entry[Hypothesi
         yield TurningPoint(cycle, "fault", f"{value.part}: {value.what}{'' if value.is_open else ', over'}")
     elif isinstance(value, Resumed):
         yield TurningPoint(cycle, "resumed", f"after cycle {value.after_cycle}, where the run was cut off")
+    elif isinstance(value, Told) and value.answer:
+        yield TurningPoint(cycle, "told", f"{value.what} is {value.state}; {value.answer}")
     elif isinstance(value, Outcome):
         yield TurningPoint(cycle, "the end", f"{value.kind}: {value.reason}")
 

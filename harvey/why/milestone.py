@@ -12,7 +12,7 @@ from harvey.why import facts
 from harvey.why.decisions import describe_decision
 from harvey.why.history import History
 from harvey.why.links import STRANGE, reason, words
-from harvey.why.model.frames import tell_model_lines
+from harvey.why.model.frames import tell_changes, tell_model_lines
 from harvey.why.model.world_file import WorldFile
 from harvey.why.sentences import sentence, value_of
 from harvey.why.story import Step, Story
@@ -22,6 +22,8 @@ from world_models.entries.task import Certificate, Milestone, PlanSketch
 FOLLOWED = ("Certificate", "Milestone", "Discrepancy")
 """The entries of a verdict; what they wake is what follows."""
 
+REVISIONS = 8
+"""So many revisions of a milestone are looked at for its verdict."""
 MAX_LISTED = 12
 """So many milestones are named where none is similar."""
 
@@ -82,18 +84,27 @@ def milestone_story(history: History, id: str, world: WorldFile | None = None) -
 
 
 def _story(history: History, id: str, last: EntryRecord, world: WorldFile | None) -> Story:
-    first = history.entry(f"{id}.0") or last
-    certificate = reason(history, last, "Certificate")
+    revisions = [record for number in range(REVISIONS) if (record := history.entry(f"{id}.{number}")) is not None]
+    first = revisions[0] if revisions else last
+    verdicts = (reason(history, record, "Certificate") for record in reversed(revisions))
+    certificate = next((found for found in verdicts if found is not None), None)
     steps = [*_tell_origin(history, first), *_tell_expectation(history, last, certificate)]
     if certificate is not None:
         steps += _tell_verdict(history, certificate, world)
         steps += _tell_consequences(history, certificate)
-    else:
+    elif last.value["status"] != "withdrawn":
         steps.append(Step("judged", f"It was never judged: when the run ended it was {last.value['status']}.",
                           (last.ref,)))
+    if last.value["status"] == "withdrawn":
+        steps += _tell_withdrawal(history, last)
     name = facts.milestone_name(value_of(last, Milestone))
     head = f"{name[0].upper()}{name[1:]}: {last.value['status']}."
     return Story(last.ref, head, describe_decision(history, first), tuple(steps))
+
+
+def _tell_withdrawal(history: History, last: EntryRecord) -> Iterator[Step]:
+    yield Step("withdrawn", f"The {words(last.author)} withdrew it in cycle {last.cycle}.", (last.ref,))
+    yield from (Step("changed", text, (frame.ref,)) for text, frame in tell_changes(history, last))
 
 
 def _tell_origin(history: History, first: EntryRecord) -> Iterator[Step]:

@@ -22,7 +22,7 @@ from world_models.words import count
 
 MARKS = ("escalated", "refuted", "not testable", "relocalization")
 """A turning point that must be told has one of these words in its line of the journal, or is of one of these kinds."""
-KINDS = ("BodyFault-", "Resumed-")
+KINDS = ("BodyFault-", "Resumed-", "Told-")
 WIDTH = 120
 WITHOUT: Mapping[str, str] = {
     "action": "no landmark was followed, and it drove by dead reckoning between milestones",

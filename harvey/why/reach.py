@@ -12,8 +12,8 @@ from harvey.why.history import History
 GOAL, MODEL, SENSOR = "goal", "model", "sensor"
 KINDS = (GOAL, MODEL, SENSOR)
 """What an explanation may end in: what was asked for, what is known of building and robot, what the camera saw."""
-KNOWN = frozenset({"LocaleFrame", "CameraState", "Wheels", "Footprint"})
-"""The kinds of entries that are a part of the model."""
+KNOWN = frozenset({"LocaleFrame", "CameraState", "Wheels", "Footprint", "Told"})
+"""The kinds of entries that are a part of the model, and what the robot is told of it."""
 Kind = Callable[[EntryRecord], str | None]
 
 

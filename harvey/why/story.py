@@ -107,11 +107,17 @@ def headline(record: EntryRecord) -> str:
     said = sentence(record)
     if record.type in ("MotorCommand", "Course"):
         return f"Harvey was told to {said}."
+    if record.type == "Told":
+        return _describe_telling(record)
     if record.type == "Look":
         return f"A picture was taken {vocabulary.purpose(value_of(record, Look).purpose)}."
     if record.type == "Hypothesis" and value_of(record, Hypothesis).is_held:
         return _describe_belief(value_of(record, Hypothesis))
     return f"{said[0].upper()}{said[1:]}." if said else record.ref
+
+
+def _describe_telling(record: EntryRecord) -> str:
+    return f"It {sentence(record)}."
 
 
 def _describe_belief(hypothesis: Hypothesis) -> str:
@@ -151,6 +157,11 @@ class _Teller:
         for type in FOLLOW.get(record.type) or [r.rpartition("-")[0] for r in record.because]:
             for below in self._below(record, type):
                 yield from self._tell(below, record)
+        for text, frame in frames.tell_changes(self.history, record):
+            if frame.ref not in self.met:
+                self.met.add(frame.ref)
+                yield from self._one(text, "changed", text, frame)
+                yield from self.reasons(frame)
 
     def context(self, record: EntryRecord) -> Iterator[Step]:
         """The plan, the goal and the command that all of it serves."""
@@ -290,6 +301,7 @@ SAY: Mapping[str, Callable[[History, EntryRecord], str]] = {
     "Discrepancy": lambda _, r: facts.doubt(value_of(r, Discrepancy)),
     "PlanSketch": lambda _, r: facts.plan(value_of(r, PlanSketch)),
     "Goal": lambda _, r: facts.goal(value_of(r, Goal)),
+    "Told": lambda _, r: _describe_telling(r),
     "Command": lambda _, r: f"The user asked for it: {value_of(r, Command).text}.",
 }
 LABELS: Mapping[str, str] = {
@@ -299,7 +311,7 @@ LABELS: Mapping[str, str] = {
     "Look": "look", "Segments": "seen", "Panorama": "thought", "BodyFault": "fault", "Recovery": "recovery",
     "Ride": "ride", "RideReport": "ride", "Obstruction": "hidden", "Quiescence": "stillness", "Outcome": "the end",
     "Resumed": "resumed", "Drift": "wheels", "LocaleFrame": "known", "FrameRequest": "asked", "CameraState": "camera",
-    "Wheels": "wheels", "Footprint": "body",
+    "Wheels": "wheels", "Footprint": "body", "Told": "told",
 }
 FOLDED = frozenset({"PoseFix", "LineMatch", "Segments", "Certificate"})
 """Told by the sentences of what rests on them."""
@@ -325,6 +337,7 @@ FOLLOW: Mapping[str, tuple[str, ...]] = {
     "MotionReport": ("MotorCommand", "Course"),
     "Ride": ("PlanSketch", "Hypothesis"),
     "RideReport": ("Ride",),
+    "LocaleFrame": ("Told", "FrameRequest"),
 }
 """Which reasons a story follows, in which order; of a type that is not named here, all."""
 

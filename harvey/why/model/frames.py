@@ -48,8 +48,24 @@ def tell_used(history: History, record: EntryRecord) -> Iterator[Sentence]:
     parts += [f"what was learnt of the robot itself ({', '.join(learnt)})"] * bool(learnt)
     if not parts:
         return
-    said = "".join(f"; {change.sentence()}" for name in changed for change in reference_of(frames[name]).changes)
+    said = "".join(f"; {text}" for text in _changes(frames[name] for name in changed))
     yield f"The act went by {' and by '.join(parts)}{said}.", (*(frames[name].ref for name in named), *learnt)
+
+
+def tell_changes(history: History, record: EntryRecord) -> Iterator[tuple[str, EntryRecord]]:
+    """What the frames that an entry rests on hold otherwise than the world's file; of equal ones the first."""
+    told: set[str] = set()
+    for frame in find_frames(history, record.because).values():
+        text = listed(_changes([frame]), MAX_LISTED)
+        if text and text not in told:
+            told.add(text)
+            yield f"It was known otherwise than in the world's file: {text}.", frame
+
+
+def _changes(frames: Iterable[EntryRecord]) -> list[str]:
+    """What is said otherwise, each once."""
+    changes = (change for frame in frames for change in reference_of(frame).changes)
+    return list(dict.fromkeys(change.sentence() for change in changes))
 
 
 def tell_model_lines(history: History, fix: EntryRecord, world: WorldFile | None) -> Iterator[Sentence]:
