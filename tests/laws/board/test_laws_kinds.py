@@ -19,6 +19,7 @@ from blackboard.kinds import Kind, NotAKindError, Registry, Role, inference, is_
 from blackboard.scheduler import Scheduler, registry_of
 from blackboard.servoing import Discrepancy
 from harvey.runner.ports import BodyPort
+from harvey.runner.world_port import WorldPort
 from harvey.wiring import knowledge_sources
 from logs import disk
 from logs.journal_file import JournalFile, read_journal
@@ -113,7 +114,8 @@ def test_every_kind_says_what_it_is_in_one_sentence_of_its_own(kind: type[Any]) 
 
 
 def test_what_a_knowledge_source_writes_from_outside_is_an_observation_or_a_request() -> None:
-    """Nobody on the board makes up what a port alone can know: a fault is closed, a frame corrected, a message taken up.
+    """Nobody on the board makes up what a port alone can know; it may close a fault, correct a frame, take up what
+    was told.
     """
     only_revised = {"BodyFault", "LocaleFrame", "Told"}
     sources = knowledge_sources()
@@ -147,9 +149,10 @@ def test_two_kinds_of_one_name_are_refused() -> None:
         Registry([Note, other])
 
 
-def test_the_body_port_answers_requests_only() -> None:
-    assert {kind.__name__ for kind in BodyPort.acts_on} == {kind.__name__ for kind in REQUESTS[1:]}
-    assert all(kind_of(kind).role is Role.REQUEST for kind in BodyPort.acts_on)
+def test_the_ports_answer_requests_only_and_each_request_is_answered_by_one() -> None:
+    answered = [kind.__name__ for port in (BodyPort, WorldPort) for kind in port.acts_on]
+    assert sorted(answered) == sorted(kind.__name__ for kind in REQUESTS[1:])
+    assert all(kind_of(kind).role is Role.REQUEST for kind in (*BodyPort.acts_on, *WorldPort.acts_on))
 
 
 def test_a_kind_without_a_sentence_is_told_by_its_fields_with_their_units() -> None:
