@@ -122,4 +122,6 @@ def test_a_robot_one_floor_up_sees_from_one_floor_up(world: World, x: float, y: 
     assert np.allclose(eye[:2], robot.camera_from_world(pose).inverse().translation[:2])
     assert abs(eye[2] - MOUNT.height_m - world.floor_m("car-2")) < 1e-9
     assert world.locale_at([*pose.position, world.floor_m("car-2")]) == "car-2"
-    assert robot.on_floor_of("car-1") is robot and robot.on_floor_of("car-2") is robot.on_floor_of("car-2")
+    up, again = robot.on_floor_of("car-2"), robot.on_floor_of("car-2")
+    assert robot.on_floor_of("car-1") is robot
+    assert up.camera is again.camera is robot.camera and up.mount == again.mount  # by these views are cached
