@@ -18,16 +18,36 @@ from blackboard.entry import Ref
 from blackboard.journal import change_record, plain
 from blackboard.scheduler import registry_of
 from harvey.errors import BadInput
-from harvey.run_files.observations import effect_of, value_of
+from harvey.run_files.observations import Originals, effect_of, value_of
 from harvey.run_files.records import EntryRecord
+from scripted_mission import HOUSE
+from world_models.actuator import ActuatorModel
 from world_models.entries.body import Frame, MotionReport, RideReport
 from world_models.entries.kinds import KINDS
+from world_models.entries.locale_frame import FrameAnswer, FrameChange, FrameRequest, LocaleFrame
+from world_models.entries.robot import Footprint, Wheels
 from world_models.entries.task import Command, Outcome
+from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
+from world_models.frame_store import FrameStore
 
 KNOWN = registry_of((), KINDS)
+HOUSE_STORE = FrameStore(read_world(Source.parse(HOUSE, "house.toml")), "of the house")
 numbers = st.floats(allow_nan=False) | st.integers(-3, 3)
 headings = st.floats(-7.0, 7.0)
 covariances = st.tuples(*[st.tuples(numbers, numbers, numbers)] * 3)
+positive = st.floats(0.01, 1.0)
+names = st.lists(st.text(max_size=5), max_size=2).map(tuple)
+
+
+@st.composite
+def locale_frames(draw: st.DrawFn) -> LocaleFrame:
+    """The frames of the house, with its door open or shut."""
+    frame = HOUSE_STORE.frame(draw(st.sampled_from(tuple(HOUSE_STORE.world.locales))))
+    by = draw(st.text(max_size=5))
+    return frame.with_changes(FrameChange("shut", d.name, by) for d in frame.doorways if draw(st.booleans()))
+
+
 observations = st.one_of(
     st.builds(MotionReport, numbers, numbers, numbers, numbers),
     st.builds(RideReport, st.text(max_size=5), st.text(max_size=5), numbers, numbers),
@@ -35,6 +55,11 @@ observations = st.one_of(
     st.builds(Command, st.text(max_size=9), headings, st.none() | headings, covariances),
     st.builds(Quiescence, st.integers(0, 10**6)),
     st.builds(Outcome, st.text(max_size=9), st.text(max_size=9)),
+    st.builds(Footprint, positive, positive),
+    st.builds(Wheels, st.builds(ActuatorModel, reach=st.floats(0.1, 2.0)), st.booleans()),
+    st.builds(FrameRequest, names, names, names, st.sampled_from(("asked", "answered")),
+              st.lists(st.builds(FrameAnswer, st.text(max_size=5), names, st.text(max_size=5)), max_size=2).map(tuple)),
+    locale_frames(),
 )
 
 
@@ -46,17 +71,21 @@ def recorded(value: Any) -> EntryRecord:
                        data["value"], 5, True)
 
 
-def pictures(value: Any) -> dict[int, bytes]:
-    return {value.number: value.jpeg} if isinstance(value, Frame) else {}
+def originals(*frames: Frame) -> Originals:
+    return Originals({frame.number: frame.jpeg for frame in frames}, HOUSE_STORE)
+
+
+def originals_of(value: Any) -> Originals:
+    return originals(value) if isinstance(value, Frame) else originals()
 
 
 @settings(deadline=None, max_examples=200)
 @given(observations)
 def test_an_observation_comes_back_as_it_was(value: Any) -> None:
-    again = value_of(recorded(value), pictures(value), KNOWN)
+    again = value_of(recorded(value), originals_of(value), KNOWN)
     assert type(again) is type(value)
     assert json.dumps(plain(again)) == json.dumps(plain(value))
-    effect = effect_of(recorded(value), pictures(value), Blackboard().view, KNOWN)
+    effect = effect_of(recorded(value), originals_of(value), Blackboard().view, KNOWN)
     assert isinstance(effect, Post)
     assert effect.because == (Ref("Leg-2", 3),)
 
@@ -70,16 +99,16 @@ def test_a_value_of_other_fields_is_refused(value: Any, data: st.DataObject) -> 
     lacking = {k: v for k, v in record.value.items() if k != key}
     for broken in (lacking, {**record.value, key: other}, {**record.value, "x": 1}):
         with pytest.raises(BadInput, match="expected"):
-            value_of(replace(record, value=broken), pictures(value), KNOWN)
+            value_of(replace(record, value=broken), originals_of(value), KNOWN)
 
 
 @given(st.binary(max_size=9), st.binary(max_size=9))
 def test_a_picture_must_be_the_one_that_was_seen(seen: bytes, kept: bytes) -> None:
     record = recorded(Frame(seen, 7, 0.5))
     if hashlib.sha256(seen).digest() == hashlib.sha256(kept).digest():
-        assert value_of(record, {7: kept}, KNOWN).jpeg == seen
+        assert value_of(record, originals(Frame(kept, 7, 0.5)), KNOWN).jpeg == seen
         return
     with pytest.raises(BadInput, match="another one"):
-        value_of(record, {7: kept}, KNOWN)
+        value_of(record, originals(Frame(kept, 7, 0.5)), KNOWN)
     with pytest.raises(BadInput, match="picture 7"):
-        value_of(record, {8: seen}, KNOWN)
+        value_of(record, originals(Frame(seen, 8, 0.5)), KNOWN)
