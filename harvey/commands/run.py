@@ -112,6 +112,7 @@ COMMAND = Command(
         ("harvey run lab-to-allens-office --seed 0..19 --go-on", "those that are still to be done, after a crash"),
         ("harvey run lab-to-allens-office --check", "which milestones it will have, and how well each tells the place"),
         ("harvey run hallway-kidnap --seed 3 --trace", "print what each cycle sees, weighs and does"),
+        ("harvey run shut-door", "told on the way that a door is shut ([[told]] in its file)"),
         ("harvey run bump --set servo.action=off", "without correcting on the move"),
         ("harvey run bump --set plan.max_leg_m=2", "with another number of harvey settings"),
         ("harvey run lab-to-allens-office --body serial:p2os", "the body behind an emulated Pioneer's serial line"),
