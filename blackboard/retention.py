@@ -2,8 +2,9 @@
 
 How long entries of a kind stay is said where the kind is defined (:class:`blackboard.kinds.Kind`). What leaves was
 posted, seen and journalled long ago, and no decision can need it any more. The law
-(tests/laws/board/test_laws_retention.py): with and without retention the decisions are the same, to the byte. A
-revision that left can still be read in the journal.
+(tests/laws/board/test_laws_retention.py): with and without retention the decisions are the same, to the byte; but what
+comes by request is asked for again when it is needed again (tests/laws/board/test_laws_missing_entries.py). A revision
+that left can still be read in the journal.
 """
 
 from __future__ import annotations

@@ -179,13 +179,25 @@ def test_nothing_leaves_memory_while_an_act_waits_and_then_it_does(team: list[Re
     assert on_board <= len(LETTERS)
 
 
-def test_what_came_while_an_act_waited_leaves_later() -> None:
+@settings(deadline=None, max_examples=100)
+@given(team=readers, texts=st.lists(letters, max_size=6), keep=st.integers(1, 3))
+def test_decisions_are_the_same_with_retention_and_without_but_for_what_is_asked_again(
+    team: list[Reader], texts: list[str], keep: int
+) -> None:
+    without = read_notes(team, texts, "", {})
+    with_it = read_notes(team, texts, "", {Page: Kind(Role.OBSERVATION, keep=keep, traced=True)})
+    assert [told(d) for d in with_it if not is_wait(d)] == [told(d) for d in without if not is_wait(d)]
+    assert sum(map(is_wait, with_it)) >= sum(map(is_wait, without))
+
+
+def test_what_came_while_an_act_waited_leaves_later_and_comes_back_when_asked_for() -> None:
     retention = {Page: Kind(Role.OBSERVATION, keep=1, traced=True)}
     reader = Reader("", 0.5, Level.PLAN, False, True)
-    decisions = read_notes([reader], ["abcd", "", ""], "", retention)
-    assert [d.left for d in decisions if is_wait(d)] == [()] * 4
+    decisions = read_notes([reader], ["abcd", "", "", "a"], "", retention)
+    assert [d.left for d in decisions if is_wait(d)] == [()] * 5
     left = [ref.id for d in decisions for ref in d.left]
-    assert left == ["Page-1", "Page-2", "Page-3"]
+    assert left == ["Page-1", "Page-2", "Page-3", "Page-4"]
+    assert [str(ref) for ref in decisions[-1].used] == ["Page-5.0"]
 
 
 @given(team=readers, text=letters)
