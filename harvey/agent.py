@@ -1,7 +1,7 @@
 """The agent of a run: its knowledge sources, model, settings and servo levels, as its run head says.
 
 ``without`` takes away a knowledge source, a landmark or a face (:mod:`harvey.what_if`), or one segment of one picture;
-``constants`` replaces servo levels and settings (``harvey settings``).
+``constants`` replaces servo levels, settings, and what the robot believes of itself (``harvey settings``).
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Agent:
         store: of the locale frames.
         sources: the knowledge sources; settings: their numbers.
         servoing: the servo levels that are on.
-        what_if: revises before each cycle what the run is to be without.
+        what_if: revises before each cycle what the robot is to know otherwise.
     """
 
     world: World
@@ -86,7 +86,8 @@ def build_agent(head: RunHead, sources: Sources = knowledge_sources) -> Agent:
     if segments:
         chosen = tuple(
             SegmentHider(settings, segments) if isinstance(s, LineFinder) else s for s in chosen)
-    return Agent(world, head.model(world), store, chosen, _servoing(head, levels), settings, WhatIf(removed))
+    return Agent(world, head.model(world), store, chosen, _servoing(head, levels), settings,
+                 WhatIf(removed, head.constants))
 
 
 def settings_of(head: RunHead) -> Settings:

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from harvey.errors import BadInput
+from harvey.robot_settings import KEYS as ROBOT_KEYS
+from harvey.robot_settings import build_believed
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.table import list_rows, replace_value
 from world_models.files.toml.settings import parse_value, suggest_keys
@@ -15,20 +17,25 @@ Pairs = tuple[tuple[str, str], ...]
 
 
 def names() -> tuple[str, ...]:
-    """Every name that :func:`build_settings` understands."""
-    return tuple(row.name for row in list_rows())
+    """Every key of an agent: numbers of its methods, and what it believes of itself."""
+    return (*(row.name for row in list_rows()), *ROBOT_KEYS)
 
 
 def build_settings(pairs: Iterable[tuple[str, str]], others: Sequence[str] = ()) -> Settings:
     """The default settings with some values replaced; ``others`` are keys that the caller understands beside them.
 
+    What the robot believes of itself is checked as well, but is no setting (:mod:`harvey.robot_settings`).
+
     Raises:
         BadInput: a name is unknown (near ones are listed), or a value is not of its setting's kind.
     """
-    settings = DEFAULT
+    pairs, settings = tuple(pairs), DEFAULT
+    build_believed(pairs)
     for key, value in pairs:
         if key not in names():
             raise unknown(key, others)
+        if key in ROBOT_KEYS:
+            continue
         try:
             settings = replace_value(settings, key, parse_value(value))
         except ValueError as error:

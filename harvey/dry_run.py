@@ -6,7 +6,7 @@ the dry run has the plan that the mission will have, as long as nothing goes wro
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -96,11 +96,22 @@ class IdealBodyPort:
             yield Post(RideReport(value.passage, value.destination, 0.0, 0.0), (change.entry,))
 
 
+Otherwise = Callable[[Scheduler], None]
+
+
+def not_otherwise(_scheduler: Scheduler) -> None:
+    """The robot is as it knows itself."""
+
+
 def dry_run(
-    world: World, robot: RobotModel, task: Command, settings: Settings = DEFAULT
+    world: World, robot: RobotModel, task: Command, settings: Settings = DEFAULT, what_if: Otherwise = not_otherwise
 ) -> tuple[tuple[MilestonePreview, ...], Outcome]:
-    """The milestones in the order in which they will come, and how the dry run of the mission ends."""
+    """The milestones in the order in which they will come, and how the dry run of the mission ends.
+
+    ``what_if`` revises what the robot believes of itself (:class:`harvey.what_if.WhatIf`).
+    """
     scheduler = build_dry_run(world, robot, settings)
+    what_if(scheduler)
     scheduler.tell([Post(replace(task, start_covariance=diagonal(FIX_SIGMA_M, FIX_SIGMA_RAD)))], "user")
     previews: list[MilestonePreview] = []
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < MAX_CYCLES:

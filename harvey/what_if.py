@@ -1,22 +1,26 @@
 """What if: what a robot knows, revised with the author "what if", to see what it would have done.
 
-Landmarks and faces that are taken away are no part of the locale frames any more; the building itself stays as it is.
-The revisions are observations like any other: they stand in the journal, and a replay takes them from there.
+Landmarks and faces that are taken away are no part of the locale frames any more, and the robot's entries have the
+values that were set; building and body stay as they are. The revisions are observations like any other: they stand in
+the journal, and a replay takes them from there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence, Set
 from difflib import get_close_matches
+from typing import Any
 
 from blackboard.board import View
 from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from blackboard.scheduler import Scheduler
 from harvey.errors import BadInput
+from harvey.robot_settings import build_believed
 from world_models.building.changes.removals import element_names
 from world_models.building.world import World
 from world_models.entries.locale_frame import FrameChange, FrameRequest, LocaleFrame
+from world_models.entries.robot import CameraState, Footprint, Wheels
 from world_models.frame_store import FrameStore
 
 AUTHOR = "what if"
@@ -30,15 +34,34 @@ class WhatIf:
     already, as in a run that is replayed, stays as it is.
     """
 
-    def __init__(self, removed: Sequence[str] = ()) -> None:
-        """``removed``: names of landmarks, whose lines go, and of faces."""
+    def __init__(self, removed: Sequence[str] = (), pairs: Iterable[tuple[str, str]] = ()) -> None:
+        """What is to be otherwise.
+
+        Args:
+            removed: names of landmarks, whose lines go, and of faces.
+            pairs: (key, value) as after ``--set``; only what the robot believes of itself is used.
+
+        Raises:
+            BadInput: a value cannot be used.
+        """
         self._removals = tuple(FrameChange("removed", name, AUTHOR) for name in dict.fromkeys(removed))
+        self._believed = build_believed(pairs)
         self._checked: tuple[Entry[LocaleFrame], ...] = ()
 
     def __call__(self, scheduler: Scheduler) -> None:
         """Tell a scheduler what its board is to be revised by, if anything."""
-        if effects := list(self._revise_frames(scheduler.view)):
+        view = scheduler.view
+        if effects := [*self._revise_robot(view), *self._revise_frames(view)]:
             scheduler.tell(effects, AUTHOR)
+
+    def _revise_robot(self, view: View) -> Iterator[Effect]:
+        """The robot's entries as they were told at the start; what is learnt of them later stands."""
+        for kind in (CameraState, Wheels, Footprint):
+            entry: Entry[Any] | None = view.latest(kind)
+            if entry is not None and entry.revision == 0:
+                value = self._believed(entry.value)
+                if value is not entry.value:
+                    yield Revise(entry, value, (entry,))
 
     def _revise_frames(self, view: View) -> Iterator[Effect]:
         if not self._removals:

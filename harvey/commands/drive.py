@@ -37,8 +37,8 @@ def _arguments(parser: ArgumentParser) -> None:
     for name, (_, metavar, text) in OPTIONS.items():
         parser.add_argument(f"--{name}", metavar=metavar, help=text)
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
-                        help="any other key of the file, as start.put_down_sigma_in=2, or a number of harvey settings;"
-                             " may be repeated")
+                        help="any other key of the file, as start.put_down_sigma_in=2, or a number of harvey settings,"
+                             " as camera.tilt_deg=1 for what the robot believes of itself; may be repeated")
     parser.add_argument("--dry-run", action="store_true", help="check everything, move nothing")
     parser.add_argument("--out", metavar="DIR", help="where the run is kept (runs/MISSION-drive)")
     parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
@@ -50,6 +50,7 @@ def _run(args: Namespace) -> int:
     from harvey.campaign.campaign import make_room, parse_pairs
     from harvey.hardware.mission import FORMAT
     from harvey.hardware.preflight import Preflight
+    from harvey.what_if import WhatIf
 
     settings, numbers = split_settings(dict(parse_pairs(args.settings)), FORMAT.keys())
     mission = _mission(args, settings)
@@ -59,7 +60,7 @@ def _run(args: Namespace) -> int:
     def clock() -> float:
         return time.monotonic() - began
 
-    with Preflight(mission, out, clock, build_settings(numbers)) as dry:
+    with Preflight(mission, out, clock, build_settings(numbers), WhatIf(pairs=numbers)) as dry:
         if not run_checks(dry):
             return 2
         if args.dry_run:

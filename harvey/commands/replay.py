@@ -28,7 +28,8 @@ def _arguments(parser: ArgumentParser) -> None:
                               " landmark goes: nothing of it is expected to be seen, and it stays in the way")
     what_if.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
                          help="with a servo level off, as servo.plan=off, or another number of harvey settings, as"
-                              " action.min_tolerance_px=8; may be repeated")
+                              " action.min_tolerance_px=8, or camera.tilt_deg=1 for what the robot believes of itself;"
+                              " may be repeated")
     what_if.add_argument("--record-only", action="store_true",
                          help="end where the record no longer answers, instead of going on in the simulator")
     what_if.add_argument("--out", metavar="DIR", help="keep what would have been as a run, for diff, why and view")
@@ -126,6 +127,7 @@ COMMAND = Command(
         ("harvey replay runs/bump-0 --without 'Frame-9 segment 12'", "had it not found one segment"),
         ("harvey replay runs/bump-0 --set servo.plan=off --out runs/bump-no-plan", "and keep it as a run"),
         ("harvey replay runs/bump-0 --set action.min_tolerance_px=8", "with another number of harvey settings"),
+        ("harvey replay runs/bump-0 --set camera.tilt_deg=1", "had it believed its camera to be tilted"),
     ),
     _arguments, _run,
     "Neither simulator nor robot takes part. Exit code 0 where every decision is the same, 1 where one is not.\n\n"

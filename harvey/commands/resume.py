@@ -62,13 +62,14 @@ def _on_hardware(
     from harvey.hardware.preflight import Preflight
     from harvey.hardware.resume import time_of_last_observation
     from harvey.hardware.run import resume
+    from harvey.what_if import WhatIf
 
     mission, began_s = rebuild_mission(head, moved), time.monotonic() - time_of_last_observation(run)
 
     def clock() -> float:
         return time.monotonic() - began_s
 
-    with Preflight(mission, run.path, clock, settings_of(head)) as dry:
+    with Preflight(mission, run.path, clock, settings_of(head), WhatIf(pairs=head.constants)) as dry:
         if not run_checks(dry) or dry.base is None or dry.camera is None:
             return 2
         _print_start(run, remains, head)

@@ -22,7 +22,8 @@ def _arguments(parser: ArgumentParser) -> None:
                              " to DIR-older-1")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
                         help="change a setting of the scenario, as servo.action=off, or a number of harvey settings,"
-                             " as plan.max_leg_m=2; may be repeated")
+                             " as plan.max_leg_m=2; camera.tilt_deg, wheels.reach and the like change what the robot"
+                             " believes of itself, not what is true; may be repeated")
     parser.add_argument("--body", metavar="BODY", default="simulated",
                         help="how the simulated body is reached: simulated, or over an emulated serial line as"
                              " serial:denning, serial:p2os or serial:create2 (simulated)")
@@ -63,12 +64,14 @@ def _check(task: Task) -> int:
     from harvey.campaign.summary import format_previews, summarize_dry_run
     from harvey.dry_run import dry_run
     from harvey.simulation.run import build_robot_model
+    from harvey.what_if import WhatIf
     from world_models.files.world_files import load_world
 
     scenario = stage.scenario
     world = load_world(scenario.world)
     robot = build_robot_model(scenario, world)
-    ahead, outcome = dry_run(world, robot, scenario.command, build_settings(task.agent_settings))
+    pairs = task.agent_settings
+    ahead, outcome = dry_run(world, robot, scenario.command, build_settings(pairs), WhatIf(pairs=pairs))
     print(format_previews(ahead))
     told, bodes_well = summarize_dry_run(ahead, outcome)
     print(f"\nthe dry run of {scenario.name} {told}")

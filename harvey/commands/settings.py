@@ -34,16 +34,18 @@ def _run(args: Namespace) -> int:
         return 0
     width = min(max(shutil.get_terminal_size((120, 24)).columns, MIN_WIDTH), MAX_WIDTH)
     print("\n".join(format_rows(rows, width)))
-    print("\nAn angle is set in radians. One number is replaced by --set ROOM.NAME=VALUE, in harvey run and replay.")
+    print("\nAn angle is set in radians. One number is replaced by --set ROOM.NAME=VALUE, in harvey run and replay.\n"
+          "Those of camera, wheels and footprint may be set in other units too, as camera.tilt_deg and camera.height_in.")
     return 0
 
 
 def select_rows(name: str | None) -> tuple[Row, ...]:
     """All settings, those of a room, or one. Raises BadInput where there is no such room or setting."""
+    from harvey.robot_settings import find_key, list_robot_rows
     from knowledge_sources.settings.table import list_rows
     from world_models.files.toml.settings import suggest_keys
 
-    rows = list_rows()
+    rows, name = (*list_rows(), *list_robot_rows()), name and find_key(name)
     chosen = tuple(row for row in rows if name in (None, row.room, row.name))
     if not chosen:
         known = [*dict.fromkeys(row.room for row in rows), *(row.name for row in rows)]
@@ -67,8 +69,11 @@ def format_rows(rows: Sequence[Row], width: int) -> Iterator[str]:
 
 def _about(room: str) -> str:
     """What a room's numbers are for, as its dataclass says."""
+    from harvey.robot_settings import ROOMS
     from knowledge_sources.settings import DEFAULT
 
+    if room in ROOMS:
+        return ROOMS[room]
     return (getattr(DEFAULT, room).__doc__ or "").strip().splitlines()[0].rstrip(".").removeprefix("The ")
 
 
@@ -103,10 +108,12 @@ COMMAND = Command(
         ("harvey settings", "all rooms"),
         ("harvey settings matching", "one room"),
         ("harvey settings plan.max_leg_m", "one number"),
+        ("harvey settings camera", "what the robot believes of its camera"),
         ("harvey settings --json", "for further use"),
         ("harvey run bump --set plan.max_leg_m=2", "run with another number"),
         ("harvey replay runs/bump-0 --set plan.max_leg_m=2", "decide a run again with another number"),
     ),
     _arguments, _run,
-    "They belong to the robot's software. The numbers of a scenario (start, sensor, wheels, faults) are in its file.",
+    "They belong to the robot's software. The numbers of a scenario (start, sensor, wheels, faults) are in its file.\n"
+    "Camera, wheels and footprint are what the robot believes of itself: set, they change that and not what is true.",
 )

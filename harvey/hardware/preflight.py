@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 
 from harvey.campaign.summary import summarize_dry_run
-from harvey.dry_run import MilestonePreview, dry_run
+from harvey.dry_run import MilestonePreview, Otherwise, dry_run, not_otherwise
 from harvey.errors import BadInput
 from harvey.hardware.base import kind_of, open_base
 from harvey.hardware.drivers.bases.base import Base, BaseFault
@@ -67,9 +67,11 @@ class Preflight:
     """
 
     def __init__(
-        self, mission: HardwareMission, out: Path, clock: Callable[[], float], settings: Settings = DEFAULT
+        self, mission: HardwareMission, out: Path, clock: Callable[[], float], settings: Settings = DEFAULT,
+        what_if: Otherwise = not_otherwise,
     ) -> None:
-        self._mission, self._out, self._clock, self._settings = mission, out, clock, settings
+        self._mission, self._out, self._clock = mission, out, clock
+        self._settings, self._what_if = settings, what_if
         self._open = ExitStack()
         self.checks: list[Check] = []
         self.robot: RobotModel | None = None
@@ -153,7 +155,7 @@ class Preflight:
             yield Check("goal", f"{lost[0]} is not within its locale", todo)
             return
         yield Check("goal", f"from {origin} to {destination}")
-        self.previews, outcome = dry_run(world, robot, self._mission.command, self._settings)
+        self.previews, outcome = dry_run(world, robot, self._mission.command, self._settings, self._what_if)
         if outcome.kind != "reached":
             yield Check("plan", outcome.reason, "another start or goal, or a world with a way between them")
             return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from harvey.replay.counterfactual import Answer, what_if
 from harvey.run_files.records import EntryRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.runner.resume import find_remains
-from harvey.simulation.run import resume_mission, run_mission
+from harvey.simulation.run import build_head, resume_mission, run_mission
 from sim.stage import Stage
 
 DESK = "allens-office/desk"
@@ -95,3 +96,40 @@ def test_another_question_is_asked_of_it(without: tuple[RunDirectory, Answer]) -
     answer = what_if(without[0], ["allens-office/bookshelf-1"], (), go_on=False)
     assert (answer.then, answer.now, answer.outcome.kind) == (None, None, "reached")
     assert answer.agreed == len(list(read_records(without[0].journal)))
+
+
+def test_a_camera_that_is_believed_to_be_tilted_makes_another_run(
+    run: RunDirectory, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One revision, before anybody acts; it is kept in run.json, replayed and asked about."""
+    out = RunDirectory(tmp_path / "tilted")
+    argv = ["replay", str(run.path), "--set", "camera.tilt_deg=0.3", "--out", str(out.path)]
+    assert main(argv) == 0
+    capsys.readouterr()
+    (revision,) = told(out)
+    assert (revision.ref, revision.cycle, revision.because) == ("CameraState-1.1", 1, ("CameraState-1.0",))
+    assert revision.value["mount"]["tilt_rad"] == pytest.approx(math.radians(0.3))
+    used = {ref for record in read_records(out.journal) for ref in record.used}
+    assert "CameraState-1.1" in used and "CameraState-1.0" not in used
+    assert json.loads((out.path / "run.json").read_text("utf-8"))["constants"] == [["camera.tilt_deg", "0.3"]]
+    assert is_replayed(out, capsys)
+    assert main(["why", str(out.path), "CameraState-1.1"]) == 0
+    assert "what if" in capsys.readouterr().out
+
+
+def test_a_camera_that_is_set_to_what_it_is_changes_nothing(run: RunDirectory) -> None:
+    answer = what_if(run, (), [("camera.tilt_deg", "0"), ("wheels.increment_m", "0.6096")], go_on=False)
+    assert (answer.then, answer.now, answer.revised, answer.outcome.kind) == (None, None, (), "reached")
+
+
+def test_what_is_set_of_a_new_run_changes_what_is_believed_and_not_what_is_true(
+    short_stage: Stage, run: RunDirectory, tmp_path: Path
+) -> None:
+    out = RunDirectory(tmp_path / "narrow")
+    head = build_head(short_stage, 3, settings=(("wheels.increment_m", "0.5"), ("footprint.radius_m", "0.3")))
+    assert run_mission(short_stage, 3, out=out.path, head=head).outcome == "reached"
+    assert [entry.ref for entry in told(out)] == ["Wheels-1.1", "Footprint-1.1"]
+    (then, now) = (json.loads((one.path / "run.json").read_text("utf-8")) for one in (run, out))
+    assert (then["scenario"], then["robot"]) == (now["scenario"], now["robot"])
+    longest = max(e.value["move_m"] for r in read_records(out.journal) for e in r.made if e.type == "MotorCommand")
+    assert longest <= 0.5 / (228.3 / 240.0) + 1e-9

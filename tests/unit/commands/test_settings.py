@@ -15,12 +15,13 @@ from harvey.agent_settings import build_settings, names
 from harvey.cli import main
 from harvey.commands.settings import format_value
 from harvey.errors import BadInput
+from harvey.robot_settings import list_robot_rows
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.table import Row, list_rows, replace_value
 from world_models.entries.body import LAST_REQUESTS
 from world_models.entries.percepts import LAST_SEGMENTS
 
-ROWS = list_rows()
+ROWS, ROBOT_ROWS = list_rows(), list_robot_rows()
 UNITS = {"px", "m", "rad", "s", "1", "count", "1/m", "grey levels", "grey levels/px", "name", "yes/no"}
 FOLDER = Path(__file__).parents[3] / "knowledge_sources"
 WORDS = {word for path in FOLDER.rglob("*.py") if path.parent.name != "settings"
@@ -199,7 +200,7 @@ def test_harvey_settings_prints_all_within_the_terminals_width(
         lines = capsys.readouterr().out.splitlines()
         assert max(map(len, lines)) <= width
         assert {line.split()[0] for line in lines if line.startswith("  ") and line[2] != " "} == {
-            row.field for row in ROWS}
+            row.field for row in (*ROWS, *ROBOT_ROWS)}
 
 
 def test_harvey_settings_names_near_rooms(capsys: pytest.CaptureFixture[str]) -> None:
