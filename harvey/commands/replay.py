@@ -67,13 +67,15 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
 def _again(run: RunDirectory) -> int:
     """Decide it again as it was."""
     from harvey.agent import build_agent
+    from harvey.run_files.observations import Originals
     from harvey.run_files.run_head import RunHead
-    from harvey.runner.replay import open_originals, replay
+    from harvey.runner.replay import open_pictures, replay
 
     agreed, head = 0, RunHead.read(run.path)
     elsewhere = head.decided_elsewhere()
+    pictures = open_pictures(run)  # what is wrong with the journal is said first
     agent = build_agent(head)
-    originals = open_originals(run, agent.store)
+    originals = Originals(pictures, agent.store)
     try:
         for decision in with_progress(replay(run, originals, agent.scheduler())):
             if not decision.same:

@@ -35,7 +35,7 @@ def _run(args: Namespace) -> int:
     width = min(max(shutil.get_terminal_size((120, 24)).columns, MIN_WIDTH), MAX_WIDTH)
     print("\n".join(format_rows(rows, width)))
     print("\nAn angle is set in radians. One number is replaced by --set ROOM.NAME=VALUE, in harvey run and replay.\n"
-          "Those of camera, wheels and footprint may be set in other units too, as camera.tilt_deg and camera.height_in.")
+          "Those of camera, wheels and footprint may be set in other units too: camera.tilt_deg, camera.height_in.")
     return 0
 
 
