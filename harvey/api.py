@@ -40,8 +40,9 @@ from harvey.runner.replay import replay as replay_run
 from harvey.runner.result import MissionResult
 from harvey.simulation.run import build_head, run_mission
 from harvey.why.journal import JournalHistory
-from harvey.why.story import Story, lines_of, tell_stories
-from harvey.why.walk import find_refs
+from harvey.why.model.element import stories_of
+from harvey.why.model.world_file import WorldFile
+from harvey.why.story import Story, lines_of
 from knowledge_sources.settings import Settings
 from logs.reader import read_true_track
 from sim.scenario import FORMAT, Scenario, ScenarioError, load_scenario, with_settings
@@ -244,7 +245,8 @@ class RecordedRun:
         """Why something came about, in sentences, as ``harvey why`` says it.
 
         Args:
-            what: an entry, as ``"MotorCommand-12"``; the number of a cycle; None for the outcome.
+            what: an entry, as ``"MotorCommand-12"``; a landmark, door, thing or room, as ``"allens-office/desk"``; the
+                number of a cycle; None for the outcome.
 
         Raises:
             BadInput: the run has none of that name; near ones are listed.
@@ -254,7 +256,7 @@ class RecordedRun:
     def stories(self, what: str | int | None = None) -> Sequence[Story]:
         """The same as data: headline, decision and reasons with the entries that say so."""
         history = JournalHistory(self._files.journal)
-        return list(tell_stories(history, find_refs(history, what)))
+        return list(stories_of(history, what, WorldFile(self._files)))
 
     def replay(self) -> int | None:
         """Decide it again from what it observed: the first cycle that is decided otherwise, or None where none is.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from harvey.commands.command import Command, whole
@@ -13,12 +13,12 @@ from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory, open_run
 from harvey.why.history import History
 from harvey.why.journal import JournalHistory
-from harvey.why.model.element import element_story, is_element
+from harvey.why.model.element import stories_of
 from harvey.why.model.world_file import WorldFile
 from harvey.why.on_the_way import levels_off, on_the_way
-from harvey.why.story import LEGEND, Story, lines_of, tell_stories
+from harvey.why.story import LEGEND, Story, lines_of
 from harvey.why.trace import cycle_lines
-from harvey.why.walk import explain, find_refs
+from harvey.why.walk import explain
 from logs.disk import is_being_written
 
 
@@ -50,9 +50,7 @@ def _run(args: Namespace) -> int:
     if args.not_ is not None:
         _print_not(run, history, args)
         return 0
-    is_told_otherwise = args.milestone is not None or (args.entry is not None and is_element(history, args.entry))
-    refs = [] if is_told_otherwise else find_refs(history, args.entry if args.at is None else args.at)
-    stories = list(_stories(run, history, args, refs))
+    stories = list(_stories(run, history, args))
     if not asked and args.at is None and history.cut_off is not None:
         print(_describe_unfinished(run, history.cut_off), file=sys.stderr if args.json else sys.stdout)
     if args.json:
@@ -60,7 +58,7 @@ def _run(args: Namespace) -> int:
     else:
         if not asked and args.at is None:
             print("\n".join([*levels_off(run), *on_the_way(history, run.read_result()), ""]))
-        print("\n".join(_paragraphs(history, args, refs, stories)))
+        print("\n".join(_paragraphs(history, args, stories)))
     return 0
 
 
@@ -73,25 +71,24 @@ def _describe_unfinished(run: RunDirectory, cycle: int) -> str:
             "The last thing that its journal tells of:\n")
 
 
-def _stories(run: RunDirectory, history: History, args: Namespace, refs: Sequence[str]) -> Iterator[Story]:
-    """Of what is asked for by name the lines of the world's file are told too; the short account is to come fast."""
+def _stories(run: RunDirectory, history: History, args: Namespace) -> Iterator[Story]:
     world = WorldFile(run)
-    if args.entry is not None and not refs:
-        yield element_story(history, args.entry, world)
-    if args.milestone is not None:
-        from harvey.why.milestone import milestone_story, milestones
+    if args.milestone is None:
+        yield from stories_of(history, args.entry if args.at is None else args.at, world)
+        return
+    from harvey.why.milestone import milestone_story, milestones
 
-        yield from (milestone_story(history, id, world) for id in milestones(history, args.milestone))
-    yield from tell_stories(history, refs, None if args.entry is None and args.at is None else world)
+    yield from (milestone_story(history, id, world) for id in milestones(history, args.milestone))
 
 
-def _paragraphs(history: History, args: Namespace, refs: list[str], stories: list[Story]) -> Iterator[str]:
+def _paragraphs(history: History, args: Namespace, stories: list[Story]) -> Iterator[str]:
     if args.at is not None:
         yield from cycle_lines(history.decision(args.at), history.candidates(args.at))
         yield ""
     for number, one in enumerate(stories):
         yield from ("",) * (number > 0)
         yield from lines_of(one)
+    refs = [one.ref for one in stories if args.milestone is None and history.find(one.ref) is not None]
     if args.depth is not None and refs:
         yield "\nEntry by entry:"
         yield from explain(history, refs, args.depth)

@@ -14,7 +14,8 @@ from harvey.why.links import words
 from harvey.why.model.frames import FRAME, MAX_LISTED, reference_of
 from harvey.why.model.world_file import WorldFile, tell_source
 from harvey.why.sentences import sentence, value_of
-from harvey.why.story import Step, Story
+from harvey.why.story import Step, Story, tell_stories
+from harvey.why.walk import find_refs
 from world_models.entries.task import Milestone
 from world_models.words import count, landmark, listed
 
@@ -27,6 +28,20 @@ MAX_MILESTONES = 8
 def is_element(history: History, text: str) -> bool:
     """Whether a name is meant for a part of the building and not for an entry of the run."""
     return history.find(text) is None and ENTRY.fullmatch(text) is None
+
+
+def stories_of(history: History, what: str | int | None, world: WorldFile) -> Iterator[Story]:
+    """The story of an entry or a part of the building (by name), of a cycle (by number), or of the outcome (None).
+
+    The outcome's is to come fast: it does not ask the world from which lines model lines come.
+
+    Raises:
+        BadInput: the run has none of that name; near ones are listed.
+    """
+    if isinstance(what, str) and is_element(history, what):
+        yield element_story(history, what, world)
+    else:
+        yield from tell_stories(history, find_refs(history, what), None if what is None else world)
 
 
 def element_story(history: History, name: str, world: WorldFile) -> Story:

@@ -1,0 +1,188 @@
+"""Why, down to the locale frames and the world's file: on a mission that is told on the way that a door is shut."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from harvey.campaign.campaign import Task, run_task
+from harvey.cli import main
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import RunHead
+from harvey.why.decisions import describe_decision
+from harvey.why.journal import JournalHistory
+from harvey.why.model.world_file import WorldFile
+from harvey.why.reach import check
+from harvey.why.story import Step, Story, lines_of, story
+from harvey.why.why_not import Fate, in_cycle, in_run
+from world_models.files.toml.mission import ROOT
+from world_models.frame_store import FrameStore, elements_of
+
+DOOR = "archive-north-door"
+WHERE = re.compile(r"([\w-]+)(?: of ([\w-]+))? \(([\w/.-]+):(\d+)\)")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
+    folder = tmp_path_factory.mktemp("told") / "shut-door"
+    run_task(Task("shut-door", (("limits.max_cycles", "130"),), 0, folder))
+    return RunDirectory(folder)
+
+
+@pytest.fixture(scope="module")
+def history(run: RunDirectory) -> JournalHistory:
+    return JournalHistory(run.journal)
+
+
+@pytest.fixture(scope="module")
+def store(run: RunDirectory) -> FrameStore:
+    head = RunHead.read(run.path)
+    return FrameStore(head.load_world(), head.world_sha256)
+
+
+def told(history: JournalHistory, ref: str, run: RunDirectory | None = None) -> Story:
+    record = history.entry(ref)
+    assert record is not None
+    return story(history, record, None if run is None else WorldFile(run))
+
+
+def step(of: Story, label: str) -> Step:
+    found = next((one for one in of.steps if one.label == label), None)
+    assert found is not None, f"{of.ref} tells no {label!r}"
+    return found
+
+
+def test_a_turn_goes_back_to_model_lines_their_frames_and_lines_of_the_file(
+    run: RunDirectory, history: JournalHistory, store: FrameStore
+) -> None:
+    turns = [ref for ref in history.refs if ref.startswith("MotorCommand-")]
+    told_lines = 0
+    for ref in turns:
+        found = told(history, ref, run)
+        model = step(found, "model")
+        held = {history.entry(frame).value["locale"] for frame in model.refs}  # type: ignore[union-attr]
+        names = elements_of_all(store, held)
+        for thing, locale, file, line in WHERE.findall(model.text):
+            name = f"{locale}/{thing}" if locale else thing
+            assert name in names
+            assert names[name] == f"{ROOT / file}:{line}"
+            told_lines += 1
+        assert "matched" in {one.label for one in found.steps}
+    assert told_lines > len(turns) > 5
+
+
+def elements_of_all(store: FrameStore, locales: set[str]) -> dict[str, str]:
+    """Landmarks of some locales by name, with file:line as the world has it."""
+    frames = [store.frame(locale) for locale in locales]
+    assert all(elements_of(frame) for frame in frames)
+    return {mark.name: mark.source for frame in frames for part in frame.parts for _, mark in part.landmarks}
+
+
+def test_a_story_says_by_which_frames_the_act_went(history: JournalHistory) -> None:
+    for decision in history.decisions():
+        for record in decision.made:
+            known = [one for one in told(history, record.ref).steps if one.label == "known"]
+            frames = {ref for one in known for ref in one.refs}
+            assert frames <= set(decision.used)
+            assert bool(known) == any(ref.startswith("LocaleFrame-") for ref in decision.used)
+            assert not any(ref.endswith(".0") and not ref.startswith("LocaleFrame-") for ref in frames)
+
+
+def test_an_act_that_asked_waits_and_comes_again(history: JournalHistory) -> None:
+    asked = [decision for decision in history.decisions() if decision.asks is not None]
+    assert len(asked) >= 4
+    for decision in asked:
+        assert decision.chosen is not None and decision.asks is not None
+        fates = [one.fate for one in in_cycle(history, decision.chosen.source, decision.cycle)]
+        assert Fate.ASKED in fates and Fate.ACTED not in fates
+        answer = step(told(history, decision.asks.ref), "answered")
+        assert re.search(r"came again in cycle \d+: it made [A-Z]", answer.text)
+    goal = history.entry("Goal-1.0")
+    assert goal is not None
+    assert "It had waited for an answer first: it asked for what is known of reception (FrameRequest-1.0)" in (
+        describe_decision(history, goal))
+
+
+def test_what_was_pending_is_known_where_acts_wait(history: JournalHistory) -> None:
+    for decision in history.decisions():
+        found = history.candidates(decision.cycle)
+        chosen = decision.chosen
+        assert len(found) == decision.pending + (chosen is not None and decision.asks is None)
+        assert chosen is None or found[0].number == chosen.number
+    acted = [one for one in in_run(history, "interpreter") if one.fate is Fate.ACTED]
+    assert [one.why for one in acted] == ["it made Hypothesis-1.0, Goal-1.0"]
+
+
+def test_a_sketch_drawn_anew_goes_back_to_what_was_told(run: RunDirectory, history: JournalHistory) -> None:
+    superseded = next(ref for ref in history.refs if ref.startswith("PlanSketch-")
+                      and history.entry(ref).value["status"] == "superseded")  # type: ignore[union-attr]
+    for ref in (superseded, "PlanSketch-3.0"):
+        found = told(history, ref, run)
+        assert f"{DOOR} is shut (user)" in step(found, "changed").text
+        assert step(found, "told").refs == ("Told-1.0",)
+    assert main(["why", str(run.path)]) == 0
+
+
+def test_every_line_of_every_explanation_ends_in_goal_model_or_sensor(history: JournalHistory) -> None:
+    found = check(history)
+    assert found.reached == found.decisions > 100
+    assert found.by_kind["model"] > 100
+
+
+def test_what_was_told_is_in_the_first_lines(run: RunDirectory, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["why", str(run.path)]) == 0
+    assert re.search(rf"^  cycle \d+  told  {DOOR} is shut", capsys.readouterr().out, re.MULTILINE)
+
+
+def test_a_door_a_landmark_and_a_room_are_answered_by_name(
+    run: RunDirectory, history: JournalHistory, store: FrameStore, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def said(name: str) -> str:
+        assert main(["why", str(run.path), name]) == 0
+        return " ".join(capsys.readouterr().out.split())
+
+    door = said(DOOR)
+    assert f"{DOOR} is described in world_models/worlds/two_ways.toml:" in door
+    assert f"the model reviser wrote: {DOOR} is shut (user). [LocaleFrame-2.1, Told-1.0, LocaleFrame-2.0]" in door
+    assert "LocaleFrame-4.1" in door and "PlanSketch-1.0" in door
+    milestone = history.entry("Milestone-1.0")
+    assert milestone is not None
+    landmark = next(name for name in milestone.value["landmarks"] if "/" in name)
+    assert "[Milestone-1." in said(landmark)
+    locale = landmark.partition("/")[0]
+    line = store.world.locale(locale).source.rpartition(":")[2]
+    assert f"{locale} is described in world_models/worlds/two_ways.toml:{line}" in said(locale)
+
+
+def test_a_name_that_nothing_has_is_answered_with_near_ones(
+    run: RunDirectory, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["why", str(run.path), "north-hall/stor"]) == 2
+    assert "north-hall/store" in capsys.readouterr().err
+    assert main(["why", str(run.path), "Gaol"]) == 2
+    assert "Goal-1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("lost", ["the head", "the world"])
+def test_without_the_worlds_file_it_answers_and_says_so(
+    run: RunDirectory, history: JournalHistory, tmp_path: Path, capsys: pytest.CaptureFixture[str], lost: str
+) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(run.path, copy)
+    if lost == "the head":
+        (copy / "run.json").unlink()
+    else:
+        head = json.loads((copy / "run.json").read_text(encoding="utf-8"))
+        (copy / "run.json").write_text(json.dumps({**head, "world": "nowhere.toml"}), encoding="utf-8")
+    for name in ("MotorCommand-12", DOOR, "north-hall", "LocaleFrame-4"):
+        assert main(["why", str(copy), name]) == 0
+        out = " ".join(capsys.readouterr().out.split())
+        assert "cannot be told: " in out
+        assert ("run.json" if lost == "the head" else "nowhere.toml") in out
+    model = step(told(history, "MotorCommand-12.0", RunDirectory(copy)), "model")
+    assert "come from what is known of " in model.text and model.refs
+    assert "\n".join(lines_of(told(history, "MotorCommand-12.0")))
