@@ -220,6 +220,25 @@ class CameraMount:
         return Pose(rotation, -rotation @ np.array([self.forward_m, 0.0, self.height_m]))
 
 
+@dataclass(frozen=True, slots=True)
+class CameraDeviation:
+    """How well a camera and its mounting are known: standard deviations, 0 where nobody has stated any.
+
+    Attributes:
+        tilt_rad, height_m, forward_m: of the mounting.
+        focal: of the focal length, as a part of it.
+    """
+
+    tilt_rad: float = 0.0
+    height_m: float = 0.0
+    forward_m: float = 0.0
+    focal: float = 0.0
+
+
+NOT_STATED = CameraDeviation()
+"""Nobody has stated how well a camera is known."""
+
+
 def clip_segments(
     segments_px: NDArray[np.float64], width: int, height: int
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
-from world_models.camera import Camera, CameraMount
+from world_models.camera import NOT_STATED, Camera, CameraDeviation, CameraMount
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.robot import CameraState, Footprint, Wheels
 from world_models.frames import Pose, Pose2
@@ -27,6 +27,7 @@ class RobotModel:
         radius_m: radius of the robot's disc.
         lens: the physical camera, with distortion; by default the camera that the model is made with.
         continuous: whether legs are driven without stopping at each increment, corrected by pictures on the move.
+        deviation: how well camera and mounting are known.
     """
 
     world: Building
@@ -36,6 +37,7 @@ class RobotModel:
     radius_m: float = 0.35
     lens: Camera = _NO_LENS
     continuous: bool = False
+    deviation: CameraDeviation = NOT_STATED
 
     def __post_init__(self) -> None:
         if self.lens is _NO_LENS:
@@ -46,7 +48,9 @@ class RobotModel:
 
     def entries(self) -> tuple[CameraState, Wheels, Footprint]:
         """What the robot knows of itself, as it lies on the board."""
-        return CameraState(self.lens, self.mount), Wheels(self.actuator, self.continuous), Footprint(self.radius_m)
+        d = self.deviation
+        camera = CameraState(self.lens, self.mount, d.tilt_rad, d.height_m, d.forward_m, d.focal)
+        return camera, Wheels(self.actuator, self.continuous), Footprint(self.radius_m)
 
     def in_building(self, building: Building) -> RobotModel:
         """The same robot in another building, or in the same one as known otherwise."""

@@ -63,7 +63,14 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.hardware.calibration import calibrate_camera, find_boards, find_mounting, grey_of, report
+    from harvey.hardware.calibration import (
+        calibrate_camera,
+        find_boards,
+        find_deviation,
+        find_mounting,
+        grey_of,
+        report,
+    )
     from knowledge_sources.methods.calibration.chessboard import Pattern
     from knowledge_sources.methods.calibration.picture import draw_calibration
     from world_models.files.toml.camera_file import camera_text
@@ -82,8 +89,8 @@ def _run(args: Namespace) -> int:
         place = _live_place(args) if place is None else place
         found, mount = find_mounting(calibration, place, pattern, board)
     lines = report(calibration, boards, found, board)
-    _write(args.out, camera_text(calibration.camera, mount, _notes(calibration, args)), lines,
-           draw_calibration(calibration, boards.shown))
+    text = camera_text(calibration.camera, mount, _notes(calibration, args), find_deviation(calibration, found, board))
+    _write(args.out, text, lines, draw_calibration(calibration, boards.shown))
     print("\n".join(lines))
     return 0
 

@@ -16,7 +16,7 @@ from knowledge_sources.methods.calibration.chessboard import Pattern, find_corne
 from knowledge_sources.methods.calibration.intrinsics import PARAMETERS, BoardView, Calibration, calibrate
 from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
 from knowledge_sources.methods.features.images import decode
-from world_models.camera import CameraMount
+from world_models.camera import CameraDeviation, CameraMount
 from world_models.words import count
 
 ENDINGS = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm", ".webp")
@@ -142,6 +142,16 @@ def find_mounting(
     if board.board_ahead_m is not None:
         forward = board.board_ahead_m - found.to_board_m
     return found, CameraMount(found.height_m, forward, found.tilt_rad)
+
+
+def find_deviation(calibration: Calibration, found: Mounting | None, board: Mounted | None) -> CameraDeviation:
+    """How well camera and mounting are known; nothing is stated of what was measured by tape alone."""
+    focal = float(calibration.deviations[0]) / calibration.camera.fx
+    if found is None:
+        return CameraDeviation(focal=focal)
+    height_m, tilt_rad, _, to_board_m, _ = (float(sigma) for sigma in found.deviations)
+    by_board = board is not None and board.board_ahead_m is not None
+    return CameraDeviation(tilt_rad, height_m, to_board_m if by_board else 0.0, focal)
 
 
 def report(

@@ -21,7 +21,7 @@ from knowledge_sources.methods.features.images import decode
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.checks import check_world
 from world_models.building.world import World
-from world_models.camera import Camera, CameraMount
+from world_models.camera import Camera, CameraDeviation, CameraMount
 from world_models.commands import parse_command
 from world_models.entries.location import Place
 from world_models.files.toml.camera_file import load_camera
@@ -105,7 +105,8 @@ class Preflight:
         yield checked
         if world is not None and seen is not None:
             m = self._mission
-            self.robot = RobotModel(world, *seen, m.actuator, m.base.radius_m)
+            camera, mount, deviation = seen
+            self.robot = RobotModel(world, camera, mount, m.actuator, m.base.radius_m, deviation=deviation)
             yield from self._plan(world, self.robot)
         if self._mission.motion.continuous:
             yield Check("motion", "these bases cannot be steered on the move", "motion.continuous = false")
@@ -125,11 +126,11 @@ class Preflight:
         return world, Check("world", f"{world.name}: {count(len(world.rooms), 'room')}, "
                                      f"{count(len(world.landmarks), 'landmark')}, no faults")
 
-    def _calibration(self) -> tuple[tuple[Camera, CameraMount] | None, Check]:
+    def _calibration(self) -> tuple[tuple[Camera, CameraMount, CameraDeviation] | None, Check]:
         if not self._mission.camera.calibration:
             return None, Check("calibration", "no file is named", "harvey calibrate, then [camera] calibration = FILE")
         try:
-            camera, mount = load_camera(self._mission.calibration)
+            camera, mount, deviation = load_camera(self._mission.calibration)
         except WorldError as error:
             return None, Check("calibration", str(error), "harvey calibrate --help")
         if mount is None:
@@ -137,7 +138,7 @@ class Preflight:
                                "add [mount] height_m, forward_m, tilt_deg to the file, or calibrate with the board on "
                                "the floor")
         bent = "no distortion" if camera.distortion is None else "with distortion"
-        return (camera, mount), Check(
+        return (camera, mount, deviation), Check(
             "calibration", f"{camera.width} x {camera.height} px, f {camera.fx:.0f} px, {bent}; "
                            f"{mount.height_m:.2f} m above the floor")
 

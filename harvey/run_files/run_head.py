@@ -18,7 +18,7 @@ from harvey.run_files.deciding_code import deciding_code
 from harvey.run_files.decoding import MisfitError, decode, fields_of
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
-from world_models.camera import Camera, CameraMount
+from world_models.camera import NOT_STATED, Camera, CameraDeviation, CameraMount
 from world_models.entries.task import Command
 from world_models.files.toml.mission import ROOT, Servo
 from world_models.files.world_files import fingerprint, load_world
@@ -26,7 +26,8 @@ from world_models.plugins import SOURCES_GROUP, list_plugins
 from world_models.robot import RobotModel
 
 SIMULATOR, HARDWARE = "simulator", "hardware"
-PARTS: Mapping[str, type[Any]] = {"camera": Camera, "mount": CameraMount, "actuator": ActuatorModel}
+PARTS: Mapping[str, type[Any]] = {
+    "camera": Camera, "mount": CameraMount, "actuator": ActuatorModel, "deviation": CameraDeviation}
 """What a robot knows of itself that has parts of its own."""
 
 T = TypeVar("T")
@@ -80,6 +81,8 @@ class RunHead:
         """The head of a run that begins now; ``more`` are the other attributes. Raises OSError for the world file."""
         known = {f.name: getattr(robot, f.name) for f in fields(robot) if f.init and f.name not in ("world", "lens")}
         known["camera"] = robot.lens  # the robot's model is made of the camera as it is, with its lens
+        if robot.deviation == NOT_STATED:
+            del known["deviation"]
         return RunHead(
             kind, name, seed, _portable(world), _sha256(world), plain(known), asdict(servo), plain(command), **more
         )

@@ -13,7 +13,7 @@ import pytest
 from harvey.errors import BadInput
 from harvey.run_files.run_head import HARDWARE, RunHead
 from world_models.actuator import ActuatorModel
-from world_models.camera import Camera, CameraMount
+from world_models.camera import Camera, CameraDeviation, CameraMount
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command
 from world_models.files.toml.mission import Servo
@@ -43,6 +43,18 @@ def test_what_the_robot_knows_comes_back(robot: RobotModel, tmp_path: Path) -> N
     assert (model.mount, model.actuator, model.radius_m) == (robot.mount, robot.actuator, robot.radius_m)
     np.testing.assert_array_equal(model.lens.matrix, robot.lens.matrix)
     np.testing.assert_array_equal(model.lens.distortion, robot.lens.distortion)
+
+
+def test_how_well_the_camera_is_known_comes_back_and_lies_on_the_board(robot: RobotModel, tmp_path: Path) -> None:
+    assert "deviation" not in build_head(robot).robot
+    known = dataclasses.replace(robot, deviation=CameraDeviation(0.01, 0.002, 0.003, 0.0004))
+    build_head(known).write(tmp_path)
+    head = RunHead.read(tmp_path)
+    model = head.model(head.load_world())
+    camera, _, _ = model.entries()
+    assert model.deviation == known.deviation
+    assert (camera.sigma_tilt_rad, camera.sigma_height_m, camera.sigma_forward_m, camera.sigma_focal) == (
+        0.01, 0.002, 0.003, 0.0004)
 
 
 def test_another_world_file_is_refused(robot: RobotModel, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from knowledge_sources.methods.features.images import decode
 from sim.made_up.chessboard import chessboard_picture, chessboard_renderer, chessboard_view
 from sim.render.optics import Optics
 from sim.render.sensor import SensorParameters
-from world_models.camera import Camera, CameraMount
+from world_models.camera import Camera, CameraDeviation, CameraMount
 from world_models.files.toml.camera_file import CameraFileError, camera_text, load_camera
 from world_models.frames import Pose
 
@@ -119,12 +120,24 @@ def test_a_board_nowhere_near_the_floor_is_refused(calibration: Calibration) -> 
 def test_a_camera_file_holds_the_same_numbers(tmp_path: Path) -> None:
     mount = CameraMount(0.2, 0.08, math.radians(5.0))
     (tmp_path / "camera.toml").write_text(camera_text(CAMERA, mount, ("a note",)))
-    camera, read = load_camera(tmp_path / "camera.toml")
+    camera, read, _ = load_camera(tmp_path / "camera.toml")
     assert (camera.fx, camera.fy, camera.cx, camera.cy) == (CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy)
     np.testing.assert_array_equal(camera.distortion, CAMERA.distortion)
     assert read is not None and read.height_m == 0.2 and read.tilt_rad == pytest.approx(mount.tilt_rad)
     (tmp_path / "camera.toml").write_text(camera_text(Camera(1.0, 2.0, 3.0, 4.0, 50, 60), None))
     assert load_camera(tmp_path / "camera.toml")[1] is None
+
+
+def test_a_camera_file_says_how_well_it_is_known(tmp_path: Path) -> None:
+    deviation = CameraDeviation(math.radians(0.2), 0.003, 0.0, 0.001)
+    text = camera_text(CAMERA, CameraMount(0.2), deviation=deviation)
+    (tmp_path / "camera.toml").write_text(text)
+    read = load_camera(tmp_path / "camera.toml").deviation
+    assert dataclasses.astuple(read) == pytest.approx(dataclasses.astuple(deviation))
+    assert "forward_m" not in text.partition("[deviation]")[2]
+    (tmp_path / "camera.toml").write_text(camera_text(CAMERA, CameraMount(0.2), deviation=CameraDeviation()))
+    assert "deviation" not in (tmp_path / "camera.toml").read_text()
+    assert load_camera(tmp_path / "camera.toml").deviation == CameraDeviation()
 
 
 @pytest.mark.parametrize(
@@ -136,6 +149,8 @@ def test_a_camera_file_holds_the_same_numbers(tmp_path: Path) -> None:
         (("fx_px", "fz_px"), "expected the key 'fx_px'"),
         (("distortion = [", "distortion = [0.0, 0.0, "), "expected an array of 4 or 5 numbers"),
         (("height_m = 0.2", "height_m = 'tall'"), "height_m: expected a number"),
+        (("[mount]", "[deviation]\nheight_m = -1.0\n[mount]"), "deviation.height_m: expected a number from 0 to 1"),
+        (("[mount]", "[deviation]\nroll_deg = 1.0\n[mount]"), "roll_deg"),
     ],
 )
 def test_a_camera_file_that_is_wrong_is_pointed_at(tmp_path: Path, change: tuple[str, str], message: str) -> None:
@@ -155,8 +170,9 @@ def test_the_command_writes_file_report_and_picture(
     (tmp_path / "grey.jpg").write_bytes(cv2.imencode(".jpg", np.full((512, 512), 99, np.uint8))[1].tobytes())
     out = tmp_path / "made" / "eye.toml"
     assert main(["calibrate", str(tmp_path), "--out", str(out)]) == 0
-    camera, mount = load_camera(out)
+    camera, mount, deviation = load_camera(out)
     assert camera.fx == pytest.approx(402.0, abs=1.0) and mount is None
+    assert 0.0 < deviation.focal < 0.01 and deviation == CameraDeviation(focal=deviation.focal)
     report = out.with_suffix(".txt").read_text()
     assert "grey.jpg: no board of 9 x 6" in report and report.strip() in capsys.readouterr().out
     picture = cv2.imread(str(out.with_suffix(".png")))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import NamedTuple
 
-from world_models.camera import Camera, CameraMount
+from world_models.camera import NOT_STATED, Camera, CameraDeviation, CameraMount
 from world_models.files.toml.source import Node, Source, WorldError
 
 PINHOLE = ("fx_px", "fy_px", "cx_px", "cy_px")
@@ -16,21 +17,38 @@ class CameraFileError(WorldError):
     """A camera file that cannot be read: names file, line, what was expected and what was got."""
 
 
-def load_camera(path: Path) -> tuple[Camera, CameraMount | None]:
-    """The camera, and how it is mounted where the file says.
+class CameraFile(NamedTuple):
+    """What a camera file says.
+
+    Attributes:
+        camera: intrinsics and lens.
+        mount: how it is mounted, where the file says.
+        deviation: how well it is known; 0 where the file does not say.
+    """
+
+    camera: Camera
+    mount: CameraMount | None
+    deviation: CameraDeviation
+
+
+def load_camera(path: Path) -> CameraFile:
+    """The camera of a file, its mounting, and how well both are known.
 
     Raises:
         CameraFileError: the file is missing or malformed.
     """
     try:
         root = Source.read(path).root.table(("camera",), ("mount", "deviation"))
-        mount = root.get("mount")
-        return _read_camera(root["camera"]), None if mount is None else _read_mount(mount)
+        camera, mount, deviation = _read_camera(root["camera"]), root.get("mount"), root.get("deviation")
+        return CameraFile(camera, None if mount is None else _read_mount(mount),
+                          NOT_STATED if deviation is None else _read_deviation(deviation, camera))
     except WorldError as error:
         raise CameraFileError(str(error)) from None
 
 
-def camera_text(camera: Camera, mount: CameraMount | None, notes: tuple[str, ...] = ()) -> str:
+def camera_text(
+    camera: Camera, mount: CameraMount | None, notes: tuple[str, ...] = (), deviation: CameraDeviation | None = None
+) -> str:
     """The text of a camera file; :func:`load_camera` reads the same numbers back."""
     values = (camera.fx, camera.fy, camera.cx, camera.cy)
     lines = [*(f"# {note}".rstrip() for note in notes), "", "[camera]",
@@ -43,6 +61,11 @@ def camera_text(camera: Camera, mount: CameraMount | None, notes: tuple[str, ...
         lines += ["", "[mount]", f"height_m = {float(mount.height_m)!r}  # optical centre above the floor",
                   f"forward_m = {float(mount.forward_m)!r}  # ahead of the axis that the robot turns about",
                   f"tilt_deg = {math.degrees(mount.tilt_rad)!r}  # downward"]
+    if deviation is not None and deviation != NOT_STATED:
+        stated = {"focal_px": deviation.focal * camera.fx, "height_m": deviation.height_m,
+                  "forward_m": deviation.forward_m, "tilt_deg": math.degrees(deviation.tilt_rad)}
+        lines += ["", "[deviation]  # standard deviations",
+                  *(f"{key} = {float(value)!r}" for key, value in stated.items() if value > 0.0)]
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
@@ -61,6 +84,14 @@ def _read_mount(node: Node) -> CameraMount:
     forward = node["forward_m"].number(-10.0, 10.0) if "forward_m" in node else 0.0
     tilt = node["tilt_deg"].number(-89.0, 89.0) if "tilt_deg" in node else 0.0
     return CameraMount(node["height_m"].number(0.01, 10.0), forward, math.radians(tilt))
+
+
+def _read_deviation(node: Node, camera: Camera) -> CameraDeviation:
+    known = {"focal_px": camera.fx, "height_m": 1.0, "forward_m": 1.0, "tilt_deg": 30.0}
+    node.table((), tuple(known))
+    stated = {key: node[key].number(0.0, most) if key in node else 0.0 for key, most in known.items()}
+    return CameraDeviation(math.radians(stated["tilt_deg"]), stated["height_m"], stated["forward_m"],
+                           stated["focal_px"] / camera.fx)
 
 
 def _read_pixels(node: Node) -> int:
