@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,7 +21,6 @@ from harvey.run_files.run_head import RunHead
 from harvey.runner.replay import open_originals
 from harvey.wiring import KNOWLEDGE_SOURCES, load_kinds
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.locale_frame import LocaleFrame
 
 KINDS = load_kinds()
 TRACED = frozenset(kind for kind in KINDS.values() if kind_of(kind).traced)
@@ -73,10 +73,18 @@ class RebuiltBoard:
         changes = _apply_aside(self.board, effects, chosen.source, decision.cycle)
         return Act(as_line([change_record(change) for change in changes]), frozenset(map(str, view.used)))
 
-    def clear_memos(self) -> None:
-        """Forget every result that was computed from frames."""
-        for frame in self.board.view.all(LocaleFrame):
-            frame.value.memo.clear()
+    @contextmanager
+    def revised(self, entry: Entry[Any], value: Any) -> Iterator[None]:
+        """A while in which an entry has another value, in a revision of its own."""
+        self._set(Entry(entry.id, entry.revision + 1, value, "test", entry.cycle, (entry.ref,)))
+        try:
+            yield
+        finally:
+            self._set(entry)
+
+    def _set(self, entry: Entry[Any]) -> None:
+        self.board._current[entry.id] = entry
+        self.board._store(type(entry.value)).put(entry)
 
 
 def recorded_act(decision: DecisionRecord) -> Act:
