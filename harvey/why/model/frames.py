@@ -38,18 +38,18 @@ def reference_of(record: EntryRecord) -> FrameReference:
 
 
 def tell_used(history: History, record: EntryRecord) -> Iterator[Sentence]:
-    """By which frames an act went; of the robot itself only what was learnt since the start is named."""
+    """By which frames an act went; of the robot itself only what was revised since the start is named."""
     used = () if record.observed else history.decision(record.cycle).used
     frames = find_frames(history, used)
-    learnt = [ref for ref in used if not ref.startswith(FRAME) and not ref.endswith(".0")]
+    revised = [ref for ref in used if not ref.startswith(FRAME) and not ref.endswith(".0")]
     changed = [name for name, frame in frames.items() if reference_of(frame).changes]
     named = list(dict.fromkeys((*changed, *frames)))[: max(MAX_LISTED, len(changed))]
     parts = [f"what was known of {listed([*named, *list(frames)[len(named):]], len(named))}"] * bool(named)
-    parts += [f"what was learnt of the robot itself ({', '.join(learnt)})"] * bool(learnt)
+    parts += [f"the revised model of the robot itself ({', '.join(revised)})"] * bool(revised)
     if not parts:
         return
     said = "".join(f"; {text}" for text in _changes(frames[name] for name in changed))
-    yield f"The act went by {' and by '.join(parts)}{said}.", (*(frames[name].ref for name in named), *learnt)
+    yield f"The act went by {' and by '.join(parts)}{said}.", (*(frames[name].ref for name in named), *revised)
 
 
 def tell_changes(history: History, record: EntryRecord) -> Iterator[tuple[str, EntryRecord]]:

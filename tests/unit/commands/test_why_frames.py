@@ -59,7 +59,7 @@ def test_a_reference_is_told_with_who_said_what() -> None:
     (("Footprint-1.0",), None, ()),
     (("LocaleFrame-1.0",), "what was known of hallway.", ("LocaleFrame-1.0",)),
     (("Footprint-1.1", "LocaleFrame-1.0"),
-     "what was known of hallway and by what was learnt of the robot itself (Footprint-1.1).",
+     "what was known of hallway and by the revised model of the robot itself (Footprint-1.1).",
      ("LocaleFrame-1.0", "Footprint-1.1")),
     (("LocaleFrame-1.0", "LocaleFrame-2.1", "LocaleFrame-3.1"),
      "what was known of library, study and hallway; library-door is shut (user).",
