@@ -17,13 +17,13 @@ from blackboard.entry import Entry
 from blackboard.scheduler import Scheduler
 from harvey.errors import BadInput
 from harvey.robot_settings import build_believed
+from harvey.run_files.records import WHAT_IF
 from world_models.building.changes.removals import element_names
 from world_models.building.world import World
 from world_models.entries.locale_frame import FrameChange, FrameRequest, LocaleFrame
 from world_models.entries.robot import CameraState, Footprint, Wheels
 from world_models.frame_store import FrameStore
 
-AUTHOR = "what if"
 MAX_SUGGESTED, MIN_SIMILARITY = 6, 0.5
 
 
@@ -44,7 +44,7 @@ class WhatIf:
         Raises:
             BadInput: a value cannot be used.
         """
-        self._removals = tuple(FrameChange("removed", name, AUTHOR) for name in dict.fromkeys(removed))
+        self._removals = tuple(FrameChange("removed", name, WHAT_IF) for name in dict.fromkeys(removed))
         self._believed = build_believed(pairs)
         self._checked: tuple[Entry[LocaleFrame], ...] = ()
 
@@ -52,7 +52,7 @@ class WhatIf:
         """Tell a scheduler what its board is to be revised by, if anything."""
         view = scheduler.view
         if effects := [*self._revise_robot(view), *self._revise_frames(view)]:
-            scheduler.tell(effects, AUTHOR)
+            scheduler.tell(effects, WHAT_IF)
 
     def _revise_robot(self, view: View) -> Iterator[Effect]:
         """The robot's entries as they were told at the start; what is learnt of them later stands."""

@@ -6,8 +6,7 @@ import json
 import re
 from typing import Any
 
-from harvey.run_files.records import DecisionRecord, as_line, decision_of
-from harvey.what_if import AUTHOR
+from harvey.run_files.records import WHAT_IF, DecisionRecord, as_line, decision_of
 from world_models.entries.locale_frame import LocaleFrame
 
 REF = re.compile(r'"([A-Za-z]+-\d+)\.(\d+)"')
@@ -29,7 +28,7 @@ class AsRecorded:
 
     def __call__(self, decision: DecisionRecord) -> DecisionRecord:
         """The decision as it would stand in the journal."""
-        told = [entry for entry in decision.observed if entry.author == AUTHOR]
+        told = [entry for entry in decision.observed if entry.author == WHAT_IF]
         for entry in told:
             id, _, revision = entry.ref.rpartition(".")
             self._undone.setdefault(id, []).append(int(revision))
@@ -52,5 +51,5 @@ def _undo_changes(record: dict[str, Any]) -> dict[str, Any]:
     """An entry without what its frame has of that author, where somebody else revised it since."""
     if record["type"] != LocaleFrame.__name__:
         return record
-    changes = [change for change in record["value"]["changes"] if change["by"] != AUTHOR]
+    changes = [change for change in record["value"]["changes"] if change["by"] != WHAT_IF]
     return {**record, "value": {**record["value"], "changes": changes}}

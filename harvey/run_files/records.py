@@ -14,6 +14,9 @@ from logs.journal_file import JournalError, read_journal
 REQUEST = "FrameRequest"
 """The type of what an act asks for that lacks a locale frame."""
 
+WHAT_IF = "what if"
+"""The author of the revisions by which a question of what would have been is asked."""
+
 
 @dataclass(frozen=True, slots=True)
 class EntryRecord:

@@ -6,7 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 
-from harvey.run_files.records import Candidate, EntryRecord
+from harvey.run_files.records import WHAT_IF, Candidate, EntryRecord
 from harvey.why.history import History
 from harvey.why.links import words
 from harvey.why.sentences import sentence
@@ -20,6 +20,8 @@ MAX_LISTED = 4
 def describe_decision(history: History, record: EntryRecord) -> str:
     """By whom, when and against what."""
     when = f"cycle {record.cycle}" + _time(history, record)
+    if record.author == WHAT_IF:
+        return f"It was revised in {when.rstrip(',')} by the question what if."
     if record.observed:
         return f"It came from outside, from {record.author}, and was taken up in {when.rstrip(',')}."
     decision = history.decision(record.cycle)

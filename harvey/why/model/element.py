@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Iterator
 
 from harvey.errors import BadInput
-from harvey.run_files.records import EntryRecord
+from harvey.run_files.records import WHAT_IF, EntryRecord
 from harvey.why import facts
 from harvey.why.history import History
 from harvey.why.links import words
@@ -80,7 +80,8 @@ def _tell_frames(history: History, held: Iterable[EntryRecord], name: str) -> It
             yield Step("known", text, (record.ref, *((request.ref,) if request is not None else ())))
         said = [change.sentence() for change in reference.changes if name in (change.name, reference.locale)]
         if said:
-            text = f"In cycle {record.cycle} the {words(record.author)} wrote: {listed(said, MAX_LISTED)}."
+            who = "the question what if" if record.author == WHAT_IF else f"the {words(record.author)}"
+            text = f"In cycle {record.cycle} {who} wrote: {listed(said, MAX_LISTED)}."
             yield Step("changed", text, (record.ref, *record.because))
 
 

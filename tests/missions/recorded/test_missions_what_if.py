@@ -91,6 +91,16 @@ def test_it_is_resumed(
     assert is_replayed(cut, capsys)
 
 
+def test_why_names_the_revision_and_its_author(
+    without: tuple[RunDirectory, Answer], capsys: pytest.CaptureFixture[str]
+) -> None:
+    (revision,) = told(without[0])
+    for name in (revision.ref, DESK):
+        assert main(["why", str(without[0].path), name]) == 0
+        said = " ".join(capsys.readouterr().out.split())
+        assert revision.ref in said and f"{DESK} is left out (what if)" in said and "the question what if" in said
+
+
 def test_another_question_is_asked_of_it(without: tuple[RunDirectory, Answer]) -> None:
     """What was taken away already stays away, and is no difference."""
     answer = what_if(without[0], ["allens-office/bookshelf-1"], (), go_on=False)
