@@ -28,8 +28,8 @@ def test_seeds_share_the_stage_and_what_the_robot_knows(scenario: Path) -> None:
     task = Task(str(scenario), (), 0)
     stage = task.stage()
     assert replace(task, seed=1).stage() is stage
-    assert build_head(stage, 0).model().world is build_head(stage, 1).model().world
-    assert build_head(stage, 0).model().world is not stage.world
+    assert build_head(stage, 0).load_world() is build_head(stage, 1).load_world()
+    assert build_head(stage, 0).load_world() is not stage.world
 
 
 def test_another_setting_is_another_stage(scenario: Path) -> None:
@@ -41,7 +41,7 @@ def test_another_setting_is_another_stage(scenario: Path) -> None:
 def test_a_file_that_was_changed_meanwhile_is_read_anew(scenario: Path) -> None:
     """The scenario, and the world that it names."""
     stage = Task(str(scenario), (), 0).stage()
-    known = build_head(stage, 0).model().world
+    known = build_head(stage, 0).load_world()
     scenario.write_text(scenario.read_text() + "\n# a remark\n")
     again = Task(str(scenario), (), 0).stage()
     assert again is not stage
@@ -49,7 +49,7 @@ def test_a_file_that_was_changed_meanwhile_is_read_anew(scenario: Path) -> None:
     floor.write_text(floor.read_text() + "\n# a remark\n")
     third = Task(str(scenario), (), 0).stage()
     assert third is not again
-    assert build_head(third, 0).model().world is not known
+    assert build_head(third, 0).load_world() is not known
 
 
 def test_a_world_that_is_gone_is_told_as_before(scenario: Path) -> None:
