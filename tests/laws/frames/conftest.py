@@ -1,17 +1,44 @@
-"""A recorded mission for the laws of frames: half-way to one door the robot is told that it is shut."""
+"""Recorded missions for the laws of frames."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import pytest
 
 from harvey.run_files.run_directory import RunDirectory
 from harvey.simulation.run import run_mission
+from sim.made_up.short_missions import OFFICE, fault
+from sim.scenario import parse_scenario
+from sim.stage import Stage, build_stage
 from two_doors import two_doors
+
+SEED = 3
 
 
 @pytest.fixture(scope="session")
-def told_run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
-    folder = tmp_path_factory.mktemp("told")
-    run = RunDirectory(folder / "run")
-    assert run_mission(two_doors(folder, ((3.0, "north-door", "shut"),)), 3, out=run.path).outcome == "reached"
-    return run
+def told_stage(tmp_path_factory: pytest.TempPathFactory) -> Stage:
+    """On the way to one door the robot is told that it is shut."""
+    return two_doors(tmp_path_factory.mktemp("told"), ((3.0, "north-door", "shut"),))
+
+
+@pytest.fixture(scope="session")
+def told_run(told_stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
+    return _record(told_stage, tmp_path_factory.mktemp("runs") / "told")
+
+
+@pytest.fixture(scope="session")
+def lost_stage() -> Stage:
+    """Somebody bumps into the robot; lost, it asks for every room of the floor at once."""
+    bump = fault("bump", "allens-office", 3.0, left_m=0.3, turn_deg=40.0)
+    return build_stage(parse_scenario(OFFICE + bump, "bump-in-allens-office"))
+
+
+@pytest.fixture(scope="session")
+def lost_run(lost_stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
+    return _record(lost_stage, tmp_path_factory.mktemp("runs") / "lost")
+
+
+def _record(stage: Stage, to: Path) -> RunDirectory:
+    assert run_mission(stage, SEED, out=to).outcome == "reached"
+    return RunDirectory(to)
