@@ -58,6 +58,6 @@ heading_deg = {heading_deg}
 put_down_sigma_m = 0.02
 put_down_sigma_deg = 1.0
 [limits]
-max_cycles = 600
+max_cycles = 3000
 {more}{tellings}"""
     return build_stage(parse_scenario(text, "two-doors"))

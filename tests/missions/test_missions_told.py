@@ -1,0 +1,151 @@
+"""What somebody tells the robot on the way: a door is shut, a thing is gone; it goes on by what is so now."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from blackboard.effect import Post
+from blackboard.journal import Decision
+from harvey.agent import build_agent
+from harvey.cli import main
+from harvey.runner.result import MissionResult
+from harvey.runner.teller import USER
+from harvey.runner.world_port import WorldPort, tell_robot
+from harvey.simulation.run import build_head, run_mission
+from sim.scenario import load_scenario
+from sim.stage import Stage, build_stage
+from two_doors import two_doors
+from world_models.entries.body import Course
+from world_models.entries.locale_frame import LocaleFrame
+from world_models.entries.task import PlanSketch
+from world_models.entries.told import Told
+
+SEED = 3
+SHUT = (3.0, "north-door", "shut")
+
+
+def drive(stage: Stage) -> tuple[MissionResult, list[Decision]]:
+    decisions: list[Decision] = []
+    return run_mission(stage, SEED, sinks=[decisions.append]), decisions
+
+
+def made(decisions: Sequence[Decision], kind: type[Any]) -> list[Any]:
+    """The entries of a kind that were made, in order."""
+    return [change.entry for decision in decisions for change in decision.made if isinstance(change.entry.value, kind)]
+
+
+def routes(decisions: Sequence[Decision]) -> list[list[str]]:
+    """The doors on the way of each sketch from locale to locale."""
+    return [[subgoal.passage for subgoal in entry.value.subgoals if subgoal.passage]
+            for entry in made(decisions, PlanSketch) if entry.revision == 0 and not entry.value.path]
+
+
+def answers(decisions: Sequence[Decision]) -> list[str]:
+    return [entry.value.answer for entry in made(decisions, Told)]
+
+
+def test_told_that_a_door_is_shut_it_goes_by_the_other() -> None:
+    result, decisions = drive(build_stage(load_scenario("shut-door")))
+    assert (result.outcome, result.collisions) == ("reached", 0)
+    assert routes(decisions) == [["reception-north-door", "archive-north-door"],
+                                 ["reception-south-door", "archive-south-door"]]
+    assert answers(decisions) == ["and took it over"]
+
+
+def test_told_that_a_thing_on_the_way_is_gone_it_goes_where_it_stood(tmp_path: Path) -> None:
+    """A table was carried to a corner; who is told does not go round where it was."""
+    places: dict[str, Any] = {"start": (2.5, 5.0), "goal": (4.0, 13.0), "heading_deg": 45.0,
+                              "more": '[[moved]]\nthing = "study/table-1"\nx_ft = -1.0\ny_ft = 5.5\n'}
+    round_it, _ = drive(two_doors(tmp_path, **places))
+    across, decisions = drive(two_doors(tmp_path, ((0.05, "study/table-1", "gone"),), **places))
+    assert [(result.outcome, result.collisions) for result in (round_it, across)] == [("reached", 0)] * 2
+    assert across.path_length_m < round_it.path_length_m - 0.1
+    assert [change.sentence() for entry in made(decisions, LocaleFrame) for change in entry.value.changes] == [
+        "study/table-1 is gone (user)"]
+
+
+def test_told_twice_it_is_told_twice_and_revises_once(tmp_path: Path) -> None:
+    result, decisions = drive(two_doors(tmp_path, (SHUT, (3.5, "north-door", "shut"))))
+    assert (result.outcome, result.collisions) == ("reached", 0)
+    assert answers(decisions) == ["and took it over", "as it was known"]
+    assert len(made(decisions, LocaleFrame)) == 2  # one of each room of the door
+    assert routes(decisions) == [["north-door"], ["south-door"]]
+
+
+def test_told_that_it_is_open_again_it_is_as_the_file_says(tmp_path: Path) -> None:
+    result, decisions = drive(two_doors(tmp_path, (SHUT, (5.0, "north-door", "open"))))
+    assert (result.outcome, result.collisions) == ("reached", 0)
+    frames = made(decisions, LocaleFrame)
+    assert [bool(entry.value.changes) for entry in frames] == [True, True, False, False]
+    assert all(entry.value is entry.value.filed or entry.value.filed is None for entry in frames[2:])
+    assert answers(decisions) == ["and took it over", "and took it over"]
+
+
+def test_told_that_the_only_door_is_shut_it_is_blocked_and_says_by_what(tmp_path: Path) -> None:
+    result, _ = drive(two_doors(tmp_path, ((1.0, "south-door", "shut"), SHUT)))
+    assert (result.outcome, result.collisions) == ("blocked", 0)
+    assert result.reason == "no passage for wheels leads from study to parlour; north-door is shut; south-door is shut"
+
+
+def test_told_while_it_rolls_it_stops_and_goes_another_way(tmp_path: Path) -> None:
+    """Rolling to one door, it is told that it is shut: it stops with the next picture, and goes by the other."""
+    stage = two_doors(tmp_path, ((1.5, "north-door", "shut"),), start=(11.0, 3.5), goal=(4.0, 5.0),
+                      heading_deg=90.0, more="[motion]\ncontinuous = true\n")
+    result, decisions = drive(stage)
+    assert (result.outcome, result.collisions) == ("reached", 0)
+    assert routes(decisions) == [["north-door"], ["south-door"]]
+    told = made(decisions, LocaleFrame)[0].cycle
+    courses = [entry for entry in made(decisions, Course) if entry.cycle > told - 4]
+    assert [entry.value.is_rolling for entry in courses[:2]] == [True, False] and courses[0].cycle < told
+    assert courses[1].cycle <= told + 3
+
+
+def test_told_of_what_is_not_there_it_says_so_and_revises_nothing(tmp_path: Path) -> None:
+    """A file cannot say so, but somebody can: the mission goes on as if nothing had been said."""
+    tellings = [Told("study/sofa-1", "gone"), Told("study/table-1", "shut"), Told("nowhere/door", "shut"),
+                Told("north-door", "gone"), Told("north-door", "open")]
+    decisions: list[Decision] = []
+    agent = build_agent(build_head(stage := two_doors(tmp_path), SEED))
+    scheduler = agent.scheduler(ports=[WorldPort(agent.store)], sinks=[decisions.append])
+    tell_robot(scheduler, agent.robot)
+    scheduler.tell([Post(build_head(stage, SEED).task())], USER)
+    for telling in tellings:
+        scheduler.tell([Post(telling)], USER)
+        while scheduler.step() is not None:
+            pass
+    assert made(decisions, LocaleFrame) == [] and not any(d.refused for d in decisions)
+    said = answers(decisions)
+    assert all(answer.startswith("which cannot be: expected ") for answer in said[:4])
+    assert "open door of study (north-door, south-door)" in said[1].replace("an open", "open")
+    assert said[4] == "as it was known"
+
+
+@pytest.mark.parametrize(("telling", "expected"), [
+    ('what = "study/table-2"\nstate = "gone"', "study/table-1"),
+    ('what = "north"\nstate = "shut"', "north-door"),
+    ('what = "study/table-1"\nstate = "shut"', "north-door"),
+    ('what = "north-door"\nstate = "ajar"', "shut"),
+])
+def test_a_scenario_that_tells_of_what_is_not_there_is_refused_with_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], telling: str, expected: str
+) -> None:
+    two_doors(tmp_path)
+    scenario = tmp_path / "told.toml"
+    text = f"""description = "told"
+world = "{tmp_path / "two_doors.toml"}"
+goal = "(ptrans (study (11.0,13.5,0)) (parlour (4.0,12.0,0)))"
+[start]
+heading_deg = 60.0
+[[told]]
+at_s = 1.0
+"""
+    scenario.write_text(f"{text}{telling}\n")
+    assert main(["run", str(scenario), "--out", str(tmp_path / "run")]) == 2
+    said = capsys.readouterr().err
+    assert f"{scenario.name}:" in said and expected in said
+    line = int(said.split(f"{scenario.name}:")[1].split(":")[0])
+    assert text.count("\n") - 1 <= line <= text.count("\n") + 2
