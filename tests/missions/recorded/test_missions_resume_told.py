@@ -1,0 +1,79 @@
+"""A run on which somebody tells the robot something: replayed to the byte; cut off, it is told the rest."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from harvey.agent import build_agent
+from harvey.run_files.records import DecisionRecord, read_records
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import RunHead
+from harvey.runner.replay import open_originals, replay
+from harvey.runner.resume import find_remains
+from harvey.simulation.run import resume_mission, run_mission
+from sim.stage import Stage
+from two_doors import two_doors
+
+TOLD = ((2.0, "study/bookshelf-1", "gone"), (3.0, "north-door", "shut"))
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> Stage:
+    return two_doors(tmp_path_factory.mktemp("world"), TOLD)
+
+
+@pytest.fixture(scope="module")
+def whole(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
+    run = RunDirectory(tmp_path_factory.mktemp("runs") / "whole")
+    assert run_mission(stage, 3, out=run.path).outcome == "reached"
+    return run
+
+
+def records_of(run: RunDirectory) -> list[DecisionRecord]:
+    return list(read_records(run.journal))
+
+
+def told_in(records: list[DecisionRecord]) -> list[tuple[int, str]]:
+    return [(record.cycle, entry.value["what"]) for record in records for entry in record.observed
+            if entry.type == "Told"]
+
+
+def is_decided_again(run: RunDirectory) -> bool:
+    agent = build_agent(RunHead.read(run.path))
+    return all(decided.same for decided in replay(run, open_originals(run, agent.store), agent.scheduler()))
+
+
+def test_a_run_that_was_told_something_is_replayed_to_the_byte(whole: RunDirectory) -> None:
+    assert [what for _, what in told_in(records_of(whole))] == [what for _, what, _ in TOLD]
+    assert is_decided_again(whole)
+
+
+@pytest.mark.parametrize(("which", "away"), [(0, 0), (1, -1), (1, 0), (1, 1)])
+def test_a_run_that_was_cut_off_near_a_telling_is_told_each_thing_once(
+    whole: RunDirectory, stage: Stage, tmp_path: Path, which: int, away: int
+) -> None:
+    """Before it was written down that it was told; after, while it asks what is meant; and when that was taken up."""
+    records = records_of(whole)
+    decisions = told_in(records)[which][0] + away
+    run = cut(whole, tmp_path / "run", decisions)
+    assert resume_mission(run, find_remains(run), stage=stage).outcome == "reached"
+    now = records_of(run)
+    assert [what for _, what in told_in(now)] == [what for _, what, _ in TOLD]
+    assert is_decided_again(run)
+    if all(entry.type != "MotorCommand" for entry in records[decisions - 1].made):  # else a motion was broken off
+        assert [r.data for r in now[:decisions]] == [r.data for r in records[:decisions]]
+        assert [r.data for r in now[decisions + 1:]] == [r.data for r in records[decisions + 1:]]
+
+
+def cut(whole: RunDirectory, to: Path, decisions: int) -> RunDirectory:
+    """The run as a crash leaves it: so many decisions, and the beginning of the next."""
+    run = RunDirectory(to)
+    to.mkdir()
+    for name in ("run.json", "camera.mjpeg"):
+        shutil.copy(whole.path / name, to / name)
+    lines = whole.journal.read_bytes().splitlines(keepends=True)
+    run.journal.write_bytes(b"".join(lines[:decisions]) + lines[decisions][:50])
+    return run
