@@ -10,6 +10,7 @@ from blackboard.effect import Effect
 from blackboard.knowledge_source import KnowledgeSource
 from harvey.runner.ports import Body
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
+from world_models.entries.touch import Contact
 
 
 class WrappedBody:
@@ -26,6 +27,9 @@ class WrappedBody:
 
     def claim(self) -> MotionReport | BodyFault:
         return self._body.claim()
+
+    def take_contact(self) -> Contact | None:
+        return self._body.take_contact()
 
     def look(self, purpose: str) -> Frame | BodyFault:
         return self._body.look(purpose)

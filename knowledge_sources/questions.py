@@ -18,6 +18,7 @@ from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import Tracks
 from world_models.entries.robot import CameraState, Footprint, Wheels
 from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch
+from world_models.entries.touch import Contact
 from world_models.frame_building import FrameBuilding
 from world_models.robot import RobotModel
 
@@ -130,6 +131,11 @@ def last_motion(view: View) -> Entry[MotorCommand] | Entry[Course] | None:
     if command is None or course is None:
         return command or course
     return course if course.cycle > command.cycle else command
+
+
+def find_contact(view: View, request: str) -> Entry[Contact] | None:
+    """The newest contact of the motion that this request asked for."""
+    return next((entry for entry in view.newest_first(Contact) if entry.because[0].id == request), None)
 
 
 def rolling_course(view: View) -> Entry[Course] | None:

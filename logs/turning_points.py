@@ -1,4 +1,4 @@
-"""Turning points of a run: goals, plans, verdicts, doubts, lost and found, faults, the end; as the robot itself knew
+"""Turning points of a run: goals, plans, verdicts, doubts, lost and found, faults, contacts, the end; as the robot itself knew
 them."""
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from world_models.entries.body import BodyFault
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch, Resumed
 from world_models.entries.told import Told
+from world_models.entries.touch import Contact
 
-TOLD = ("refuted", "not testable", "lost", "found", "fault", "resumed", "told")
+TOLD = ("refuted", "not testable", "lost", "found", "fault", "contact", "resumed", "told")
 """Kinds that a short account of a run must not leave out."""
 REMEMBERED = 8
 """The newest entries of a type that are looked back for."""
@@ -90,6 +91,9 @@ def turning_points(change: Change, cycle: int, get: Get, belief: Entry[Hypothesi
         yield TurningPoint(cycle, "found", f"{value.place()}; it knows again where it is")
     elif isinstance(value, BodyFault):
         yield TurningPoint(cycle, "fault", f"{value.part}: {value.what}{'' if value.is_open else ', over'}")
+    elif isinstance(value, Contact):
+        where = f"{belief.value.place()} by its belief; " if belief is not None else ""
+        yield TurningPoint(cycle, "contact", f"{where}{words.brief(value)}")
     elif isinstance(value, Resumed):
         yield TurningPoint(cycle, "resumed", f"after cycle {value.after_cycle}, where the run was cut off")
     elif isinstance(value, Told) and value.answer:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sim.body.actuator import ActuatorParameters
+from sim.body.bumper import Bumper
 from sim.body.elevator import Helper
 from sim.faults.fault import Fault
 from sim.faults.registry import read_fault
@@ -91,7 +92,7 @@ class ScenarioLimits(Limits):
 
 FORMAT = MissionFormat(
     {**TABLES, "limits": ScenarioLimits, "camera": CameraSettings, "render": Render, "actuator": ActuatorParameters,
-     "sensor": SensorParameters},
+     "sensor": SensorParameters, "bumper": Bumper},
     ("details", "faults", "moved", "rides"),
 )
 
@@ -113,6 +114,7 @@ class Scenario(Mission):
     render: Render
     actuator: ActuatorParameters
     sensor: SensorParameters
+    bumper: Bumper
     faults: tuple[Fault, ...] = ()
     moved: tuple[MovedThing, ...] = ()
     rides: tuple[Helper, ...] = ()

@@ -12,6 +12,8 @@ import numpy as np
 
 SMALL_M, TINY_M = 0.1, 0.01
 """A length up to the first is told in millimetres, below the second in tenths of them."""
+STRAIGHT_RAD = math.radians(0.05)
+"""A smaller angle is told as none."""
 MAX_FIELDS_TEXT = 160
 """Length of the text that tells a value of unknown kind by its fields [characters]."""
 
@@ -54,6 +56,11 @@ def turn(angle_rad: Number) -> str:
     """A counter-clockwise angle as a turn to one side: ``3.1 degrees left``."""
     angle = number(angle_rad)
     return f"{degrees(abs(angle))} {'left' if angle >= 0.0 else 'right'}"
+
+
+def bearing(angle_rad: Number) -> str:
+    """A direction from the robot's heading: ``straight ahead`` or ``31.0 degrees left of ahead``."""
+    return "straight ahead" if abs(number(angle_rad)) < STRAIGHT_RAD else f"{turn(angle_rad)} of ahead"
 
 
 def motion(turn_rad: float, move_m: float) -> str:

@@ -24,6 +24,7 @@ from sim.stage import Stage, build_stage
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate, Outcome
+from world_models.entries.touch import Contact
 from world_models.frames import Pose2, wrap_angle
 
 SCENARIO = "lab-to-allens-office"
@@ -88,6 +89,10 @@ class RepeatingBody:
     def claim(self) -> MotionReport | BodyFault:
         """Return the next recorded motion."""
         return self.execute(MotorCommand(0.0, 0.0))
+
+    def take_contact(self) -> Contact | None:
+        """Return none: none is recorded."""
+        return None
 
     def look(self, purpose: str) -> Frame | BodyFault:
         """Return the video's next frame."""

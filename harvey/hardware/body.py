@@ -21,6 +21,7 @@ from world_models.entries.body import (
     Ride,
     RideReport,
 )
+from world_models.entries.touch import Contact
 
 BASE_WORDS: Mapping[str, str] = {
     "silent": "link lost",
@@ -132,6 +133,11 @@ class HardwareBody:
             return self._measure_motion(self._base.odometry())
         except BaseFault as fault:
             return self._to_base_fault(fault)
+
+    def take_contact(self) -> Contact | None:
+        """What the base felt to touch, by our clock."""
+        contact = self._base.take_contact()
+        return None if contact is None else replace(contact, when_s=self._clock())
 
     def look(self, purpose: str) -> Frame | BodyFault:
         """A picture."""

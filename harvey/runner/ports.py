@@ -20,6 +20,7 @@ from world_models.entries.body import (
     Ride,
     RideReport,
 )
+from world_models.entries.touch import Contact
 
 
 class Body(Protocol):
@@ -35,6 +36,10 @@ class Body(Protocol):
 
     def claim(self) -> MotionReport | BodyFault:
         """What the wheels claim of the last command, after a fault broke it off."""
+        ...
+
+    def take_contact(self) -> Contact | None:
+        """What the robot felt to touch since the last call; asked after each motion."""
         ...
 
     def look(self, purpose: str, /) -> Frame | BodyFault:
@@ -79,20 +84,34 @@ class BodyPort:
         if isinstance(entry.value, Recovery) and entry.value.status == "asked":
             yield from self._try_again(entry)
         elif isinstance(change, Posted) and isinstance(entry.value, MotorCommand):
-            yield self._post(entry, self._body.execute(entry.value))
+            yield from self._answer_motion(entry, (self._body.execute(entry.value),))
         elif not isinstance(change, Retracted) and isinstance(entry.value, Course):
             found = self._body.steer(entry.value)
-            for answer in (found,) if isinstance(found, BodyFault) else found:
-                yield self._post(entry, answer)
+            yield from self._answer_motion(entry, (found,) if isinstance(found, BodyFault) else found)
         elif isinstance(change, Posted) and isinstance(entry.value, Look):
             yield self._post(entry, self._body.look(entry.value.purpose))
         elif isinstance(change, Posted) and isinstance(entry.value, Ride):
             yield self._post(entry, self._body.ride(entry.value))
 
-    def _post(self, request: Entry[Any], found: MotionReport | Frame | RideReport | BodyFault) -> Effect:
+    def _answer_motion(
+        self, request: Entry[Any], found: Iterable[MotionReport | Frame | BodyFault]
+    ) -> Iterable[Effect]:
+        """What a motion touched, then how it ended; a fault in which something was touched rests on the contact too."""
+        touched = self._take_contacts(request)
+        yield from touched
+        for answer in found:
+            yield self._post(request, answer, touched if isinstance(answer, BodyFault) else ())
+
+    def _take_contacts(self, request: Entry[Any]) -> tuple[Effect, ...]:
+        contact = self._body.take_contact()
+        return () if contact is None else (Post(contact, (request,)),)
+
+    def _post(
+        self, request: Entry[Any], found: MotionReport | Frame | RideReport | BodyFault, why: tuple[Effect, ...] = ()
+    ) -> Effect:
         if isinstance(found, BodyFault):
             self._unanswered[request.id] = request
-            return Post(replace(found, request=request.id), (request,))
+            return Post(replace(found, request=request.id), (request, *why))
         return Post(found, (request,))
 
     def _try_again(self, recovery: Entry[Recovery]) -> Iterable[Effect]:
@@ -111,6 +130,8 @@ class BodyPort:
             return
         del self._unanswered[asked.request]
         yield Revise(recovery, replace(tried, status="over", what="", detail=""), (recovery,))
+        if isinstance(wanted, MotorCommand | Course):
+            yield from self._take_contacts(request)
         yield Post(found, (request,))
 
     def _answer_again(

@@ -311,7 +311,7 @@ LABELS: Mapping[str, str] = {
     "Look": "look", "Segments": "seen", "Panorama": "thought", "BodyFault": "fault", "Recovery": "recovery",
     "Ride": "ride", "RideReport": "ride", "Obstruction": "hidden", "Quiescence": "stillness", "Outcome": "the end",
     "Resumed": "resumed", "Drift": "wheels", "LocaleFrame": "known", "FrameRequest": "asked", "CameraState": "camera",
-    "Wheels": "wheels", "Footprint": "body", "Told": "told",
+    "Wheels": "wheels", "Footprint": "body", "Contact": "touched", "Told": "told",
 }
 FOLDED = frozenset({"PoseFix", "LineMatch", "Segments", "Certificate"})
 """Told by the sentences of what rests on them."""
@@ -329,12 +329,13 @@ FOLLOW: Mapping[str, tuple[str, ...]] = {
     "Segments": ("Frame", "Milestone"),
     "Tracks": ("Frame", "Hypothesis"),
     "Hypothesis": ("BodyFault",),
-    "Discrepancy": ("Discrepancy", "BodyFault", "Certificate", "Hypothesis", "MotionReport"),
+    "Discrepancy": ("Discrepancy", "BodyFault", "Contact", "Certificate", "Hypothesis", "MotionReport"),
     "Goal": ("PlanSketch", "Hypothesis"),
     "PlanSketch": ("Milestone", "Leg", "PlanSketch", "Hypothesis"),
     "Look": ("Milestone", "Discrepancy", "Segments", "Hypothesis"),
     "Frame": ("Look", "Course"),
     "MotionReport": ("MotorCommand", "Course"),
+    "Contact": ("MotorCommand", "Course"),
     "Ride": ("PlanSketch", "Hypothesis"),
     "RideReport": ("Ride",),
     "LocaleFrame": ("Told", "FrameRequest"),

@@ -13,7 +13,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.questions import find_belief, find_robot
+from knowledge_sources.questions import find_belief, find_contact, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import BodyFault, Course, Look, MotionReport, MotorCommand
@@ -71,7 +71,8 @@ class DeadReckoner(RobotKnowledgeSource):
             what = f"something stopped the robot: {report.move_m:.2f} m of {request.value.move_m:.2f} m are claimed"
             bound_px = self._settings.plan.max_deviation_px
             stopped = Discrepancy(Level.ACTION, what, math.inf, (bound_px, bound_px), "px")
-            yield Post(stopped, (trigger.entry,))
+            contact = find_contact(view, request.id)
+            yield Post(stopped, (trigger.entry,) if contact is None else (trigger.entry, contact))
 
 
 def _compute_missing_motion(

@@ -11,6 +11,7 @@ TRUE_ROBOT, TRUE_TRAIL = f"{WORLD}/robot/true", f"{WORLD}/robot/true_trail"
 BELIEVED_ROBOT, BELIEVED_TRAIL = f"{WORLD}/robot/believed", f"{WORLD}/robot/believed_trail"
 BELIEVED_BODY = f"{BELIEVED_ROBOT}/body"
 CANDIDATES = f"{WORLD}/robot/candidates"
+CONTACTS = f"{WORLD}/robot/contacts"
 GOAL, PATH, LEG, LANDMARKS = f"{WORLD}/plan/goal", f"{WORLD}/plan/path", f"{WORLD}/plan/leg", f"{WORLD}/plan/landmarks"
 
 CAMERA = "camera"

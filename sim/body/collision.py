@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -38,13 +39,25 @@ class Obstacles:
         """Distance from the robot's rim to the nearest obstacle; negative where they overlap [m]."""
         if not len(self.segments_world):
             return float("inf")
+        gap = self._gaps(pose)
+        return float(np.sqrt(np.min(np.einsum("ij,ij->i", gap, gap)))) - radius_m
+
+    def nearest_direction_rad(self, pose: Pose2) -> float:
+        """The direction of the nearest obstacle from the robot's heading, counter-clockwise; 0 where there is none."""
+        if not len(self.segments_world):
+            return 0.0
+        gap = self._gaps(pose)
+        x, y = -gap[np.argmin(np.einsum("ij,ij->i", gap, gap))]
+        return math.remainder(math.atan2(y, x) - pose.heading_rad, math.tau)
+
+    def _gaps(self, pose: Pose2) -> NDArray[np.float64]:
+        """(n, 2) from the nearest point of each segment to the robot."""
         start = self.segments_world[:, 0]
         along = self.segments_world[:, 1] - start
         length2 = np.maximum(np.einsum("ij,ij->i", along, along), 1e-18)
         to_robot = pose.position - start
         t = np.clip(np.einsum("ij,ij->i", to_robot, along) / length2, 0.0, 1.0)
-        gap = to_robot - t[:, None] * along
-        return float(np.sqrt(np.min(np.einsum("ij,ij->i", gap, gap)))) - radius_m
+        return np.asarray(to_robot - t[:, None] * along)
 
     def blocks(self, before: Pose2, after: Pose2) -> bool:
         """Whether a small step ends in a contact. A step away from what is touched already is free."""

@@ -11,6 +11,7 @@ from dataclasses import replace
 from sim.body.simulated_body import SimulatedBody
 from sim.faults.fault import DeviceFault
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
+from world_models.entries.touch import Contact
 
 
 class FaultyBody:
@@ -50,6 +51,10 @@ class FaultyBody:
         if self._done is None:
             raise ValueError("expected a command before a claim of what was done of it, got none")
         return replace(self._done, sim_time_s=self._body.truth.time_s) if fault is None else self._answer(fault)
+
+    def take_contact(self) -> Contact | None:
+        """What the bumper felt, as soon as the base can be read."""
+        return self._body.take_contact() if self._find_fault("base") is None else None
 
     def look(self, purpose: str) -> Frame | BodyFault:
         """A picture; with a fault of the camera none is taken."""

@@ -11,6 +11,7 @@ import numpy as np
 from sim.body.actuator import STEP_M, ActuatorParameters, Slip, Wheels, arc_displacement, arc_steps
 from sim.body.body_camera import BodyCamera
 from sim.body.building import Building
+from sim.body.bumper import Bumper
 from sim.body.continuous_motion import ContinuousMotion
 from sim.faults.fault import DeviceFault, Fault
 from sim.faults.schedule import FaultSchedule
@@ -20,6 +21,7 @@ from sim.truth import Truth
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Odometry, Ride, RideReport
 from world_models.entries.location import Place
+from world_models.entries.touch import Contact
 from world_models.frames import Pose2
 
 FRAME_S = 0.1
@@ -47,6 +49,7 @@ class SimulatedBody:
         seed: int,
         actuator: ActuatorParameters | None = None,
         sensor: SensorParameters | None = None,
+        bumper: Bumper | None = None,
         faults: tuple[Fault, ...] = (),
         put_down_sigma_m: float = 0.0,
         put_down_sigma_rad: float = 0.0,
@@ -56,6 +59,7 @@ class SimulatedBody:
         put_down_rng, self._wheel_rng, pixel_rng, self.fault_rng = (np.random.default_rng(s) for s in streams)
         self._building = building
         self._camera = BodyCamera(camera, mount, sensor or SensorParameters(), pixel_rng)
+        self._bumper = bumper or Bumper()
         self._wheels = Wheels.draw(actuator or ActuatorParameters(), self._wheel_rng)
         self._schedule = FaultSchedule.of(faults)
         self._dark_until_s = 0.0
@@ -63,7 +67,8 @@ class SimulatedBody:
         self._device_faults: dict[str, tuple[DeviceFault, float]] = {}  # with the time at which each began
         self._helped: dict[int, int] = {}
         self._slip: Slip | None = None
-        self._touching = False
+        self._touching_rad: float | None = None
+        self._contact: Contact | None = None
         self._motion = ContinuousMotion()
         self._odometry = Pose2(0.0, 0.0, 0.0)
         self._truth = Truth(start, locale=building.locale_at(start))
@@ -140,6 +145,17 @@ class SimulatedBody:
         """MOVE straight ahead."""
         return self.execute(MotorCommand(0.0, move_m))
 
+    @property
+    def touching_rad(self) -> float | None:
+        """The true direction in which :meth:`roll` touches something, from the heading; None where nothing is touched.
+        """
+        return self._touching_rad
+
+    def take_contact(self) -> Contact | None:
+        """What the bumper felt since the last call, the last of it."""
+        contact, self._contact = self._contact, None
+        return contact
+
     def stop(self) -> None:
         """Nothing to do: it stands between commands."""
 
@@ -161,7 +177,7 @@ class SimulatedBody:
         (turn [rad], move [m]): nothing while something is in the way.
         """
         if turn_rad == move_m == 0.0:
-            self._slip, self._touching = None, False
+            self._slip, self._touching_rad = None, None
             self._advance_time(duration_s)
             return 0.0, 0.0
         slip = self._slip = self._slip or self._wheels.sample_slip(self._wheel_rng)
@@ -169,9 +185,8 @@ class SimulatedBody:
         there = before @ Pose2(*self._wheels.sample_skitter(turn_rad, self._wheel_rng), turn_rad * slip.turn_factor)
         there = there @ arc_displacement(move_m * slip.length_factor, slip.curvature_per_m)
         if self._building.obstacles.blocks(before, there):
-            if not self._touching:
-                self._count_collision()
-            self._touching = True
+            if self._touching_rad is None:
+                self._touching_rad = self._count_collision(there)
             self._advance_time(duration_s)
             return 0.0, 0.0
         self._drive_to(there, duration_s)
@@ -219,7 +234,7 @@ class SimulatedBody:
             step, self._motion = self._motion.advance(duration_s / steps, parameters.acceleration_m_per_s2)
             before = self._truth.world_from_robot
             if self._building.obstacles.blocks(before, before @ step):
-                self._count_collision()
+                self._count_collision(before @ step)
                 self._advance_time(duration_s / steps)
                 return True
             self._drive_to(before @ step, duration_s / steps)
@@ -274,7 +289,7 @@ class SimulatedBody:
                 return index / len(steps)
             before = self._truth.world_from_robot
             if self._building.obstacles.blocks(before, before @ step):
-                self._count_collision()
+                self._count_collision(before @ step)
                 self._track.append(self._truth)
                 return index / len(steps)
             self._drive_to(before @ step, each_s)
@@ -289,8 +304,12 @@ class SimulatedBody:
             for kind, fault in self.device_faults.items()
         )
 
-    def _count_collision(self) -> None:
+    def _count_collision(self, there: Pose2) -> float:
+        """Something is touched on the way to ``there``; returns its direction from the heading [rad]."""
         self._truth = replace(self._truth, collisions=self._truth.collisions + 1)
+        direction_rad = self._building.obstacles.nearest_direction_rad(there)
+        self._contact = self._bumper.feel(direction_rad, self._truth.time_s)
+        return direction_rad
 
     def _add_odometry(self, turn_rad: float, move_m: float) -> None:
         self._odometry = self._odometry @ Pose2(0.0, 0.0, turn_rad) @ Pose2(move_m, 0.0, 0.0)

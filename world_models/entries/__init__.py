@@ -1,8 +1,8 @@
 """What lies on the blackboard, one file a family; each kind says here what it is, how long it stays, and its sentence.
 
 ``locale_frame``: what is known of the building, one locale at a time, and the requests that bring it. ``robot``: what
-the robot knows of its camera, wheels and footprint. ``body``: requests to the robot's body and its answers. ``task``:
-command, goal, plan sketch, leg, milestone, certificate, outcome. ``percepts``: tracks, segments, matches, pose fixes.
-``told``: what somebody says of the building. ``location``: pose hypotheses. ``obstruction``: what stands before the
-camera. ``kinds``: all of them.
+the robot knows of its camera, wheels and footprint. ``body``: requests to the robot's body and its answers. ``touch``:
+contacts and ranges. ``task``: command, goal, plan sketch, leg, milestone, certificate, outcome. ``percepts``: tracks,
+segments, matches, pose fixes. ``told``: what somebody says of the building. ``location``: pose hypotheses.
+``obstruction``: what stands before the camera. ``kinds``: all of them.
 """

@@ -40,6 +40,9 @@ class ScriptedBody:
     def claim(self) -> MotionReport | BodyFault:
         return self._fault("base") or MotionReport(0.0, 0.1, 1.0, self.now_s)
 
+    def take_contact(self) -> None:
+        return None
+
     def look(self, purpose: str) -> Frame | BodyFault:
         return self._fault("camera") or Frame(b"", 0, self.now_s, purpose)
 

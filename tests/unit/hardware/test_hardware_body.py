@@ -49,6 +49,9 @@ class FakeBase:
     def move(self, move_m: float) -> MotionReport:
         return self.execute(MotorCommand(0.0, move_m))
 
+    def take_contact(self) -> None:
+        return None
+
     def execute(self, command: MotorCommand, /) -> MotionReport:
         self._called("execute")
         part = 1.0 if self.fails is None else self.fails[1]

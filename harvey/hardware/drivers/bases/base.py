@@ -11,6 +11,7 @@ from typing import Literal, Protocol, get_args
 
 from harvey.hardware.drivers.bases.link import Link
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
+from world_models.entries.touch import Contact
 
 FaultKind = Literal["silent", "nonsense", "disconnected", "stalled", "watchdog", "refused", "stopped"]
 """How a base fails.
@@ -40,6 +41,11 @@ class Base(Protocol):
 
     def execute(self, command: MotorCommand, /) -> MotionReport:
         """TURN, then MOVE. Raises BaseFault, with what had been done so far."""
+        ...
+
+    def take_contact(self) -> Contact | None:
+        """What it felt to touch since the last call: pressed bumpers, or wheels that were held. Asks the base nothing.
+        """
         ...
 
     def stop(self) -> None:

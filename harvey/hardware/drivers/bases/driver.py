@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from harvey.hardware.drivers.bases.base import BaseFault, FaultKind
 from harvey.hardware.drivers.bases.link import Link
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
+from world_models.entries.touch import Contact
 
 LOOK_S = 0.05
 """A driver that waits for a motion looks up this often, for a stop that was asked for and what the base says [s]."""
@@ -25,6 +26,7 @@ class Driver(ABC):
         self._stop_asked = threading.Event()
         self._gone = self._closed = False
         self._so_far: MotionReport | None = None
+        self._contact: Contact | None = None
 
     def turn(self, turn_rad: float) -> MotionReport:
         """Turn on the spot. Raises BaseFault."""
@@ -41,6 +43,11 @@ class Driver(ABC):
         with self._call():
             self._so_far = None
             return self._carried_out(command)
+
+    def take_contact(self) -> Contact | None:
+        """What it felt to touch since the last call."""
+        contact, self._contact = self._contact, None
+        return contact
 
     def stop(self) -> None:
         """Stand still; what is under way in another thread ends with a fault of kind ``stopped``. Raises BaseFault."""
