@@ -10,7 +10,7 @@ from blackboard.effect import Effect
 from blackboard.knowledge_source import KnowledgeSource
 from harvey.runner.ports import Body
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
-from world_models.entries.touch import Contact
+from world_models.entries.touch import Contact, Ranges
 
 
 class WrappedBody:
@@ -30,6 +30,9 @@ class WrappedBody:
 
     def take_contact(self) -> Contact | None:
         return self._body.take_contact()
+
+    def ranges(self) -> Ranges | None:
+        return self._body.ranges()
 
     def look(self, purpose: str) -> Frame | BodyFault:
         return self._body.look(purpose)

@@ -1,5 +1,4 @@
-"""Turning points of a run: goals, plans, verdicts, doubts, lost and found, faults, contacts, the end; as the robot itself knew
-them."""
+"""Turning points of a run, as the robot knew them: goals, plans, verdicts, doubts, lost and found, contacts, end."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ from typing import Any
 from sim.body.actuator import ActuatorParameters
 from sim.body.bumper import Bumper
 from sim.body.elevator import Helper
+from sim.body.range_ring import RangeRing
 from sim.faults.fault import Fault
 from sim.faults.registry import read_fault
 from sim.moved_things import MovedThing
@@ -92,7 +93,7 @@ class ScenarioLimits(Limits):
 
 FORMAT = MissionFormat(
     {**TABLES, "limits": ScenarioLimits, "camera": CameraSettings, "render": Render, "actuator": ActuatorParameters,
-     "sensor": SensorParameters, "bumper": Bumper},
+     "sensor": SensorParameters, "bumper": Bumper, "ranges": RangeRing},
     ("details", "faults", "moved", "rides"),
 )
 
@@ -115,6 +116,7 @@ class Scenario(Mission):
     actuator: ActuatorParameters
     sensor: SensorParameters
     bumper: Bumper
+    ranges: RangeRing
     faults: tuple[Fault, ...] = ()
     moved: tuple[MovedThing, ...] = ()
     rides: tuple[Helper, ...] = ()

@@ -53,7 +53,7 @@ class Stage:
         s = self.scenario
         return SimulatedBody(
             self.building, self.start_world, s.camera.camera, s.camera.mount,
-            seed=seed, actuator=s.actuator, sensor=s.sensor, bumper=s.bumper,
+            seed=seed, actuator=s.actuator, sensor=s.sensor, bumper=s.bumper, ranges=s.ranges,
             faults=s.faults,
             put_down_sigma_m=s.start.put_down_sigma_m, put_down_sigma_rad=s.start.put_down_sigma_rad,
         )

@@ -24,7 +24,7 @@ from sim.stage import Stage, build_stage
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate, Outcome
-from world_models.entries.touch import Contact
+from world_models.entries.touch import Contact, Ranges
 from world_models.frames import Pose2, wrap_angle
 
 SCENARIO = "lab-to-allens-office"
@@ -92,6 +92,10 @@ class RepeatingBody:
 
     def take_contact(self) -> Contact | None:
         """Return none: none is recorded."""
+        return None
+
+    def ranges(self) -> Ranges | None:
+        """Return none: none are recorded."""
         return None
 
     def look(self, purpose: str) -> Frame | BodyFault:

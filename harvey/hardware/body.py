@@ -21,7 +21,7 @@ from world_models.entries.body import (
     Ride,
     RideReport,
 )
-from world_models.entries.touch import Contact
+from world_models.entries.touch import Contact, Ranges
 
 BASE_WORDS: Mapping[str, str] = {
     "silent": "link lost",
@@ -92,16 +92,17 @@ class HardwareBody:
         clock: the time of reports and faults [s].
         pause: waits so long [s]; None: by the wall clock, or until the robot is stopped for good.
         carried: carries out a ride in an elevator; None: there is no ride.
+        ranges: whether the base's range sensors are read.
     """
 
     def __init__(
         self, base: Base, eye: Eye, *, clock: Callable[[], float], pause: Callable[[float], object] | None = None,
-        carried: Callable[[Ride], RideReport | BodyFault] | None = None,
+        carried: Callable[[Ride], RideReport | BodyFault] | None = None, ranges: bool = False,
     ) -> None:
         self._base, self._eye, self._clock = base, eye, clock
         self._stopped, self._heeded = threading.Event(), threading.Event()
         self._pause = pause or self._stopped.wait
-        self._carried = carried
+        self._carried, self._has_ranges = carried, ranges
         self._why = ""
         self._began_s = 0.0
         self._before: Odometry | None = None
@@ -138,6 +139,18 @@ class HardwareBody:
         """What the base felt to touch, by our clock."""
         contact = self._base.take_contact()
         return None if contact is None else replace(contact, when_s=self._clock())
+
+    def ranges(self) -> Ranges | None:
+        """What the base's range sensors measure, where they are wanted; none where it does not answer: the next motion
+        finds out why.
+        """
+        if not self._has_ranges or self._stopped.is_set():
+            return None
+        try:
+            found = self._base.ranges()
+        except BaseFault:
+            return None
+        return None if found is None else replace(found, when_s=self._clock())
 
     def look(self, purpose: str) -> Frame | BodyFault:
         """A picture."""

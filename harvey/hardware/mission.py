@@ -59,7 +59,15 @@ class EyeSettings:
                              f"{self.rate_hz:g}, {self.late_s:g} and {self.lag_s:g}")
 
 
-FORMAT = MissionFormat({**TABLES, "base": BaseSettings, "camera": EyeSettings, "actuator": ActuatorModel})
+@dataclass(frozen=True, slots=True)
+class RangeSettings:
+    """Whether the base's range sensors are read with each picture: sonars, or the light bumper of a Create 2."""
+
+    read: bool = False
+
+
+FORMAT = MissionFormat({
+    **TABLES, "base": BaseSettings, "camera": EyeSettings, "actuator": ActuatorModel, "ranges": RangeSettings})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -69,6 +77,7 @@ class HardwareMission(Mission):
     base: BaseSettings
     camera: EyeSettings
     actuator: ActuatorModel
+    ranges: RangeSettings
 
     @property
     def calibration(self) -> Path:

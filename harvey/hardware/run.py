@@ -65,7 +65,7 @@ def _hardware_run(
     sinks: Sequence[Sink], live: bool, whole: Extent | None = None,
 ) -> Iterator[Run]:
     """A run whose body can be stopped by a key, and whose base hears a heartbeat; closes the base."""
-    body = HardwareBody(base, eye, clock=clock)
+    body = HardwareBody(base, eye, clock=clock, ranges=mission.ranges.read)
     try:
         agent = build_agent(head)
         with stop_key(body.stop_for_good), Heartbeat(base) as heartbeat:

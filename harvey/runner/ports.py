@@ -20,7 +20,7 @@ from world_models.entries.body import (
     Ride,
     RideReport,
 )
-from world_models.entries.touch import Contact
+from world_models.entries.touch import Contact, Ranges
 
 
 class Body(Protocol):
@@ -40,6 +40,10 @@ class Body(Protocol):
 
     def take_contact(self) -> Contact | None:
         """What the robot felt to touch since the last call; asked after each motion."""
+        ...
+
+    def ranges(self) -> Ranges | None:
+        """What its range sensors measure now; None where it has none or they are not wanted."""
         ...
 
     def look(self, purpose: str, /) -> Frame | BodyFault:
@@ -89,7 +93,7 @@ class BodyPort:
             found = self._body.steer(entry.value)
             yield from self._answer_motion(entry, (found,) if isinstance(found, BodyFault) else found)
         elif isinstance(change, Posted) and isinstance(entry.value, Look):
-            yield self._post(entry, self._body.look(entry.value.purpose))
+            yield from self._post_with_ranges(entry, self._body.look(entry.value.purpose))
         elif isinstance(change, Posted) and isinstance(entry.value, Ride):
             yield self._post(entry, self._body.ride(entry.value))
 
@@ -100,11 +104,20 @@ class BodyPort:
         touched = self._take_contacts(request)
         yield from touched
         for answer in found:
-            yield self._post(request, answer, touched if isinstance(answer, BodyFault) else ())
+            yield from self._post_with_ranges(request, answer, touched if isinstance(answer, BodyFault) else ())
 
     def _take_contacts(self, request: Entry[Any]) -> tuple[Effect, ...]:
         contact = self._body.take_contact()
         return () if contact is None else (Post(contact, (request,)),)
+
+    def _post_with_ranges(
+        self, request: Entry[Any], found: MotionReport | Frame | RideReport | BodyFault, why: tuple[Effect, ...] = ()
+    ) -> Iterable[Effect]:
+        """An answer; with a picture comes what range sensors measure at the same place and time."""
+        ranges = self._body.ranges() if isinstance(found, Frame) else None
+        if ranges is not None:
+            yield Post(ranges, (request,))
+        yield self._post(request, found, why)
 
     def _post(
         self, request: Entry[Any], found: MotionReport | Frame | RideReport | BodyFault, why: tuple[Effect, ...] = ()
@@ -132,7 +145,7 @@ class BodyPort:
         yield Revise(recovery, replace(tried, status="over", what="", detail=""), (recovery,))
         if isinstance(wanted, MotorCommand | Course):
             yield from self._take_contacts(request)
-        yield Post(found, (request,))
+        yield from self._post_with_ranges(request, found)
 
     def _answer_again(
         self, wanted: MotorCommand | Course | Look | Ride

@@ -47,6 +47,6 @@ def open_body(body: SimulatedBody, kind: str) -> Iterator[Body]:
     base = base_kinds()[kind].connect_to_emulator(PseudoTerminalLink(FaultyLine(emulator.on_body(body), body), clock))
     try:
         yield HardwareBody(base, FaultyBody(body), clock=lambda: body.truth.time_s, pause=body.wait,
-                           carried=body.ride)
+                           carried=body.ride, ranges=body.has_ranges)
     finally:
         base.close()

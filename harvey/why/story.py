@@ -311,7 +311,7 @@ LABELS: Mapping[str, str] = {
     "Look": "look", "Segments": "seen", "Panorama": "thought", "BodyFault": "fault", "Recovery": "recovery",
     "Ride": "ride", "RideReport": "ride", "Obstruction": "hidden", "Quiescence": "stillness", "Outcome": "the end",
     "Resumed": "resumed", "Drift": "wheels", "LocaleFrame": "known", "FrameRequest": "asked", "CameraState": "camera",
-    "Wheels": "wheels", "Footprint": "body", "Contact": "touched", "Told": "told",
+    "Wheels": "wheels", "Footprint": "body", "Contact": "touched", "Ranges": "ranges", "Told": "told",
 }
 FOLDED = frozenset({"PoseFix", "LineMatch", "Segments", "Certificate"})
 """Told by the sentences of what rests on them."""

@@ -11,7 +11,7 @@ from dataclasses import replace
 from sim.body.simulated_body import SimulatedBody
 from sim.faults.fault import DeviceFault
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
-from world_models.entries.touch import Contact
+from world_models.entries.touch import Contact, Ranges
 
 
 class FaultyBody:
@@ -55,6 +55,10 @@ class FaultyBody:
     def take_contact(self) -> Contact | None:
         """What the bumper felt, as soon as the base can be read."""
         return self._body.take_contact() if self._find_fault("base") is None else None
+
+    def ranges(self) -> Ranges | None:
+        """As the body does; none while the base cannot be read."""
+        return self._body.ranges() if self._find_fault("base") is None else None
 
     def look(self, purpose: str) -> Frame | BodyFault:
         """A picture; with a fault of the camera none is taken."""

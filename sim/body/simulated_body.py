@@ -13,6 +13,7 @@ from sim.body.body_camera import BodyCamera
 from sim.body.building import Building
 from sim.body.bumper import Bumper
 from sim.body.continuous_motion import ContinuousMotion
+from sim.body.range_ring import RangeRing
 from sim.faults.fault import DeviceFault, Fault
 from sim.faults.schedule import FaultSchedule
 from sim.render.occluder import Occluder
@@ -21,7 +22,7 @@ from sim.truth import Truth
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Odometry, Ride, RideReport
 from world_models.entries.location import Place
-from world_models.entries.touch import Contact
+from world_models.entries.touch import Contact, Ranges
 from world_models.frames import Pose2
 
 FRAME_S = 0.1
@@ -35,8 +36,8 @@ MIN_CLEARANCE_M = 0.02
 class SimulatedBody:
     """A robot with a camera in a building; the target of the scenario's faults.
 
-    The same arguments and the same calls give the same answers. Wheels, camera, faults and putting down draw from
-    random streams of their own, so that a fault does not change the noise. Poses are in the world frame.
+    The same arguments and the same calls give the same answers. Wheels, camera, sonars, faults and putting down draw
+    from random streams of their own, so that a fault does not change the noise. Poses are in the world frame.
     """
 
     def __init__(
@@ -50,16 +51,17 @@ class SimulatedBody:
         actuator: ActuatorParameters | None = None,
         sensor: SensorParameters | None = None,
         bumper: Bumper | None = None,
+        ranges: RangeRing | None = None,
         faults: tuple[Fault, ...] = (),
         put_down_sigma_m: float = 0.0,
         put_down_sigma_rad: float = 0.0,
     ) -> None:
         """Put the robot down near ``start`` (world frame), with the given standard deviations of place and heading."""
-        streams = np.random.SeedSequence(seed).spawn(4)
-        put_down_rng, self._wheel_rng, pixel_rng, self.fault_rng = (np.random.default_rng(s) for s in streams)
+        streams = [np.random.default_rng(stream) for stream in np.random.SeedSequence(seed).spawn(5)]
+        put_down_rng, self._wheel_rng, pixel_rng, self.fault_rng, self._range_rng = streams
         self._building = building
         self._camera = BodyCamera(camera, mount, sensor or SensorParameters(), pixel_rng)
-        self._bumper = bumper or Bumper()
+        self._bumper, self._ring = bumper or Bumper(), ranges or RangeRing()
         self._wheels = Wheels.draw(actuator or ActuatorParameters(), self._wheel_rng)
         self._schedule = FaultSchedule.of(faults)
         self._dark_until_s = 0.0
@@ -155,6 +157,16 @@ class SimulatedBody:
         """What the bumper felt since the last call, the last of it."""
         contact, self._contact = self._contact, None
         return contact
+
+    @property
+    def has_ranges(self) -> bool:
+        """Whether it has a ring of sonars."""
+        return self._ring.sensors > 0
+
+    def ranges(self) -> Ranges | None:
+        """What the ring of sonars measures; None without one."""
+        obstacles, truth = self._building.obstacles, self._truth
+        return self._ring.measure(obstacles.segments_world, truth.world_from_robot, self._range_rng, truth.time_s)
 
     def stop(self) -> None:
         """Nothing to do: it stands between commands."""

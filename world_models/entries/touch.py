@@ -51,3 +51,46 @@ class Contact:
         if self.sigma_rad >= AROUND_SIGMA_RAD:
             return f"{felt} in an unknown direction; at {self.when_s:.1f} s"
         return f"{felt} {words.bearing(self.direction_rad)} ({sure}); at {self.when_s:.1f} s"
+
+
+@observation(keep=2)
+@dataclass(frozen=True, slots=True)
+class Ranges:
+    """One reading of a ring of range sensors; it is taken with a picture, and rests on the same request.
+
+    Attributes:
+        directions_rad: (n,) of each echo or, without one, of the sensor's axis; from the robot's heading,
+            counter-clockwise.
+        distances_m: (n,) from the robot's axis to the nearest thing that sends back an echo; None without an echo:
+            nothing is there, or it throws the sound elsewhere.
+        sigma_m: standard deviation of a distance.
+        half_beam_rad: the echo comes from anywhere within this of its direction.
+        max_range_m: what is further from the robot's axis sends back no echo.
+        when_s: by the body's clock.
+    """
+
+    directions_rad: tuple[float, ...]
+    distances_m: tuple[float | None, ...]
+    sigma_m: float
+    half_beam_rad: float
+    max_range_m: float
+    when_s: float
+
+    def __post_init__(self) -> None:
+        if len(self.directions_rad) != len(self.distances_m):
+            raise ValueError(f"expected a distance for each of {len(self.directions_rad)} directions, got "
+                             f"{len(self.distances_m)}")
+
+    @property
+    def echoes(self) -> tuple[tuple[float, float], ...]:
+        """(direction [rad], distance [m]) of each sensor that has an echo."""
+        both = zip(self.directions_rad, self.distances_m, strict=True)
+        return tuple((direction, distance) for direction, distance in both if distance is not None)
+
+    def sentence(self) -> str:
+        echoes = self.echoes
+        heard = f"{len(echoes)} of {words.count(len(self.distances_m), 'range sensor')} have an echo"
+        if not echoes:
+            return f"{heard}; at {self.when_s:.1f} s"
+        direction, distance = min(echoes, key=lambda echo: echo[1])
+        return f"{heard}, the nearest {words.metres(distance)} away, {words.bearing(direction)}; at {self.when_s:.1f} s"

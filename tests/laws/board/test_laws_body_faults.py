@@ -43,6 +43,9 @@ class ScriptedBody:
     def take_contact(self) -> None:
         return None
 
+    def ranges(self) -> None:
+        return None
+
     def look(self, purpose: str) -> Frame | BodyFault:
         return self._fault("camera") or Frame(b"", 0, self.now_s, purpose)
 

@@ -52,6 +52,9 @@ class FakeBase:
     def take_contact(self) -> None:
         return None
 
+    def ranges(self) -> None:
+        return None
+
     def execute(self, command: MotorCommand, /) -> MotionReport:
         self._called("execute")
         part = 1.0 if self.fails is None else self.fails[1]

@@ -11,7 +11,7 @@ from typing import Literal, Protocol, get_args
 
 from harvey.hardware.drivers.bases.link import Link
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
-from world_models.entries.touch import Contact
+from world_models.entries.touch import Contact, Ranges
 
 FaultKind = Literal["silent", "nonsense", "disconnected", "stalled", "watchdog", "refused", "stopped"]
 """How a base fails.
@@ -46,6 +46,10 @@ class Base(Protocol):
     def take_contact(self) -> Contact | None:
         """What it felt to touch since the last call: pressed bumpers, or wheels that were held. Asks the base nothing.
         """
+        ...
+
+    def ranges(self) -> Ranges | None:
+        """What its range sensors measure now; None where it has none. Raises BaseFault."""
         ...
 
     def stop(self) -> None:

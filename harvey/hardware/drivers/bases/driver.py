@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from harvey.hardware.drivers.bases.base import BaseFault, FaultKind
 from harvey.hardware.drivers.bases.link import Link
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
-from world_models.entries.touch import Contact
+from world_models.entries.touch import Contact, Ranges
 
 LOOK_S = 0.05
 """A driver that waits for a motion looks up this often, for a stop that was asked for and what the base says [s]."""
@@ -48,6 +48,12 @@ class Driver(ABC):
         """What it felt to touch since the last call."""
         contact, self._contact = self._contact, None
         return contact
+
+    def ranges(self) -> Ranges | None:
+        """What its range sensors measure. Raises BaseFault."""
+        with self._call():
+            self._so_far = None
+            return self._read_ranges()
 
     def stop(self) -> None:
         """Stand still; what is under way in another thread ends with a fault of kind ``stopped``. Raises BaseFault."""
@@ -89,6 +95,10 @@ class Driver(ABC):
     @abstractmethod
     def _read_odometry(self) -> Odometry:
         """Ask the base where it is. Raises BaseFault and OSError."""
+
+    def _read_ranges(self) -> Ranges | None:
+        """Ask the base what its range sensors measure; None where it has none. Raises BaseFault and OSError."""
+        return None
 
     @abstractmethod
     def _after_reopening(self) -> None:

@@ -1,0 +1,89 @@
+"""A ring of sonars round the simulated robot: each hears the nearest solid thing in its cone, if the sound comes back.
+
+A smooth wall throws sound away like a mirror: at a large angle of incidence an echo may fail. Echoes by way of a second
+wall are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.body.collision import ROBOT_RADIUS_M
+from world_models.bounds import Bounds, check_bounds
+from world_models.entries.touch import Ranges
+from world_models.frames import Pose2
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class RangeRing:
+    """Sonars on the robot's rim that face outward, the first one straight ahead.
+
+    Attributes:
+        sensors: how many; 0 for a robot without any. The Denning platform had 24.
+        half_beam_rad: half of the cone's angle.
+        reach_m: from the rim; what is further away sends back no echo.
+        sigma_m: standard deviation of a distance.
+        specular_rad: an echo at a larger angle of incidence may fail.
+        dropout: the part of those that do.
+    """
+
+    sensors: int = 0
+    half_beam_rad: float = math.radians(12.5)
+    reach_m: float = 6.0
+    sigma_m: float = 0.02
+    specular_rad: float = math.radians(30.0)
+    dropout: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_bounds(self, {
+            "sensors": Bounds(0, 24), "half_beam_rad": Bounds(0.001, math.pi / 3.0), "reach_m": Bounds(0.1, 50.0),
+            "sigma_m": Bounds(0.0, 1.0), "specular_rad": Bounds(0.0, math.pi / 2.0), "dropout": Bounds(0.0, 1.0)})
+
+    def measure(self, segments_world: Floats, pose: Pose2, rng: np.random.Generator, when_s: float) -> Ranges | None:
+        """A reading at a pose among solid segments (n, 2, 2); None without sensors. Two random numbers a sensor."""
+        if not self.sensors:
+            return None
+        noise, chance = rng.standard_normal(self.sensors), rng.random(self.sensors)
+        axes = [math.remainder(math.tau * number / self.sensors, math.tau) for number in range(self.sensors)]
+        distances: list[float | None] = []
+        for axis_rad, error, luck in zip(axes, noise.tolist(), chance.tolist(), strict=True):
+            sensor = pose @ Pose2(0.0, 0.0, axis_rad) @ Pose2(ROBOT_RADIUS_M, 0.0, 0.0)
+            away_m, incidence_rad = find_echo(segments_world, sensor, self.half_beam_rad)
+            lost = away_m > self.reach_m or (incidence_rad > self.specular_rad and luck < self.dropout)
+            distances.append(None if lost else ROBOT_RADIUS_M + max(0.0, away_m + self.sigma_m * error))
+        return Ranges(tuple(axes), tuple(distances), self.sigma_m, self.half_beam_rad, ROBOT_RADIUS_M + self.reach_m,
+                      when_s)
+
+
+def find_echo(segments_world: Floats, sensor: Pose2, half_beam_rad: float) -> tuple[float, float]:
+    """The nearest point of segments (n, 2, 2) in a sensor's cone: (distance [m], angle of incidence [rad]).
+
+    The distance is infinite where nothing is in the cone.
+    """
+    c, s = math.cos(sensor.heading_rad), math.sin(sensor.heading_rad)
+    ends = (segments_world - sensor.position) @ np.array([[c, -s], [s, c]])
+    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    low, high = np.zeros(len(start)), np.ones(len(start))
+    for side in (1.0, -1.0):  # the cone is what two half-planes have in common: clip the segments by both
+        normal = np.array([math.sin(half_beam_rad), side * math.cos(half_beam_rad)])
+        at_start, slope = start @ normal, along @ normal
+        with np.errstate(divide="ignore", invalid="ignore"):
+            crossing = -at_start / slope
+        low = np.where(slope > 0.0, np.maximum(low, crossing), low)
+        high = np.where(slope < 0.0, np.minimum(high, crossing), high)
+        high = np.where((slope == 0.0) & (at_start < 0.0), -1.0, high)
+    length2 = np.maximum(np.einsum("ij,ij->i", along, along), 1e-18)
+    nearest = np.minimum(np.maximum(-np.einsum("ij,ij->i", start, along) / length2, low), high)
+    points = start + nearest[:, None] * along
+    distances = np.where(low <= high, np.hypot(points[:, 0], points[:, 1]), np.inf)
+    if not np.isfinite(distances).any():
+        return math.inf, 0.0
+    best = int(np.argmin(distances))
+    across = abs(float(points[best] @ along[best])) / math.sqrt(length2[best]) / max(float(distances[best]), 1e-9)
+    return float(distances[best]), math.asin(min(1.0, across))
