@@ -49,16 +49,21 @@ class RangeRing:
         """A reading at a pose among solid segments (n, 2, 2); None without sensors. Two random numbers a sensor."""
         if not self.sensors:
             return None
-        noise, chance = rng.standard_normal(self.sensors), rng.random(self.sensors)
         axes = [math.remainder(math.tau * number / self.sensors, math.tau) for number in range(self.sensors)]
         distances: list[float | None] = []
-        for axis_rad, error, luck in zip(axes, noise.tolist(), chance.tolist(), strict=True):
+        for axis_rad in axes:
             sensor = pose @ Pose2(0.0, 0.0, axis_rad) @ Pose2(ROBOT_RADIUS_M, 0.0, 0.0)
-            away_m, incidence_rad = find_echo(segments_world, sensor, self.half_beam_rad)
-            lost = away_m > self.reach_m or (incidence_rad > self.specular_rad and luck < self.dropout)
-            distances.append(None if lost else ROBOT_RADIUS_M + max(0.0, away_m + self.sigma_m * error))
+            away_m = self.hear(segments_world, sensor, rng)
+            distances.append(None if away_m is None else ROBOT_RADIUS_M + away_m)
         return Ranges(tuple(axes), tuple(distances), self.sigma_m, self.half_beam_rad, ROBOT_RADIUS_M + self.reach_m,
                       when_s)
+
+    def hear(self, segments_world: Floats, sensor: Pose2, rng: np.random.Generator) -> float | None:
+        """What one sensor hears, from the sensor [m]; None without an echo. Always takes two random numbers."""
+        error, luck = float(rng.standard_normal()), float(rng.random())
+        away_m, incidence_rad = find_echo(segments_world, sensor, self.half_beam_rad)
+        lost = away_m > self.reach_m or (incidence_rad > self.specular_rad and luck < self.dropout)
+        return None if lost else max(0.0, away_m + self.sigma_m * error)
 
 
 def find_echo(segments_world: Floats, sensor: Pose2, half_beam_rad: float) -> tuple[float, float]:

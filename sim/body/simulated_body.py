@@ -168,6 +168,11 @@ class SimulatedBody:
         obstacles, truth = self._building.obstacles, self._truth
         return self._ring.measure(obstacles.segments_world, truth.world_from_robot, self._range_rng, truth.time_s)
 
+    def echo(self, sensor: Pose2) -> float | None:
+        """What a sonar of an emulated base hears, from the sensor [m]; its pose is in the robot's frame."""
+        pose = self._truth.world_from_robot @ sensor
+        return self._ring.hear(self._building.obstacles.segments_world, pose, self._range_rng)
+
     def stop(self) -> None:
         """Nothing to do: it stands between commands."""
 

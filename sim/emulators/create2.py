@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 
 from sim.emulators.ground import Ground
+from world_models.frames import Pose2
 
 STREAM_S = 0.015
 AXLE_M = 0.235
@@ -22,8 +23,15 @@ LENGTHS: Mapping[int, int] = {
 }
 """Data bytes of an opcode; 140, 148 and 149 give their own number, all others have none."""
 
-SIZES: Mapping[int, int] = {7: 1, 35: 1, 41: 2, 42: 2, 43: 2, 44: 2}
+SIZES: Mapping[int, int] = {7: 1, 35: 1, 41: 2, 42: 2, 43: 2, 44: 2, **dict.fromkeys(range(46, 52), 2)}
 """Bytes of the sensor packets that it can send."""
+
+LIGHTS = (65, 38, 13, -13, -38, -65)
+"""Directions of the light bumper's sensors [degrees], packets 46 to 51; they are on the rim."""
+
+RADIUS_M = 0.17
+MAX_SIGNAL, FADING_M = 4095, 0.05
+"""The signal of a thing that is touched, and over which distance it falls to a third."""
 
 WANDERING = (300, 150)
 """Wheel speeds (right, left) while it cleans: a circle [mm/s]."""
@@ -158,9 +166,26 @@ class Create2Emulator:
         frame = bytes([19, len(body)]) + body
         self._out += frame + bytes([-sum(int(byte) for byte in frame) % 256])
 
+    def _bumps(self) -> int:
+        """Which halves of the bumper are pressed: bit 0 the right one, bit 1 the left one."""
+        touching_rad = self._ground.touching_rad
+        if touching_rad is None:
+            return 3
+        if abs(touching_rad) > math.pi / 2.0:
+            return 0
+        middle_rad = math.radians(15.0)
+        return (touching_rad < middle_rad) | (touching_rad > -middle_rad) << 1
+
+    def _signal(self, angle_deg: int) -> int:
+        """What a sensor of the light bumper sees."""
+        away_m = self._ground.echo(Pose2(0.0, 0.0, math.radians(angle_deg)) @ Pose2(RADIUS_M, 0.0, 0.0))
+        return 0 if away_m is None else round(MAX_SIGNAL * math.exp(-max(0.0, away_m) / FADING_M))
+
     def _packet(self, number: int) -> bytes:
+        if number >= 46:
+            return self._signal(LIGHTS[number - 46]).to_bytes(2, "big")
         value = {
-            7: 3 if self._bumped else 0, 35: self.mode, 41: self._wanted[0], 42: self._wanted[1],
+            7: self._bumps() if self._bumped else 0, 35: self.mode, 41: self._wanted[0], 42: self._wanted[1],
             43: math.floor(self._left), 44: math.floor(self._right),
         }[number]
         return (value % (1 << 8 * SIZES[number])).to_bytes(SIZES[number], "big")

@@ -148,6 +148,10 @@ class DenningEmulator:
                 self._stop(seq)
             case "BEAT", [question]:
                 self._send_odometry(seq, question)
+            case "TOUCH", []:
+                self._send_contact(seq)
+            case "RANGES", [question]:
+                self._send_ranges(seq, question)
             case _:
                 self._send(token, seq, "NO", "verb")
 
@@ -213,6 +217,24 @@ class DenningEmulator:
             pose = pose @ Pose2(0.0, 0.0, self._claim.turn_rad) @ Pose2(self._claim.move_m, 0.0, 0.0)
         where = (pose.x_m, pose.y_m, pose.heading_rad, self._motion.claim.time_s)
         self._send(self._token, seq, "HERE", question, *(repr(v) for v in where))
+
+    def _send_contact(self, seq: int) -> None:
+        """What the present command touched; nothing of any other."""
+        contact = self._motion.contact if seq == self._seq and not self.moving else None
+        if contact is None:
+            self._send(self._token, seq, "FELT", "none")
+        else:
+            numbers = (contact.direction_rad, contact.sigma_rad, contact.when_s)
+            self._send(self._token, seq, "FELT", contact.by, *(repr(v) for v in numbers))
+
+    def _send_ranges(self, seq: int, question: str) -> None:
+        found = self._motion.ranges()
+        if found is None:
+            self._send(self._token, seq, "ECHOES", question)
+            return
+        limits = (round(1000.0 * v) for v in (found.sigma_m, found.half_beam_rad, found.max_range_m))
+        echoes = ("-" if distance is None else str(round(1000.0 * distance)) for distance in found.distances_m)
+        self._send(self._token, seq, "ECHOES", question, *map(str, limits), *echoes)
 
     def _send(self, token: str, seq: int, verb: str, *words: str) -> None:
         body = " ".join((token, str(seq), verb, *words)).encode("ascii")

@@ -6,8 +6,16 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+from sim.body.bumper import Bumper
+from sim.body.collision import ROBOT_RADIUS_M
+from sim.body.range_ring import RangeRing
 from sim.emulators.ground import Ground
 from world_models.entries.body import MotionReport, MotorCommand
+from world_models.entries.touch import Contact, Ranges
+from world_models.frames import Pose2
+
+RING = RangeRing(sensors=24)
+"""Of the platform: sonars that face outward at equal angles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +60,24 @@ class Motion(Protocol):
         """Of the last command."""
         ...
 
+    @property
+    def contact(self) -> Contact | None:
+        """What the last command touched."""
+        ...
+
+    def ranges(self) -> Ranges | None:
+        """What its sonars measure now."""
+        ...
+
 
 class Body(Protocol):
     """Something that executes a whole command in one call."""
 
     def execute(self, command: MotorCommand, /) -> MotionReport: ...
+
+    def take_contact(self) -> Contact | None: ...
+
+    def ranges(self) -> Ranges | None: ...
 
 
 class InstantMotion:
@@ -67,9 +88,11 @@ class InstantMotion:
     def __init__(self, body: Body) -> None:
         self._body = body
         self._claim = Claim()
+        self._contact: Contact | None = None
 
     def begin(self, turn_rad: float, move_m: float) -> None:
         report = self._body.execute(MotorCommand(turn_rad, move_m))
+        self._contact = self._body.take_contact()
         self._claim = Claim(report.turn_rad, report.move_m, report.duration_s, report.sim_time_s)
 
     def advance(self, duration_s: float) -> None:
@@ -85,6 +108,13 @@ class InstantMotion:
     @property
     def claim(self) -> Claim:
         return self._claim
+
+    @property
+    def contact(self) -> Contact | None:
+        return self._contact
+
+    def ranges(self) -> Ranges | None:
+        return self._body.ranges()
 
 
 class ConstantSpeedMotion:
@@ -103,11 +133,12 @@ class ConstantSpeedMotion:
         self._claim = Claim(time_s=ground.time_s)
         self._ended = "ok"
         self._held_s = 0.0
+        self._contact: Contact | None = None
 
     def begin(self, turn_rad: float, move_m: float) -> None:
         self._turn, self._move, self._began_s = turn_rad, move_m, self._ground.time_s
         self._claim = Claim(time_s=self._began_s)
-        self._ended, self._held_s = "", 0.0
+        self._ended, self._held_s, self._contact = "", 0.0, None
 
     def advance(self, duration_s: float) -> None:
         left_s = duration_s
@@ -127,6 +158,17 @@ class ConstantSpeedMotion:
     def claim(self) -> Claim:
         return self._claim
 
+    @property
+    def contact(self) -> Contact | None:
+        return self._contact
+
+    def ranges(self) -> Ranges | None:
+        axes = [math.remainder(math.tau * number / RING.sensors, math.tau) for number in range(RING.sensors)]
+        heard = [self._ground.echo(Pose2(0.0, 0.0, axis) @ Pose2(ROBOT_RADIUS_M, 0.0, 0.0)) for axis in axes]
+        distances = tuple(None if away_m is None else ROBOT_RADIUS_M + away_m for away_m in heard)
+        return Ranges(tuple(axes), distances, RING.sigma_m, RING.half_beam_rad, ROBOT_RADIUS_M + RING.reach_m,
+                      self._ground.time_s)
+
     def _step(self, max_s: float) -> float:
         """Roll for at most this time, or to the end of the turn or move; returns the time that it took [s]."""
         turning = self._claim.turn_rad != self._turn
@@ -141,6 +183,9 @@ class ConstantSpeedMotion:
         self._held_s = self._held_s + step_s if rolled == (0.0, 0.0) else 0.0
         if self._held_s > self.max_held_s:
             self._ended = "stalled"
+            touching_rad, now_s = self._ground.touching_rad, self._ground.time_s
+            self._contact = (Contact.of_stall(now_s, turning=turning) if touching_rad is None
+                             else Bumper().feel(touching_rad, now_s))
         self._add(*rolled, finished=step == to_go and rolled != (0.0, 0.0), turning=turning)
         return max(step_s, 1e-9)
 

@@ -17,6 +17,15 @@ class Ground(Protocol):
         """Time of the base [s]."""
         ...
 
+    @property
+    def touching_rad(self) -> float | None:
+        """The direction, from the heading, in which the base touches something; None where it touches nothing."""
+        ...
+
+    def echo(self, sensor: Pose2) -> float | None:
+        """What a sonar hears, from the sensor [m]; None without an echo. Its pose is in the robot's frame."""
+        ...
+
     def roll(self, turn_rad: float, move_m: float, duration_s: float) -> tuple[float, float]:
         """Roll for a while: a turn in place or a move. Returns what was done, (turn [rad], move [m])."""
         ...
@@ -29,7 +38,8 @@ class IdealGround:
         pose: of the robot, from where it began.
         turned_rad, moved_m: sums of all turns and moves, signed.
         rolled_s: time of its last motion [s].
-        held: whether something holds the wheels.
+        held: whether something holds the wheels; touching_rad: in which direction something is touched.
+        wall_m: how far all round it every sonar has an echo, from its axis; None: nowhere.
     """
 
     def __init__(self) -> None:
@@ -38,10 +48,15 @@ class IdealGround:
         self.turned_rad = self.moved_m = 0.0
         self.rolled_s = -math.inf
         self.held = False
+        self.touching_rad: float | None = None
+        self.wall_m: float | None = None
 
     @property
     def time_s(self) -> float:
         return self._time_s
+
+    def echo(self, sensor: Pose2) -> float | None:
+        return None if self.wall_m is None else self.wall_m - math.hypot(sensor.x_m, sensor.y_m)
 
     def roll(self, turn_rad: float, move_m: float, duration_s: float) -> tuple[float, float]:
         self._time_s += duration_s
@@ -63,6 +78,13 @@ class SimulatedGround:
     @property
     def time_s(self) -> float:
         return self._body.truth.time_s
+
+    @property
+    def touching_rad(self) -> float | None:
+        return self._body.touching_rad
+
+    def echo(self, sensor: Pose2) -> float | None:
+        return self._body.echo(sensor)
 
     def roll(self, turn_rad: float, move_m: float, duration_s: float) -> tuple[float, float]:
         return self._body.roll(turn_rad, move_m, duration_s)

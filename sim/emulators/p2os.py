@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from sim.emulators.ground import Ground
 from sim.emulators.p2os_packets import PacketReader, Request, build_encoder_counts, build_packet, build_status
+from world_models.frames import Pose2
 
 WATCHDOG_S = 2.0
 STATUS_S = 0.1
@@ -14,6 +15,20 @@ TICK_S = 0.015
 AXLE_M = 0.33
 COUNTS_PER_M = 132_000
 NAMES = b"Harvey_0001\0Pioneer\0p3dx-sh\0"
+
+
+SONARS = (
+    (69, 136, 90), (114, 119, 50), (148, 78, 30), (166, 27, 10), (166, -27, -10), (148, -78, -30), (114, -119, -50),
+    (69, -136, -90), (-157, -136, -90), (-203, -119, -130), (-237, -78, -150), (-255, -27, -170), (-255, 27, 170),
+    (-237, 78, 150), (-203, 119, 130), (-157, 136, 90))
+"""Where each sonar is [mm] and faces [degrees], in the robot's frame."""
+
+NO_ECHO_MM = 5000
+HEARD_PER_STATUS = 4
+"""Sonars that fire between two status packets."""
+
+FRONT_BUMPERS = (52, 19, 0, -19, -52)
+"""Directions of the segments [degrees]; those of the rear are opposite."""
 
 
 class Axis:
@@ -87,6 +102,7 @@ class P2osEmulator:
         self._left = self._right = 0.0
         self._stalled = self._encoders = False
         self._quiet_s = self._since_status_s = 0.0
+        self._sonars_on, self._next_sonar = False, 0
 
     def power_cycle(self) -> None:
         """Off and on again: it stands, and all state is lost."""
@@ -193,12 +209,36 @@ class P2osEmulator:
                 turning.go_at(math.radians(argument))
             case 23:  # SETRA
                 turning.max_acceleration = max(0.1, abs(math.radians(argument)))
+            case 28:  # SONAR
+                self._sonars_on = bool(argument & 1)
             case 29:  # STOP
                 travel.go_at(0.0)
                 turning.go_at(0.0)
             case 55:  # ESTOP
                 travel.stop_at_once()
                 turning.stop_at_once()
+
+    def _pressed(self, middle_rad: float) -> int:
+        """The pressed segment of the bumper in this direction, as a bit."""
+        touching_rad = self._ground.touching_rad
+        if touching_rad is None:
+            return 0
+        angles = (middle_rad + math.radians(angle) for angle in FRONT_BUMPERS)
+        off = [abs(math.remainder(touching_rad - angle, math.tau)) for angle in angles]
+        nearest = off.index(min(off))
+        return 1 << nearest if off[nearest] <= math.radians(20.0) else 0
+
+    def _heard(self) -> list[tuple[int, int]]:
+        """What the next sonars hear, in turn."""
+        if not self._sonars_on:
+            return []
+        numbers = [(self._next_sonar + at) % len(SONARS) for at in range(HEARD_PER_STATUS)]
+        self._next_sonar = (numbers[-1] + 1) % len(SONARS)
+        return [(number, self._range_mm(*SONARS[number])) for number in numbers]
+
+    def _range_mm(self, x_mm: int, y_mm: int, angle_deg: int) -> int:
+        away_m = self._ground.echo(Pose2(x_mm / 1000.0, y_mm / 1000.0, math.radians(angle_deg)))
+        return NO_ECHO_MM if away_m is None else min(NO_ECHO_MM, round(1000.0 * away_m))
 
     def _send_status(self) -> None:
         left, right = (self._travel.rate + side * self._turning.rate * AXLE_M / 2.0 for side in (-1, 1))
@@ -207,6 +247,7 @@ class P2osEmulator:
             moving=not (self._travel.at_rest and self._turning.at_rest),
             x=round(1000 * self._x), y=round(1000 * self._y), heading=units,
             left=round(1000 * left), right=round(1000 * right), stalled=self._stalled, enabled=self._enabled,
+            front=self._pressed(0.0), rear=self._pressed(math.pi), sonars=self._heard(),
         )
         if self._encoders:
             wrap = (round(COUNTS_PER_M * side) for side in (self._left, self._right))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 STRING = 0x2B
@@ -81,14 +82,20 @@ def _parse_request(content: bytes) -> Request:
 
 
 def build_status(
-    *, moving: bool, x: int, y: int, heading: int, left: int, right: int, stalled: bool, enabled: bool
+    *, moving: bool, x: int, y: int, heading: int, left: int, right: int, stalled: bool, enabled: bool,
+    front: int = 0, rear: int = 0, sonars: Sequence[tuple[int, int]] = (),
 ) -> bytes:
-    """A standard server information packet: battery full, no sonar, nothing on the ports."""
+    """A standard server information packet: battery full, nothing on the ports.
+
+    Args:
+        front, rear: pressed segments of the bumpers, a bit each.
+        sonars: (number, range) of those that have heard since the last packet.
+    """
     return build_packet(struct.pack(
-        "<BHHhhhBBBhHBBBBBB",
+        "<BHHhhhBBBhHBB",
         0x33 if moving else 0x32, x & 0x7FFF, y & 0x7FFF, heading, left, right, 130,
-        1 if stalled else 0, 1 if stalled else 0, 0, 1 if enabled else 0, 0, 0, 0, 0, 0, 0,
-    ))
+        int(stalled) | rear << 1, int(stalled) | front << 1, 0, int(enabled), 0, len(sonars),
+    ) + b"".join(struct.pack("<BH", *sonar) for sonar in sonars) + bytes(4))
 
 
 def build_encoder_counts(left: int, right: int) -> bytes:

@@ -260,6 +260,12 @@ def test_over_a_body_that_acts_at_once_the_denning_reports_are_the_bodys_own() -
         def execute(self, command: MotorCommand) -> MotionReport:
             return MotionReport(command.turn_rad * (1 + 2**-50), command.move_m / 3.0, 0.1 + 0.2, 1e-17)
 
+        def take_contact(self) -> None:
+            return None
+
+        def ranges(self) -> None:
+            return None
+
     base = DenningBase(PseudoTerminalLink(DenningEmulator(InstantMotion(Body()))))
     command = MotorCommand(-0.1, math.pi)
     assert base.execute(command) == Body().execute(command)

@@ -12,11 +12,13 @@ from collections.abc import Iterator
 
 from harvey.hardware.drivers.bases.base import BaseKind, FaultKind
 from harvey.hardware.drivers.bases.counters import step
+from harvey.hardware.drivers.bases.create2_senses import build_ranges, find_contact
 from harvey.hardware.drivers.bases.create2_wire import SAFE_MODE, Decoder, Report, drive, safe, stream, wake
 from harvey.hardware.drivers.bases.driver import LOOK_S, Driver
 from harvey.hardware.drivers.bases.guard import Guard
 from harvey.hardware.drivers.bases.link import Link
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
+from world_models.entries.touch import Contact, Ranges
 from world_models.frames import Pose2, wrap_angle
 
 BAUD = 115200
@@ -62,6 +64,7 @@ class Create2Base(Driver):
         self._doubts = 0
         self._heard_s = self._said_s = -math.inf
         self._wanted = (0, 0)
+        self._lights_wanted = False
         self._right_m = self._left_m = 0.0
         self._pose = Pose2(0.0, 0.0, 0.0)
         self.guard = Guard(lambda: link.write(drive(0, 0)), link.now, WATCHDOG_S)
@@ -105,7 +108,8 @@ class Create2Base(Driver):
                 self.guard.disarm()
                 return
             if self._link.now() - self._heard_s > 0.2:
-                self._send(wake() if self._link.now() - since_s > 0.5 or self._last is None else stream())
+                ask = wake if self._link.now() - since_s > 0.5 or self._last is None else stream
+                self._send(ask(with_lights=self._lights_wanted))
         if self._link.now() - self._heard_s > PATIENCE_S:
             raise self._fault("silent", "no stream" + self._noise())
         raise self._fault("nonsense", "told to stop, it goes on")
@@ -121,6 +125,19 @@ class Create2Base(Driver):
                 raise self._fault("nonsense", "it was moving, and nobody had asked for that", stopped=True)
             return Odometry(self._pose.x_m, self._pose.y_m, wrap_angle(self._pose.heading_rad), self._link.now())
         raise self._fault("silent", "no stream" + self._noise())
+
+    def _read_ranges(self) -> Ranges | None:
+        """The light bumper; the base streams it from the first time that it is asked for."""
+        self._lights_wanted = True
+        if self._last is None:
+            self._halt()
+        ends_s = self._link.now() + 2.0 * PATIENCE_S
+        for report in self._reports(ends_s):
+            if report.lights:
+                return build_ranges(report.lights, self._link.now())
+            if self._link.now() - self._said_s > REPEAT_S:
+                self._send(stream(with_lights=True))
+        return None
 
     def _after_reopening(self) -> None:
         self._decoder.clear()
@@ -160,8 +177,10 @@ class Create2Base(Driver):
             dropped = ": a wheel hangs in the air" if report.bumps & 12 else ""
             self._give_up("refused", f"it left the safe mode (mode {report.mode}){dropped}")
         if report.bumps & 3:
+            self._contact = find_contact(report.bumps, self._link.now())
             self._give_up("stalled", "its bumper is pressed")
         if way.stands_for_s > STALLED_S:
+            self._contact = Contact.of_stall(self._link.now(), turning=way.is_turning)
             self._give_up("stalled", "its wheels are held")
         if way.is_astray(goal_m):
             self._give_up("nonsense", ASTRAY)
@@ -257,6 +276,10 @@ class _Way:
         """Whether the wheels have gone too far, backwards, together in a turn, or apart in a move."""
         gone_m, askew_m = self._progress()
         return not -STRAY_M <= gone_m <= goal_m + STRAY_M or abs(askew_m) > ASKEW_M
+
+    @property
+    def is_turning(self) -> bool:
+        return self._turning
 
     @property
     def stands_for_s(self) -> float:

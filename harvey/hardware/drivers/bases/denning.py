@@ -9,11 +9,19 @@ from __future__ import annotations
 import secrets
 from collections.abc import Iterator
 
-from harvey.hardware.drivers.bases.base import BaseKind
-from harvey.hardware.drivers.bases.denning_wire import Decoder, Frame, encode, number
+from harvey.hardware.drivers.bases.base import BaseFault, BaseKind
+from harvey.hardware.drivers.bases.denning_wire import (
+    Decoder,
+    Frame,
+    encode,
+    number,
+    parse_contact,
+    parse_ranges,
+)
 from harvey.hardware.drivers.bases.driver import LOOK_S, Driver
 from harvey.hardware.drivers.bases.link import Link
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
+from world_models.entries.touch import Contact, Ranges
 
 BAUD = 38400
 NOBODY = "00000000"
@@ -24,6 +32,9 @@ REPEAT_S = 0.15
 
 PATIENCE_S = 1.0
 """Silence of the base that is taken for a fault."""
+
+SHORT_M = 0.0015
+"""A move that claims less than was asked for, by more than this, was stopped by something."""
 
 
 class DenningBase(Driver):
@@ -38,6 +49,7 @@ class DenningBase(Driver):
         self._seq = self._asked = 0
         self._unresolved = False
         self._speeds = (0.0, 0.0)
+        self._has_senses = True
 
     def _carried_out(self, command: MotorCommand) -> MotionReport:
         self._ready()
@@ -48,6 +60,7 @@ class DenningBase(Driver):
         ends_s = self._link.now() + self._longest_s(command)
         for answer in self._answers(frame, ends_s):
             if answer.verb == "DONE":
+                self._feel(answer, command)
                 return self._report(answer)
         self._cancel()
         raise self._fault("stalled", f"not done after {self._longest_s(command):.1f} s", stopped=True)
@@ -66,6 +79,38 @@ class DenningBase(Driver):
             if answer.verb == "HERE" and answer.words[0] == str(self._asked) and values is not None:
                 return Odometry(*values)
         raise self._fault("silent", "no answer to a heartbeat")
+
+    def _read_ranges(self) -> Ranges | None:
+        self._ready()
+        self._asked += 1
+        question = str(self._asked)
+        for answer in self._ask_more(Frame(self._token, self._seq, "RANGES", (question,))):
+            if answer.verb == "ECHOES" and answer.words[:1] == (question,):
+                return parse_ranges(answer.words[1:], self._link.now())
+        return None
+
+    def _feel(self, done: Frame, command: MotorCommand) -> None:
+        """Ask what was touched, where the motion came to less than was asked for."""
+        stalled = done.words[:1] == ("stalled",)
+        moved_m = command.move_m if self._so_far is None else self._so_far.move_m
+        if not stalled and moved_m > command.move_m - SHORT_M:
+            return
+        if stalled:
+            self._contact = Contact.of_stall(self._link.now(), turning=moved_m == 0.0 and command.turn_rad != 0.0)
+        for answer in self._ask_more(Frame(self._token, self._seq, "TOUCH")):
+            if answer.verb == "FELT":
+                self._contact = parse_contact(answer) or self._contact
+                return
+
+    def _ask_more(self, frame: Frame) -> Iterator[Frame]:
+        """The answers to a question that a base need not understand; none of one that does not, or is silent."""
+        if self._has_senses:
+            try:
+                yield from self._answers(frame, self._link.now() + PATIENCE_S)
+            except BaseFault as fault:
+                self._has_senses = fault.detail != "verb"
+                if fault.kind not in ("refused", "silent"):
+                    raise
 
     def _after_reopening(self) -> None:
         self._decoder.clear()
@@ -86,7 +131,7 @@ class DenningBase(Driver):
             values = answer.numbers(1, 3)
             if answer.verb == "HI" and answer.words[0] == self._nonce and values is not None and min(values) > 0:
                 self._token, self._seq, self._unresolved = answer.token, 0, False
-                self._speeds = (values[1], values[2])
+                self._speeds, self._has_senses = (values[1], values[2]), True
                 return
         raise self._fault("silent", "no answer to a greeting")
 

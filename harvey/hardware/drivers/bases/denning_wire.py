@@ -10,13 +10,17 @@ from __future__ import annotations
 import math
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import get_args
+
+from world_models.entries.touch import Contact, Ranges, Sense
 
 LONGEST = 200
 """Bytes of a line; more without an end is noise."""
 
 _LINE = re.compile(rb"#([0-9A-F]{8} (?:0|[1-9][0-9]{0,8}) [A-Z]+(?: [ -)+-~]+)?)\*([0-9A-F]{8})", re.ASCII)
+_WHOLE = re.compile(r"[0-9]{1,6}", re.ASCII)
 _NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?", re.ASCII)
 
 
@@ -85,6 +89,27 @@ class Decoder:
     def clear(self) -> None:
         """Forget a line that was begun."""
         self._rest = b""
+
+
+def parse_contact(frame: Frame) -> Contact | None:
+    """The contact of a ``FELT``; None where nothing was touched, or it is none."""
+    values, sense = frame.numbers(1, 3), next((s for s in get_args(Sense) if frame.words[:1] == (s,)), None)
+    if values is None or sense is None or not (abs(values[0]) <= math.pi and values[1] > 0.0):
+        return None
+    return Contact(sense, *values)
+
+
+def parse_ranges(words: Sequence[str], when_s: float) -> Ranges | None:
+    """The ranges of an ``ECHOES`` without its question; None where the base has no sensors, or it is none.
+
+    Words: sigma [mm], half of the beam [mrad], furthest echo [mm], then the distance of each sensor [mm] or ``-``.
+    """
+    if len(words) < 4 or not all(_WHOLE.fullmatch(word) or (word == "-" and at > 2) for at, word in enumerate(words)):
+        return None
+    sigma_m, half_beam_rad, max_range_m = (int(word) / 1000.0 for word in words[:3])
+    distances = tuple(None if word == "-" else int(word) / 1000.0 for word in words[3:])
+    axes = tuple(math.remainder(math.tau * at / len(distances), math.tau) for at in range(len(distances)))
+    return Ranges(axes, distances, sigma_m, half_beam_rad, max_range_m, when_s)
 
 
 def number(value: float) -> str:

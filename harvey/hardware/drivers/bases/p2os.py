@@ -16,6 +16,7 @@ from harvey.hardware.drivers.bases.base import BaseKind
 from harvey.hardware.drivers.bases.counters import step
 from harvey.hardware.drivers.bases.driver import LOOK_S, Driver
 from harvey.hardware.drivers.bases.link import Link
+from harvey.hardware.drivers.bases.p2os_senses import build_ranges, find_contact
 from harvey.hardware.drivers.bases.p2os_wire import (
     CLOSE,
     ENABLE,
@@ -36,6 +37,7 @@ from harvey.hardware.drivers.bases.p2os_wire import (
     encode,
 )
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
+from world_models.entries.touch import Ranges
 from world_models.frames import wrap_angle
 
 BAUD = 9600
@@ -53,6 +55,9 @@ PATIENCE_S = 0.7
 
 TURN_PART_RAD = 2.0
 """A turn of more goes in parts, because the base turns to a heading the short way."""
+
+RING_S = 1.5
+"""So long the sonars are waited for, until each has heard."""
 
 MOVE_PART_M = 4.0
 STRAY_M, STRAY_RAD = 0.04, math.radians(6.0)
@@ -77,6 +82,7 @@ class P2osBase(Driver):
         self._names: tuple[str, ...] = ()
         self._last: Status | None = None
         self._doubts = 0
+        self._sonars_wanted = False
         self._heard_s = self._said_s = -math.inf
         self._x_m = self._y_m = self._heading_rad = 0.0
 
@@ -113,6 +119,17 @@ class P2osBase(Driver):
             return self._place()
         raise self._fault("silent", "no status")
 
+    def _read_ranges(self) -> Ranges | None:
+        """Each sonar's next range; the base fires them in turn."""
+        self._open()
+        self._sonars_wanted = True
+        heard: dict[int, int] = {}
+        for status in self._statuses(encode(SONAR, 1), PULSE_S, self._link.now() + RING_S):
+            if any(number in heard for number, _ in status.sonars):
+                break
+            heard.update(status.sonars)
+        return build_ranges(heard, self._link.now())
+
     def _after_reopening(self) -> None:
         self._decoder.clear()
         self._heard_s = -math.inf
@@ -123,7 +140,7 @@ class P2osBase(Driver):
     def _prepare(self) -> None:
         """Settings, said again before each command, since one may have been lost; that the motors run is seen."""
         settings = (encode(SETV, round(1000 * self._speed)), encode(SETRV, round(math.degrees(self._turn_speed))),
-                    encode(SONAR, 0))
+                    encode(SONAR, int(self._sonars_wanted)))
         self._link.write(b"".join(settings))
         for status in self._statuses(encode(ENABLE, 1), 0.1, self._link.now() + 2.0):
             if status.enabled:
@@ -169,6 +186,8 @@ class P2osBase(Driver):
 
     def _gave_up(self, what: str) -> None:
         stalled = self._last is not None and self._last.stalled
+        if self._last is not None:
+            self._contact = find_contact(self._last, self._link.now(), turning=what == "turn")
         self._halt()
         raise self._fault("stalled", f"the {what} came to nothing" + (": a motor is held" if stalled else ""),
                           stopped=True)
@@ -298,7 +317,7 @@ class _Way:
         """Take note of a status, and see that the motion is the one that was asked for."""
         base = self._base
         dx, dy = base._x_m - self._from_m[0], base._y_m - self._from_m[1]
-        self._held = self._held + 1 if status.stalled else 0
+        self._held = self._held + 1 if status.stalled or status.front or status.rear else 0
         if self._held >= 5:
             base._gave_up("turn" if turning else "move")
         along = dx * math.cos(self.heading_rad) + dy * math.sin(self.heading_rad)

@@ -22,7 +22,7 @@ SETRV, VEL, HEAD, DHEAD, ENCODER, RVEL, SETRA, SONAR, STOP, ESTOP = 10, 11, 12, 
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """A standard server information packet, in the base's own units.
+    """A standard server information packet, in the base's own units; bumpers as ARIA and Player read them.
 
     Attributes:
         moving: whether the motors run.
@@ -31,6 +31,8 @@ class Status:
         left, right: wheel velocities.
         stalled: whether a motor is.
         enabled: whether the motors may run.
+        front, rear: pressed segments of the bumpers, a bit each, from the left.
+        sonars: (number, range) of those that have heard since the last packet.
     """
 
     moving: bool
@@ -41,6 +43,9 @@ class Status:
     right: int
     stalled: bool
     enabled: bool
+    front: int = 0
+    rear: int = 0
+    sonars: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,9 +151,12 @@ def understood(content: bytes) -> Status | Counts | Echo | None:
 
 
 def _status(content: bytes) -> Status:
+    ends = min(20 + 3 * content[19], len(content) - 2)
     x, y, heading, left, right = (content[i] | content[i + 1] << 8 for i in range(1, 11, 2))
     return Status(
         moving=content[0] == 0x33, x=x & 0x7FFF, y=y & 0x7FFF, heading=heading,
         left=left - (left >> 15 << 16), right=right - (right >> 15 << 16),
         stalled=bool((content[12] | content[13]) & 1), enabled=bool(content[16] & 1),
+        front=content[13] >> 1, rear=content[12] >> 1,
+        sonars=tuple((content[i], content[i + 1] | content[i + 2] << 8) for i in range(20, ends, 3)),
     )
