@@ -12,6 +12,7 @@ from sim.body.actuator import ActuatorParameters
 from sim.body.bumper import Bumper
 from sim.body.elevator import Helper
 from sim.body.range_ring import RangeRing
+from sim.differences.table import NO_DIFFERENCES, TruthTable, read_truth
 from sim.faults.fault import Fault
 from sim.faults.registry import read_fault
 from sim.moved_things import MovedThing
@@ -94,7 +95,7 @@ class ScenarioLimits(Limits):
 FORMAT = MissionFormat(
     {**TABLES, "limits": ScenarioLimits, "camera": CameraSettings, "render": Render, "actuator": ActuatorParameters,
      "sensor": SensorParameters, "bumper": Bumper, "ranges": RangeRing},
-    ("details", "faults", "moved", "rides"),
+    ("details", "faults", "moved", "rides", "truth"),
 )
 
 
@@ -107,6 +108,7 @@ class Scenario(Mission):
         faults: what goes wrong, in the order of the file.
         moved: things that stand elsewhere than in the robot's model.
         rides: who presses the buttons of elevators.
+        truth: what is otherwise than the robot's model says.
     """
 
     details: tuple[Path, ...]
@@ -120,6 +122,7 @@ class Scenario(Mission):
     faults: tuple[Fault, ...] = ()
     moved: tuple[MovedThing, ...] = ()
     rides: tuple[Helper, ...] = ()
+    truth: TruthTable = NO_DIFFERENCES
 
     def refused(self, key: Key, why: str) -> ScenarioError:
         """The error to raise where one of its values does not fit the building."""
@@ -187,5 +190,6 @@ def _scenario(source: Source, name: str, folder: Path) -> Scenario:
         faults=tuple(read_fault(item) for item in node["faults"].items()) if "faults" in node else (),
         moved=tuple(read_settings(item, MovedThing) for item in node["moved"].items()) if "moved" in node else (),
         rides=tuple(read_settings(item, Helper) for item in node["rides"].items()) if "rides" in node else (),
+        truth=read_truth(node["truth"]) if "truth" in node else NO_DIFFERENCES,
         **shared,
     )

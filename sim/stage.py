@@ -5,21 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from sim.body.building import Building
-from sim.body.collision import Obstacles
 from sim.body.elevator import Elevators
 from sim.body.simulated_body import SimulatedBody
-from sim.render.renderer import Renderer
+from sim.differences.changing_faces import ChangingFaces, State
 from sim.scenario import Scenario
+from sim.scenario_changes import find_changed_locales, find_changes
 from sim.scenario_checks import check_names, check_room, find_named_locales, move_scenario_things
 from sim.truth import Score, Truth, score
-from world_models.building.geometry.faces import Face
 from world_models.building.geometry.outlines import inside_polygon
 from world_models.building.locales import Link
 from world_models.building.world import World
+from world_models.camera import Camera, CameraMount
 from world_models.commands import parse_command
 from world_models.entries.location import Place
 from world_models.files.world_files import WorldError, load_world
@@ -51,8 +52,9 @@ class Stage:
     def body(self, seed: int) -> SimulatedBody:
         """A new body, put down at the start, for a run with this seed."""
         s = self.scenario
+        camera, mount = _true_camera(s)
         return SimulatedBody(
-            self.building, self.start_world, s.camera.camera, s.camera.mount,
+            self.building, self.start_world, camera, mount,
             seed=seed, actuator=s.actuator, sensor=s.sensor, bumper=s.bumper, ranges=s.ranges,
             faults=s.faults,
             put_down_sigma_m=s.start.put_down_sigma_m, put_down_sigma_rad=s.start.put_down_sigma_rad,
@@ -73,12 +75,15 @@ def build_stage(scenario: Scenario) -> Stage:
         ScenarioError: the world or its details cannot be read, or the scenario does not fit the building.
     """
     world = _world(scenario)
+    _true_camera(scenario)
     check_names(scenario, world)
     start, goal = _ends(scenario, world)
-    around = _around(world, (start.locale, goal.locale, *find_named_locales(scenario)))
+    named = (*find_named_locales(scenario), *find_changed_locales(scenario, world))
+    around = _around(world, (start.locale, goal.locale, *named))
     faces = move_scenario_things(scenario, world, world.faces_within(around))
+    changing = ChangingFaces(faces, find_changes(scenario, world, around, faces), scenario.render.samples)
     elevators = Elevators.of_links(_links_in(world, around), world, scenario.rides)
-    on_floor = _storeys(world, around, faces, elevators, scenario.render.samples)
+    on_floor = _storeys(world, around, changing, elevators)
     building = on_floor(world.floor_m(start.locale))
     check_room(scenario, world, start, building, on_floor)
     heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
@@ -96,6 +101,14 @@ def _world(scenario: Scenario) -> World:
         raise scenario.refused(("details" if of_details else "world",), str(error)) from None
 
 
+def _true_camera(scenario: Scenario) -> tuple[Camera, CameraMount]:
+    """The camera and its mounting as they are. Raises ScenarioError where there is no such camera."""
+    try:
+        return scenario.truth.camera.mounted(scenario.camera.camera, scenario.camera.mount)
+    except ValueError as error:
+        raise scenario.refused(("truth", "camera"), str(error)) from None
+
+
 def _ends(scenario: Scenario, world: World) -> tuple[Place, Place]:
     """The places where the mission begins and ends. Raises ScenarioError where the world has no such place."""
     try:
@@ -111,20 +124,31 @@ def _around(world: World, locales: Sequence[str]) -> str:
 
 
 def _storeys(
-    world: World, around: str, faces: Sequence[Face], elevators: Elevators, samples: int
+    world: World, around: str, changing: ChangingFaces, elevators: Elevators
 ) -> Callable[[float], Building]:
-    """A function from the height of the body's floor [m] to the building there; each storey is built once."""
-    renderer = Renderer.of_faces(faces, samples)
-    known: dict[float, Building] = {}
+    """A function from the height of the body's floor [m] to the building there at the start of the run.
+
+    Each state of each storey is built once.
+    """
+    known: dict[tuple[float, State], Building] = {}
+    finders: dict[float, Callable[[Pose2], str]] = {}
+
+    def at_time(floor_m: float, time_s: float) -> Building:
+        key = round(floor_m, 3), changing.state_at(time_s)
+        if key not in known:
+            storey, state = key
+            if storey not in finders:
+                finders[storey] = _locale_finder(world, around, floor_m)
+            known[key] = Building(
+                changing.renderer(state), changing.obstacles(state, floor_m), finders[storey],
+                lambda place: place.in_world(world), floor_m, elevators, on_floor,
+                partial(at_time, floor_m) if changing.is_changing else None,
+                changing.added(state), changing.gone(state),
+            )
+        return known[key]
 
     def on_floor(floor_m: float) -> Building:
-        storey = round(floor_m, 3)
-        if storey not in known:
-            known[storey] = Building(
-                renderer, Obstacles.of_faces(faces, floor_m), _locale_finder(world, around, floor_m),
-                lambda place: place.in_world(world), floor_m, elevators, on_floor,
-            )
-        return known[storey]
+        return at_time(floor_m, 0.0)
 
     return on_floor
 

@@ -9,6 +9,7 @@ from sim.body.collision import Obstacles
 from sim.body.elevator import Elevators
 from sim.render.mesh import FaceLike
 from sim.render.renderer import Renderer
+from world_models.building.geometry.faces import Face
 from world_models.entries.location import Place
 from world_models.frames import Pose2
 
@@ -37,6 +38,8 @@ class Building:
         floor_m: height of the floor that the body stands on [m]; obstacles and locales are those of this floor.
         elevators: the rides to other floors.
         on_floor: the building for a body on the floor of this height [m].
+        at_time: the building on this floor at a time of the run [s]; None where nothing changes.
+        added, gone: faces that are there, or not, otherwise than in the building's files.
     """
 
     renderer: Renderer
@@ -46,6 +49,9 @@ class Building:
     floor_m: float = 0.0
     elevators: Elevators = NO_ELEVATORS
     on_floor: Callable[[float], Building] | None = field(default=None, repr=False)
+    at_time: Callable[[float], Building] | None = field(default=None, repr=False)
+    added: tuple[Face, ...] = ()
+    gone: tuple[Face, ...] = ()
 
     @staticmethod
     def of_faces(

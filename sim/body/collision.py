@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +34,11 @@ class Obstacles:
         parts = [_floor_edges(polygon) for polygon in polygons if len(polygon) > 1]
         segments = np.concatenate(parts) if parts else np.zeros((0, 2, 2))
         return Obstacles(np.unique(np.round(segments, 6), axis=0))
+
+    def with_faces(self, faces: Sequence[FaceLike], floor_m: float = 0.0) -> Obstacles:
+        """These and what is solid of more faces."""
+        more = Obstacles.of_faces(faces, floor_m).segments_world
+        return Obstacles(np.concatenate([self.segments_world, more])) if len(more) else self
 
     def clearance_m(self, pose: Pose2, radius_m: float = ROBOT_RADIUS_M) -> float:
         """Distance from the robot's rim to the nearest obstacle; negative where they overlap [m]."""

@@ -104,6 +104,11 @@ class SimulatedBody:
         return self._camera.frames
 
     @property
+    def building(self) -> Building:
+        """The building as it is at this moment. Not for knowledge sources."""
+        return self._building
+
+    @property
     def curvature_per_m(self) -> float:
         """Mean curvature of this run's wheels on a straight move [1/m]. Not for knowledge sources."""
         return self._wheels.curvature_per_m
@@ -345,10 +350,23 @@ class SimulatedBody:
         self._schedule = self._schedule.advance(duration_s, way_m, self._truth.locale)
         due, self._schedule = self._schedule.take_due(self._truth.locale)
         self._truth = replace(self._truth, time_s=self._truth.time_s + duration_s)
+        self._follow_changes()
         for fault in due:
             fault.apply(self)
         self._truth = replace(self._truth, lights_on=self._truth.time_s >= self._dark_until_s)
         self._track.append(self._truth)
+
+    def _follow_changes(self) -> None:
+        """Let the building change with time. What would come to where the robot stands waits until it has gone."""
+        if self._building.at_time is None:
+            return
+        now = self._building.at_time(self._truth.time_s)
+        here = self._truth.world_from_robot
+        if now is not self._building and not self._is_run_into(now.obstacles.clearance_m(here)):
+            self._building = now
+
+    def _is_run_into(self, clearance_m: float) -> bool:
+        return clearance_m < 0.0 and clearance_m < self._building.obstacles.clearance_m(self._truth.world_from_robot)
 
     # What faults may do: see sim.faults.fault.FaultTarget.
 

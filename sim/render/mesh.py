@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 import numpy as np
@@ -100,6 +100,18 @@ def build_mesh(faces: Iterable[FaceLike]) -> Mesh:
         scales_m=np.array([_scale(r) for r in regions], np.float64),
         seeds=np.array([r.seed for r in regions], np.int64),
     )
+
+
+def join_meshes(meshes: Sequence[Mesh]) -> Mesh:
+    """One mesh with the patches of several, in order. Raises ValueError for too many patches."""
+    count = sum(len(mesh) for mesh in meshes)
+    if count > MAX_PATCHES:
+        raise ValueError(f"expected at most {MAX_PATCHES} regions, got {count}")
+    starts = np.cumsum([0, *(len(mesh.vertices_world) for mesh in meshes)])
+    first = [mesh.first[:-1] + start for mesh, start in zip(meshes, starts[:-1], strict=True)]
+    rest = [f.name for f in fields(Mesh) if f.name != "first"]
+    joined = {name: np.concatenate([getattr(mesh, name) for mesh in meshes]) for name in rest}
+    return Mesh(first=np.concatenate([*first, starts[-1:]]), **joined)
 
 
 def _side_patches(regions: Sequence[RegionLike]) -> list[tuple[NDArray[np.float64], NDArray[np.float64], RegionLike]]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.render.mesh import FaceLike, Mesh, build_mesh
+from sim.render.mesh import FaceLike, Mesh, build_mesh, join_meshes
 from sim.render.noise_table import build_noise_table
 from sim.render.pieces import split_pieces
 from sim.render.projection import Pinhole, View, project_mesh
@@ -52,8 +52,15 @@ class Renderer:
         """The renderer of these faces. Raises ValueError for a bad region or number of samples."""
         sample_offsets(samples)
         mesh = build_mesh(faces)
-        light = mesh.colours * illumination(mesh.planes_world[:, :3])[:, None]
-        return Renderer(mesh, light, build_noise_table(), samples)
+        return Renderer(mesh, _light(mesh), build_noise_table(), samples)
+
+    def with_faces(self, faces: Sequence[FaceLike]) -> Renderer:
+        """The renderer of the same building with more faces. Raises ValueError for a bad region."""
+        if not faces:
+            return self
+        more = build_mesh(faces)
+        light = np.concatenate([self.light, _light(more)])
+        return replace(self, mesh=join_meshes((self.mesh, more)), light=light)
 
     def radiance(self, camera: Camera, camera_from_world: Pose) -> NDArray[np.float32]:
         """The noiseless image (height, width, 3), RGB in 0..1."""
@@ -75,6 +82,10 @@ class Renderer:
         columns = (view.inverse_depths, view.textures.reshape(-1, 6), view.bases_m, 1.0 / mesh.scales_m[:, None],
                    self.light, mesh.textures[:, None], mesh.seeds[:, None])
         return np.concatenate(columns, axis=1)
+
+
+def _light(mesh: Mesh) -> NDArray[np.float64]:
+    return np.asarray(mesh.colours * illumination(mesh.planes_world[:, :3])[:, None])
 
 
 def illumination(normals_world: NDArray[np.float64]) -> NDArray[np.float64]:

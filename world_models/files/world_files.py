@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -11,28 +12,34 @@ from world_models.files.compiled.schema import SUFFIXES
 from world_models.files.compiled.sqlite_locales import SqliteLocales
 from world_models.files.compiled.writer import compile_world
 from world_models.files.construction.builder import build_world
+from world_models.files.construction.specs import WorldSpec
 from world_models.files.toml.includes import WORLDS, compute_digest
+from world_models.files.toml.settings import suggest_keys
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.toml.world_reader import WorldReader
 
 __all__ = ["SUFFIXES", "WORLDS", "WorldError", "compile_file", "fingerprint", "load_world", "read_world"]
 
 
-def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[str]] = ()) -> World:
+def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[str]] = (),
+               opened: Collection[str] = ()) -> World:
     """The world of a TOML file, or of a compiled one, which is read one locale at a time.
 
     Args:
         path: the world file.
         details: further files that add parts, finishes and things (no rooms or doors). A compiled world contains its
             details: here they must be those that it was compiled with, and only their names count.
+        opened: closed doors between two locales that are built open; a compiled world has none.
 
     Raises:
         WorldError: a file cannot be read or does not describe a world; names file, line, what was expected and got.
     """
     path = Path(path)
     if path.suffix in SUFFIXES:
+        if opened:
+            raise WorldError(f"{path}: expected a TOML file where closed doors are opened, got a compiled world")
         return World(SqliteLocales(path, [Path(detail).stem for detail in details]))
-    return read_world(Source.read(path), [Source.read(Path(detail)) for detail in details])
+    return read_world(Source.read(path), [Source.read(Path(detail)) for detail in details], opened)
 
 
 def fingerprint(path: str | PathLike[str]) -> str:
@@ -50,10 +57,20 @@ def compile_file(path: str | PathLike[str], out: str | PathLike[str],
     return layers[-1]
 
 
-def read_world(base: Source, details: Sequence[Source] = ()) -> World:
+def read_world(base: Source, details: Sequence[Source] = (), opened: Collection[str] = ()) -> World:
     """The world of files already read; see :func:`load_world`."""
     reader = WorldReader(base)
     reader.read_base()
     for source in details:
         reader.read_details(source)
-    return build_world(reader.spec())
+    spec = reader.spec()
+    return build_world(_with_open_doors(spec, opened) if opened else spec)
+
+
+def _with_open_doors(spec: WorldSpec, opened: Collection[str]) -> WorldSpec:
+    closed = [door.name for door in spec.doors if not door.is_open and len(door.between) == 2]
+    for name in opened:
+        if name not in closed:
+            near = suggest_keys(name, closed)
+            raise WorldError(f"expected a closed door between two locales, {near}, got {name!r}")
+    return replace(spec, doors=tuple(replace(d, is_open=d.is_open or d.name in opened) for d in spec.doors))

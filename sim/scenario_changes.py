@@ -1,0 +1,117 @@
+"""From a scenario's ``[truth]`` to the changes of its building, checked against the building."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from sim.differences.change import Change, compare_faces
+from sim.differences.leaf import build_leaf
+from sim.differences.shapes import build_thing, footprint
+from sim.differences.table import ExtraThing, TrueDoor, TrueThing
+from sim.moved_things import MovedThing, belongs_to, move_things
+from sim.scenario import Scenario
+from world_models.building.geometry.faces import Face
+from world_models.building.geometry.outlines import inside_polygon
+from world_models.building.locales import Doorway
+from world_models.building.world import World
+from world_models.entries.location import Place
+from world_models.files.toml.settings import suggest_keys
+from world_models.files.world_files import WorldError, load_world
+
+MAX_OUTSIDE_M = 0.15
+"""A thing may reach this far out of its room's outline [m]."""
+
+
+def find_changed_locales(scenario: Scenario, world: World) -> list[str]:
+    """The locales whose doors or things are otherwise. Raises ScenarioError for an unknown one."""
+    rooms = [extra.locale for extra in scenario.truth.extra]
+    for i, name in enumerate(rooms):
+        if name not in world.locales or not world.is_room(name):
+            near = suggest_keys(name, world.rooms)
+            raise scenario.refused(("truth", "extra", i, "locale"), f"expected a room, {near}, got {name!r}")
+    open_doors = {doorway.name: doorway for doorway in world.doorways} if scenario.truth.doors else {}
+    return [*rooms, *(locale for door in scenario.truth.doors if door.name in open_doors
+                      for locale in open_doors[door.name].between)]
+
+
+def find_changes(scenario: Scenario, world: World, around: str, faces: Sequence[Face]) -> tuple[Change, ...]:
+    """The changes of a building with these faces, those of a locale (``around``), in the order of the file.
+
+    Raises:
+        ScenarioError: there is no such door, thing or room, or something has no room where it is put.
+    """
+    truth = scenario.truth
+    open_doors = {doorway.name: doorway for doorway in world.doorways} if truth.doors else {}
+    return (
+        *(_change_door(scenario, i, door, open_doors, world, around) for i, door in enumerate(truth.doors)),
+        *(_change_thing(scenario, i, thing, world, faces) for i, thing in enumerate(truth.things)),
+        *(_add_thing(scenario, i, extra, world) for i, extra in enumerate(truth.extra)),
+    )
+
+
+def _change_door(
+    scenario: Scenario, i: int, door: TrueDoor, open_doors: dict[str, Doorway], world: World, around: str
+) -> Change:
+    doorway = open_doors.get(door.name)
+    if doorway is None:
+        return _open_door(scenario, i, door, open_doors, world, around)
+    if door.into not in ("", *doorway.between):
+        raise scenario.refused(("truth", "doors", i, "into"),
+                               f"expected {suggest_keys(door.into, doorway.between)}, got {door.into!r}")
+    is_open = door.state == "open"
+    floor_m = world.floor_m(door.into or doorway.between[0])
+    return Change(door, f"door {door.name}", added=() if is_open else build_leaf(door, doorway, floor_m))
+
+
+def _open_door(
+    scenario: Scenario, i: int, door: TrueDoor, open_doors: dict[str, Doorway], world: World, around: str
+) -> Change:
+    """A door that the model has closed, and that is truly open."""
+    if door.state != "open":
+        raise scenario.refused(("truth", "doors", i, "name"), "expected a door that is open in the model, "
+                               f"{suggest_keys(door.name, open_doors)}, got {door.name!r}")
+    try:
+        opened = load_world(scenario.world, details=scenario.details, opened=(door.name,))
+    except WorldError as error:
+        raise scenario.refused(("truth", "doors", i, "name"), str(error)) from None
+    if door.name not in [doorway.name for doorway in opened.doorways]:
+        raise scenario.refused(("truth", "doors", i, "name"),
+                               f"expected a door that can be open, got {door.name!r}: the rooms do not meet there")
+    return compare_faces(door, f"door {door.name}", world.faces_within(around), opened.faces_within(around))
+
+
+def _change_thing(scenario: Scenario, i: int, thing: TrueThing, world: World, faces: Sequence[Face]) -> Change:
+    moved = MovedThing(thing.thing, thing.x_m, thing.y_m)
+    own = [face for face in faces if belongs_to(face, moved)]
+    if not own:
+        near = suggest_keys(thing.thing, [known.name for known in world.things])
+        raise scenario.refused(("truth", "things", i, "thing"),
+                               f"expected a thing of the building, {near}, got {thing.thing!r}")
+    there = () if thing.missing else move_things(own, [moved])
+    for face in there:
+        _check_within(scenario, ("truth", "things", i), thing.thing, face.polygon_world[:, :2], world, face.locale)
+    return Change(thing, f"thing {thing.thing}", frozenset(face.name for face in own), there)
+
+
+def _add_thing(scenario: Scenario, i: int, extra: ExtraThing, world: World) -> Change:
+    place = Place(extra.locale, extra.x_m, extra.y_m, extra.heading_rad).in_world(world)
+    world_from_thing = place.lifted(world.floor_m(extra.locale))
+    turn = np.array([[math.cos(place.heading_rad), math.sin(place.heading_rad)],
+                     [-math.sin(place.heading_rad), math.cos(place.heading_rad)]])
+    corners = footprint(extra.kind) @ turn + place.position
+    _check_within(scenario, ("truth", "extra", i), f"the {extra.kind}", corners, world, extra.locale)
+    name = f"{extra.locale}/extra-{i}-{extra.kind}"
+    return Change(extra, name, added=build_thing(extra.kind, name, extra.locale, world_from_thing))
+
+
+def _check_within(
+    scenario: Scenario, key: tuple[str | int, ...], what: str, corners_world: np.ndarray, world: World, locale: str
+) -> None:
+    outline = world.outline(locale)
+    if not all(inside_polygon(corner, outline, MAX_OUTSIDE_M) for corner in corners_world):
+        (x0, y0), (x1, y1) = corners_world.min(axis=0), corners_world.max(axis=0)
+        reach = f"from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m in the world"
+        raise scenario.refused(key, f"expected {what} to stand within {locale}, got it {reach}")

@@ -1,0 +1,109 @@
+"""The ``[truth]`` of a scenario: read, checked against the building, and built."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from sim.differences.shapes import SHAPES
+from sim.differences.table import NO_DIFFERENCES, TrueCamera
+from sim.scenario import ScenarioError, load_scenario, parse_scenario
+from sim.stage import build_stage
+from world_models.files.world_files import load_world
+from world_models.frames import Pose2
+
+SMALL = 'world = "research_center"\ngoal = "(ptrans (hallway (4,4,0)) (hallway (24,4,0)))"\n'
+BOX = '[[truth.extra]]\nkind = "box"\nlocale = "hallway"\nx_ft = 14\ny_ft = 4\n'
+
+
+def test_without_a_truth_table_all_is_as_believed() -> None:
+    assert parse_scenario(SMALL).truth == NO_DIFFERENCES
+
+
+def test_the_table_is_read_in_the_files_units() -> None:
+    times = "at_s = 3\nuntil_s = 9\nheading_deg = 90\n"
+    truth = parse_scenario(SMALL + BOX + times + "[truth.camera]\ntilt_deg = 1\n").truth
+    (box,) = truth.extra
+    assert (box.x_m, box.at_s, box.until_s) == pytest.approx((14 * 0.3048, 3.0, 9.0))
+    assert box.heading_rad == pytest.approx(math.pi / 2) and truth.camera.tilt_rad == pytest.approx(math.radians(1))
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ("[truth]\ndoor = 3\n", r"m\.toml:4: truth\.door: expected one of the keys doors, things, extra, camera"),
+    ('[[truth.extra]]\nkind = "boks"\n', r"m\.toml:3: truth\.extra\.0: expected kind = one of box, got 'boks'"),
+    (BOX + "at_s = 5\nuntil_s = 4\n", r"m\.toml:9: truth\.extra\.0\.until_s: expected a number above 5"),
+    (BOX + "height_m = 2\n", r"m\.toml:8: truth\.extra\.0\.height_m: expected one of heading"),
+    ('[[truth.doors]]\nname = "a"\nstate = "shutt"\n', r"m\.toml:3: truth\.doors\.0: expected state = one of shut"),
+    ('[[truth.doors]]\nname = "a"\nopen_deg = 200\n', r"m\.toml:5: truth\.doors\.0\.open_deg: expected a number above"),
+    ('[[truth.things]]\nthing = "a/b"\n', r"m\.toml:3: truth\.things\.0: expected either missing = true or .* neither"),
+    ('[[truth.things]]\nthing = "a/b"\nmissing = true\nx_m = 1\n', r"truth\.things\.0: expected either .* got both"),
+    ("[truth.camera]\ntilt_deg = 80\n", r"m\.toml:4: truth\.camera\.tilt_deg: expected a number from -28"),
+])
+def test_a_malformed_table_is_pointed_at(text: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        parse_scenario(SMALL + text, "m.toml")
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    (BOX.replace("hallway", "halway"), r"m\.toml:5: truth\.extra\.0\.locale: expected a room, one of hallway"),
+    (BOX.replace("y_ft = 4", "y_ft = 40"), r"m\.toml:3: truth\.extra\.0: expected the box to stand within hallway"),
+    (BOX.replace("x_ft = 14", "x_ft = 4"), r"m\.toml:2: goal: expected 0\.35 m of room at the start"),
+    ('[[truth.doors]]\nname = "libary-door"\n',
+     r"m\.toml:4: truth\.doors\.0\.name: expected a door that is open in the model, one of library-door"),
+    ('[[truth.doors]]\nname = "fire-exit"\nstate = "open"\n',
+     r"m\.toml:4: truth\.doors\.0\.name: expected a closed door between two locales, one of .*'fire-exit'"),
+    ('[[truth.doors]]\nname = "library-door"\ninto = "office"\n',
+     r"m\.toml:5: truth\.doors\.0\.into: expected one of hallway, library"),
+    ('[[truth.things]]\nthing = "hallway/chandelier"\nmissing = true\n',
+     r"m\.toml:4: truth\.things\.0\.thing: expected a thing of the building"),
+    ('[[truth.things]]\nthing = "hallway/notices-by-students"\nx_ft = 500\n',
+     r"m\.toml:3: truth\.things\.0: expected hallway/notices-by-students to stand within hallway"),
+    ("[truth.camera]\nfocal_px = -1000\n", r"m\.toml:3: truth\.camera: expected a focal length above 0"),
+])
+def test_what_does_not_go_with_the_building_is_pointed_at(text: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        build_stage(parse_scenario(SMALL + text, "m.toml"))
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_every_thing_stands_on_the_floor_and_is_solid(kind: str) -> None:
+    stage = build_stage(parse_scenario(SMALL + BOX.replace("box", kind)))
+    assert min(face.polygon_world[:, 2].min() for face in stage.building.added) == pytest.approx(0.0, abs=0.011)
+    there = stage.start_world @ Pose2(10 * 0.3048, 0.0, 0.0)
+    free = build_stage(parse_scenario(SMALL)).building.obstacles
+    assert stage.building.obstacles.clearance_m(there) < 0.05 < 0.3 < free.clearance_m(there)
+
+
+def test_a_missing_thing_is_gone_with_all_that_is_on_it() -> None:
+    text = SMALL + '[[truth.things]]\nthing = "allens-office/desk"\nmissing = true\n'
+    stage = build_stage(parse_scenario(text.replace("(hallway (4,4,0))", "(allens-office (7,4,0))")))
+    assert stage.building.gone and not stage.building.added
+    assert all(face.name.startswith("allens-office/desk") for face in stage.building.gone)
+
+
+def test_a_closed_door_that_is_truly_open_can_be_driven_through() -> None:
+    text = SMALL.replace("(4,4,0)", "(49,4,0)").replace("(24,4,0)", "(60,4,0)")
+    door = '[[truth.doors]]\nname = "conference-side-door"\nstate = "open"\n'
+    closed, opened = build_stage(parse_scenario(text)), build_stage(parse_scenario(text + door))
+    world = load_world(opened.scenario.world, opened=("conference-side-door",))
+    (doorway,) = [d for d in world.doorways if d.name == "conference-side-door"]
+    there = Pose2(float(doorway.centre_world[0]), float(doorway.centre_world[1]), 0.0)
+    assert closed.building.obstacles.clearance_m(there) < 0.0 < opened.building.obstacles.clearance_m(there)
+
+
+def test_the_true_camera_differs_and_the_robot_believes_the_scenarios() -> None:
+    stage = build_stage(parse_scenario(SMALL + "[truth.camera]\ntilt_deg = 1.0\nheight_m = 0.02\nfocal_px = 5\n"))
+    plain = build_stage(parse_scenario(SMALL))
+    assert stage.scenario.camera == plain.scenario.camera
+    assert stage.body(0).picture() != plain.body(0).picture()
+    believed, mount = stage.scenario.camera.camera, stage.scenario.camera.mount
+    camera, true_mount = TrueCamera(tilt_rad=0.1, height_m=0.02, focal_px=5.0).mounted(believed, mount)
+    assert (camera.fx - believed.fx, camera.cx - believed.cx) == (5.0, 0.0)
+    assert true_mount.height_m == mount.height_m + 0.02 and true_mount.tilt_rad == mount.tilt_rad + 0.1
+
+
+@pytest.mark.parametrize(("name", "added"), [("box-in-the-way", "extra-0-box"), ("door-found-shut", "true-leaf")])
+def test_the_shipped_scenarios_have_what_they_are_named_for(name: str, added: str) -> None:
+    faces = build_stage(load_scenario(name)).building.added
+    assert faces and all(added in face.name for face in faces)
