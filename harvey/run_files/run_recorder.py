@@ -17,6 +17,7 @@ from logs.camera_file import CameraFile
 from logs.disk import sync_folder
 from logs.journal_file import JournalFile
 from logs.recording.writer import RecordingWriter
+from world_models.building.geometry.faces import Face
 from world_models.building.world import World
 from world_models.entries.body import Frame
 from world_models.entries.location import Place
@@ -99,6 +100,11 @@ class RunRecorder:
         """Where the robot truly is, and where it touched something since the last cycle, for the drawing."""
         if self._recording_writer is not None:
             self._recording_writer.truth(pose, sim_time_s, contacts)
+
+    def draw_true_building(self, added: tuple[Face, ...], gone: tuple[Face, ...]) -> None:
+        """How the building truly differs from its model from now on: faces that are there besides, and that are not."""
+        if self._recording_writer is not None:
+            self._recording_writer.true_building(added, gone)
 
     def close(self) -> None:
         """No more decisions. Raises RecordingError where the recording's last part could not be written."""

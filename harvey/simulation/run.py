@@ -25,6 +25,7 @@ from harvey.wiring import knowledge_sources
 from sim.scenario import Scenario, ScenarioError, scenario_from_tables
 from sim.stage import Stage, build_stage
 from world_models.actuator import ActuatorModel
+from world_models.building.geometry.faces import Face
 from world_models.building.world import World
 from world_models.files.toml.mission import ROOT
 from world_models.files.world_files import load_world
@@ -133,6 +134,7 @@ class SimulatedRun(Run):
         around: Around = unchanged,
     ) -> None:
         self.simulated_body = body = stage.body(head.seed)
+        self._drawn: tuple[tuple[Face, ...], tuple[Face, ...]] = (), ()
         self._line, self._contact_watch = ExitStack(), ContactWatch(agent.world, body)
         reached = around(self._line.enter_context(open_body(body, head.body)), lambda: recorder.replaying)
         super().__init__(
@@ -144,6 +146,10 @@ class SimulatedRun(Run):
     def _draw_truth(self) -> None:
         truth = self.simulated_body.truth
         self.recorder.draw_truth(truth.world_from_robot, truth.time_s, self._contact_watch.new_contacts())
+        differs = self.simulated_body.building.added, self.simulated_body.building.gone
+        if differs != self._drawn:
+            self._drawn = differs
+            self.recorder.draw_true_building(*differs)
 
     def __enter__(self) -> SimulatedRun:
         return self

@@ -10,6 +10,7 @@ from blackboard.change import Change, Retracted
 from blackboard.entry import Entry
 from blackboard.journal import Decision
 from blackboard.kinds import always
+from world_models.building.geometry.faces import Face
 from world_models.entries.location import Place
 from world_models.frames import Pose2
 
@@ -64,6 +65,14 @@ class Mirror:
 
 
 @dataclass(frozen=True, slots=True)
+class Difference:
+    """How a building truly differs from its model: faces that are there besides, and faces that are not."""
+
+    added: tuple[Face, ...] = ()
+    gone: tuple[Face, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Moment:
     """One cycle as the loggers see it.
 
@@ -72,12 +81,14 @@ class Moment:
         mirror: the board after it.
         truth: where the robot truly was since the last cycle, oldest first; empty where nobody knows.
         contacts: where it truly touched something since then.
+        differences: how the building truly differed from its model since then; empty where that did not change.
     """
 
     decision: Decision
     mirror: Mirror
     truth: tuple[Pose2, ...] = ()
     contacts: tuple[Place, ...] = ()
+    differences: tuple[Difference, ...] = ()
     _changes: tuple[Change, ...] = field(init=False)
     _kinds: frozenset[type[Any]] = field(init=False)
 

@@ -12,9 +12,10 @@ from logs.errors import RecordingError
 from logs.recording import loggers as built_in
 from logs.recording.belief import Belief
 from logs.recording.blueprint import blueprint
-from logs.recording.board_mirror import Mirror, Moment
+from logs.recording.board_mirror import Difference, Mirror, Moment
 from logs.recording.logger import Logger, Subject
 from logs.recording.stream import LIVE_PORT, RecordingStream
+from world_models.building.geometry.faces import Face
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import Frame, MotionReport
@@ -78,6 +79,7 @@ class RecordingWriter:
         self._sim_time_s = 0.0
         self._truth: list[Pose2] = []
         self._contacts: list[Place] = []
+        self._differences: list[Difference] = []
         for logger in self._loggers:
             logger.begin(self._stream)
 
@@ -86,6 +88,10 @@ class RecordingWriter:
         self._contacts += contacts
         self._truth.append(world_from_robot)
         self._sim_time_s = max(self._sim_time_s, sim_time_s)
+
+    def true_building(self, added: tuple[Face, ...], gone: tuple[Face, ...]) -> None:
+        """How the building truly differs from its model from now on; drawn with the next decision."""
+        self._differences.append(Difference(added, gone))
 
     def __call__(self, decision: Decision) -> None:
         """Draw one decision.
@@ -116,8 +122,9 @@ class RecordingWriter:
         self._stream.close()
 
     def _moment(self, decision: Decision) -> Moment:
-        moment = Moment(decision, self._mirror, tuple(self._truth), tuple(self._contacts))
+        moment = Moment(decision, self._mirror, tuple(self._truth), tuple(self._contacts), tuple(self._differences))
         self._truth.clear()
+        self._differences.clear()
         self._contacts.clear()
         for change in moment.changes:
             self._mirror.take(change)

@@ -20,17 +20,25 @@ from blackboard.level import Level
 from harvey.simulation.run import run_mission
 from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources
 from knowledge_sources.settings import Settings
+from sim.body.building import Building as TrueBuilding
 from sim.body.simulated_body import SimulatedBody
-from sim.stage import Stage
+from sim.differences.change import Change as Difference
+from sim.differences.table import Lasting, TrueCamera
+from sim.made_up.short_missions import OFFICE
+from sim.scenario import parse_scenario
+from sim.stage import Stage, build_stage
 from sim.truth import Truth
 from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotionReport
+from world_models.entries.robot import CameraState
 from world_models.robot import RobotModel
 
 FROM_VIEW = Building | RobotModel | Camera | CameraMount | ActuatorModel | View
 """What a knowledge source knows only from the view that it is given."""
+OF_TRUTH = Truth | SimulatedBody | Stage | TrueBuilding | Lasting | TrueCamera | Difference
+"""What belongs to the simulator."""
 NAMES = [source.__module__.rpartition(".")[2] for source in KNOWLEDGE_SOURCES]
 NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "fault_handler", "path_follower",
               "elevator_rider", "obstruction_finder", "model_reviser", "withdrawer"}
@@ -88,9 +96,41 @@ def test_no_expert_holds_the_truth(short_stage: Stage) -> None:
     """Neither the simulator nor the building or the robot can be reached from what a knowledge source holds."""
     body = short_stage.body(3)
     for source in knowledge_sources():
-        held = [thing for thing in _reachable(source) if isinstance(thing, Truth | SimulatedBody | Stage | FROM_VIEW)]
+        held = [thing for thing in _reachable(source) if isinstance(thing, OF_TRUTH | FROM_VIEW)]
         assert held == [], source.name
     assert any(isinstance(thing, Truth) for thing in _reachable(body))  # the walk does find it where it is
+
+
+TRUTH_TABLE = """
+[truth.camera]
+focal_px = 0.5
+[[truth.things]]
+thing = "allens-office/desk"
+missing = true
+[[truth.extra]]
+kind = "bin"
+locale = "allens-office"
+x_ft = 2.0
+y_ft = 6.0
+at_s = 3.0
+"""
+
+
+def test_nothing_of_a_truth_that_differs_is_on_the_board() -> None:
+    """Neither in an entry nor in a knowledge source after the mission; the robot believes in the scenario's camera."""
+    stage, entries, sources = build_stage(parse_scenario(OFFICE + TRUTH_TABLE)), [], list(knowledge_sources())
+
+    def listen(decision: Decision) -> None:
+        entries.extend(change.entry for change in (*decision.observed, *decision.made))
+
+    run_mission(stage, 3, sources=lambda _: sources, sinks=[listen])
+    assert entries and stage.building.gone
+    held = [thing for thing in _reachable((entries, sources)) if isinstance(thing, OF_TRUTH)]
+    assert held == []
+    texts = [thing for thing in _reachable(entries) if isinstance(thing, str)]
+    assert not [text for text in texts if "extra-0" in text or text == "bin"]
+    cameras = [entry.value for entry in entries if isinstance(entry.value, CameraState)]
+    assert [camera.lens.fx for camera in cameras] == [stage.scenario.camera.camera.fx]
 
 
 def _reachable(root: Any) -> Iterable[Any]:

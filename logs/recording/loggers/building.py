@@ -106,16 +106,21 @@ def _mesh(world: World, colours: NDArray[np.float64], of_storey: NDArray[np.bool
     """The surfaces of a storey as a mesh that shows from their visible sides only: no wall stands in one's way."""
     polygons, normals = world.scene.polygons_world, world.scene.planes_world[:, :3]
     shown = of_storey & ((normals[:, 2] > -0.5) | (polygons[..., 2].min(axis=1) < floor_m + HEAD_HIGH_M))
-    light = SOFT_LIGHT + LAMP_LIGHT * normals @ (LAMP / np.linalg.norm(LAMP))
-    lit = np.clip(255.0 * light[:, None] * colours, 0, 255).astype(np.uint8)[shown]
+    lit = light_colours(colours, normals)[shown]
     corners = polygons.shape[1]
     return rr.Mesh3D(
         vertex_positions=polygons[shown].reshape(-1, 3), vertex_colors=np.repeat(lit, corners, axis=0),
-        triangle_indices=_triangles(len(lit), corners), face_rendering=rr.components.MeshFaceRendering.Front,
+        triangle_indices=triangles(len(lit), corners), face_rendering=rr.components.MeshFaceRendering.Front,
     )
 
 
-def _triangles(count: int, corners: int) -> NDArray[np.int64]:
+def light_colours(colours: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """(n, 3) what is shown of colours (n, 3), 0..1, on surfaces with unit normals (n, 3)."""
+    light = SOFT_LIGHT + LAMP_LIGHT * normals @ (LAMP / np.linalg.norm(LAMP))
+    return np.asarray(np.clip(255.0 * light[:, None] * colours, 0, 255), np.uint8)
+
+
+def triangles(count: int, corners: int) -> NDArray[np.int64]:
     """(count * (corners - 2), 3) fans for convex polygons that lie one after the other."""
     rest = np.arange(1, corners - 1)
     fan = np.stack([np.zeros_like(rest), rest, rest + 1], axis=1)
