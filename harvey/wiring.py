@@ -20,6 +20,7 @@ from knowledge_sources.action.elevator_rider import ElevatorRider
 from knowledge_sources.action.fault_handler import FaultHandler
 from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.action.motor import Motor
+from knowledge_sources.action.obstacle_finder import ObstacleFinder
 from knowledge_sources.action.path_follower import PathFollower
 from knowledge_sources.action.withdrawer import Withdrawer
 from knowledge_sources.goal.interpreter import Interpreter
@@ -59,6 +60,7 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     Relocalizer,
     FaultHandler,
     ModelReviser,
+    ObstacleFinder,
     Withdrawer,
     MissionMonitor,
 )

@@ -95,5 +95,5 @@ def _leads_there(sketch: PlanSketch, frame: LocaleFrame) -> bool:
     if any(subgoal.passage in shut for subgoal in left):
         return True
     crosses = any(frame.name in (subgoal.origin.locale, subgoal.destination.locale) for subgoal in left)
-    is_rearranged = not frame.changes or any(change.what == "gone" for change in frame.changes)
+    is_rearranged = not frame.changes or any(change.what in ("gone", "extra") for change in frame.changes)
     return crosses and is_rearranged

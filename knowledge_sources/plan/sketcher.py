@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
 from blackboard.board import View
@@ -14,6 +14,7 @@ from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
 from knowledge_sources.questions import ACTIVE_SKETCH, find_belief, find_building, find_frames, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis, Place
+from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch, Subgoal
 from world_models.frames import wrap_angle
 
@@ -143,7 +144,9 @@ class Sketcher(RobotKnowledgeSource):
         else:
             parts = planner.plan_between_locales(_place_of(belief.value), subgoal.destination, subgoal.tolerance_m)
         if parts is None:
-            yield Post(Outcome("blocked", f"no way through {locale} to {subgoal.destination}"), (go,))
+            obstacles = _find_obstacles(view, (locale,))
+            reason = f"no way through {locale} to {subgoal.destination}{_name_obstacles(obstacles)}"
+            yield Post(Outcome("blocked", reason), (go, *obstacles))
         else:
             frames = find_frames(view, _list_locales(parts))
             yield Post(PlanSketch(s.goal, (*s.path, s.at), locale, parts), (go, belief, *frames))
@@ -165,11 +168,21 @@ class Sketcher(RobotKnowledgeSource):
         """Why no sketch leads from one locale to another."""
         building = find_building(view)
         if building.route(here, there) is not None:
-            return f"something stands before a passage on the way from {here} to {there}"
+            named = _name_obstacles(view.all(Obstacle))
+            return f"something stands before a passage on the way from {here} to {there}{named}"
         shut = "".join(f"; {doorway.name} is shut" for doorway in building.shut_doorways())
         by_stairs = building.is_walkable(here, there, self._settings.plan.max_walked_rooms)
         stairs = "; people can walk there, by stairs" * by_stairs
         return f"no passage for wheels leads from {here} to {there}{shut}{stairs}"
+
+
+def _find_obstacles(view: View, locales: Collection[str]) -> tuple[Entry[Obstacle], ...]:
+    """What stands in the way in some locales, and is not in the file."""
+    return view.where(Obstacle, lambda obstacle: obstacle.locale in locales)
+
+
+def _name_obstacles(obstacles: Sequence[Entry[Obstacle]]) -> str:
+    return f"; in the way is {' and '.join(entry.value.words() for entry in obstacles)}" if obstacles else ""
 
 
 def _list_locales(subgoals: Iterable[Subgoal]) -> set[str]:

@@ -97,6 +97,15 @@ class ActionSettings:
         0.003, "rad", "Standard deviation of the heading of an elevator car, from floor to floor.",
         "engineering judgement")
 
+    # Obstacle finder
+    obstacle_width_m: float = setting(
+        0.45, "m", "Width and depth that something touched is taken to have.", "engineering judgement")
+    touch_margin_m: float = setting(
+        0.05, "m", "A wall or thing of the model that is so much further than the robot's rim explains a contact.",
+        "engineering judgement")
+    max_touch_sigma_rad: float = setting(
+        0.6, "rad", "A contact whose direction is less sure tells of no obstacle.", "engineering judgement")
+
     # Fault handler
     max_fault_s: float = setting(
         30.0, "s", "A fault that lasts longer ends the mission.", "engineering judgement")

@@ -23,11 +23,12 @@ from world_models.building.changes.shut_doors import shut_door
 from world_models.building.extents import LocaleExtent
 from world_models.building.locale_source import LocaleGeometry, PassageEdge
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.things import Thing
+from world_models.building.things import ROBOT_TOP_M, Thing
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, PlanSketch
+from world_models.frames import frozen
 
-ChangeKind = Literal["shut", "gone", "removed"]
+ChangeKind = Literal["shut", "gone", "removed", "extra"]
 UNDONE: Mapping[str, ChangeKind] = {"open": "shut", "there": "gone"}
 """What takes back which change."""
 RequestStatus = Literal["asked", "answered"]
@@ -42,17 +43,20 @@ class FrameChange:
     """What is believed of a locale otherwise than its file says.
 
     Attributes:
-        what: shut (a door), gone (a thing), or removed (a landmark's lines, or a face).
+        what: shut (a door), gone (a thing), removed (a landmark's lines, or a face), or extra (something stands there
+            that the file lacks).
         name: of the door, thing, landmark or face.
         by: who said so.
+        footprint: of what is extra: the corners of what it takes of the floor [m, world].
     """
 
     what: ChangeKind
     name: str
     by: str
+    footprint: tuple[tuple[float, float], ...] = ()
 
     def sentence(self) -> str:
-        said = {"shut": "is shut", "gone": "is gone", "removed": "is left out"}[self.what]
+        said = {"shut": "is shut", "gone": "is gone", "removed": "is left out", "extra": "stands in the way"}[self.what]
         return f"{self.name} {said} ({self.by})"
 
 
@@ -164,6 +168,9 @@ class LocaleFrame:
         if change.what == "gone":
             parts, things = remove_thing(self.parts, self.things, change.name)
             return replace(self, parts=parts, things=things, changes=changes, filed=filed, memo={})
+        if change.what == "extra":
+            things = (*self.things, _to_thing(change, self.name))
+            return replace(self, things=things, changes=changes, filed=filed, memo={})
         parts = remove_element(self.parts, change.name)
         return replace(self, parts=parts, changes=changes, filed=filed, memo={})
 
@@ -187,6 +194,12 @@ class LocaleFrame:
         held = (f"{words.count(len(self.children), 'locale')} in it" if self.children else
                 f"{words.count(len(self.doorways), 'open door')}, {words.count(len(self.things), 'thing')}")
         return f"what is known of {self.name}{parent}: {held}{_tell_changes(self.changes)}; from {self.locale.source}"
+
+
+def _to_thing(change: FrameChange, locale: str) -> Thing:
+    """What stands there and the file lacks: nobody knows how high it is, so it is in the way at every height."""
+    footprint = frozen(change.footprint, (None, 2))
+    return Thing(change.name, locale, "obstacle", footprint, 0.0, ROBOT_TOP_M, None, change.by)
 
 
 FRAME_OF: Index[LocaleFrame] = Index(LocaleFrame, lambda frame: frame.name, "frame")
