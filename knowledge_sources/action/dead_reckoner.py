@@ -62,16 +62,17 @@ class DeadReckoner(RobotKnowledgeSource):
         yield step
         rolled = drift.after_motion(actuator, report.turn_rad, report.move_m, on_the_spot=not on_the_move)
         yield Post(rolled, (trigger.entry,)) if known is None else Revise(known, rolled, (trigger.entry, known))
-        if on_the_move and fault is None:
-            return  # a picture was taken on the move
-        yield Post(Look("track"), (step,))
-        if request is None or fault is not None or on_the_move:
+        if not on_the_move or fault is not None:  # on the move a picture was taken
+            yield Post(Look("track"), (step,))
+        if request is None or fault is not None:
             return
-        if report.move_m < self._settings.action.min_claimed_part * request.value.move_m:
-            what = f"something stopped the robot: {report.move_m:.2f} m of {request.value.move_m:.2f} m are claimed"
+        contact = find_contact(view, request.id)
+        what = "something was touched on the move" if on_the_move else (
+            f"something stopped the robot: {report.move_m:.2f} m of {request.value.move_m:.2f} m are claimed")
+        is_short = not on_the_move and report.move_m < self._settings.action.min_claimed_part * request.value.move_m
+        if contact is not None or is_short:
             bound_px = self._settings.plan.max_deviation_px
             stopped = Discrepancy(Level.ACTION, what, math.inf, (bound_px, bound_px), "px")
-            contact = find_contact(view, request.id)
             yield Post(stopped, (trigger.entry,) if contact is None else (trigger.entry, contact))
 
 

@@ -14,7 +14,7 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.motion.routes import measure_thing_distance_m, measure_wall_distance_m
-from knowledge_sources.questions import find_contact, find_frames, find_robot
+from knowledge_sources.questions import find_contact, find_frames, find_robot, last_motion
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.building import Building
 from world_models.entries.locale_frame import FrameChange, LocaleFrame
@@ -26,22 +26,23 @@ from world_models.entries.touch import Contact
 class ObstacleFinder(RobotKnowledgeSource):
     """Concludes from a contact that something stands in the way, and puts it into the frame of its locale.
 
-    A contact is explained by the model where a wall or a thing is near enough to be touched, by what the belief and
-    the contact's direction leave open. Then nothing is concluded; nor where the direction is not known. How large the
-    thing is a touch does not tell: it is taken to be ``obstacle_width_m`` wide and deep.
+    It waits until a milestone was verified where the robot touched: as long as its place is in doubt, a contact may be
+    with a wall. The model explains a contact where a wall or a thing is near enough to be touched, by what the belief
+    leaves open. Then nothing is concluded; nor where the contact's direction is not known. How large the thing is a
+    touch does not tell: it is taken to be ``obstacle_width_m`` wide and deep.
     """
 
     level = Level.ACTION
-    watches = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "odometry"),)
+    watches = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),)
     writes = (Obstacle, LocaleFrame)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        contact, most_rad = _find_new_contact(view, trigger.entry.value), self._settings.action.max_touch_sigma_rad
+        contact, most_rad = _find_new_contact(view), self._settings.action.max_touch_sigma_rad
         return 0.95 if contact is not None and contact.value.sigma_rad <= most_rad else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief: Entry[Hypothesis] = trigger.entry
-        contact = _find_new_contact(view, belief.value)
+        contact = _find_new_contact(view)
         if contact is None:
             return
         robot, locale, s = find_robot(view), belief.value.locale, self._settings.action
@@ -63,10 +64,10 @@ class ObstacleFinder(RobotKnowledgeSource):
             yield Revise(frame, frame.value.changed(change), (found, frame))
 
 
-def _find_new_contact(view: View, belief: Hypothesis) -> Entry[Contact] | None:
-    """The contact of the motion that a belief was last moved by, if no obstacle rests on it yet."""
-    report = view.get(belief.motion)
-    contact = None if report is None else find_contact(view, report.because[0].id)
+def _find_new_contact(view: View) -> Entry[Contact] | None:
+    """The contact in the last motion, if no obstacle rests on it yet: the robot stands as it touched."""
+    last = last_motion(view)
+    contact = None if last is None else find_contact(view, last.id)
     if contact is None or any(contact.ref in obstacle.because for obstacle in view.all(Obstacle)):
         return None
     return contact

@@ -1,0 +1,99 @@
+"""A thing that the model lacks is touched once, and driven round; what the model explains, or doubt leaves open, is no
+obstacle."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from blackboard.board import Blackboard
+from blackboard.change import Revised
+from blackboard.effect import Post, Revise
+from blackboard.journal import Decision
+from harvey.simulation.run import build_robot_model, run_mission
+from knowledge_sources.action.obstacle_finder import ObstacleFinder
+from sim.scenario import load_scenario, parse_scenario
+from sim.stage import build_stage
+from world_models.building.world import World
+from world_models.entries.body import MotorCommand
+from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.obstacle import Obstacle
+from world_models.entries.touch import Contact
+from world_models.files.world_files import WORLDS, load_world
+from world_models.frame_store import FrameStore
+from world_models.frames import Pose2
+
+CARTON = """units = "feet"
+[finishes]
+cardboard = { colour = [0.58, 0.46, 0.32], texture = "speckle", scale = 0.3 }
+[parts]
+carton = [{ x = [-0.7, 0.7], y = [-0.7, 0.7], z = [0.0, 1.6], finish = "cardboard" }]
+[locales]
+north-hall = { things = [ { part = "carton", at = [14, 4.1] } ] }
+"""
+MISSION = """description = "A carton in the hall, of which the model knows nothing."
+world = "two_ways"
+details = ["carton.toml"]
+goal = "(ptrans (north-hall (3,4,0)) (north-hall (26,4,0)))"
+[start]
+put_down_sigma_m = 0.02
+put_down_sigma_deg = 1.0
+"""
+
+
+def test_a_carton_that_the_model_lacks_is_touched_once_and_driven_round(tmp_path: Path) -> None:
+    (tmp_path / "carton.toml").write_text(CARTON, encoding="utf-8")
+    decisions: list[Decision] = []
+    result = run_mission(build_stage(parse_scenario(MISSION, "carton", tmp_path)), 1, sinks=[decisions.append])
+    found = [change.entry for d in decisions for change in d.made if isinstance(change.entry.value, Obstacle)]
+    assert (result.outcome, result.collisions, result.false_accepts) == ("reached", 1, 0)
+    assert result.error_m < 0.0254
+    assert len(found) == 1
+    assert found[0].value.locale == "north-hall" and found[0].value.x_m == pytest.approx((14 - 0.7) * 0.3048, abs=0.05)
+    assert found[0].because[0].id.startswith("Contact-")
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return load_world(WORLDS / "two_ways.toml")
+
+
+def touch(world: World, pose: Pose2, contact: Contact, *, sigma_m: float = 0.01) -> list[Obstacle]:
+    """What the obstacle finder concludes from a contact at a pose of the north hall, once a milestone was verified."""
+    board, store = Blackboard(), FrameStore(world)
+    robot = build_robot_model(load_scenario("shut-door"), world)
+    frames = [Post(store.frame(name)) for name in ("", "north-hall")]
+    belief = Hypothesis("north-hall", pose, diagonal(sigma_m, 0.005), "odometry")
+    command = Post(MotorCommand(0.0, 0.6))
+    made = board.apply([*map(Post, robot.entries()), *frames, command, Post(contact, (command,)), Post(belief)],
+                       author="test", cycle=1)
+    seen = Hypothesis("north-hall", pose, diagonal(sigma_m, 0.005), "milestone")
+    (revised,) = board.apply([Revise(made[-1].entry, seen)], author="test", cycle=2)
+    source, view = ObstacleFinder(), board.view
+    assert isinstance(revised, Revised)
+    if source.rate(view, revised) is None:
+        return []
+    return [e.value for e in source.act(view, revised) if isinstance(e, Post) and isinstance(e.value, Obstacle)]
+
+
+MIDDLE = Pose2(4.0, 1.2, 0.0)
+AHEAD = Contact("bumper", 0.0, 0.15, 3.0)
+
+
+def test_what_is_touched_on_free_floor_is_an_obstacle_where_it_was_touched(world: World) -> None:
+    (found,) = touch(world, MIDDLE, AHEAD)
+    assert (found.x_m, found.y_m) == pytest.approx((4.35, 1.2), abs=1e-6)
+    assert found.sigma_m > 0.01
+
+
+def test_a_wall_that_may_have_been_touched_explains_a_contact(world: World) -> None:
+    beside_the_wall = Pose2(4.0, 0.40, -math.pi / 2.0)
+    assert touch(world, beside_the_wall, AHEAD) == []
+    assert touch(world, MIDDLE, AHEAD, sigma_m=0.4) == []  # it may stand at the wall, as far as it knows
+
+
+def test_a_contact_from_nowhere_tells_of_no_obstacle(world: World) -> None:
+    assert touch(world, MIDDLE, Contact.of_stall(3.0)) == []
+    assert touch(world, MIDDLE, Contact.of_stall(3.0, turning=True)) == []
