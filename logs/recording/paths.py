@@ -12,6 +12,7 @@ BELIEVED_ROBOT, BELIEVED_TRAIL = f"{WORLD}/robot/believed", f"{WORLD}/robot/beli
 BELIEVED_BODY = f"{BELIEVED_ROBOT}/body"
 CANDIDATES = f"{WORLD}/robot/candidates"
 GOAL, PATH, LEG, LANDMARKS = f"{WORLD}/plan/goal", f"{WORLD}/plan/path", f"{WORLD}/plan/leg", f"{WORLD}/plan/landmarks"
+FRAMES, FRAME_LIST = f"{WORLD}/frames", "frames"
 
 CAMERA = "camera"
 IMAGE = f"{CAMERA}/image"
