@@ -14,6 +14,7 @@ TRUE_ADDED, TRUE_GONE = f"{WORLD}/truth/added", f"{WORLD}/truth/gone"
 CANDIDATES = f"{WORLD}/robot/candidates"
 CONTACTS = f"{WORLD}/robot/contacts"
 GOAL, PATH, LEG, LANDMARKS = f"{WORLD}/plan/goal", f"{WORLD}/plan/path", f"{WORLD}/plan/leg", f"{WORLD}/plan/landmarks"
+FRAMES, FRAME_LIST = f"{WORLD}/frames", "frames"
 
 CAMERA = "camera"
 IMAGE = f"{CAMERA}/image"

@@ -8,7 +8,7 @@ import rerun as rr
 
 from logs.recording.board_mirror import Moment
 from logs.recording.logger import Logger, Subject
-from logs.recording.palette import BELIEVED, DONE, LEVELS, MATCHED, PLANNED, REJECTED, TRUE, VERDICTS, Colour
+from logs.recording.palette import BELIEVED, DONE, LEVELS, MATCHED, PLANNED, REJECTED, REVISED, TRUE, VERDICTS, Colour
 from logs.recording.panel import Panel, log_view
 from logs.recording.paths import CHAPTERS
 from logs.recording.stream import RecordingStream
@@ -21,7 +21,11 @@ ASTRAY_M, BACK_M = 0.2, 0.1
 
 COLOURS: Mapping[str, Colour] = {
     **VERDICTS, "goal": PLANNED, "plan": PLANNED, "doubt": LEVELS["plan"], "lost": REJECTED, "found": BELIEVED,
+<<<<<<< HEAD
     "resumed": DONE, "in truth": TRUE, "collision": REJECTED, "contact": BELIEVED,
+=======
+    "resumed": DONE, "in truth": TRUE, "collision": REJECTED, "told": REVISED,
+>>>>>>> hub/main
 }
 
 

@@ -81,7 +81,7 @@ def test_a_frame_that_nobody_asked_for_is_never_on_the_board(told_run: RunDirect
 
 
 @given(st.integers(0, 2**32))
-@settings(max_examples=3, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=2, phases=(Phase.explicit, Phase.generate))
 def test_the_order_in_which_frames_arrive_does_not_change_decisions(lost_run: RunDirectory, seed: int) -> None:
     """What the world answered in one cycle comes in another order, so the entries have other names."""
     agent = build_agent(RunHead.read(lost_run.path))
