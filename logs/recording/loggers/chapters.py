@@ -21,11 +21,7 @@ ASTRAY_M, BACK_M = 0.2, 0.1
 
 COLOURS: Mapping[str, Colour] = {
     **VERDICTS, "goal": PLANNED, "plan": PLANNED, "doubt": LEVELS["plan"], "lost": REJECTED, "found": BELIEVED,
-<<<<<<< HEAD
-    "resumed": DONE, "in truth": TRUE, "collision": REJECTED, "contact": BELIEVED,
-=======
-    "resumed": DONE, "in truth": TRUE, "collision": REJECTED, "told": REVISED,
->>>>>>> hub/main
+    "resumed": DONE, "in truth": TRUE, "collision": REJECTED, "contact": BELIEVED, "told": REVISED,
 }
 
 
