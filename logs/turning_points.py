@@ -91,8 +91,7 @@ def turning_points(change: Change, cycle: int, get: Get, belief: Entry[Hypothesi
     elif isinstance(value, BodyFault):
         yield TurningPoint(cycle, "fault", f"{value.part}: {value.what}{'' if value.is_open else ', over'}")
     elif isinstance(value, Contact):
-        where = f"{belief.value.place()} by its belief; " if belief is not None else ""
-        yield TurningPoint(cycle, "contact", f"{where}{words.brief(value)}")
+        yield TurningPoint(cycle, "contact", words.brief(value))
     elif isinstance(value, Resumed):
         yield TurningPoint(cycle, "resumed", f"after cycle {value.after_cycle}, where the run was cut off")
     elif isinstance(value, Told) and value.answer:

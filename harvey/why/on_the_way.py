@@ -1,4 +1,4 @@
-"""What happened on the way: when and where the robot was lost and found, what was refuted, faults and collisions."""
+"""What happened on the way: when and where the robot was lost and found, what was refuted, faults, contacts."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from world_models.words import count
 
 MARKS = ("escalated", "refuted", "not testable", "relocalization")
 """A turning point that must be told has one of these words in its line of the journal, or is of one of these kinds."""
-KINDS = ("BodyFault-", "Resumed-", "Told-")
+KINDS = ("BodyFault-", "Contact-", "Resumed-", "Told-")
 WIDTH = 120
 WITHOUT: Mapping[str, str] = {
     "action": "no landmark was followed, and it drove by dead reckoning between milestones",

@@ -12,7 +12,7 @@ BELIEVED_ROBOT, BELIEVED_TRAIL = f"{WORLD}/robot/believed", f"{WORLD}/robot/beli
 BELIEVED_BODY = f"{BELIEVED_ROBOT}/body"
 TRUE_ADDED, TRUE_GONE = f"{WORLD}/truth/added", f"{WORLD}/truth/gone"
 CANDIDATES = f"{WORLD}/robot/candidates"
-CONTACTS = f"{WORLD}/robot/contacts"
+CONTACTS, RANGES = f"{WORLD}/robot/contacts", f"{BELIEVED_ROBOT}/ranges"
 GOAL, PATH, LEG, LANDMARKS = f"{WORLD}/plan/goal", f"{WORLD}/plan/path", f"{WORLD}/plan/leg", f"{WORLD}/plan/landmarks"
 FRAMES, FRAME_LIST = f"{WORLD}/frames", "frames"
 

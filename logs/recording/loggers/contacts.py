@@ -29,14 +29,13 @@ class Contacts(Logger):
         self._places: list[tuple[float, float, float]] = []
         self._labels: list[str] = []
 
-    def begin(self, stream: RecordingStream) -> None:
-        stream.fix(CONTACTS, rr.Points3D.from_fields(colors=[BELIEVED], radii=0.08, show_labels=False))
-
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         contacts = moment.changed(Contact)
         held = self._belief.now(moment.mirror) if contacts else None
         if held is None:
             return
+        if not self._places:
+            stream.fix(CONTACTS, rr.Points3D.from_fields(colors=[BELIEVED], radii=0.08, show_labels=False))
         footprint = moment.mirror.latest(Footprint)
         for contact in contacts:
             radius_m = 0.0 if footprint is None else footprint.value.radius_m
