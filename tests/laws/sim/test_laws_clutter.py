@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.body.collision import ROBOT_RADIUS_M, Obstacles
-from sim.body.free_floor import find_free_floor, has_way
+from sim.body.free_floor import find_free_floor, find_shortest_way, has_way
 from sim.made_up.clutter import KEPT_FREE_M, MAX_THINGS, ClutterMaker
 from sim.made_up.cluttered_missions import write_cluttered_mission
 from sim.scenario import load_scenario, parse_scenario
@@ -69,6 +70,26 @@ def test_there_is_a_way_through_a_gap_that_is_wider_than_the_robot_and_no_other(
              [(3, 0), (3, 2 - width_m / 2)], [(3, 2 + width_m / 2), (3, 4)]]
     free = find_free_floor(Obstacles(np.array(walls, float)))
     assert has_way(free, Pose2(1.0, 1.0, 0.0), Pose2(5.0, 3.0, 0.0)) == (width_m > 2.0 * ROBOT_RADIUS_M)
+
+
+@settings(deadline=None, max_examples=20)
+@given(y0_m=st.floats(0.5, 3.5), y1_m=st.floats(0.5, 3.5), gap_m=st.floats(0.8, 2.0))
+def test_the_shortest_way_is_round_the_jambs(y0_m: float, y1_m: float, gap_m: float) -> None:
+    """Never shorter than the straight line, nor longer than by way of the middle of the gap, and always free."""
+    walls = [[(0, 0), (6, 0)], [(6, 0), (6, 4)], [(6, 4), (0, 4)], [(0, 4), (0, 0)],
+             [(3, 0), (3, 2 - gap_m / 2)], [(3, 2 + gap_m / 2), (3, 4)]]
+    free = find_free_floor(Obstacles(np.array(walls, float)))
+    start, goal, middle = Pose2(0.6, y0_m, 0.0), Pose2(5.4, y1_m, 0.0), Pose2(3.0, 2.0, 0.0)
+    way = find_shortest_way(free, start, goal)
+    assert way is not None
+    length_m = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+    assert start.distance_to(goal) - 1e-9 <= length_m <= 1.01 * (start.distance_to(middle) + middle.distance_to(goal))
+    assert shapely.covers(shapely.buffer(free, 0.011), shapely.linestrings(way))
+
+
+def test_where_there_is_no_way_none_is_found() -> None:
+    free = find_free_floor(Obstacles(np.array([[(0, 0), (6, 0)], [(0, 4), (6, 4)], [(3, 0), (3, 4)]], float)))
+    assert find_shortest_way(free, Pose2(1.0, 2.0, 0.0), Pose2(5.0, 2.0, 0.0)) is None
 
 
 @pytest.mark.parametrize("leaves_way", [True, False])

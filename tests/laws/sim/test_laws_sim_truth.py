@@ -16,10 +16,11 @@ from sim.body.simulated_body import SimulatedBody
 from sim.differences.change import Change, find_active
 from sim.differences.shapes import SHAPES
 from sim.differences.table import Lasting
-from sim.scenario import parse_scenario
+from sim.scenario import load_scenario, parse_scenario
 from sim.stage import Stage, build_stage
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import Course, MotorCommand
+from world_models.entries.body import Course, MotorCommand, Ride, RideReport
+from world_models.entries.location import Place
 from world_models.frames import Pose2
 
 CAMERA, MOUNT = Camera.from_field_of_view(math.radians(65.0), 160, 160), CameraMount(1.0)
@@ -122,6 +123,20 @@ def test_a_door_that_opens_again_is_as_if_it_had_never_been_shut() -> None:
     body.wait(3.0)
     assert before.added and not body.building.added
     np.testing.assert_array_equal(see(body.building, stage.goal_world), see(stage_of("").building, stage.goal_world))
+
+
+def test_on_another_floor_what_differs_there_is_there_too() -> None:
+    scenario = load_scenario("elevator-ride")
+    box = '[[truth.extra]]\nkind = "box"\nlocale = "first-hallway"\nx_ft = 20\ny_ft = 4\nat_s = 5\n'
+    stage = build_stage(parse_scenario(f"{scenario.source.text}\n{box}", "ride", scenario.folder))
+    body, world = stage.body(0), stage.world
+    (link,) = [link for link in world.links if link.kind == "elevator"]
+    up, down = sorted(link.between, key=world.floor_m, reverse=True)
+    there = Place("first-hallway", 20 * 0.3048, 4 * 0.3048).in_world(world)
+    body.put_robot(Pose2(*link.stop_of(up)))
+    assert body.building.obstacles.clearance_m(there) > 0.0
+    assert isinstance(body.ride(Ride("PlanSketch-1", 0, link.name, up, down)), RideReport)
+    assert body.building.floor_m == world.floor_m(down) and body.building.obstacles.clearance_m(there) < 0.0
 
 
 def test_the_last_entry_about_a_door_holds() -> None:
