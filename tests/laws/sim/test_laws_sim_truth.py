@@ -130,7 +130,7 @@ def test_on_another_floor_what_differs_there_is_there_too() -> None:
     box = '[[truth.extra]]\nkind = "box"\nlocale = "first-hallway"\nx_ft = 20\ny_ft = 4\nat_s = 5\n'
     stage = build_stage(parse_scenario(f"{scenario.source.text}\n{box}", "ride", scenario.folder))
     body, world = stage.body(0), stage.world
-    (link,) = [link for link in world.links if link.kind == "elevator"]
+    link = next(link for link in world.links if link.name == "elevator-1-2")
     up, down = sorted(link.between, key=world.floor_m, reverse=True)
     there = Place("first-hallway", 20 * 0.3048, 4 * 0.3048).in_world(world)
     body.put_robot(Pose2(*link.stop_of(up)))
