@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -11,7 +12,10 @@ from harvey.hardware.body import BASE_WORDS, CAMERA_WORDS, HardwareBody, Watchin
 from harvey.hardware.drivers.bases.base import BaseFault, FaultKind
 from harvey.hardware.drivers.cameras.video_camera import CameraFault, CameraFaultKind, Health, VideoCamera
 from harvey.hardware.heartbeat import Heartbeat
+from harvey.hardware.mission import load_mission
 from world_models.entries.body import STOP_KEY, BodyFault, Frame, MotionReport, MotorCommand, Odometry
+from world_models.entries.touch import Ranges
+from world_models.files.toml.mission import ROOT
 
 
 class Clock:
@@ -52,7 +56,7 @@ class FakeBase:
     def take_contact(self) -> None:
         return None
 
-    def ranges(self) -> None:
+    def ranges(self) -> Ranges | None:
         return None
 
     def execute(self, command: MotorCommand, /) -> MotionReport:
@@ -217,3 +221,32 @@ def test_the_heart_beats_while_the_mission_goes_on_and_stops_the_base_once_it_ha
         beaten.clear()
         heart.tick()
         assert beaten.wait(10.0)
+
+
+class Sonars(FakeBase):
+    """A base with one sonar, which fails when it is told to."""
+
+    def ranges(self) -> Ranges | None:
+        self._called("ranges")
+        if self.fails is not None:
+            raise BaseFault(self.fails[0], "as it was told to")
+        return Ranges((0.0,), (1.0,), 0.01, 0.2, 5.0, -1.0)
+
+
+def test_ranges_are_asked_for_only_where_the_mission_wants_them_and_dated_by_our_clock() -> None:
+    clock = Clock()
+    base = Sonars(clock)
+    clock.pass_(3.0)
+    assert HardwareBody(base, Open(), clock=clock).ranges() is None and "ranges" not in base.calls
+    body = HardwareBody(base, Open(), clock=clock, ranges=True)
+    found = body.ranges()
+    assert found is not None and (found.when_s, found.distances_m) == (3.0, (1.0,))
+    base.fails = ("silent", 0.0)
+    assert body.ranges() is None
+
+
+def test_a_missions_file_says_whether_ranges_are_read(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "flat" / "mission.toml").read_text(encoding="utf-8")
+    for more, wanted in (("", False), ("\n[ranges]\nread = true\n", True)):
+        (tmp_path / "m.toml").write_text(text + more, encoding="utf-8")
+        assert load_mission(tmp_path / "m.toml", {}).ranges.read is wanted
