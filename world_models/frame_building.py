@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from blackboard.board import View
 from blackboard.effect import MissingEntryError
@@ -13,7 +13,7 @@ from world_models.building.extents import LocaleExtent
 from world_models.building.locale_source import LocaleGeometry, PassageEdge
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.things import Thing
-from world_models.entries.locale_frame import ANSWERED, CHANGED, FRAME_OF, ROOT, FrameRequest, LocaleFrame
+from world_models.entries.locale_frame import ANSWERED, CHANGED, FRAME_OF, ROOT, FrameAnswer, FrameRequest, LocaleFrame
 
 T = TypeVar("T")
 
@@ -142,8 +142,7 @@ class FrameLocales:
 
     def find_rooms(self, phrases: tuple[str, ...]) -> tuple[str, ...]:
         """See :meth:`FrameBuilding.find_rooms`."""
-        answers = {answer.asked: answer for request in self._view.having(ANSWERED, True)
-                   for answer in request.value.answers}
+        answers = self._answers("called")
         unknown = tuple(phrase for phrase in phrases if phrase not in answers)
         if unknown:
             raise MissingEntryError(FrameRequest(called=unknown))
@@ -153,11 +152,14 @@ class FrameLocales:
         return tuple(answers[phrase].locales[0] for phrase in phrases)
 
     def _missing(self, names: tuple[str, ...]) -> Exception:
-        for request in self._view.having(ANSWERED, True):
-            for answer in request.value.answers:
-                if answer.asked in names and answer.error:
-                    return ValueError(answer.error)
-        return MissingEntryError(FrameRequest(names))
+        answers = self._answers("locales")
+        errors = [answers[name].error for name in names if name in answers]
+        return ValueError(errors[0]) if errors else MissingEntryError(FrameRequest(names))
+
+    def _answers(self, question: Literal["locales", "called", "elements"]) -> dict[str, FrameAnswer]:
+        """What the world said to one kind of question, by what was asked; to ``locales`` only that there are none."""
+        return {answer.asked: answer for request in self._view.having(ANSWERED, True)
+                for answer in request.value.answers if answer.asked in getattr(request.value, question)}
 
     def _note(self, frame: LocaleFrame) -> LocaleFrame:
         if self._notes:
@@ -245,13 +247,12 @@ class FrameLocales:
 
     def find_elements(self, name: str) -> tuple[str, ...]:
         """See :meth:`FrameBuilding.find_elements`."""
-        for request in self._view.having(ANSWERED, True):
-            for answer in request.value.answers:
-                if answer.asked == name and name in request.value.elements:
-                    if answer.error:
-                        raise ValueError(answer.error)
-                    return answer.locales
-        raise MissingEntryError(FrameRequest(elements=(name,)))
+        answer = self._answers("elements").get(name)
+        if answer is None:
+            raise MissingEntryError(FrameRequest(elements=(name,)))
+        if answer.error:
+            raise ValueError(answer.error)
+        return answer.locales
 
 
 def _reaches_height(extent: LocaleExtent, z_m: float, margin_m: float) -> bool:

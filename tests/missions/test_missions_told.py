@@ -124,6 +124,21 @@ def test_told_of_what_is_not_there_it_says_so_and_revises_nothing(tmp_path: Path
     assert said[4] == "as it was known"
 
 
+def test_told_nonsense_of_a_room_it_still_asks_for_that_room(tmp_path: Path) -> None:
+    """The answer that a room is no door is no answer to what is known of the room."""
+    decisions: list[Decision] = []
+    head = build_head(two_doors(tmp_path), SEED)
+    agent = build_agent(head)
+    scheduler = agent.scheduler(ports=[WorldPort(agent.store)], sinks=[decisions.append])
+    tell_robot(scheduler, agent.robot)
+    for said in (Told("parlour", "shut"), head.task()):
+        scheduler.tell([Post(said)], USER)
+        while scheduler.step() is not None:
+            pass
+    assert not any(decision.refused for decision in decisions)
+    assert routes(decisions) == [["north-door"]]
+
+
 @pytest.mark.parametrize(("telling", "expected"), [
     ('what = "study/table-2"\nstate = "gone"', "study/table-1"),
     ('what = "north"\nstate = "shut"', "north-door"),

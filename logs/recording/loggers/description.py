@@ -21,7 +21,8 @@ Play, or drag the cursor at the bottom; click the number of a turning point to g
 
 **Levels:** *action* (blue) corrects moves, *plan* (orange) checks milestones, *goal* (red) finds a lost robot.
 **Ring:** doubt, 1 sigma, 20 times as large; **bands** in plots: ±1 sigma. **Arrows in the picture:** drift, 5 times as
-long. **Grey:** done. Ask on with `harvey why`.
+long. **Grey:** done. **Outlined rooms:** known on the board, pink ones otherwise than in the file. Ask on with
+`harvey why`.
 """
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,7 +31,7 @@ ROBOT_KINDS = (CameraState, Wheels, Footprint)
 MAX_LISTED = 40
 """The list has so many frames at most."""
 
-OUTLINE_M, MARK_M = 0.06, 0.1
+OUTLINE_M, MARK_M = 0.04, 0.1
 """Radii of the strips."""
 BAR_M = 1.2
 """A shut door is barred, and a thing that is gone struck out, so high above the floor."""
@@ -40,8 +40,8 @@ HEADER = "| locale | frame | since cycle | asked for by | otherwise than in the 
 
 
 @dataclass(frozen=True, slots=True)
-class _Known:
-    """A frame on the board.
+class Known:
+    """A frame on the board, as the list tells it.
 
     Attributes:
         entry: its current revision.
@@ -60,8 +60,7 @@ class LocaleFrames(Logger):
     def __init__(self, subject: Subject) -> None:
         super().__init__(subject)
         self._world = subject.world
-        self._known: dict[str, _Known] = {}
-        self._names: dict[str, str] = {}
+        self._known: dict[str, Known] = {}
         self._askers: dict[str, str] = {}
         self._robot: dict[type[Any], Entry[Any]] = {}
         self._listed = ""
@@ -74,18 +73,20 @@ class LocaleFrames(Logger):
         stream.fix(FRAME_LIST, rr.TextDocument.from_fields(media_type="text/markdown"))
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
-        left = [ref.id for ref in moment.decision.left if ref.id in self._names]
+        left = [ref.id for ref in moment.decision.left if ref.id in self._known]
         for ref in moment.decision.left:
             self._askers.pop(ref.id, None)
         if self._listed and not left and not moment.touched(LocaleFrame, FrameRequest, *ROBOT_KINDS):
             return
-        before = dict(self._known)
+        before = self._newest()
         self._take(moment.decision.observed)
         for id in left:
-            self._leave(id)
+            self._known.pop(id, None)
         self._take(moment.decision.made)
-        self._draw(stream, before)
-        text = describe(self._known.values(), self._robot.values())
+        now = self._newest()
+        for name in {**before, **now}:
+            self._draw(stream, before.get(name), now.get(name))
+        text = describe(now.values(), self._robot.values())
         if text != self._listed:
             self._listed = text
             stream.log(FRAME_LIST, rr.TextDocument, text=[text])
@@ -99,32 +100,26 @@ class LocaleFrames(Logger):
                 self._robot[type(entry.value)] = entry
             elif isinstance(entry.value, LocaleFrame):
                 if isinstance(change, Retracted):
-                    self._leave(entry.id)
+                    self._known.pop(entry.id, None)
                 else:
                     self._know(entry)
 
     def _know(self, entry: Entry[LocaleFrame]) -> None:
-        name = self._names[entry.id] = entry.value.name
-        known = self._known.get(name)
-        if known is not None and known.entry.id == entry.id:
-            self._known[name] = replace(known, entry=entry)
-        else:
+        known = self._known.get(entry.id)
+        if known is None:
             askers = (self._askers[ref.id] for ref in entry.because if ref.id in self._askers)
-            self._known[name] = _Known(entry, entry.cycle, next(askers, entry.author))
+            known = Known(entry, entry.cycle, next(askers, entry.author))
+        self._known[entry.id] = replace(known, entry=entry)
 
-    def _leave(self, id: str) -> None:
-        name = self._names.pop(id, "")
-        if name in self._known and self._known[name].entry.id == id:
-            del self._known[name]
+    def _newest(self) -> dict[str, Known]:
+        """The newest frame of each locale, by its name."""
+        return {known.entry.value.name: known for known in self._known.values()}
 
-    def _draw(self, stream: RecordingStream, before: Mapping[str, _Known]) -> None:
-        """Draw the rooms whose frames came or changed, and clear those whose frames left."""
-        for name in {**before, **self._known}:
-            old, new = before.get(name), self._known.get(name)
-            if old != new:
-                self._draw_room(stream, old.entry.value if old else None, new.entry.value if new else None)
-
-    def _draw_room(self, stream: RecordingStream, old: LocaleFrame | None, new: LocaleFrame | None) -> None:
+    def _draw(self, stream: RecordingStream, before: Known | None, now: Known | None) -> None:
+        """Draw a room whose frame came or changed; clear one whose frame left."""
+        if before == now:
+            return
+        old, new = (known.entry.value if known else None for known in (before, now))
         frame = new or old
         if frame is None or not frame.extent.is_room:
             return
@@ -176,7 +171,7 @@ def _strip(points: Sequence[Any], height_m: float) -> NDArray[np.float32]:
     return np.array([(*point[:2], height_m) for point in points], np.float32)
 
 
-def describe(known: Iterable[_Known], robot: Iterable[Entry[Any]]) -> str:
+def describe(known: Iterable[Known], robot: Iterable[Entry[Any]]) -> str:
     """The list in markdown: frames with what is believed otherwise first, then in the order of the world's file."""
     frames = sorted(known, key=lambda k: (not k.entry.value.changes, k.entry.value.extent.number))
     more = [f"... and {words.count(len(frames) - MAX_LISTED, 'frame')} more"] * (len(frames) > MAX_LISTED)
@@ -185,7 +180,7 @@ def describe(known: Iterable[_Known], robot: Iterable[Entry[Any]]) -> str:
     return "\n".join([*table, "", *more, *itself])
 
 
-def _row(known: _Known) -> str:
+def _row(known: Known) -> str:
     entry = known.entry
     changes = "; ".join(map(FrameChange.sentence, entry.value.changes))
     since = f"{known.since}, revised in {entry.cycle}" if entry.revision else str(known.since)
