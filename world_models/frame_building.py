@@ -247,6 +247,10 @@ class FrameLocales:
 
     def find_elements(self, name: str) -> tuple[str, ...]:
         """See :meth:`FrameBuilding.find_elements`."""
+        changed = (self._note(entry.value) for entry in self._view.having(CHANGED, True))
+        extra = tuple(frame.name for frame in changed if ("extra", name) in {(c.what, c.name) for c in frame.changes})
+        if extra:  # no file knows it
+            return extra
         answer = self._answers("elements").get(name)
         if answer is None:
             raise MissingEntryError(FrameRequest(elements=(name,)))

@@ -48,6 +48,8 @@ class ModelReviser(RobotKnowledgeSource):
 def _revise(frame: LocaleFrame, told: Entry[Told]) -> LocaleFrame:
     """The frame as it is now known. Raises ValueError where it has nothing that could be so."""
     what, state = told.value.what, told.value.state
+    if state == "gone" and any((change.what, change.name) == ("extra", what) for change in frame.changes):
+        return frame.restored("extra", what)
     known = {(change.what, change.name) for change in frame.changes}
     filed = frame.filed or frame
     names = [door.name for door in filed.doorways] if state in DOOR_STATES else [thing.name for thing in filed.things]

@@ -18,6 +18,7 @@ from sim.scenario import load_scenario, parse_scenario
 from sim.stage import build_stage
 from world_models.building.world import World
 from world_models.entries.body import MotorCommand
+from world_models.entries.locale_frame import LocaleFrame
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.touch import Contact
@@ -97,3 +98,14 @@ def test_a_wall_that_may_have_been_touched_explains_a_contact(world: World) -> N
 def test_a_contact_from_nowhere_tells_of_no_obstacle(world: World) -> None:
     assert touch(world, MIDDLE, Contact.of_stall(3.0)) == []
     assert touch(world, MIDDLE, Contact.of_stall(3.0, turning=True)) == []
+
+
+def test_an_obstacle_of_which_the_robot_is_told_that_it_is_gone_is_forgotten(tmp_path: Path) -> None:
+    (tmp_path / "carton.toml").write_text(CARTON, encoding="utf-8")
+    told = '[[told]]\nat_s = 30.0\nwhat = "north-hall/obstacle-1"\nstate = "gone"\n'
+    decisions: list[Decision] = []
+    stage = build_stage(parse_scenario(MISSION + told, "carton", tmp_path))
+    result = run_mission(stage, 1, sinks=[decisions.append])
+    frames = [change.entry for d in decisions for change in d.made if isinstance(change.entry.value, LocaleFrame)]
+    assert result.outcome == "reached"
+    assert [len(frame.value.changes) for frame in frames] == [1, 0]

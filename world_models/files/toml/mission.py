@@ -6,6 +6,7 @@ World, goal, start, arrival, servo levels, way of driving, limits. Each format a
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -31,6 +32,8 @@ from world_models.files.toml.source import Node, Source, WorldError
 
 ROOT = WORLDS.parents[1]
 """The folder of the packages: files that come with the project are named relative to it."""
+OBSTACLE = re.compile(r".+/obstacle-\d+")
+"""How an obstacle that the robot found is called."""
 TURN = Bounds(-2.0 * math.pi, 2.0 * math.pi)
 MIN_SIGMA = 0.005
 """Floor of the start's standard deviations [m, rad]: nobody puts a robot down better."""
@@ -97,6 +100,8 @@ class Telling:
             kind, known = "an open door", [doorway.name for doorway in world.doorways]
         else:
             kind, known = "a thing", [thing.name for thing in world.things]
+            if self.state == "gone" and OBSTACLE.fullmatch(self.what):
+                return ""  # what the robot will have found by then
         return "" if self.what in known else f"expected {kind}, {suggest_keys(self.what, known)}, got {self.what!r}"
 
 
