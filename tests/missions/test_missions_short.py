@@ -54,7 +54,7 @@ def test_the_result_file_has_what_is_promised(runs: list[tuple[Path, MissionResu
 
 
 def test_every_decision_rests_on_a_command_or_an_observation(runs: list[tuple[Path, MissionResult]]) -> None:
-    """Walking ``because`` from any entry ends at the user's command or at what the body observed."""
+    """Walking ``because`` from any entry ends at the user's command, or at what the robot was told of itself."""
     because: dict[str, list[str]] = {}
     authors: dict[str, str] = {}
     for line in (runs[0][0] / "journal.jsonl").read_text().splitlines():
@@ -62,5 +62,6 @@ def test_every_decision_rests_on_a_command_or_an_observation(runs: list[tuple[Pa
         for entry in (*record["observed"], *record["made"]):
             because[entry["entry"]], authors[entry["entry"]] = entry["because"], entry["author"]
     roots = {ref for ref, reasons in because.items() if not reasons}
-    assert {authors[ref] for ref in roots} <= {"user", "scheduler"}
+    assert {authors[ref] for ref in roots} <= {"user", "scheduler", "robot"}
+    assert {ref.partition("-")[0] for ref in roots if authors[ref] == "robot"} == {"CameraState", "Wheels", "Footprint"}
     assert all(reason in because for reasons in because.values() for reason in reasons)
