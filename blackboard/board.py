@@ -155,6 +155,8 @@ class View:
 
     def latest(self, kind: type[T], where: Callable[[T], bool] = always) -> Entry[T] | None:
         """The newest posting of a type that satisfies a predicate, or None; :meth:`newest` asks no other."""
+        if where is always:
+            return next(self.newest_first(kind), None)
         return next((entry for entry in self.newest_first(kind) if where(entry.value)), None)
 
     def where(self, kind: type[T], predicate: Callable[[T], bool]) -> tuple[Entry[T], ...]:
