@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath
 from typing import Any, Literal
 
 from blackboard.board import View
@@ -193,7 +194,8 @@ class LocaleFrame:
         parent = f" in {self.locale.parent}" if self.locale.parent else ""
         held = (f"{words.count(len(self.children), 'locale')} in it" if self.children else
                 f"{words.count(len(self.doorways), 'open door')}, {words.count(len(self.things), 'thing')}")
-        return f"what is known of {self.name}{parent}: {held}{_tell_changes(self.changes)}; from {self.locale.source}"
+        source = PurePath(self.locale.source).name
+        return f"what is known of {self.name}{parent}: {held}{_tell_changes(self.changes)}; from {source}"
 
 
 def _to_thing(change: FrameChange, locale: str) -> Thing:
