@@ -13,10 +13,9 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.motion.routes import measure_thing_distance_m, measure_wall_distance_m
+from knowledge_sources.methods.motion.routes import find_nearest
 from knowledge_sources.questions import find_contact, find_frames, find_robot, last_motion
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.building.building import Building
 from world_models.entries.locale_frame import FrameChange, LocaleFrame
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle
@@ -49,7 +48,7 @@ class ObstacleFinder(RobotKnowledgeSource):
         pose, c = belief.value.world_from_robot(robot.world), contact.value
         sigma_m = math.hypot(belief.value.sigma_m, robot.radius_m * math.hypot(belief.value.sigma_rad, c.sigma_rad))
         reach_m = robot.radius_m + s.touch_margin_m + 3.0 * belief.value.sigma_m
-        if _measure_nearest_m(robot.world, locale, np.array(pose.position)) <= reach_m:
+        if find_nearest(robot.world, locale, pose.position)[0] <= reach_m:
             return
         ahead = pose.heading_rad + c.direction_rad
         out, across = np.array([math.cos(ahead), math.sin(ahead)]), np.array([-math.sin(ahead), math.cos(ahead)])
@@ -71,13 +70,6 @@ def _find_new_contact(view: View) -> Entry[Contact] | None:
     if contact is None or any(contact.ref in obstacle.because for obstacle in view.all(Obstacle)):
         return None
     return contact
-
-
-def _measure_nearest_m(building: Building, locale: str, point: Floats) -> float:
-    """Distance of a point from the nearest wall or thing that the model has in a locale [m]."""
-    openings = [np.concatenate(doorway.thresholds_world) for doorway in building.doorways_of(locale)]
-    things = (measure_thing_distance_m(footprint, point) for footprint in building.obstacles(locale))
-    return min(measure_wall_distance_m(building.outline(locale), openings, point), *things, math.inf)
 
 
 def _build_footprint(

@@ -1,8 +1,8 @@
 """Locale frames (§3.4): what the robot knows of a locale, as an entry, and the request that brings it to the board.
 
 The long-term model of the building is a network of frames in a file. What matters for the task at hand is instantiated
-from it on the board: a knowledge source that lacks a frame asks for it, and the world's port answers. Whoever learns
-better revises the frame.
+from it on the board: a knowledge source that lacks a frame asks for it, and the world's port answers. What is
+learnt of the locale revises its frame.
 """
 
 from __future__ import annotations

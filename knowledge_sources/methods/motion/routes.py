@@ -96,6 +96,15 @@ def measure_thing_distance_m(footprint: Any, point: Any) -> float:
     return float(shapely.Polygon(np.asarray(footprint, float)).distance(shapely.Point(point)))
 
 
+def find_nearest(building: Building, locale: str, point: Any) -> tuple[float, str]:
+    """Distance [m] of a point (2,) [world] from the nearest wall or obstacle of a locale, and which of them it is."""
+    openings = [np.concatenate(doorway.thresholds_world) for doorway in building.doorways_of(locale)]
+    near = [(measure_wall_distance_m(building.outline(locale), openings, point), "a wall")]
+    near += [(measure_thing_distance_m(thing.footprint_world, point), thing.name)
+             for thing in building.things_of(locale) if thing.is_obstacle]
+    return min(near)
+
+
 def _find_nearest_free(free: shapely.Geometry, point: Floats, floor: Callable[[], shapely.Geometry]) -> Floats | None:
     """Of the nearest point of each free part, and all corners: the nearest that is not behind a barrier."""
     parts = [part for part in shapely.get_parts(free) if not part.is_empty]

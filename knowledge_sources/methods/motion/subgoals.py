@@ -11,10 +11,9 @@ from shapely import Geometry, Point
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.motion.routes import (
     find_free_space,
+    find_nearest,
     find_shortest_route,
     is_clear,
-    measure_thing_distance_m,
-    measure_wall_distance_m,
 )
 from knowledge_sources.settings.plan import PlanSettings
 from world_models.building.locales import Link, Passage
@@ -34,12 +33,7 @@ class SubgoalPlanner:
         building, name = self._building, there.locale
         if not building.locale(name).contains((there.x_m, there.y_m)):
             return f"is not within {name}"
-        point = there.in_world(building).position
-        openings = [np.concatenate(doorway.thresholds_world) for doorway in building.doorways_of(name)]
-        near = [(measure_wall_distance_m(building.outline(name), openings, point), "a wall")]
-        near += [(measure_thing_distance_m(t.footprint_world, point), t.name)
-                 for t in building.things_of(name) if t.is_obstacle]
-        distance_m, what = min(near)
+        distance_m, what = find_nearest(building, name, there.in_world(building).position)
         radius_m, margin_m = self._robot.radius_m, self._settings.clearances_m[-1]
         if distance_m >= radius_m + margin_m:
             return ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -19,6 +19,7 @@ from logs.recording.logger import Subject
 from logs.recording.loggers.locale_frames import LocaleFrames, marks_path, outline_path
 from logs.recording.palette import KNOWN, REVISED
 from logs.recording.paths import FRAME_LIST
+from logs.recording.stream import RecordingStream
 from scripted_mission import CAMERA, MOUNT, house
 from world_models.building.world import World
 from world_models.entries.locale_frame import FrameChange, LocaleFrame
@@ -52,6 +53,7 @@ def test_what_is_drawn_and_listed_is_what_is_on_the_board(plan: list[tuple[tuple
     """A step may come from outside or by an act; a frame may be asked for that is there already."""
     world, board, stream = the_house(), Blackboard(), LastLogged()
     logger, store = LocaleFrames(Subject("house", world, CAMERA, MOUNT, Belief(world))), FrameStore(world, "a file")
+    drawn = cast(RecordingStream, stream)
     for cycle, ((what, room), is_observed) in enumerate(plan, start=1):
         there = [entry for entry in board.view.all(LocaleFrame) if entry.value.name == room]
         left: tuple[Ref, ...] = ()
@@ -62,7 +64,7 @@ def test_what_is_drawn_and_listed_is_what_is_on_the_board(plan: list[tuple[tuple
         changes = board.apply(effects, author="world", cycle=cycle)
         observed, made = (changes, ()) if is_observed else ((), changes)
         decision = Decision(cycle, (), observed, Level.PLAN, (), (), None, None, 0, made, left=left)
-        logger.log(stream, Moment(decision, Mirror()))  # type: ignore[arg-type]
+        logger.log(drawn, Moment(decision, Mirror()))
         for name in ROOMS:
             newest = [entry.value for entry in board.view.all(LocaleFrame) if entry.value.name == name][-1:]
             outline = stream.rows.get(outline_path(name), {"strips": []})
@@ -74,7 +76,7 @@ def test_what_is_drawn_and_listed_is_what_is_on_the_board(plan: list[tuple[tuple
             assert (f"| {name} |" in stream.rows[FRAME_LIST]["text"][0]) == bool(newest)
     logged = stream.count
     for cycle in (98, 99):
-        logger.log(stream, Moment(Decision(cycle, (), (), Level.PLAN, (), (), None, None, 0), Mirror()))  # type: ignore[arg-type]
+        logger.log(drawn, Moment(Decision(cycle, (), (), Level.PLAN, (), (), None, None, 0), Mirror()))
     assert stream.count == logged + (not plan), "where nothing changes nothing is logged"
 
 

@@ -1,4 +1,4 @@
-"""Laws of extents: whoever descends from the root finds what is near, and memory and compiled worlds agree."""
+"""Laws of extents: a descent from the root finds what is near, and worlds in memory and compiled worlds agree."""
 
 from pathlib import Path
 

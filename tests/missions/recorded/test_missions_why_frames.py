@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -50,6 +51,12 @@ def told(history: JournalHistory, ref: str, run: RunDirectory | None = None) -> 
     return story(history, record, None if run is None else WorldFile(run))
 
 
+def value_in(history: JournalHistory, ref: str) -> dict[str, Any]:
+    record = history.entry(ref)
+    assert record is not None
+    return dict(record.value)
+
+
 def step(of: Story, label: str) -> Step:
     found = next((one for one in of.steps if one.label == label), None)
     assert found is not None, f"{of.ref} tells no {label!r}"
@@ -64,7 +71,7 @@ def test_a_turn_goes_back_to_model_lines_their_frames_and_lines_of_the_file(
     for ref in turns:
         found = told(history, ref, run)
         model = step(found, "model")
-        held = {history.entry(frame).value["locale"] for frame in model.refs}  # type: ignore[union-attr]
+        held = {value_in(history, frame)["locale"] for frame in model.refs}
         names = elements_of_all(store, held)
         for thing, locale, file, line in WHERE.findall(model.text):
             name = f"{locale}/{thing}" if locale else thing
@@ -119,7 +126,7 @@ def test_what_was_pending_is_known_where_acts_wait(history: JournalHistory) -> N
 
 def test_a_sketch_drawn_anew_goes_back_to_what_was_told(run: RunDirectory, history: JournalHistory) -> None:
     superseded = next(ref for ref in history.refs if ref.startswith("PlanSketch-")
-                      and history.entry(ref).value["status"] == "superseded")  # type: ignore[union-attr]
+                      and value_in(history, ref)["status"] == "superseded")
     for ref in (superseded, "PlanSketch-3.0"):
         found = told(history, ref, run)
         assert f"{DOOR} is shut (user)" in step(found, "changed").text
