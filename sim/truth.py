@@ -18,6 +18,7 @@ class Truth:
         time_s: simulated time since the run began [s].
         path_m: length of the path driven so far [m]; displacements by faults do not count.
         collisions: contacts so far.
+        contact_m_per_s: how fast it moved when it touched something last.
         lights_on: whether the building is lit.
         locale: the name of the locale that it is in, "" outside all.
     """
@@ -26,6 +27,7 @@ class Truth:
     time_s: float = 0.0
     path_m: float = 0.0
     collisions: int = 0
+    contact_m_per_s: float = 0.0
     lights_on: bool = True
     locale: str = ""
 

@@ -55,8 +55,13 @@ def format_result(r: MissionResult, out: Path | None) -> str:
 
 def _places(r: MissionResult) -> str:
     """Where the robot truly touched something."""
-    where = listed([f"in cycle {c.cycle} at {Place(c.locale, c.x_m, c.y_m).words()}" for c in r.contacts])
+    where = listed([f"in cycle {c.cycle} at {Place(c.locale, c.x_m, c.y_m).words()}{_speed(c.speed_m_per_s)}"
+                    for c in r.contacts])
     return f": {where}" if where else ""
+
+
+def _speed(speed_m_per_s: float | None) -> str:
+    return "" if speed_m_per_s is None else f" at {speed_m_per_s:.2f} m/s"
 
 
 def format_results(results: Sequence[MissionResult]) -> str:

@@ -25,12 +25,14 @@ class Contact:
     Attributes:
         cycle: the first that began after it.
         locale: where the robot was, "" outside all locales; x_m, y_m: in the frame of the locale, else of the world.
+        speed_m_per_s: how fast it moved; None in the results of older versions.
     """
 
     cycle: int
     locale: str
     x_m: float
     y_m: float
+    speed_m_per_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from sim.body.simulated_body import SimulatedBody
 from sim.truth import Truth
 from world_models.building.world import World
 from world_models.entries.location import Place
+
+
+@dataclass(frozen=True, slots=True)
+class TrueContact:
+    """Where the robot truly was, and how fast it moved, when it touched something."""
+
+    place: Place
+    speed_m_per_s: float
 
 
 class ContactWatch:
@@ -15,14 +25,15 @@ class ContactWatch:
         self._world, self._body = world, body
         self._counted = self._followed = 0
 
-    def new_contacts(self) -> tuple[Place, ...]:
-        """The true places of the robot when it touched something, oldest first."""
+    def new_contacts(self) -> tuple[TrueContact, ...]:
+        """Each time that the robot truly touched something, oldest first."""
         if self._body.truth.collisions == self._counted:
             return ()
         track = self._body.track
-        found: list[Place] = []
+        found: list[TrueContact] = []
         for truth in (*track[self._followed:], self._body.truth):
-            found += [self._place(truth)] * (truth.collisions - self._counted)
+            contact = TrueContact(self._place(truth), truth.contact_m_per_s)
+            found += [contact] * (truth.collisions - self._counted)
             self._counted = truth.collisions
         self._followed = len(track)
         return tuple(found)

@@ -73,7 +73,9 @@ class Referee:
         )
 
     def _note_contacts(self, cycle: int) -> None:
-        self._contacts += [Contact(cycle, p.locale, p.x_m, p.y_m) for p in self._contact_watch.new_contacts()]
+        for contact in self._contact_watch.new_contacts():
+            place = contact.place
+            self._contacts.append(Contact(cycle, place.locale, place.x_m, place.y_m, contact.speed_m_per_s))
 
     def _follow(self) -> None:
         """How far the robot truly strayed from the leg that it was driving since the last decision."""

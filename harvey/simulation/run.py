@@ -145,7 +145,8 @@ class SimulatedRun(Run):
 
     def _draw_truth(self) -> None:
         truth = self.simulated_body.truth
-        self.recorder.draw_truth(truth.world_from_robot, truth.time_s, self._contact_watch.new_contacts())
+        touched = tuple(contact.place for contact in self._contact_watch.new_contacts())
+        self.recorder.draw_truth(truth.world_from_robot, truth.time_s, touched)
         differs = self.simulated_body.building.added, self.simulated_body.building.gone
         if differs != self._drawn:
             self._drawn = differs

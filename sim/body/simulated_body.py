@@ -208,7 +208,7 @@ class SimulatedBody:
         there = there @ arc_displacement(move_m * slip.length_factor, slip.curvature_per_m)
         if self._building.obstacles.blocks(before, there):
             if self._touching_rad is None:
-                self._touching_rad = self._count_collision(there)
+                self._touching_rad = self._count_collision(there, duration_s)
             self._advance_time(duration_s)
             return 0.0, 0.0
         self._drive_to(there, duration_s)
@@ -256,7 +256,7 @@ class SimulatedBody:
             step, self._motion = self._motion.advance(duration_s / steps, parameters.acceleration_m_per_s2)
             before = self._truth.world_from_robot
             if self._building.obstacles.blocks(before, before @ step):
-                self._count_collision(before @ step)
+                self._count_collision(before @ step, duration_s / steps)
                 self._advance_time(duration_s / steps)
                 return True
             self._drive_to(before @ step, duration_s / steps)
@@ -311,7 +311,7 @@ class SimulatedBody:
                 return index / len(steps)
             before = self._truth.world_from_robot
             if self._building.obstacles.blocks(before, before @ step):
-                self._count_collision(before @ step)
+                self._count_collision(before @ step, each_s)
                 self._track.append(self._truth)
                 return index / len(steps)
             self._drive_to(before @ step, each_s)
@@ -326,9 +326,10 @@ class SimulatedBody:
             for kind, fault in self.device_faults.items()
         )
 
-    def _count_collision(self, there: Pose2) -> float:
-        """Something is touched on the way to ``there``; returns its direction from the heading [rad]."""
-        self._truth = replace(self._truth, collisions=self._truth.collisions + 1)
+    def _count_collision(self, there: Pose2, within_s: float) -> float:
+        """Something is touched in a step to ``there``; returns its direction from the heading [rad]."""
+        speed_m_per_s = there.distance_to(self._truth.world_from_robot) / within_s
+        self._truth = replace(self._truth, collisions=self._truth.collisions + 1, contact_m_per_s=speed_m_per_s)
         direction_rad = self._building.obstacles.nearest_direction_rad(there)
         self._contact = self._bumper.feel(direction_rad, self._truth.time_s)
         return direction_rad

@@ -20,6 +20,7 @@ from world_models.frames import Pose2
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)
 BUILDING = Building.of_faces(box_room(), samples=1)
 COMMANDS = st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(0.0, 2.0)), max_size=12)
+SPEED_M_PER_S = ActuatorParameters().speed_m_per_s
 
 
 def body(seed: int, put_down_sigma: float = 0.0) -> SimulatedBody:
@@ -41,6 +42,8 @@ def test_no_wall_is_entered_and_a_contact_cuts_the_claim(seed: int, commands: li
         report = robot.execute(MotorCommand(turn, move))
         assert BUILDING.obstacles.clearance_m(robot.truth.world_from_robot) >= 0.0
         assert (robot.truth.collisions > before) == (report.move_m < move - 0.0011)
+        if robot.truth.collisions > before:
+            assert 0.9 * SPEED_M_PER_S < robot.truth.contact_m_per_s < SPEED_M_PER_S
 
 
 @settings(deadline=None, max_examples=25)

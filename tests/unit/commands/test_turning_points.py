@@ -129,14 +129,14 @@ def test_a_level_that_was_off_is_said(tmp_path: Path) -> None:
 
 
 def test_the_summary_tells_them_and_the_result_keeps_them() -> None:
-    contacts, points = (Contact(3, "kitchen", 1.5, 2.0),), (TurningPoint(4, "lost", "here; nothing fits"),)
+    contacts, points = (Contact(3, "kitchen", 1.5, 2.0, 0.38),), (TurningPoint(4, "lost", "here; nothing fits"),)
     known = MissionResult(
         scenario="s", seed=0, outcome="reached", reason="so it was", goal="(ptrans)", final_error_m=0.01,
         final_heading_error_rad=0.0, path_length_m=20.0, sim_time_s=90.0, wall_time_s=10.0, frames=9, decisions=400,
         milestones={"verified": 5, "refuted": 1, "not_testable": 0, "false_accepts": 0}, replans=2, relocalizations=0,
         sketches=3, collisions=1, max_cross_track_m=1.0, contacts=contacts, turning_points=points)
     text = format_result(known, None)
-    assert "collisions    1: in cycle 3 at kitchen (1.50, 2.00) m" in text
+    assert "collisions    1: in cycle 3 at kitchen (1.50, 2.00) m at 0.38 m/s" in text
     assert "lost          cycle 4: here; nothing fits" in text
     assert MissionResult.of_record(json.loads(json.dumps(known.record()))) == replace(known, amiss=[])
 
@@ -161,7 +161,8 @@ def test_a_contact_is_found_once_where_the_robot_truly_was(locale: str) -> None:
     watch = ContactWatch(house(), cast(SimulatedBody, body))
     assert watch.new_contacts() == ()
     body.truth, body.track = moments[2], tuple(moments)
-    (place,) = watch.new_contacts()
-    assert (place.locale, place.x_m) == (locale, 2.0) and watch.new_contacts() == ()
-    body.truth = replace(moments[2], collisions=2)
-    assert [place.x_m for place in watch.new_contacts()] == [3.0]
+    (contact,) = watch.new_contacts()
+    assert (contact.place.locale, contact.place.x_m, contact.speed_m_per_s) == (locale, 2.0, 0.0)
+    assert watch.new_contacts() == ()
+    body.truth = replace(moments[2], collisions=2, contact_m_per_s=0.3)
+    assert [(contact.place.x_m, contact.speed_m_per_s) for contact in watch.new_contacts()] == [(3.0, 0.3)]
