@@ -133,7 +133,7 @@ class Building(ABC):
         return frozen(self.world_from_locale(locale).apply(np.column_stack([own, np.zeros(len(own))]))[:, :2])
 
     def obstacles(self, locale: str) -> tuple[NDArray[np.float64], ...]:
-        """Footprints (4, 2) of the things in a locale that the robot could hit [m, world]."""
+        """Footprints (k, 2) of the things in a locale that the robot could hit [m, world]."""
         return tuple(t.footprint_world for t in self.things_of(locale) if t.is_obstacle)
 
     # -- places and routes -----------------------------------------------------------------------------------------

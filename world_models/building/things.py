@@ -36,7 +36,8 @@ class Thing:
         name: unique in the world.
         locale: where it stands.
         kind: the part that it is made from.
-        footprint_world: (4, 2) rectangle on the floor round all of it, or round what the robot could hit [m].
+        footprint_world: (4, 2) rectangle on the floor round all of it, or round what the robot could hit [m]; a
+            polygon (k, 2) where the file lacks it.
         low_m, high_m: its vertical extent above the floor.
         protrusion_m: how far it protrudes from its wall; ``None`` for a free-standing thing.
         source: file:line where it is placed.

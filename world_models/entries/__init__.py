@@ -4,5 +4,6 @@
 the robot knows of its camera, wheels and footprint. ``body``: requests to the robot's body and its answers. ``touch``:
 contacts and ranges. ``task``: command, goal, plan sketch, leg, milestone, certificate, outcome. ``percepts``: tracks,
 segments, matches, pose fixes. ``told``: what somebody says of the building. ``location``: pose hypotheses.
-``obstruction``: what stands before the camera. ``obstacle``: what stands in the way. ``kinds``: all of them.
+``obstruction``: what stands before the camera. ``obstacle``: what stands in the way. ``floor``: free
+floor, and what floors look like. ``kinds``: all of them.
 """

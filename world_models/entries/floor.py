@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -73,3 +74,54 @@ class FreeFloor:
         free = f"free up to {words.metres(min(far))} to {words.metres(max(far))}" if far else "nowhere seen to be free"
         named = f"; {words.count(len(self.things), 'thing')} that the model lacks" if self.things else ""
         return f"the floor of {self.locale} is {free}, by the {self.sense}{named}; at {self.seen_s:.1f} s"
+
+
+Colour = tuple[float, float, float]
+
+
+@inference(keep=8)
+@dataclass(frozen=True, slots=True)
+class FloorAppearance:
+    """What the floor of a locale looks like, as far as it has been learnt from where the robot has just driven.
+
+    Attributes:
+        locale: whose floor.
+        mean: of its colour (red, green, blue) in pictures, 0..255.
+        covariance: (3, 3) of its colour.
+        samples: how many pixels it was learnt from, as far as they count; 0: it is what the model says.
+    """
+
+    locale: str
+    mean: Colour
+    covariance: tuple[Colour, Colour, Colour]
+    samples: float
+
+    def sentence(self) -> str:
+        red, green, blue = self.mean
+        learnt = f"learnt from {self.samples:.0f} pixels" if self.samples else "as the model has it"
+        return f"the floor of {self.locale} looks ({red:.0f}, {green:.0f}, {blue:.0f}) of 255, {learnt}"
+
+
+def picture_of(view: FloorView) -> Iterable[str]:
+    return (view.frame,)
+
+
+@inference(keep=3, needs=picture_of)
+@dataclass(frozen=True, slots=True)
+class FloorView:
+    """A picture that later ones are compared with: what stands up from the floor moves otherwise than the floor.
+
+    Attributes:
+        frame: id of the frame entry.
+        x_m, y_m, heading_rad: where the robot was [world].
+        seen_s: when, by the body's clock.
+    """
+
+    frame: str
+    x_m: float
+    y_m: float
+    heading_rad: float
+    seen_s: float
+
+    def sentence(self) -> str:
+        return f"{self.frame} is kept: the floor was seen from {words.point(self.x_m, self.y_m)} of the world"

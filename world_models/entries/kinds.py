@@ -1,6 +1,18 @@
 """All kinds of entries that come with the project; a knowledge source of another package brings its own."""
 
 from blackboard.kinds import kinds_in
-from world_models.entries import body, locale_frame, location, obstacle, obstruction, percepts, robot, task, told, touch
+from world_models.entries import (
+    body,
+    floor,
+    locale_frame,
+    location,
+    obstacle,
+    obstruction,
+    percepts,
+    robot,
+    task,
+    told,
+    touch,
+)
 
-KINDS = kinds_in(locale_frame, told, robot, body, touch, task, percepts, location, obstacle, obstruction)
+KINDS = kinds_in(locale_frame, told, robot, body, touch, task, percepts, location, obstacle, obstruction, floor)

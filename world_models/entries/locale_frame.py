@@ -19,6 +19,7 @@ from blackboard.kinds import observation, request
 from blackboard.level import Level
 from blackboard.servoing import OPEN
 from world_models import words
+from world_models.building.changes.extra_things import add_extra
 from world_models.building.changes.removals import remove_element, remove_thing
 from world_models.building.changes.shut_doors import shut_door
 from world_models.building.extents import LocaleExtent
@@ -48,13 +49,15 @@ class FrameChange:
             that the file lacks).
         name: of the door, thing, landmark or face.
         by: who said so.
-        footprint: of what is extra: the corners of what it takes of the floor [m, world].
+        footprint: of what is extra: the corners, counter-clockwise, of what it takes of the floor [m, world].
+        height_m: of what is extra: up to here it hides what is behind it; 0 where nothing tells how high it is.
     """
 
     what: ChangeKind
     name: str
     by: str
     footprint: tuple[tuple[float, float], ...] = ()
+    height_m: float = 0.0
 
     def sentence(self) -> str:
         said = {"shut": "is shut", "gone": "is gone", "removed": "is left out", "extra": "stands in the way"}[self.what]
@@ -171,7 +174,9 @@ class LocaleFrame:
             return replace(self, parts=parts, things=things, changes=changes, filed=filed, memo={})
         if change.what == "extra":
             things = (*self.things, _to_thing(change, self.name))
-            return replace(self, things=things, changes=changes, filed=filed, memo={})
+            floor_m = self.extent.reach[2]
+            parts = add_extra(self.parts, change.name, self.name, change.footprint, floor_m, change.height_m)
+            return replace(self, parts=parts, things=things, changes=changes, filed=filed, memo={})
         parts = remove_element(self.parts, change.name)
         return replace(self, parts=parts, changes=changes, filed=filed, memo={})
 
@@ -199,9 +204,9 @@ class LocaleFrame:
 
 
 def _to_thing(change: FrameChange, locale: str) -> Thing:
-    """What stands there and the file lacks: nobody knows how high it is, so it is in the way at every height."""
+    """What stands there and the file lacks; where nobody knows how high it is, it is in the way at every height."""
     footprint = frozen(change.footprint, (None, 2))
-    return Thing(change.name, locale, "obstacle", footprint, 0.0, ROBOT_TOP_M, None, change.by)
+    return Thing(change.name, locale, "obstacle", footprint, 0.0, change.height_m or ROBOT_TOP_M, None, change.by)
 
 
 FRAME_OF: Index[LocaleFrame] = Index(LocaleFrame, lambda frame: frame.name, "frame")

@@ -4,5 +4,6 @@ In reading order:
 
 * :mod:`.shut_doors`: a doorway found shut.
 * :mod:`.removals`: a thing, a landmark or a face that is gone.
+* :mod:`.extra_things`: something that stands there and the file lacks.
 * :mod:`.open_passages`: passage graphs without the passages that are shut.
 """
