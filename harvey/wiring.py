@@ -16,6 +16,7 @@ from blackboard.scheduler import registry_of
 from blackboard.servoing import Servoing
 from knowledge_sources.action.correlator_tracker import CorrelatorTracker
 from knowledge_sources.action.dead_reckoner import DeadReckoner
+from knowledge_sources.action.door_watcher import DoorWatcher
 from knowledge_sources.action.elevator_rider import ElevatorRider
 from knowledge_sources.action.fault_handler import FaultHandler
 from knowledge_sources.action.model_reviser import ModelReviser
@@ -61,6 +62,7 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     FaultHandler,
     ModelReviser,
     ObstacleFinder,
+    DoorWatcher,
     Withdrawer,
     MissionMonitor,
 )

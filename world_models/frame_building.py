@@ -35,8 +35,9 @@ class FrameBuilding(Building):
 
     locale_source: FrameLocales
 
-    def __init__(self, view: View) -> None:
-        super().__init__(FrameLocales(view))
+    def __init__(self, view: View, instead: Iterable[LocaleFrame] = ()) -> None:
+        """``instead``: of the frames on the board, to ask what would be if they were otherwise."""
+        super().__init__(FrameLocales(view, instead))
 
     def cached(self, name: str, max_items: int, key: Hashable, compute: Callable[[], T]) -> T:
         frames = self.locale_source
@@ -112,8 +113,9 @@ class FrameBuilding(Building):
 class FrameLocales:
     """A :class:`world_models.building.locale_source.LocaleSource` of the frames on a board."""
 
-    def __init__(self, view: View) -> None:
+    def __init__(self, view: View, instead: Iterable[LocaleFrame] = ()) -> None:
         self._view = view
+        self._instead = {frame.name: frame for frame in instead}
         self._notes: list[dict[str, LocaleFrame]] = []
 
     def frame(self, name: str) -> LocaleFrame:
@@ -122,10 +124,16 @@ class FrameLocales:
         Raises:
             MissingEntryError: it is not on the board; ValueError: the world has no such locale.
         """
-        entry = self._view.newest(FRAME_OF, name)
-        if entry is None:
+        found = self._find(name)
+        if found is None:
             raise self._missing((name,))
-        return self._note(entry.value)
+        return self._note(found)
+
+    def _find(self, name: str) -> LocaleFrame | None:
+        if name in self._instead:
+            return self._instead[name]
+        entry = self._view.newest(FRAME_OF, name)
+        return None if entry is None else entry.value
 
     def root(self) -> LocaleFrame:
         """The frame of the locale that contains all others. Raises MissingEntryError."""
@@ -180,8 +188,7 @@ class FrameLocales:
     def are_current(self, frames: Iterable[LocaleFrame]) -> bool:
         """Whether these are the revisions on the board; they count as read."""
         for frame in frames:
-            entry = self._view.newest(FRAME_OF, frame.name)
-            if entry is None or entry.value is not frame:
+            if self._find(frame.name) is not frame:
                 return False
             self._note(frame)
         return True

@@ -3,6 +3,7 @@
 from blackboard.kinds import kinds_in
 from world_models.entries import (
     body,
+    door_state,
     floor,
     locale_frame,
     location,
@@ -15,4 +16,5 @@ from world_models.entries import (
     touch,
 )
 
-KINDS = kinds_in(locale_frame, told, robot, body, touch, task, percepts, location, obstacle, obstruction, floor)
+KINDS = kinds_in(locale_frame, told, robot, body, touch, task, percepts, location, obstacle, obstruction, floor,
+                 door_state)

@@ -11,6 +11,7 @@ from numba import njit
 from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.verification import VerificationSettings
+from world_models.building.building import Building
 from world_models.building.geometry.faces import area_vector
 from world_models.building.geometry.regions import Finish, expected_brightness
 from world_models.building.locale_source import LocaleGeometry
@@ -44,31 +45,18 @@ def predict_face_colors(
 def _predict(
     robot: RobotModel, camera: Camera, camera_from_world: Pose, settings: VerificationSettings
 ) -> tuple[FaceColor, ...]:
-    rays, (left, top, right, bottom), window = _build_rays(camera, settings)
-    rooms = sorted(find_visible_locales(robot.world, window, camera_from_world))
-    packets = {(p.locale, p.neighbour or ""): p for room in rooms for p in robot.world.locale_source.geometry(room)}
-    if not packets:
-        return ()
-    parts = [_build_surfaces(packets[key]) for key in sorted(packets)]
-    corners, colors, normals = (np.concatenate([part[i] for part in parts]) for i in range(3))
-    center = camera_from_world.inverse().translation
-    facing = np.flatnonzero(np.einsum("ij,ij->i", normals, center - corners[:, 0]) > 1e-6)
-    near = camera_from_world.apply(corners[facing].reshape(-1, 3)).reshape(-1, MAX_CORNERS, 3)
-    boxes = _bound(near)
-    in_view = np.flatnonzero(np.any(near[..., 2] > NEAR_PLANE_M, axis=1) & (boxes[:, 0] <= right)
-                             & (boxes[:, 2] >= left) & (boxes[:, 1] <= bottom) & (boxes[:, 3] >= top))
-    facing = facing[in_view]
-    turned = normals[facing] @ camera_from_world.rotation.T
-    surface, depth = _cast_rays(near[in_view], turned, boxes[in_view], rays, settings.color_grid_size)
-    surface[np.append(np.isnan(colors[facing, 0]), False)[surface]] = -1  # of unknown color: it only hides
+    rays, bounds, window = _build_rays(camera, settings)
+    colors, normals, surface, depth = cast_rays(
+        robot.world, camera_from_world, rays, bounds, window, settings.color_grid_size)
+    surface[np.append(np.isnan(colors[:, 0]), False)[surface]] = -1  # of unknown color: it only hides
     if camera.obstruction is not None:
         surface[camera.obstruction.covers(_sample_pixels(camera.width, camera.height, settings)).ravel()] = -1
     hit = np.unique(surface[surface >= 0])
     if not len(hit):
         return ()
-    appearance = np.round(np.column_stack([colors, normals])[facing[hit]], 4)
+    appearance = np.round(np.column_stack([colors, normals])[hit], 4)
     keys, group = np.unique(appearance, axis=0, return_inverse=True)
-    group_of = np.full(len(facing) + 1, -1)  # the last element is that of surface -1
+    group_of = np.full(len(colors) + 1, -1)  # the last element is that of surface -1
     group_of[hit] = group.ravel()
     of = group_of[surface].reshape(-1, RAYS)
     whole = np.flatnonzero((of[:, 0] >= 0) & np.all(of == of[:, :1], axis=1))
@@ -76,6 +64,38 @@ def _predict(
     points = camera_from_world.inverse().apply(at).reshape(-1, 3)
     return tuple(_to_face_color(keys[g, :3], points[of[whole, 0] == g], settings.max_face_points)
                  for g in _find_largest(of[whole, 0], settings))
+
+
+def cast_rays(
+    world: Building, camera_from_world: Pose, rays: Floats, bounds: Floats, window: Window, size: int
+) -> tuple[Floats, Floats, Ints, Floats]:
+    """Which surface of the model each ray meets first.
+
+    Args:
+        rays: (n, 3), z = 1, in the camera frame: a grid of ``size`` by ``size`` samples of RAYS each.
+        bounds: (4,) the rectangle around them; window: what of the picture is looked at.
+
+    Returns:
+        Shaded colors (m, 3) and normals (m, 3) of the surfaces in view, the number (n,) of each ray's (-1: none), and
+        its depth (n,) [m].
+    """
+    rooms = sorted(find_visible_locales(world, window, camera_from_world))
+    packets = {(p.locale, p.neighbour or ""): p for room in rooms for p in world.locale_source.geometry(room)}
+    if not packets:
+        return np.zeros((0, 3)), np.zeros((0, 3)), np.full(len(rays), -1), np.full(len(rays), np.inf)
+    parts = [_build_surfaces(packets[key]) for key in sorted(packets)]
+    corners, colors, normals = (np.concatenate([part[i] for part in parts]) for i in range(3))
+    center = camera_from_world.inverse().translation
+    facing = np.flatnonzero(np.einsum("ij,ij->i", normals, center - corners[:, 0]) > 1e-6)
+    near = camera_from_world.apply(corners[facing].reshape(-1, 3)).reshape(-1, MAX_CORNERS, 3)
+    boxes = _bound(near)
+    left, top, right, bottom = bounds
+    in_view = np.flatnonzero(np.any(near[..., 2] > NEAR_PLANE_M, axis=1) & (boxes[:, 0] <= right)
+                             & (boxes[:, 2] >= left) & (boxes[:, 1] <= bottom) & (boxes[:, 3] >= top))
+    facing = facing[in_view]
+    turned = normals[facing] @ camera_from_world.rotation.T
+    surface, depth = _cast_rays(near[in_view], turned, boxes[in_view], rays, size)
+    return colors[facing], normals[facing], surface, depth
 
 
 @lru_cache(maxsize=8)

@@ -1,0 +1,127 @@
+"""Door watcher (§4: models are incomplete): doors of the model that are shut, or open again, by what pictures show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from knowledge_sources.methods.arrays import Image
+from knowledge_sources.methods.doors.belief import update_door
+from knowledge_sources.methods.doors.leaf import decode_half, describe, measure_opening, weigh_leaf
+from knowledge_sources.methods.doors.opening import is_in_view, predict_opening
+from knowledge_sources.questions import (
+    find_belief,
+    find_frames,
+    find_robot_in,
+    is_in_doubt,
+    is_over,
+    is_up_to_date,
+)
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.building.building import Building
+from world_models.building.locales import Doorway
+from world_models.entries.body import Frame
+from world_models.entries.door_state import DoorPicture, DoorState
+from world_models.entries.locale_frame import FrameChange, LocaleFrame
+from world_models.entries.location import Hypothesis
+from world_models.entries.task import Milestone
+from world_models.frame_building import FrameBuilding
+
+
+class Watched(NamedTuple):
+    """A doorway in view, and whether it is believed to be shut."""
+
+    doorway: Doorway
+    is_shut: bool
+
+
+class DoorWatcher(RobotKnowledgeSource):
+    """Looks whether the doors in view are open or shut, and puts what it finds into the frames of both their rooms.
+
+    It looks at pictures as long as the belief is trusted: at those that track landmarks, and at those by which a
+    milestone was verified. An opening shows what the model has beyond, or a leaf. That adds to the log odds of the
+    door; at stated odds, by pictures from two places at least, the door is shut, and the sketcher draws another way.
+    One that is believed to be shut and shows what is beyond is open again.
+    """
+
+    level = Level.ACTION
+    watches = (
+        Watch(Frame, (Posted,), lambda f: f.purpose == "track"),
+        Watch(Milestone, (Revised,), lambda m: m.status == "verified"),
+    )
+    writes = (DoorState, LocaleFrame)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        belief, frame = find_belief(view), view.latest(Frame)
+        if belief is None or frame is None or not self._is_trusted(view, belief.value):
+            return None
+        return 0.8 if any(True for _ in self._list_in_view(view, belief.value)) else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        belief, frame = find_belief(view), view.latest(Frame)
+        if belief is None or frame is None:
+            return
+        image = None
+        for watched in list(self._list_in_view(view, belief.value)):
+            image = decode_half(frame.value.jpeg) if image is None else image
+            yield from self._watch(view, watched, belief, frame, image)
+
+    def _is_trusted(self, view: View, belief: Hypothesis) -> bool:
+        """Whether the belief includes every motion, nothing doubts it, and it is precise enough to look at doors."""
+        s = self._settings.doors
+        if is_over(view) or is_in_doubt(view) or not is_up_to_date(view):
+            return False
+        return belief.sigma_m <= s.max_sigma_m and belief.sigma_rad <= s.max_sigma_rad
+
+    def _list_in_view(self, view: View, belief: Hypothesis) -> Iterator[Watched]:
+        """The doorways of the robot's room that a picture may show."""
+        locale = belief.locale
+        robot = find_robot_in(view, locale)
+        pose = belief.world_from_robot(robot.world)
+        for frame in find_frames(view, (locale,)):
+            doors = [Watched(d, is_shut=False) for d in frame.value.doorways]
+            doors += [Watched(d, is_shut=True) for d in frame.value.shut_doorways]
+            yield from (w for w in doors if is_in_view(robot, pose, w.doorway, locale, self._settings.doors))
+
+    def _watch(
+        self, view: View, watched: Watched, belief: Entry[Hypothesis], frame: Entry[Frame], image: Image
+    ) -> Iterable[Effect]:
+        """Weigh what a picture shows of a door, and revise what is believed of it."""
+        s, door, locale = self._settings.doors, watched.doorway, belief.value.locale
+        robot = find_robot_in(view, locale)
+        pose, covariance = belief.value.world_from_robot(robot.world), belief.value.covariance_world(robot.world)
+        frames = find_frames(view, door.between)
+        beyond = _with_door_open(view, door.name, frames) if watched.is_shut else robot.world
+        opening = predict_opening(robot, pose, covariance, door, locale, beyond, s)
+        evidence = None if opening is None else measure_opening(robot, opening, image, s)
+        if opening is None or evidence is None:
+            return
+        known = view.latest(DoorState, lambda state: state.door == door.name)
+        ratio = weigh_leaf(evidence, s)
+        picture = DoorPicture(frame.id, opening.box_px, pose.x_m, pose.y_m, pose.heading_rad, ratio,
+                              describe(evidence, ratio))
+        if known is None and (ratio > 0.0) == watched.is_shut:
+            return  # as it is believed to be
+        now = update_door(None if known is None else known.value, door.name, door.between, picture,
+                          frame.value.sim_time_s, is_believed_shut=watched.is_shut, settings=s)
+        if now is None or (known is not None and now.state == known.value.state == "open"):
+            return
+        because = (frame, belief) if known is None else (frame, belief, known)
+        found = Post(now, because) if known is None else Revise(known, now, because)
+        yield found
+        if now.state == "shut" and not watched.is_shut:
+            for entry in frames:
+                yield Revise(entry, entry.value.changed(FrameChange("shut", door.name, self.name)), (found, entry))
+        elif now.state == "open" and watched.is_shut:
+            for entry in frames:
+                yield Revise(entry, entry.value.restored("shut", door.name), (found, entry))
+
+
+def _with_door_open(view: View, door: str, frames: Iterable[Entry[LocaleFrame]]) -> Building:
+    """The building as it would be known if a door were open that is believed to be shut."""
+    return FrameBuilding(view, [entry.value.restored("shut", door) for entry in frames])

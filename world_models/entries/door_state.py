@@ -1,0 +1,68 @@
+"""Doors: whether one is open or shut, by what pictures show in its opening."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from blackboard.kinds import inference
+
+DoorCondition = Literal["open", "shut", "ajar", "unknown"]
+
+
+@dataclass(frozen=True, slots=True)
+class DoorPicture:
+    """What one picture says of a door.
+
+    Attributes:
+        frame: id of the picture.
+        box_px: the opening in it: left, top, right, bottom of the rectified picture.
+        x_m, y_m, heading_rad: where the robot believed to be [world].
+        log_ratio: log likelihood ratio of a leaf against an open doorway.
+        shows: what is seen in the opening, in words.
+    """
+
+    frame: str
+    box_px: tuple[float, float, float, float]
+    x_m: float
+    y_m: float
+    heading_rad: float
+    log_ratio: float
+    shows: str
+
+
+@inference()
+@dataclass(frozen=True, slots=True)
+class DoorState:
+    """Whether a door is open or shut.
+
+    Attributes:
+        door: its name; between: the locales that it joins.
+        state: open, shut, ajar (too little room is left to pass), or unknown as long as that is not certain.
+        certainty: probability of the state, 0..1; of unknown: that the door is not open.
+        log_odds: of not being open, all pictures together.
+        pictures: number of them that were counted.
+        last: the last of them.
+        seen_s: when that was taken, by the body's clock.
+    """
+
+    door: str
+    between: tuple[str, str]
+    state: DoorCondition
+    certainty: float
+    log_odds: float
+    pictures: int
+    last: DoorPicture
+    seen_s: float
+
+    @property
+    def is_passable(self) -> bool:
+        return self.state not in ("shut", "ajar")
+
+    def sentence(self) -> str:
+        said = f"{self.door} is {self.state}"
+        if self.state == "unknown":
+            said = f"{self.door} may be shut"
+        seen = f"{self.pictures} picture{'s' * (self.pictures != 1)}"
+        return f"{said}: its opening shows {self.last.shows}; {self.certainty:.1%} by {seen}, the last at " \
+               f"{self.seen_s:.1f} s"
