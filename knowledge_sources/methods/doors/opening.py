@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from knowledge_sources.methods.arrays import Mask, Floats
+from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.verification.predicted_colors import RAYS, cast_rays
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.doors import DoorSettings
 from world_models.building.building import Building
 from world_models.building.locales import Doorway
 from world_models.camera import NEAR_PLANE_M
-from world_models.frames import Pose2
+from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 
 Box = tuple[float, float, float, float]
