@@ -1,82 +1,348 @@
-"""Obstacle finder (§4: models are incomplete): what was touched where the model has free floor stands in the way."""
+"""Obstacle finder (§4: models are incomplete): what stands on the floor, and is not in the model, is in the way.
+
+It is told of by touch, by pictures of the floor or by range sensors; and it is forgotten when its floor is seen free.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import shapely
 
 from blackboard.board import View
-from blackboard.change import Change, Revised, Watch
+from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.motion.footprints import (
+    Corners,
+    build_free_floor,
+    build_polygon,
+    deepen,
+    join_footprints,
+    list_corners,
+    measure_change_m,
+    measure_free_part,
+    measure_width_m,
+)
 from knowledge_sources.methods.motion.routes import find_nearest
-from knowledge_sources.questions import find_contact, find_frames, find_robot, last_motion
+from knowledge_sources.questions import (
+    find_belief,
+    find_building,
+    find_contact,
+    find_frames,
+    find_robot,
+    is_in_doubt,
+    last_motion,
+)
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.settings.action import ActionSettings
+from world_models.building.building import Building
+from world_models.building.locales import Doorway
+from world_models.entries.floor import FloorThing, FreeFloor
 from world_models.entries.locale_frame import FrameChange, LocaleFrame
 from world_models.entries.location import Hypothesis, Place
-from world_models.entries.obstacle import Obstacle
+from world_models.entries.obstacle import Obstacle, ObstacleStatus
 from world_models.entries.touch import Contact
+
+MAX_BEHIND_DOOR_M = 4.0
+"""Through a doorway a thing of the next room is seen so far behind it."""
+
+
+@dataclass
+class _Draft:
+    """What an act concludes of one obstacle: its entry so far, if there is one, and what it is now."""
+
+    old: Entry[Obstacle] | None
+    new: Obstacle
+    because: list[object] = field(default_factory=list)
 
 
 class ObstacleFinder(RobotKnowledgeSource):
-    """Concludes from a contact that something stands in the way, and puts it into the frame of its locale.
+    """Concludes that something stands in the way, and puts it into the frame of its locale; or that it is gone.
 
-    It waits until a milestone was verified where the robot touched: as long as its place is in doubt, a contact may be
-    with a wall. The model explains a contact where a wall or a thing is near enough to be touched, by what the belief
-    leaves open. Then nothing is concluded; nor where the contact's direction is not known. How large the thing is a
-    touch does not tell: it is taken to be ``obstacle_width_m`` wide and deep.
+    Of a contact it waits until a milestone was verified where the robot touched: as long as its place is in doubt, a
+    contact may be with a wall. The model explains a contact where a wall or a thing is near enough to be touched, by
+    what the belief leaves open. Then nothing is concluded; nor where the contact's direction is not known. How large
+    the thing is a touch does not tell: it is taken to be ``obstacle_width_m`` wide and deep.
+
+    What is seen on the floor is joined with what is known there already. It is there when it is certain enough, by one
+    sure picture or two unsure ones; and gone when most of its footprint is seen to be free floor. The frame is revised
+    only when the footprint has changed so much that plans may change.
     """
 
     level = Level.ACTION
-    watches = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),)
+    watches = (
+        Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),
+        Watch(FreeFloor, (Posted,)),
+    )
     writes = (Obstacle, LocaleFrame)
 
     def rate(self, view: View, trigger: Change) -> float | None:
+        if isinstance(trigger.entry.value, FreeFloor):
+            if find_belief(view) is None or is_in_doubt(view):
+                return None
+            return 0.95 if trigger.entry.value.things or view.latest(Obstacle, _may_be_there) else None
         contact, most_rad = _find_new_contact(view), self._settings.action.max_touch_sigma_rad
         return 0.95 if contact is not None and contact.value.sigma_rad <= most_rad else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief: Entry[Hypothesis] = trigger.entry
-        contact = _find_new_contact(view)
-        if contact is None:
-            return
+        if isinstance(trigger.entry.value, FreeFloor):
+            drafts = list(self._weigh_floor(view, trigger.entry))
+        else:
+            contact = _find_new_contact(view)
+            drafts = [] if contact is None else list(self._weigh_contact(view, contact, trigger.entry))
+        yield from self._write(view, drafts)
+
+    # -- touch ---------------------------------------------------------------------------------------------------------
+
+    def _weigh_contact(self, view: View, contact: Entry[Contact], belief: Entry[Hypothesis]) -> Iterator[_Draft]:
         robot, locale, s = find_robot(view), belief.value.locale, self._settings.action
         pose, c = belief.value.world_from_robot(robot.world), contact.value
         sigma_m = math.hypot(belief.value.sigma_m, robot.radius_m * math.hypot(belief.value.sigma_rad, c.sigma_rad))
-        reach_m = robot.radius_m + s.touch_margin_m + 3.0 * belief.value.sigma_m
-        if find_nearest(robot.world, locale, pose.position)[0] <= reach_m:
-            return
         ahead = pose.heading_rad + c.direction_rad
         out, across = np.array([math.cos(ahead), math.sin(ahead)]), np.array([-math.sin(ahead), math.cos(ahead)])
         touched = np.array(pose.position) + robot.radius_m * out
+        reach_m = s.touch_margin_m + 3.0 * belief.value.sigma_m
+        known = _find_touched(view, touched, reach_m + 3.0 * sigma_m)
+        if known is not None:
+            o = known.value
+            seen = replace(o, certainty=s.max_obstacle_certainty, seen_s=c.when_s, touched_s=c.when_s, status="there")
+            yield _Draft(known, seen, [contact, belief])
+            return
+        if find_nearest(robot.world, locale, pose.position)[0] <= robot.radius_m + reach_m:
+            return
         footprint = _build_footprint(touched, out, across, s.obstacle_width_m)
-        name = f"{locale}/obstacle-{1 + len(view.all(Obstacle))}"
         at = Place.of_world(robot.world, locale, float(touched[0]), float(touched[1]))
-        found = Post(Obstacle(name, locale, footprint, sigma_m, at.x_m, at.y_m, s.obstacle_width_m), (contact, belief))
-        yield found
-        for frame in find_frames(view, (locale,)):
-            change = FrameChange("extra", name, self.name, footprint)
-            yield Revise(frame, frame.value.changed(change), (found, frame))
+        found = Obstacle(
+            _name_next(view, locale), locale, footprint, sigma_m, at.x_m, at.y_m, s.obstacle_width_m,
+            certainty=s.max_obstacle_certainty, seen_s=c.when_s, looked_s=c.when_s, touched_s=c.when_s, by="touch",
+            evidence=c.sentence())
+        yield _Draft(None, found, [contact, belief])
+
+    # -- floor ---------------------------------------------------------------------------------------------------------
+
+    def _weigh_floor(self, view: View, scan: Entry[FreeFloor]) -> Iterator[_Draft]:
+        """What a sight of the floor tells of each thing in it, and of each obstacle whose floor it shows."""
+        f, s = scan.value, self._settings.action
+        free = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
+        drafts: dict[str, _Draft] = {}
+        known = {entry.id: entry for entry in view.all(Obstacle)}
+        fresh = 0
+        for thing in f.things:
+            if thing.p_thing < s.min_thing_certainty or thing.sigma_m > s.max_obstacle_sigma_m:
+                continue
+            shape = deepen(thing.footprint, (f.x_m, f.y_m), s.obstacle_depth_m)
+            entry = _find_same([e for e in known.values() if e.id not in drafts], shape, thing.sigma_m)
+            if entry is not None:
+                new = self._see_again(find_building(view), entry.value, thing, shape, free, scan)
+                if new is not None:
+                    drafts[entry.id] = _Draft(entry, new, [scan])
+                continue
+            if _find_same([e for e in known.values() if e.id in drafts], shape, thing.sigma_m) is not None:
+                continue  # another part of what was joined already
+            found = self._see_first(view, thing, shape, scan, fresh)
+            if found is not None:
+                fresh += 1
+                drafts[f"new {fresh}"] = _Draft(None, found, [scan])
+        yield from drafts.values()
+        seen = [build_polygon(thing.footprint).buffer(2.0 * thing.sigma_m) for thing in f.things]
+        for entry in known.values():
+            if entry.id in drafts or not _may_be_there(entry.value):
+                continue
+            polygon = build_polygon(entry.value.footprint)
+            if not any(polygon.intersects(shape) for shape in seen):
+                gone = self._miss(entry.value, measure_free_part(entry.value.footprint, free), f.seen_s)
+                if gone is not None:
+                    yield _Draft(entry, gone, [scan, entry])
+
+    def _see_first(
+        self, view: View, thing: FloorThing, shape: shapely.Polygon, scan: Entry[FreeFloor], before: int
+    ) -> Obstacle | None:
+        """A thing that was not known; None where walls and things of the model may be all that is seen."""
+        world, f, s = find_building(view), scan.value, self._settings.action
+        locale = _find_room(world, shape, f.locale)
+        margin_m = s.touch_margin_m + thing.sigma_m
+        unexplained = shapely.intersection(shape, _find_open_floor(world, locale, margin_m))
+        if unexplained.area < 0.3 * shape.area:
+            return None
+        own = shapely.intersection(shape, _find_open_floor(world, locale, 0.0))
+        footprint = list_corners(own)
+        if not footprint:
+            return None
+        found = Obstacle(
+            _name_next(view, locale, before), locale, footprint, thing.sigma_m, 0.0, 0.0, 0.0, thing.height_m,
+            thing.sigma_height_m, min(thing.p_thing, s.max_obstacle_certainty), f.seen_s, f.seen_s, None, f.sense,
+            _tell(thing, scan), _status(thing.p_thing, s))
+        return _place(world, found, own)
+
+    def _see_again(
+        self, world: Building, known: Obstacle, thing: FloorThing, shape: shapely.Polygon, free: shapely.Geometry,
+        scan: Entry[FreeFloor],
+    ) -> Obstacle | None:
+        """A known obstacle after it was seen once more; None where that tells nothing that matters."""
+        s, seen_s = self._settings.action, scan.value.seen_s
+        certainty = known.certainty
+        if known.status == "gone":
+            certainty = thing.p_thing
+        elif seen_s - known.looked_s >= s.min_evidence_interval_s:
+            certainty = _combine(known.certainty, thing.p_thing / (1.0 - min(thing.p_thing, 0.999)))
+        certainty = min(certainty, s.max_obstacle_certainty)
+        own = shapely.intersection(shape, _find_open_floor(world, known.locale, 0.0))
+        joined = join_footprints(build_polygon(known.footprint), shape if own.is_empty else own, free, thing.sigma_m)
+        footprint = list_corners(joined)
+        moved = measure_change_m(known.footprint, footprint) >= s.min_footprint_change_m
+        surer = certainty > known.certainty + 0.02 or _status(certainty, s) != known.status
+        higher = thing.sigma_height_m < 0.7 * known.sigma_height_m
+        if not (moved or surer or higher or seen_s - known.seen_s >= 2.0):
+            return None
+        height, sigma = (thing.height_m, thing.sigma_height_m) if higher else (known.height_m, known.sigma_height_m)
+        status: ObstacleStatus = "there" if known.is_there else _status(certainty, s)
+        new = replace(known, certainty=certainty, seen_s=seen_s, looked_s=seen_s, status=status, height_m=height,
+                      sigma_height_m=sigma, sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, scan))
+        return _place(world, replace(new, footprint=footprint), joined) if moved and footprint else new
+
+    def _miss(self, known: Obstacle, free_part: float, seen_s: float) -> Obstacle | None:
+        """A known obstacle after its floor was seen free; None where not enough of it was seen."""
+        s = self._settings.action
+        if free_part < s.min_free_part or seen_s - known.looked_s < s.min_evidence_interval_s:
+            return None
+        certainty = _combine(known.certainty, s.free_floor_odds**free_part)
+        status: ObstacleStatus = "gone" if certainty < s.min_gone_certainty else known.status
+        return replace(known, certainty=certainty, looked_s=seen_s, status=status)
+
+    # -- board ---------------------------------------------------------------------------------------------------------
+
+    def _write(self, view: View, drafts: Iterable[_Draft]) -> Iterable[Effect]:
+        """The obstacles, and the frames that have them."""
+        changes: dict[str, list[tuple[Obstacle, Effect]]] = {}
+        for draft in drafts:
+            because = tuple(draft.because)
+            effect: Effect = Post(draft.new, because) if draft.old is None else Revise(draft.old, draft.new, because)
+            yield effect
+            changes.setdefault(draft.new.locale, []).append((draft.new, effect))
+        for frame in find_frames(view, changes):
+            value, reasons = frame.value, list[object]()
+            for obstacle, effect in changes[frame.value.name]:
+                revised = self._revise_frame(value, obstacle)
+                if revised is not value:
+                    value = revised
+                    reasons.append(effect)
+            if value is not frame.value:
+                yield Revise(frame, value, (*reasons, frame))
+
+    def _revise_frame(self, frame: LocaleFrame, obstacle: Obstacle) -> LocaleFrame:
+        """A frame with an obstacle as it is known now; the same where no plan could change by it."""
+        s = self._settings.action
+        known = next((c for c in frame.changes if (c.what, c.name) == ("extra", obstacle.name)), None)
+        if not obstacle.is_there:
+            return frame if known is None else frame.restored("extra", obstacle.name)
+        height_m = obstacle.height_m + obstacle.sigma_height_m if obstacle.is_height_known else 0.0
+        change = FrameChange("extra", obstacle.name, self.name, obstacle.footprint, round(height_m, 2))
+        if known is None:
+            return frame.changed(change)
+        moved_m = measure_change_m(known.footprint, change.footprint)
+        if moved_m < s.min_footprint_change_m and abs(known.height_m - change.height_m) < s.min_height_change_m:
+            return frame
+        return frame.restored("extra", obstacle.name).changed(change)
+
+
+def _may_be_there(obstacle: Obstacle) -> bool:
+    return obstacle.status != "gone"
+
+
+def _status(certainty: float, settings: ActionSettings) -> ObstacleStatus:
+    return "there" if certainty >= settings.min_obstacle_certainty else "suspected"
+
+
+def _combine(certainty: float, odds: float) -> float:
+    """The probability after further evidence."""
+    product = certainty / max(1e-9, 1.0 - certainty) * odds
+    return product / (1.0 + product)
 
 
 def _find_new_contact(view: View) -> Entry[Contact] | None:
     """The contact in the last motion, if no obstacle rests on it yet: the robot stands as it touched."""
     last = last_motion(view)
     contact = None if last is None else find_contact(view, last.id)
-    if contact is None or any(contact.ref in obstacle.because for obstacle in view.all(Obstacle)):
+    if contact is None or any(o.value.touched_s == contact.value.when_s for o in view.all(Obstacle)):
         return None
     return contact
 
 
-def _build_footprint(
-    touched: Floats, out: Floats, across: Floats, side_m: float
-) -> tuple[tuple[float, float], ...]:
+def _find_touched(view: View, touched: Floats, reach_m: float) -> Entry[Obstacle] | None:
+    """The known obstacle that may have been touched."""
+    at = shapely.Point(touched)
+    near = [(build_polygon(entry.value.footprint).distance(at), entry.id, entry)
+            for entry in view.where(Obstacle, _may_be_there)]
+    distance_m, _, entry = min(near, default=(math.inf, "", None))
+    return entry if distance_m <= reach_m else None
+
+
+def _find_same(known: Iterable[Entry[Obstacle]], shape: shapely.Polygon, sigma_m: float) -> Entry[Obstacle] | None:
+    """The obstacle that a thing is another sight of: that of which it covers most, within the standard deviations."""
+    best: tuple[float, Entry[Obstacle]] | None = None
+    for entry in known:
+        reach_m = 2.0 * math.hypot(sigma_m, entry.value.sigma_m)
+        shared = shapely.intersection(build_polygon(entry.value.footprint).buffer(reach_m), shape).area
+        if shared > 0.0 and (best is None or shared > best[0]):
+            best = shared, entry
+    return None if best is None else best[1]
+
+
+def _find_room(world: Building, shape: shapely.Polygon, near: str) -> str:
+    """The room in which most of a thing stands, of that where the robot is and those next to it."""
+    if shapely.Polygon(world.outline(near)).contains(shape.centroid):
+        return near
+    doors = {doorway.other(near): doorway for doorway in world.doorways_of(near)}
+    rooms = [near, *(room for room, door in doors.items() if _is_seen_through(door, shape))]
+    areas = [shapely.intersection(shapely.Polygon(world.outline(room)), shape).area for room in rooms]
+    return rooms[int(np.argmax(areas))]
+
+
+def _is_seen_through(door: Doorway, shape: shapely.Polygon) -> bool:
+    """Whether a thing is near enough to a doorway to stand in it, or right behind it."""
+    return bool(shapely.MultiPoint(np.concatenate(door.thresholds_world)).distance(shape) < MAX_BEHIND_DOOR_M)
+
+
+def _find_open_floor(world: Building, locale: str, margin_m: float) -> shapely.Geometry:
+    """The floor of a room, with its open doorways, so far from its walls and from what the file has there."""
+    openings = [shapely.MultiPoint(np.concatenate(doorway.thresholds_world)).convex_hull.buffer(0.01)
+                for doorway in world.doorways_of(locale)]
+    floor = shapely.union_all([shapely.Polygon(world.outline(locale)), *openings])
+    things = [shapely.Polygon(thing.footprint_world) for thing in world.things_of(locale)
+              if thing.is_obstacle and thing.kind != "obstacle"]
+    return shapely.difference(shapely.buffer(floor, -margin_m), shapely.buffer(shapely.union_all(things), margin_m))
+
+
+def _place(world: Building, obstacle: Obstacle, shape: shapely.Geometry) -> Obstacle:
+    """An obstacle with the place and the width that follow from its footprint."""
+    middle = shape.centroid
+    at = Place.of_world(world, obstacle.locale, float(middle.x), float(middle.y))
+    return replace(obstacle, x_m=round(at.x_m, 3), y_m=round(at.y_m, 3),
+                   width_m=round(measure_width_m(obstacle.footprint), 3))
+
+
+def _tell(thing: FloorThing, scan: Entry[FreeFloor]) -> str:
+    """Which pixels of which picture tell of a thing."""
+    picture = next((ref.id for ref in scan.because if ref.id.startswith("Frame-")), scan.id)
+    if scan.value.sense != "camera":
+        return f"{scan.id}: {thing.evidence}"
+    left, top, right, bottom = thing.box_px
+    return f"{picture}, pixels ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f}): {thing.evidence}"
+
+
+def _name_next(view: View, locale: str, before: int = 0) -> str:
+    return f"{locale}/obstacle-{1 + len(view.all(Obstacle)) + before}"
+
+
+def _build_footprint(touched: Floats, out: Floats, across: Floats, side_m: float) -> Corners:
     """The corners of a square behind the point that was touched, its near side across the direction [m, world]."""
     half = 0.5 * side_m
-    corners = (touched - half * across, touched - half * across + side_m * out,
-               touched + half * across + side_m * out, touched + half * across)
-    return tuple((float(x), float(y)) for x, y in corners)
+    corners = (touched - half * across, touched + half * across, touched + half * across + side_m * out,
+               touched - half * across + side_m * out)
+    return tuple((float(x), float(y)) for x, y in corners[::-1])

@@ -5,16 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+import shapely
+
 from blackboard.board import View
 from blackboard.change import Change, Revised, Watch
 from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.questions import active_goal
+from knowledge_sources.methods.motion.footprints import build_polygon
+from knowledge_sources.questions import active_goal, find_belief, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.settings.plan import PlanSettings
 from world_models.entries.locale_frame import LocaleFrame
+from world_models.entries.obstacle import Obstacle
 from world_models.entries.percepts import Tracks
 from world_models.entries.task import Milestone, PlanSketch
+
+SLACK_M = 0.03
+"""By so much less than the least clearance a leg may pass an obstacle: it is no better known."""
 
 
 class Withdrawer(RobotKnowledgeSource):
@@ -22,7 +30,8 @@ class Withdrawer(RobotKnowledgeSource):
 
     A milestone that waits to be judged is withdrawn where its prediction rested on the frame; one that was verified,
     where a landmark of it is gone: its place in the sketch must be verified anew. A sketch that led through a door that
-    is now shut, or round a thing that is now gone, is superseded; the sketcher draws it anew.
+    is now shut, or round a thing that is now gone, is superseded; the sketcher draws it anew. So is one whose way an
+    obstacle blocks: it stands within the robot's radius and the least clearance of what is left of a leg.
     """
 
     level = Level.ACTION
@@ -30,15 +39,15 @@ class Withdrawer(RobotKnowledgeSource):
     writes = (Milestone, PlanSketch, Tracks)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        return 1.0 if any(True for _ in _withdrawals(view, trigger.entry)) else None
+        return 1.0 if any(True for _ in _withdrawals(view, trigger.entry, self._settings.plan)) else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        yield from _withdrawals(view, trigger.entry)
+        yield from _withdrawals(view, trigger.entry, self._settings.plan)
 
 
-def _withdrawals(view: View, frame: Entry[LocaleFrame]) -> Iterable[Effect]:
+def _withdrawals(view: View, frame: Entry[LocaleFrame], settings: PlanSettings) -> Iterable[Effect]:
     """What is to be withdrawn after a frame was revised."""
-    superseded = _find_misled(view, frame)
+    superseded = _find_misled(view, frame, settings)
     unverified: set[str] = set()
     for milestone in view.all(Milestone):
         m = milestone.value
@@ -79,13 +88,50 @@ def _holds(view: View, milestone: Milestone) -> bool:
     return s.is_active and s.verified and s.at == milestone.index
 
 
-def _find_misled(view: View, frame: Entry[LocaleFrame]) -> dict[str, None]:
+def _find_misled(view: View, frame: Entry[LocaleFrame], settings: PlanSettings) -> dict[str, None]:
     """The ids of the active sketches, all of them, where one leads through what has changed."""
     if active_goal(view) is None:
         return {}
     active = view.where(PlanSketch, lambda sketch: sketch.is_active)
-    misled = any(_leads_there(sketch.value, frame.value) for sketch in active)
+    changed = _list_changed(view, frame)
+    if changed:
+        misled = any(_meets(view, sketch, obstacle, settings) for sketch in active for obstacle in changed)
+    else:
+        misled = any(_leads_there(sketch.value, frame.value) for sketch in active)
     return dict.fromkeys(sketch.id for sketch in active) if misled else {}
+
+
+def _list_changed(view: View, frame: Entry[LocaleFrame]) -> list[Obstacle]:
+    """The obstacles for which a frame was revised: what was found, or is gone."""
+    found = (view.get(ref.id) for ref in frame.because)
+    return [entry.value for entry in found if entry is not None and isinstance(entry.value, Obstacle)]
+
+
+def _meets(view: View, sketch: Entry[PlanSketch], obstacle: Obstacle, settings: PlanSettings) -> bool:
+    """Whether what is left of a sketch leads against an obstacle that is there, or round one that is gone."""
+    belief = find_belief(view)
+    if belief is None:
+        return False
+    robot, s = find_robot(view), sketch.value
+    world = robot.world
+    footprint = build_polygon(obstacle.footprint)
+    here = shapely.Point(belief.value.world_from_robot(world).position)
+    clearance_m = settings.clearances_m[-1] if obstacle.is_there else settings.clearances_m[0]
+    reach_m = robot.radius_m + clearance_m + (-SLACK_M if obstacle.is_there else SLACK_M)
+    for index, subgoal in enumerate(s.subgoals[s.at:]):
+        if obstacle.locale not in (subgoal.origin.locale, subgoal.destination.locale):
+            continue
+        start, end = (shapely.Point(p.in_world(world).position) for p in (subgoal.origin, subgoal.destination))
+        if not obstacle.is_there:
+            near_m = min(start.distance(footprint), end.distance(footprint))
+        elif subgoal.primitive:  # where the robot is too near already, it may still drive away from there
+            near_m = shapely.LineString([here if index == 0 else start, end]).distance(footprint)
+            reach_m = min(reach_m, here.distance(footprint) - SLACK_M)
+        else:
+            near_m = end.distance(footprint)
+        if near_m < reach_m:
+            return True
+    return False
 
 
 def _leads_there(sketch: PlanSketch, frame: LocaleFrame) -> bool:

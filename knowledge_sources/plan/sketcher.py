@@ -168,7 +168,7 @@ class Sketcher(RobotKnowledgeSource):
         """Why no sketch leads from one locale to another."""
         building = find_building(view)
         if building.route(here, there) is not None:
-            named = _name_obstacles(view.all(Obstacle))
+            named = _name_obstacles(view.where(Obstacle, lambda obstacle: obstacle.is_there))
             return f"something stands before a passage on the way from {here} to {there}{named}"
         shut = "".join(f"; {doorway.name} is shut" for doorway in building.shut_doorways())
         by_stairs = building.is_walkable(here, there, self._settings.plan.max_walked_rooms)
@@ -178,7 +178,7 @@ class Sketcher(RobotKnowledgeSource):
 
 def _find_obstacles(view: View, locales: Collection[str]) -> tuple[Entry[Obstacle], ...]:
     """What stands in the way in some locales, and is not in the file."""
-    return view.where(Obstacle, lambda obstacle: obstacle.locale in locales)
+    return view.where(Obstacle, lambda obstacle: obstacle.is_there and obstacle.locale in locales)
 
 
 def _name_obstacles(obstacles: Sequence[Entry[Obstacle]]) -> str:

@@ -106,6 +106,46 @@ class ActionSettings:
     max_touch_sigma_rad: float = setting(
         0.6, "rad", "A contact whose direction is less sure tells of no obstacle.", "engineering judgement")
 
+    min_thing_certainty: float = setting(
+        0.5, "1", "What is seen on the floor with less certainty than this tells of no obstacle.",
+        "engineering judgement")
+    min_obstacle_certainty: float = setting(
+        0.9, "1", "With this certainty an obstacle is there: by one sure picture, or by two unsure ones.",
+        "engineering judgement")
+    max_obstacle_certainty: float = setting(
+        0.99, "1", "No obstacle is more certain than this, so that what is gone is soon forgotten.",
+        "engineering judgement")
+    min_gone_certainty: float = setting(
+        0.5, "1", "An obstacle that is less certain is gone.", "engineering judgement")
+    min_free_part: float = setting(
+        0.5, "1", "Part of an obstacle's footprint that must be seen free to tell that it is not there any more.",
+        "engineering judgement")
+    free_floor_odds: float = setting(
+        0.03, "1", "Odds of an obstacle that is there while all of its footprint is seen free.",
+        "engineering judgement")
+    min_evidence_interval_s: float = setting(
+        0.3, "s", "Pictures that follow each other faster are no further evidence of an obstacle.",
+        "engineering judgement")
+    max_obstacle_sigma_m: float = setting(
+        0.4, "m", "What is seen on the floor with a larger standard deviation is waited for until it is nearer.",
+        "engineering judgement")
+    obstacle_depth_m: float = setting(
+        0.3, "m", "Depth that something is taken to have of which only the near side is seen.", "engineering judgement")
+    min_footprint_change_m: float = setting(
+        0.1, "m", "A frame is revised when an obstacle's footprint turns out otherwise by so much.",
+        "engineering judgement")
+    min_height_change_m: float = setting(
+        0.15, "m", "The same of its height.", "engineering judgement")
+
+    # Floor watcher
+    max_floor_sigma_m: float = setting(
+        0.1, "m", "The floor is looked at while the robot's place is known to this.", "engineering judgement")
+    max_floor_sigma_rad: float = setting(
+        math.radians(1.0), "rad", "The same of its heading.", "engineering judgement")
+    floor_view_distance_m: float = setting(
+        0.25, "m", "A picture is kept to compare later ones with when the robot has gone so far since the last.",
+        "engineering judgement")
+
     # Fault handler
     max_fault_s: float = setting(
         30.0, "s", "A fault that lasts longer ends the mission.", "engineering judgement")

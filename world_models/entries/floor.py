@@ -49,7 +49,7 @@ class FreeFloor:
         locale: of the belief.
         x_m, y_m: of the sensor over the floor [m, world].
         bearings_rad: (n,) directions from there [rad, world], counter-clockwise.
-        near_m: (n,) the floor is seen from here on; nearer, a thing higher than what the robot rolls over may be hidden.
+        near_m: (n,) the floor is seen from here on; nearer, a thing too high to be rolled over may be hidden.
         far_m: (n,) up to here it is free; below ``near_m`` where none of it is.
         ends: (n,) what is there: a thing that the model lacks, something of the model, or the end of sight.
         sigma_m: (n,) standard deviations of ``far_m``.

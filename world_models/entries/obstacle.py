@@ -30,7 +30,10 @@ class Obstacle:
         height_m: of its top above the floor; sigma_height_m: standard deviation; infinite where nothing tells it.
         certainty: probability that it is there.
         seen_s: when it was last seen, ranged or touched, by the body's clock.
+        looked_s: when its place was last seen or ranged, whether or not it was there still.
+        touched_s: when it was last touched; None where it never was.
         by: what told of it first.
+        evidence: what tells of it, in words: which pixels of which picture.
         status: suspected (not certain enough to act on), there, or gone.
     """
 
@@ -45,7 +48,10 @@ class Obstacle:
     sigma_height_m: float = math.inf
     certainty: float = 1.0
     seen_s: float = 0.0
+    looked_s: float = 0.0
+    touched_s: float | None = None
     by: ObstacleSense = "touch"
+    evidence: str = ""
     status: ObstacleStatus = "there"
 
     @property
@@ -65,4 +71,5 @@ class Obstacle:
         state = {"suspected": "may be in the way", "there": "is in the way", "gone": "is gone"}[self.status]
         sure = f"its near side is known to {words.metres(self.sigma_m)}, certainty {self.certainty:.2f}"
         last = {"touch": "touched", "camera": "seen", "ranges": "ranged"}[self.by]
-        return f"{self.words()} {state} ({self.name}); first {last}, {sure}; last at {self.seen_s:.1f} s"
+        evidence = f"; {self.evidence}" if self.evidence else ""
+        return f"{self.words()} {state} ({self.name}); first {last}, {sure}; last at {self.seen_s:.1f} s{evidence}"

@@ -1,0 +1,105 @@
+"""Footprints of things on the floor: joined from several sights of a thing, and taken back where the floor is free.
+
+All coordinates are on the floor, in one frame, in metres.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry.polygon import orient
+
+from knowledge_sources.methods.arrays import Floats
+
+Corners = tuple[tuple[float, float], ...]
+
+GRAIN_M = 1e-3
+"""Corners are told to this."""
+MIN_SIDE_M = 0.02
+"""A footprint is at least so wide and so deep."""
+
+
+def build_polygon(footprint: Any) -> shapely.Polygon:
+    """The hull of the corners (k, 2), with an area also where they lie in a line."""
+    hull = shapely.convex_hull(shapely.multipoints(np.asarray(footprint, float).reshape(-1, 2)))
+    if isinstance(hull, shapely.Polygon) and hull.area > MIN_SIDE_M**2:
+        return hull
+    return hull.buffer(0.5 * MIN_SIDE_M, join_style="mitre", cap_style="square")
+
+
+def list_corners(shape: shapely.Geometry) -> Corners:
+    """The corners of the hull of a shape, counter-clockwise; () where it has no area."""
+    hull = shapely.convex_hull(shape)
+    if not isinstance(hull, shapely.Polygon) or hull.is_empty:
+        return ()
+    ring = shapely.get_coordinates(orient(hull.simplify(5 * GRAIN_M)))[:-1]
+    return tuple((round(float(x), 3), round(float(y), 3)) for x, y in ring)
+
+
+def build_free_floor(
+    x_m: float, y_m: float, bearings_rad: Sequence[float], near_m: Sequence[float], far_m: Sequence[float]
+) -> shapely.Geometry:
+    """The floor that is free by one sight: between the near and the far end of each direction, and between these."""
+    at = np.array([x_m, y_m])
+    out = np.column_stack([np.cos(bearings_rad), np.sin(bearings_rad)])
+    near, far = np.asarray(near_m, float), np.asarray(far_m, float)
+    pieces = []
+    for run in _find_runs(far > near + GRAIN_M):
+        ring = np.concatenate([at + far[run, None] * out[run], (at + near[run, None] * out[run])[::-1]])
+        pieces.append(shapely.make_valid(shapely.Polygon(ring)))
+    return shapely.union_all(pieces)
+
+
+def _find_runs(free: Any) -> list[Floats]:
+    """The indices of each run of at least two neighbours for which it holds."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(free, int), [0]])))
+    return [np.arange(a, b) for a, b in zip(ends[::2], ends[1::2], strict=True) if b - a >= 2]
+
+
+def deepen(footprint: Any, eye: Any, depth_m: float) -> shapely.Polygon:
+    """What a thing is taken to cover whose near side alone is seen from an ``eye`` (2,): at least so deep behind that.
+
+    A footprint that is as deep already stays.
+    """
+    polygon = build_polygon(footprint)
+    corners = shapely.get_coordinates(polygon)[:-1]
+    away = corners.mean(axis=0) - np.asarray(eye, float)
+    out = away / (float(np.linalg.norm(away)) or 1.0)
+    along = corners @ out
+    lacking = depth_m - float(np.ptp(along))
+    if lacking <= 0.0:
+        return polygon
+    return build_polygon(np.concatenate([corners, corners + lacking * out]))
+
+
+def join_footprints(
+    known: shapely.Geometry, seen: shapely.Geometry, free: shapely.Geometry, sigma_m: float
+) -> shapely.Geometry:
+    """Both, without what is seen to be free by more than the standard deviation; at least what is seen now."""
+    kept = shapely.difference(known, shapely.buffer(free, -sigma_m))
+    parts = [part for part in shapely.get_parts(kept) if part.distance(seen) <= sigma_m]
+    return shapely.convex_hull(shapely.union_all([seen, *parts]))
+
+
+def measure_free_part(footprint: Any, free: shapely.Geometry) -> float:
+    """Which part of a footprint is seen to be free floor, 0..1."""
+    polygon = build_polygon(footprint)
+    return float(shapely.intersection(polygon, free).area / polygon.area)
+
+
+def measure_change_m(one: Any, other: Any) -> float:
+    """How far the outlines of two footprints are from each other, at most; infinite where there is none."""
+    if not len(one) or not len(other):
+        return math.inf
+    return float(build_polygon(one).hausdorff_distance(build_polygon(other)))
+
+
+def measure_width_m(footprint: Any) -> float:
+    """The longer side of the smallest rectangle round a footprint."""
+    ring = shapely.get_coordinates(shapely.minimum_rotated_rectangle(build_polygon(footprint)))
+    return max(float(np.linalg.norm(b - a)) for a, b in pairwise(ring))

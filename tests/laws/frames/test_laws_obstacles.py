@@ -1,0 +1,192 @@
+"""What stands on the floor and is not in the model: found when it is certain enough, joined, and forgotten."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from blackboard.board import Blackboard
+from blackboard.change import Change, Posted
+from blackboard.effect import Effect, Post
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from harvey.simulation.run import build_robot_model
+from knowledge_sources.action.obstacle_finder import ObstacleFinder
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.settings import DEFAULT
+from sim.scenario import load_scenario
+from world_models.building.world import World
+from world_models.entries.floor import FloorThing, FreeFloor
+from world_models.entries.locale_frame import FRAME_OF, LocaleFrame
+from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.obstacle import Obstacle
+from world_models.files.world_files import WORLDS, load_world
+from world_models.frame_building import FrameBuilding
+from world_models.frame_store import FrameStore
+from world_models.frames import Pose2
+from world_models.visibility.lines_and_points import visible_lines
+
+HALL = "north-hall"
+X_M, Y_M = 6.2484, 3.6576
+"""The hall's corner in the world."""
+HERE = Pose2(X_M + 2.0, Y_M + 1.2, 0.0)
+CARTON = tuple((X_M + x, Y_M + y) for x, y in ((4.0, 1.0), (4.5, 1.0), (4.5, 1.4), (4.0, 1.4)))
+SCREEN = tuple((X_M + x, Y_M + y) for x, y in ((3.9, 0.6), (4.3, 0.6), (4.3, 1.8), (3.9, 1.8)))
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return load_world(WORLDS / "two_ways.toml")
+
+
+class Hall:
+    """A board with a robot in the north hall, and the obstacle finder beside it."""
+
+    def __init__(self, world: World) -> None:
+        self.board, store = Blackboard(), FrameStore(world)
+        self.robot = build_robot_model(load_scenario("shut-door"), world)
+        self._belief = Hypothesis(HALL, Pose2(2.0, 1.2, 0.0), diagonal(0.01, 0.005), "tracks")
+        frames = [Post(store.frame(name)) for name in ("", HALL, "reception", "archive")]
+        self.board.apply([*map(Post, self.robot.entries()), *frames, Post(self._belief)], author="test", cycle=1)
+        self.source, self.cycle = ObstacleFinder(), 1
+
+    def see(self, *things: FloorThing, seen_s: float, far_m: float = 4.0) -> tuple[Change, ...]:
+        """One sight of the floor: free up to ``far_m``, with some things on it."""
+        bearings = np.linspace(-0.5, 0.5, 41)
+        far = np.full(41, far_m)
+        for thing in things:
+            corners = np.array(thing.footprint) - HERE.position
+            angles = np.arctan2(corners[:, 1], corners[:, 0])
+            hit = (bearings >= angles.min() - 0.02) & (bearings <= angles.max() + 0.02)
+            far[hit] = np.minimum(far[hit], np.linalg.norm(corners, axis=1).min())
+        scan = FreeFloor("camera", HALL, HERE.x_m, HERE.y_m, tuple(bearings.tolist()), (1.5,) * 41,
+                         tuple(far.tolist()), ("sight",) * 41, (0.02,) * 41, things, seen_s)
+        self.cycle += 1
+        (posted,) = self.board.apply([Post(scan)], author="floor_watcher", cycle=self.cycle)
+        assert isinstance(posted, Posted)
+        if self.source.rate(self.board.view, posted) is None:
+            return ()
+        effects: list[Effect] = list(self.source.act(self.board.view, posted))
+        return self.board.apply(effects, author=self.source.name, cycle=self.cycle)
+
+    @property
+    def obstacles(self) -> list[Obstacle]:
+        return [entry.value for entry in self.board.view.all(Obstacle)]
+
+    @property
+    def frame(self) -> LocaleFrame:
+        entry = self.board.view.newest(FRAME_OF, HALL)
+        assert entry is not None
+        return entry.value
+
+
+def carton(p_thing: float = 0.97, *, by_m: float = 0.0, height_m: float = 0.4) -> FloorThing:
+    corners = tuple((x, y + by_m) for x, y in CARTON)
+    return FloorThing(corners, 0.03, height_m, 0.05, p_thing, (200.0, 300.0, 260.0, 350.0), "unlike the floor")
+
+
+@pytest.fixture
+def hall(world: World) -> Hall:
+    return Hall(world)
+
+
+def test_one_sure_picture_makes_an_obstacle_and_says_which_pixels(hall: Hall) -> None:
+    hall.see(carton(), seen_s=1.0)
+    (found,) = hall.obstacles
+    assert found.status == "there" and found.by == "camera" and found.certainty >= 0.9
+    assert found.width_m == pytest.approx(0.5, abs=0.05)
+    assert "pixels (200, 300) to (260, 350)" in found.sentence() and "0.4 m high" in found.sentence()
+    (change,) = hall.frame.changes
+    assert (change.what, change.name) == ("extra", found.name) and change.height_m == pytest.approx(0.45)
+
+
+def test_an_unsure_picture_makes_a_suspicion_and_a_second_one_an_obstacle(hall: Hall) -> None:
+    hall.see(carton(0.8), seen_s=1.0)
+    assert [o.status for o in hall.obstacles] == ["suspected"] and not hall.frame.changes
+    hall.see(carton(0.8), seen_s=1.03)  # the next picture on the move tells nothing new
+    assert [o.status for o in hall.obstacles] == ["suspected"] and not hall.frame.changes
+    hall.see(carton(0.8), seen_s=3.0)
+    assert [o.status for o in hall.obstacles] == ["there"] and len(hall.frame.changes) == 1
+
+
+def test_what_is_seen_again_is_one_obstacle_and_the_frame_stays(hall: Hall) -> None:
+    hall.see(carton(), seen_s=1.0)
+    before = hall.frame
+    for step in range(5):
+        hall.see(carton(by_m=0.01 * step), seen_s=2.0 + step)
+    assert len(hall.obstacles) == 1 and hall.frame is before
+    hall.see(carton(by_m=0.25), seen_s=9.0)
+    assert len(hall.obstacles) == 1 and hall.frame is not before and len(hall.frame.changes) == 1
+
+
+def test_what_is_seen_free_is_forgotten_within_two_pictures_and_found_again(hall: Hall) -> None:
+    hall.see(carton(), seen_s=1.0)
+    hall.see(carton(), seen_s=2.0)
+    for seen_s in (3.0, 4.0):
+        hall.see(seen_s=seen_s)
+    assert [o.status for o in hall.obstacles] == ["gone"]
+    assert hall.frame.changes == () and "is gone" in hall.obstacles[0].sentence()
+    hall.see(carton(), seen_s=5.0)
+    assert [o.status for o in hall.obstacles] == ["there"] and len(hall.frame.changes) == 1
+
+
+def test_floor_that_is_not_seen_does_not_make_an_obstacle_gone(hall: Hall) -> None:
+    hall.see(carton(), seen_s=1.0)
+    for step in range(5):
+        hall.see(seen_s=2.0 + step, far_m=1.9)  # the carton stands beyond
+    assert [o.status for o in hall.obstacles] == ["there"]
+
+
+def test_what_was_touched_is_forgotten_when_its_floor_is_clearly_free(hall: Hall) -> None:
+    touched = Obstacle(f"{HALL}/obstacle-1", HALL, CARTON, 0.05, 4.0, 1.2, 0.45, certainty=0.99, touched_s=0.5)
+    hall.board.apply([Post(touched)], author="test", cycle=hall.cycle)
+    hall.see(seen_s=3.0)
+    hall.see(seen_s=4.0)
+    assert [o.status for o in hall.obstacles] == ["gone"]
+
+
+def test_what_the_model_has_there_is_no_obstacle(hall: Hall) -> None:
+    outline = hall.robot.world.outline(HALL)
+    wall_y = float(outline[:, 1].max())
+    strip = tuple((X_M + x, wall_y - y) for x, y in ((3.0, 0.04), (4.0, 0.04), (4.0, 0.0), (3.0, 0.0)))
+    skirting = FloorThing(strip, 0.03, 0.1, math.inf, 0.99, (0.0, 0.0, 9.0, 9.0), "unlike the floor")
+    hall.see(skirting, seen_s=1.0)
+    assert hall.obstacles == []
+
+
+def test_a_pose_in_doubt_never_makes_an_obstacle(hall: Hall) -> None:
+    hall.board.apply([Post(Discrepancy(Level.PLAN, "lost", None, (4.0, 30.0), "px"))], author="test", cycle=hall.cycle)
+    hall.see(carton(), seen_s=1.0)
+    assert hall.obstacles == []
+
+
+def test_nothing_is_expected_to_be_seen_behind_it_and_all_of_it_when_it_is_gone(world: World, hall: Hall) -> None:
+    robot = hall.robot
+    camera_from_world = robot.camera_from_world(HERE)
+    high = replace(carton(height_m=1.2), footprint=SCREEN)
+
+    def lines() -> Floats:
+        building = FrameBuilding(hall.board.view)
+        return visible_lines(building, robot.camera, camera_from_world, locales=[HALL]).segments_px
+
+    before = lines()
+    hall.see(high, seen_s=1.0)
+    during = lines()
+    assert total_length(during) < 0.9 * total_length(before)
+    for seen_s in (3.0, 4.0):
+        hall.see(seen_s=seen_s)
+    assert np.array_equal(lines(), before)
+
+
+def total_length(segments: Floats) -> float:
+    return float(np.linalg.norm(np.diff(segments, axis=1), axis=2).sum())
+
+
+def test_the_numbers_fit_together() -> None:
+    s = DEFAULT.action
+    assert s.min_thing_certainty < s.min_obstacle_certainty < s.max_obstacle_certainty
+    odds = s.max_obstacle_certainty / (1.0 - s.max_obstacle_certainty) * s.free_floor_odds**2
+    assert odds < s.min_gone_certainty / (1.0 - s.min_gone_certainty)  # two pictures are enough
