@@ -7,6 +7,7 @@ happens when things go wrong? ``scale``: how fast, how large, how long? A new on
 from __future__ import annotations
 
 import importlib
+import inspect
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -41,6 +42,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "kidnap": "Kidnaps to anywhere on generated floors of 40 rooms",
         "malformed-worlds": "World and building files with errors put in",
         "missions": "1,000 missions without trouble and 1,000 with",
+        "obstacles": "1,000 missions among things that the model lacks",
         "serial-chaos": "Drivers of bases over serial lines with errors",
         "video-stream": "A mission's frames through VideoCapture, compared",
     },
@@ -61,17 +63,20 @@ def list_names() -> tuple[str, ...]:
     return tuple(name for group in EXPERIMENTS.values() for name in group)
 
 
-def run(name: str, *, quick: bool = False, seed: int = 0) -> Report:
-    """Run one experiment.
+def run(name: str, *, quick: bool = False, seed: int = 0, missions: int | None = None) -> Report:
+    """Run one experiment; ``missions``: how many, where it drives missions by number.
 
     Raises:
-        BadInput: there is no such experiment; similar names are given.
+        BadInput: there is no such experiment (similar names are given), or none by number of missions.
     """
     if name not in list_names():
         from world_models.files.toml.settings import suggest_keys
 
         raise BadInput(f"expected an experiment: {suggest_keys(name, list_names())}, got {name!r}")
-    report: Report = importlib.import_module(_module(name)).run(quick, seed)
+    run_one = importlib.import_module(_module(name)).run
+    if missions is not None and "missions" not in inspect.signature(run_one).parameters:
+        raise BadInput(f"--missions: {name} has no number of missions to choose")
+    report: Report = run_one(quick, seed) if missions is None else run_one(quick, seed, missions=missions)
     return report
 
 

@@ -16,12 +16,13 @@ def _arguments(parser: ArgumentParser) -> None:
                         help="a small version, of seconds to two minutes; it claims only what it can show")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.add_argument("--seed", metavar="N", type=whole, default=0, help="of all random numbers (0)")
+    parser.add_argument("--missions", metavar="N", type=whole, help="how many, for the experiments that say so")
 
 
 def _run(args: Namespace) -> int:
     import experiments
 
-    report = experiments.run(args.name, quick=args.quick, seed=args.seed)
+    report = experiments.run(args.name, quick=args.quick, seed=args.seed, missions=args.missions or None)
     print(json.dumps(report.record(), indent=2) if args.json else report.text())
     return 0 if report.holds else 1
 
@@ -31,6 +32,7 @@ COMMAND = Command(
     (
         ("harvey experiment levels --quick", "what the three servo levels do"),
         ("harvey experiment render-speed", "the simulator's frames per second and edge accuracy"),
+        ("harvey experiment obstacles --missions 200", "a fifth of its missions"),
         ("harvey experiment levels --json", "for further use"),
     ),
     _arguments, _run,
