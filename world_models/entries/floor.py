@@ -87,7 +87,7 @@ class FloorAppearance:
     Attributes:
         locale: whose floor.
         mean: of its colour (red, green, blue) in pictures, 0..255.
-        covariance: (3, 3) of its colour.
+        covariance: (3, 3) of the logarithm of its brightness, and of red and blue as parts of it.
         samples: how many pixels it was learnt from, as far as they count; 0: it is what the model says.
     """
 

@@ -67,12 +67,12 @@ def _predict(
 
 
 def cast_rays(
-    world: Building, camera_from_world: Pose, rays: Floats, bounds: Floats, window: Window, size: int
+    world: Building, camera_from_world: Pose, rays: Floats, bounds: Floats, window: Window, size: int, each: int = RAYS
 ) -> tuple[Floats, Floats, Ints, Floats]:
     """Which surface of the model each ray meets first.
 
     Args:
-        rays: (n, 3), z = 1, in the camera frame: a grid of ``size`` by ``size`` samples of RAYS each.
+        rays: (n, 3), z = 1, in the camera frame: a grid of samples, ``size`` in a row, ``each`` rays a sample.
         bounds: (4,) the rectangle around them; window: what of the picture is looked at.
 
     Returns:
@@ -94,7 +94,7 @@ def cast_rays(
                              & (boxes[:, 2] >= left) & (boxes[:, 1] <= bottom) & (boxes[:, 3] >= top))
     facing = facing[in_view]
     turned = normals[facing] @ camera_from_world.rotation.T
-    surface, depth = _cast_rays(near[in_view], turned, boxes[in_view], rays, size)
+    surface, depth = _cast_rays(near[in_view], turned, boxes[in_view], rays, size, each)
     return colors[facing], normals[facing], surface, depth
 
 
@@ -153,14 +153,14 @@ def _bound(corners: Floats) -> Floats:
 
 
 @njit(cache=True, error_model="numpy")
-def _cast_rays(corners: Any, normals: Any, boxes: Any, rays: Any, size: int) -> Any:
+def _cast_rays(corners: Any, normals: Any, boxes: Any, rays: Any, size: int, each: int) -> Any:
     """Index of the polygon (m, k, 3), camera frame, that each ray (x, y, 1) meets first (-1: none), and its depth [m].
 
-    The rays are those of a grid of ``size`` by ``size`` samples. A point of a polygon's plane is inside where it is on
+    The rays are those of a grid of samples, ``size`` in a row, ``each`` rays a sample. A point of a polygon's plane is inside where it is on
     the same side of all planes through the eye and one edge.
     """
     surface, depth = np.full(len(rays), -1, np.int64), np.full(len(rays), np.inf)
-    columns, rows = rays[: RAYS * size : RAYS, 0], rays[:: RAYS * size, 1]
+    columns, rows = rays[: each * size : each, 0], rays[:: each * size, 1]
     edges = np.empty((corners.shape[1], 3))
     for m in range(len(corners)):
         n, c = normals[m], corners[m]
@@ -175,8 +175,8 @@ def _cast_rays(corners: Any, normals: Any, boxes: Any, rays: Any, size: int) -> 
         left, right = np.searchsorted(columns, boxes[m, 0]) - 1, np.searchsorted(columns, boxes[m, 2]) + 1
         top, bottom = np.searchsorted(rows, boxes[m, 1]) - 1, np.searchsorted(rows, boxes[m, 3]) + 1
         ahead = n[0] * c[0, 0] + n[1] * c[0, 1] + n[2] * c[0, 2]
-        for row in range(max(top, 0), min(bottom, size)):
-            for i in range(RAYS * (size * row + max(left, 0)), RAYS * (size * row + min(right, size))):
+        for row in range(max(top, 0), min(bottom, len(rows))):
+            for i in range(each * (size * row + max(left, 0)), each * (size * row + min(right, size))):
                 x, y = rays[i, 0], rays[i, 1]
                 if not (boxes[m, 0] <= x <= boxes[m, 2] and boxes[m, 1] <= y <= boxes[m, 3]):
                     continue

@@ -1,0 +1,105 @@
+"""What the floor looks like: brightness and colour with covariance, from the model, from pictures, from where it drove.
+
+Light is not modelled: only the hue of the model's colour is relied on, and each picture tells how bright the floor is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.settings.floor import FloorSettings
+from world_models.entries.floor import FloorAppearance
+
+DARK = 6.0
+"""Added to the sum of the three channels [0..765]: in the dark, noise is no colour."""
+TRIM = 9.0
+"""Pixels within this squared Mahalanobis distance go on to the next round of the fit."""
+ROUNDS = 4
+
+
+def compute_looks(colours: Floats | NDArray[np.float32]) -> Floats:
+    """Logarithm of the brightness, and red and blue as parts of it, (..., 3), of colours (..., 3) of 0..255."""
+    total = colours.sum(axis=-1, dtype=float) + DARK
+    return np.stack([np.log(total), (colours[..., 0] + DARK / 3.0) / total, (colours[..., 2] + DARK / 3.0) / total],
+                    axis=-1)
+
+
+def default_covariance(settings: FloorSettings) -> Floats:
+    """(3, 3) of looks, where none is learnt: the least that is ever taken."""
+    return np.diag([settings.min_brightness_sigma**2, settings.min_chroma_sigma**2, settings.min_chroma_sigma**2])
+
+
+def fit_looks(looks: Floats, expected: Floats, is_learnt: bool, settings: FloorSettings) -> tuple[Floats, Floats] | None:
+    """Mean (3,) and covariance (3, 3) of the looks (n, 3) of a floor in one picture; None where it is not to be seen.
+
+    Most of what may be floor by its hue decides how bright the floor is; it is fitted by trimming, so that things on it
+    do not count.
+
+    Args:
+        expected: (3,) looks by the model, or as learnt.
+        is_learnt: whether the brightness of ``expected`` tells anything.
+    """
+    is_alike = np.all(np.abs(looks[:, 1:] - expected[1:]) <= settings.max_chroma_error, axis=1)
+    near = looks[is_alike]
+    if len(near) < settings.min_floor_pixels:
+        return None
+    least = default_covariance(settings)
+    mean, covariance = _find_mode(near, expected if is_learnt else None, least), 4.0 * least
+    for _ in range(ROUNDS):
+        kept = near[measure_unlike(near, mean, covariance) <= TRIM]
+        if len(kept) < settings.min_floor_pixels:
+            return None
+        mean = kept.mean(axis=0)
+        covariance = np.maximum(np.diag(kept.var(axis=0) * 1.1), least)  # 1.1: trimming makes it smaller
+    return mean, covariance
+
+
+def measure_unlike(looks: Floats, mean: Floats, covariance: Floats) -> Floats:
+    """Squared Mahalanobis distance (...) of looks (..., 3) from the floor's."""
+    off = looks - mean
+    return np.asarray(np.einsum("...i,ij,...j->...", off, np.linalg.inv(covariance), off))
+
+
+def learn_appearance(
+    known: FloorAppearance | None, locale: str, colours: Floats, settings: FloorSettings
+) -> FloorAppearance | None:
+    """What a floor looks like after some of it (n, 3; 0..255) was driven over: the mean over what was learnt before.
+
+    None where there are too few pixels to add.
+    """
+    if len(colours) < settings.min_floor_pixels:
+        return known
+    looks = compute_looks(colours)
+    mean = np.median(colours, axis=0)
+    least = default_covariance(settings)
+    spread = np.percentile(np.abs(looks - np.median(looks, axis=0)), 68.0, axis=0)
+    covariance = np.maximum(np.diag(spread**2), least)
+    weight, before = float(len(colours)), 0.0
+    if known is not None and known.samples > 0.0:
+        before = min(known.samples, settings.max_samples)
+        mean = (before * np.array(known.mean) + weight * mean) / (before + weight)
+        covariance = (before * np.array(known.covariance) + weight * covariance) / (before + weight)
+    red, green, blue = (round(float(x), 1) for x in mean)
+    rows = [tuple(round(float(x), 9) for x in row) for row in covariance]
+    return FloorAppearance(locale, (red, green, blue), ((rows[0][0], rows[0][1], rows[0][2]), (
+        rows[1][0], rows[1][1], rows[1][2]), (rows[2][0], rows[2][1], rows[2][2])),
+        min(before + weight, settings.max_samples))
+
+
+def _find_mode(looks: Floats, expected: Floats | None, least: Floats) -> Floats:
+    """The most frequent brightness of looks (n, 3), with the median hue there; near what was learnt, if anything was."""
+    sigma = math.sqrt(least[0, 0])
+    values = looks[:, 0]
+    if expected is not None:
+        near = np.abs(values - expected[0]) <= 6.0 * sigma
+        values = values[near] if np.count_nonzero(near) > len(values) // 4 else values
+    counts, edges = np.histogram(values, bins=max(1, math.ceil(float(np.ptp(values)) / sigma)))
+    wide = np.convolve(counts, np.ones(3), "same")
+    best = int(np.argmax(wide))
+    middle = 0.5 * (edges[best] + edges[best + 1])
+    there = np.abs(looks[:, 0] - middle) <= 2.0 * sigma
+    return np.median(looks[there], axis=0) if there.any() else np.median(looks, axis=0)

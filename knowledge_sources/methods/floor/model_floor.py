@@ -1,0 +1,75 @@
+"""Where the model has floor in a picture, and of which colour: rays of its pixels, ended in the model (§3.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.arrays import Floats, Ints
+from knowledge_sources.methods.floor.floor_grid import STEP_PX, FloorGrid
+from knowledge_sources.methods.verification.predicted_colors import cast_rays
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+from world_models.visibility.portals import image_window
+
+MIN_UP = 0.99
+"""A surface whose normal has at least this upward part is level."""
+STEP = 2
+"""Rays are cast through every second row and column of the grid."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModelFloor:
+    """What the model has in the pixels of a :class:`~knowledge_sources.methods.floor.floor_grid.FloorGrid`.
+
+    Attributes:
+        kinds: (rows, columns) which of ``colours`` the floor there has; -1: no floor.
+        colours: (k, 3) shaded, 0..1; NaN: unknown.
+        is_plain: (rows, columns) floor, and no other part of the model is near enough to be taken for it.
+    """
+
+    kinds: Ints
+    colours: Floats
+    is_plain: NDArray[np.bool_]
+
+
+def predict_model_floor(
+    robot: RobotModel, pose: Pose2, grid: FloorGrid, floor_m: float, rolled_over_m: float, margin_px: float
+) -> ModelFloor:
+    """Predict the floor from a pose.
+
+    Args:
+        floor_m: height of the floor [m, world]; what is level and at most ``rolled_over_m`` above it is floor too.
+        margin_px: pixels of the picture that are so near to another part of the model are not plain.
+    """
+    camera_from_world = robot.camera_from_world(pose)
+    rays = robot.camera.rays(grid.pixels[::STEP, ::STEP].reshape(-1, 2))
+    bounds = np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)])
+    columns = len(range(0, grid.shape[1], STEP))
+    colours, normals, surface, depth = cast_rays(
+        robot.world, camera_from_world, np.ascontiguousarray(rays), bounds, image_window(robot.camera), columns, 1)
+    if not len(colours):
+        nothing = np.full(grid.shape, -1)
+        return ModelFloor(nothing, np.zeros((0, 3)), nothing >= 0)
+    world_from_camera = camera_from_world.inverse()
+    met = np.isfinite(depth)
+    heights = np.full(len(rays), np.inf)
+    heights[met] = world_from_camera.apply(rays[met] * depth[met, None])[:, 2] - floor_m
+    is_floor = met & (normals[surface, 2] > MIN_UP) & (np.abs(heights) <= rolled_over_m)
+    keys, kind_of = np.unique(np.round(colours, 4), axis=0, return_inverse=True)
+    kinds = np.where(is_floor, kind_of.ravel()[surface], -1).reshape(-1, columns)
+    kinds = np.repeat(np.repeat(kinds, STEP, axis=0), STEP, axis=1)[: grid.shape[0], : grid.shape[1]]
+    return ModelFloor(kinds, keys, _find_plain(kinds, margin_px))
+
+
+def _find_plain(kinds: Ints, margin_px: float) -> NDArray[np.bool_]:
+    """Pixels round which all have the same kind of floor; beyond the picture's border it goes on."""
+    half = int(np.ceil(margin_px / STEP_PX)) + STEP // 2
+    mask = np.ones((2 * half + 1, 2 * half + 1), np.uint8)
+    values = (kinds + 1).astype(np.float32)
+    low = cv2.erode(values, mask, borderType=cv2.BORDER_REPLICATE)
+    high = cv2.dilate(values, mask, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray((low == high) & (kinds >= 0))

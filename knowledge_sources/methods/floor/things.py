@@ -1,0 +1,121 @@
+"""Regions of a picture that do not look like the floor, and where on the floor they stand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.polygon import orient
+
+from knowledge_sources.methods.arrays import Floats, Ints
+from knowledge_sources.methods.floor.floor_grid import FloorGrid
+from knowledge_sources.settings.floor import FloorSettings
+
+MIN_ROWS = 3
+"""A region of fewer rows is noise."""
+CUT_PART = 0.55
+"""Of a region that the lower border cuts off: its foot is taken to be at this part of the range of that border."""
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """A connected part of the picture that does not look like the floor.
+
+    Attributes:
+        mask: (rows, columns) of the grid.
+        feet: (k, 2) row and column of each column's lowest pixel that may stand on the floor.
+        is_cut: whether the picture's lower border cuts it off: its foot is nearer than what is seen.
+        is_clipped: whether it goes on above what is looked at: its top is not seen.
+        top: (2,) row and column of its highest pixel.
+    """
+
+    mask: NDArray[np.bool_]
+    feet: Ints
+    is_cut: bool
+    is_clipped: bool
+    top: tuple[int, int]
+
+
+def find_regions(
+    unlike: NDArray[np.bool_], tells: NDArray[np.bool_], grid: FloorGrid, settings: FloorSettings
+) -> tuple[Region, ...]:
+    """The regions of unlike pixels, the largest first.
+
+    Args:
+        unlike: (rows, columns) what does not look like the floor; tells: where that tells anything.
+    """
+    seen = unlike & tells
+    near = cv2.dilate(seen.astype(np.uint8), np.ones((3, 3), np.uint8))
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(near, connectivity=8)
+    found = []
+    for i in sorted(range(1, count), key=lambda i: (-stats[i, cv2.CC_STAT_AREA], i)):
+        mask = (labels == i) & seen
+        if np.count_nonzero(mask) < settings.min_thing_pixels:
+            continue
+        rows = np.flatnonzero(mask.any(axis=1))
+        if len(rows) < MIN_ROWS:
+            continue
+        region = _describe_region(mask, tells, grid, settings)
+        if region is not None:
+            found.append(region)
+    return tuple(found)
+
+
+def _describe_region(
+    mask: NDArray[np.bool_], tells: NDArray[np.bool_], grid: FloorGrid, settings: FloorSettings
+) -> Region | None:
+    columns = np.flatnonzero(mask.any(axis=0))
+    lowest = mask.shape[0] - 1 - np.argmax(mask[::-1, columns], axis=0)
+    last = mask.shape[0] - 1
+    cut = lowest >= last - 1
+    ranges = grid.ranges_m[lowest, columns]
+    # below a foot there is floor; where the model's own parts begin there, it is no foot
+    stands = cut | tells[np.minimum(lowest + 2, last), columns]
+    if not stands.any():
+        return None
+    nearest = float(ranges[stands].min())
+    if nearest > settings.sight_m:
+        return None
+    is_foot = stands & (ranges <= nearest + settings.max_thing_depth_m)
+    highest = np.argmax(mask[:, columns], axis=0)
+    k = int(np.argmin(highest))
+    above = max(0, int(highest[k]) - 2)
+    is_clipped = bool(highest[k] <= 1 or not tells[above, columns[k]])
+    feet = np.stack([lowest[is_foot], columns[is_foot]], axis=1)
+    return Region(mask, feet, bool(cut[is_foot].any()), is_clipped, (int(highest[k]), int(columns[k])))
+
+
+def find_footprint(region: Region, grid: FloorGrid, settings: FloorSettings) -> Floats:
+    """(k, 2) corners, counter-clockwise, robot's frame, of what a region takes of the floor [m].
+
+    It is the hull of its feet, and of the same points further off by the depth that is assumed.
+    """
+    points = grid.points_robot[region.feet[:, 0], region.feet[:, 1]]
+    eye = grid.points_robot[-1].mean(axis=0) * 0.0
+    away = points - eye
+    lengths = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+    cut = region.feet[:, 0] >= grid.shape[0] - 2
+    near = np.where(cut[:, None], eye + away * CUT_PART, points)
+    nearest = float(np.linalg.norm(near - eye, axis=1).min())
+    far = points + away / lengths * np.clip(
+        nearest + settings.assumed_depth_m - lengths, 0.1, settings.assumed_depth_m)
+    hull = shapely.convex_hull(shapely.multipoints(np.concatenate([near, far])))
+    if not isinstance(hull, shapely.Polygon):
+        hull = hull.buffer(0.02, quad_segs=1)
+    slim = hull.simplify(0.01)
+    return np.asarray(orient(slim if isinstance(slim, shapely.Polygon) else hull).exterior.coords)[:-1, :2]
+
+
+def measure_height(region: Region, grid: FloorGrid) -> tuple[float, float]:
+    """Height of a region's top [m] if it stands up from its feet, and its standard deviation; infinite if unknown."""
+    row, column = region.top
+    ranges = grid.ranges_m[region.feet[:, 0], region.feet[:, 1]]
+    foot_m = float(ranges.min()) if not region.is_cut else float(ranges.min()) * CUT_PART
+    top_m = float(grid.ranges_m[row, column])
+    height = grid.camera_height_m * (1.0 - min(1.0, foot_m / top_m)) if np.isfinite(top_m) else grid.camera_height_m
+    if region.is_clipped or region.is_cut:
+        return height, float("inf")
+    return height, 0.03 + 0.05 * foot_m * height

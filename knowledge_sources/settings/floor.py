@@ -1,0 +1,75 @@
+"""Settings of the methods that see free floor (§4, §5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from knowledge_sources.settings.setting import setting
+
+
+@dataclass(frozen=True, slots=True)
+class FloorSettings:
+    """The numbers of the methods that see free floor, with a camera or range sensors."""
+
+    # Which parts are used
+    use_appearance: bool = setting(
+        True, "on/off", "What does not look like the floor is a thing on it.", "engineering judgement")
+    use_parallax: bool = setting(
+        True, "on/off", "Two pictures tell whether it stands up from the floor or lies flat on it.",
+        "engineering judgement")
+    use_ranges: bool = setting(
+        True, "on/off", "Range sensors tell of free floor too, where the robot has any.", "engineering judgement")
+
+    # How far
+    sight_m: float = setting(
+        4.5, "m", "The floor is looked at up to this distance from the camera.", "engineering judgement")
+    max_hidden_m: float = setting(
+        0.2, "m", "Floor counts as seen where nothing higher than this can hide below the picture's lower border.",
+        "engineering judgement")
+    bearings: int = setting(64, "count", "Directions in which the free floor of a picture is written down.",
+                            "engineering judgement")
+    max_rolled_over_m: float = setting(
+        0.05, "m", "What is not higher than this is rolled over.", "engineering judgement")
+
+    # Appearance
+    min_floor_pixels: int = setting(
+        150, "count", "With fewer pixels of a floor in sight, its looks are not learnt from a picture.",
+        "engineering judgement")
+    max_chroma_error: float = setting(
+        0.035, "1", "Largest difference from the model's colour, in its parts of red and blue, of what may be floor.",
+        "engineering judgement")
+    min_chroma_sigma: float = setting(
+        0.005, "1", "Floor of the standard deviation of the floor's colour.", "engineering judgement")
+    min_brightness_sigma: float = setting(
+        0.05, "1", "Floor of the standard deviation of the logarithm of the floor's brightness.",
+        "engineering judgement")
+    max_unlike: float = setting(
+        5.0, "1", "Pixels further than so many standard deviations from the floor's looks do not look like it.",
+        "engineering judgement")
+    max_samples: float = setting(
+        2000.0, "count", "Past pixels of a floor weigh at most as much as this many.", "engineering judgement")
+
+    # Things
+    model_margin_px: float = setting(
+        3.0, "px", "Pixels so near to an edge of the model tell nothing; the belief's uncertainty comes on top.",
+        "engineering judgement")
+    min_thing_pixels: int = setting(
+        10, "count", "Smallest region, in pixels of half the picture's size.", "engineering judgement")
+    assumed_depth_m: float = setting(
+        0.3, "m", "Depth that a thing is taken to have behind what is seen of it.", "engineering judgement")
+    max_thing_depth_m: float = setting(
+        1.0, "m", "Feet of one thing are at most so much further than its nearest.", "engineering judgement")
+    p_seen_once: float = setting(
+        0.7, "1", "Probability that what does not look like the floor stands on it, before parallax tells.",
+        "engineering judgement")
+
+    # Parallax
+    min_parallax_px: float = setting(
+        3.0, "px", "Parallax tells where solid and flat things differ by at least this.", "engineering judgement")
+    parallax_odds: float = setting(
+        50.0, "1", "Odds that one clear comparison of two pictures is worth.", "engineering judgement")
+    min_parallax_correlation: float = setting(
+        0.5, "1", "Smallest correlation of two patches that tells anything.", "engineering judgement")
+    min_parallax_margin: float = setting(
+        0.15, "1", "Smallest difference of the correlations of the two hypotheses that tells anything.",
+        "engineering judgement")
