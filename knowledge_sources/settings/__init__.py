@@ -11,6 +11,7 @@ from knowledge_sources.settings.action import ActionSettings
 from knowledge_sources.settings.calibration import CalibrationSettings
 from knowledge_sources.settings.doors import DoorSettings
 from knowledge_sources.settings.features import FeaturesSettings
+from knowledge_sources.settings.floor import FloorSettings
 from knowledge_sources.settings.goal import GoalSettings
 from knowledge_sources.settings.localization import LocalizationSettings
 from knowledge_sources.settings.matching import MatchingSettings
@@ -35,6 +36,7 @@ class Settings:
     action: ActionSettings = field(default_factory=ActionSettings)
     plan: PlanSettings = field(default_factory=PlanSettings)
     goal: GoalSettings = field(default_factory=GoalSettings)
+    floor: FloorSettings = field(default_factory=FloorSettings)
 
 
 DEFAULT = Settings()

@@ -13,12 +13,12 @@ class FloorSettings:
 
     # Which parts are used
     use_appearance: bool = setting(
-        True, "on/off", "What does not look like the floor is a thing on it.", "engineering judgement")
+        True, "yes/no", "What does not look like the floor is a thing on it.", "engineering judgement")
     use_parallax: bool = setting(
-        True, "on/off", "Two pictures tell whether it stands up from the floor or lies flat on it.",
+        True, "yes/no", "Two pictures tell whether it stands up from the floor or lies flat on it.",
         "engineering judgement")
     use_ranges: bool = setting(
-        True, "on/off", "Range sensors tell of free floor too, where the robot has any.", "engineering judgement")
+        True, "yes/no", "Range sensors tell of free floor too, where the robot has any.", "engineering judgement")
 
     # How far
     sight_m: float = setting(

@@ -33,7 +33,9 @@ def default_covariance(settings: FloorSettings) -> Floats:
     return np.diag([settings.min_brightness_sigma**2, settings.min_chroma_sigma**2, settings.min_chroma_sigma**2])
 
 
-def fit_looks(looks: Floats, expected: Floats, is_learnt: bool, settings: FloorSettings) -> tuple[Floats, Floats] | None:
+def fit_looks(
+    looks: Floats, expected: Floats, is_learnt: bool, settings: FloorSettings
+) -> tuple[Floats, Floats] | None:
     """Mean (3,) and covariance (3, 3) of the looks (n, 3) of a floor in one picture; None where it is not to be seen.
 
     Most of what may be floor by its hue decides how bright the floor is; it is fitted by trimming, so that things on it
@@ -91,7 +93,7 @@ def learn_appearance(
 
 
 def _find_mode(looks: Floats, expected: Floats | None, least: Floats) -> Floats:
-    """The most frequent brightness of looks (n, 3), with the median hue there; near what was learnt, if anything was."""
+    """The most frequent brightness of looks (n, 3) and the median hue there; near what was learnt, if anything was."""
     sigma = math.sqrt(least[0, 0])
     values = looks[:, 0]
     if expected is not None:

@@ -41,7 +41,9 @@ class FloorGrid:
 
 
 @lru_cache(maxsize=8)
-def build_floor_grid(camera: Camera, mount: CameraMount, camera_height_m: float, max_range_m: float) -> FloorGrid | None:
+def build_floor_grid(
+    camera: Camera, mount: CameraMount, camera_height_m: float, max_range_m: float
+) -> FloorGrid | None:
     """The grid of a pinhole camera; None where no row of the picture shows floor within the range."""
     u = (np.arange(camera.width // STEP_PX) + 0.5) * STEP_PX - 0.5
     v = (np.arange(camera.height // STEP_PX) + 0.5) * STEP_PX - 0.5

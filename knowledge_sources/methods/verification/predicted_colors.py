@@ -156,8 +156,8 @@ def _bound(corners: Floats) -> Floats:
 def _cast_rays(corners: Any, normals: Any, boxes: Any, rays: Any, size: int, each: int) -> Any:
     """Index of the polygon (m, k, 3), camera frame, that each ray (x, y, 1) meets first (-1: none), and its depth [m].
 
-    The rays are those of a grid of samples, ``size`` in a row, ``each`` rays a sample. A point of a polygon's plane is inside where it is on
-    the same side of all planes through the eye and one edge.
+    The rays are those of a grid of samples, ``size`` in a row, ``each`` rays a sample. A point of a polygon's plane is
+    inside where it is on the same side of all planes through the eye and one edge.
     """
     surface, depth = np.full(len(rays), -1, np.int64), np.full(len(rays), np.inf)
     columns, rows = rays[: each * size : each, 0], rays[:: each * size, 1]

@@ -1,0 +1,102 @@
+"""Does a region stand up from the floor, or lie flat on it? Its top in two pictures with known motion between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor.floor_grid import STEP_PX, FloorGrid
+from knowledge_sources.methods.floor.things import Region
+from knowledge_sources.settings.floor import FloorSettings
+from world_models.camera import NEAR_PLANE_M, Camera, CameraMount
+from world_models.frames import Pose2
+
+HALF = 4
+"""Patches are squares of 2 HALF + 1 pixels of the reduced picture."""
+COLUMNS = 8
+"""Places of a region's upper border that are compared."""
+MIN_DEVIATION = 4.0
+"""A patch with less contrast than this [grey levels] tells nothing."""
+
+Project = Callable[[Floats], Floats]
+
+
+def compute_parallax_odds(
+    region: Region, grid: FloorGrid, picture: NDArray[np.float32], earlier: NDArray[np.float32],
+    earlier_from_now: Pose2, camera: Camera, mount: CameraMount, settings: FloorSettings,
+) -> float:
+    """The odds that a region is solid against flat, by an earlier picture; 1 where nothing tells.
+
+    Points of the upper border are on the floor if the region is flat, and above its foot if it is solid. Where they
+    were in the earlier picture then differs; the patch round each tells which of the two it is.
+
+    Args:
+        picture, earlier: (h, w) grey, reduced by STEP_PX.
+        earlier_from_now: the robot's pose now in its frame then.
+    """
+    rows, columns = _find_upper_border(region)
+    if not len(rows):
+        return 1.0
+    points = grid.points_robot[rows, columns]
+    eye = np.array([mount.forward_m, 0.0])
+    ranges = np.linalg.norm(points - eye, axis=1)
+    foot_of = {int(column): float(grid.ranges_m[row, column]) for row, column in region.feet}
+    foot_m = np.array([foot_of.get(int(column), min(foot_of.values())) for column in columns])
+    part = np.minimum(foot_m / ranges, 1.0)
+    flat = np.column_stack([points, np.zeros(len(points))])
+    solid = np.column_stack([eye + (points - eye) * part[:, None], grid.camera_height_m * (1.0 - part)])
+    then_flat, then_solid = (_project(p, earlier_from_now, camera, mount, grid) for p in (flat, solid))
+    apart = np.linalg.norm(then_flat - then_solid, axis=1) * STEP_PX
+    votes = 0
+    for i in np.flatnonzero(apart >= settings.min_parallax_px):
+        patch = _cut(picture, grid.top + int(rows[i]), int(columns[i]))
+        as_flat, as_solid = (_correlate(earlier, patch, there[i]) for there in (then_flat, then_solid))
+        is_found = max(as_flat, as_solid) >= settings.min_parallax_correlation
+        if is_found and abs(as_solid - as_flat) >= settings.min_parallax_margin:
+            votes += 1 if as_solid > as_flat else -1
+    if votes == 0:
+        return 1.0
+    return float(settings.parallax_odds ** np.clip(votes / 2.0, -1.0, 1.0))
+
+
+def _find_upper_border(region: Region) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns of some pixels of the upper border, spread over the region."""
+    if region.is_clipped:
+        return np.zeros(0, np.intp), np.zeros(0, np.intp)
+    columns = np.flatnonzero(region.mask.any(axis=0))
+    some = np.unique(columns[np.linspace(0, len(columns) - 1, min(COLUMNS, len(columns))).astype(int)])
+    return np.argmax(region.mask[:, some], axis=0), some
+
+
+def _project(points_robot: Floats, earlier_from_now: Pose2, camera: Camera, mount: CameraMount, grid: FloorGrid
+             ) -> Floats:
+    """Where points (n, 3) of the robot's frame now were in the earlier picture, reduced [px]; NaN behind it."""
+    c, s = np.cos(earlier_from_now.heading_rad), np.sin(earlier_from_now.heading_rad)
+    flat = points_robot[:, :2] @ np.array([[c, s], [-s, c]]) + np.array(earlier_from_now.position)
+    height = mount.height_m - grid.camera_height_m  # of the floor above the plan on which poses are
+    there = mount.camera_from_robot.apply(np.column_stack([flat, points_robot[:, 2] + height]))
+    ahead = there[:, 2] > NEAR_PLANE_M
+    pixels = camera.project(np.where(ahead[:, None], there, (0.0, 0.0, 1.0)))
+    pixels[~ahead] = np.nan
+    return np.asarray((pixels + 0.5) / STEP_PX - 0.5)
+
+
+def _cut(picture: NDArray[np.float32], row: float, column: float) -> NDArray[np.float32]:
+    size = (2 * HALF + 1, 2 * HALF + 1)
+    return np.asarray(cv2.getRectSubPix(picture, size, (float(column), float(row))), np.float32)
+
+
+def _correlate(earlier: NDArray[np.float32], patch: NDArray[np.float32], there: Floats) -> float:
+    """Largest normalized correlation of a patch within a pixel of a place; -1 where it is not in the picture."""
+    rows, columns = earlier.shape
+    if not (np.isfinite(there).all() and HALF < there[0] < columns - HALF - 1 and HALF < there[1] < rows - HALF - 1):
+        return -1.0
+    size = 2 * (HALF + 1) + 1
+    window = cv2.getRectSubPix(earlier, (size, size), (float(there[0]), float(there[1])))
+    if patch.std() < MIN_DEVIATION or window.std() < MIN_DEVIATION:
+        return -1.0
+    return float(cv2.matchTemplate(window, patch, cv2.TM_CCOEFF_NORMED).max())

@@ -1,0 +1,252 @@
+"""How far the floor is free, by one picture: what does not look like floor where the model has floor ends it (§4)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.features.images import decode_colour
+from knowledge_sources.methods.features.rectification import get_rectifier
+from knowledge_sources.methods.floor.appearance import (
+    compute_looks,
+    default_covariance,
+    fit_looks,
+    learn_appearance,
+    measure_unlike,
+)
+from knowledge_sources.methods.floor.floor_grid import STEP_PX, FloorGrid, build_floor_grid
+from knowledge_sources.methods.floor.model_floor import ModelFloor, predict_model_floor
+from knowledge_sources.methods.floor.parallax import compute_parallax_odds
+from knowledge_sources.methods.floor.things import Region, find_footprint, find_regions, measure_height
+from knowledge_sources.settings import DEFAULT, Settings
+from knowledge_sources.settings.floor import FloorSettings
+from world_models.camera import Camera
+from world_models.entries.floor import FloorAppearance, FloorEnd, FloorThing, FreeFloor
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+
+DRIVEN_HALF_WIDTH_M = 0.25
+"""Half the width of the strip that was driven over, from which the floor's looks are learnt."""
+GREY = np.array([0.299, 0.587, 0.114], np.float32)
+SIGHT_PART = 2.0
+"""Pixels are looked at up to so many times the sight, for the tops of things."""
+
+
+class Seen(NamedTuple):
+    """A picture and the robot's pose [world] when it was taken."""
+
+    jpeg: bytes
+    pose: Pose2
+
+
+def see_free_floor(
+    robot: RobotModel,
+    locale: str,
+    pose: Pose2,
+    covariance: Floats,
+    jpeg: bytes,
+    earlier: Sequence[Seen],
+    appearances: Mapping[str, FloorAppearance],
+    seen_s: float,
+    settings: Settings = DEFAULT,
+) -> tuple[FreeFloor, tuple[FloorAppearance, ...]]:
+    """How far the floor is free in each direction, what ends it, and what the floor looks like as learnt from it.
+
+    Args:
+        robot: on the floor of the locale.
+        pose, covariance: of the robot and (3, 3) of (x, y, heading), world.
+        jpeg: the picture as the lens made it.
+        earlier: pictures from before, the newest first: for parallax, and to learn from where it has driven since.
+        appearances: what is known of the floors' looks, by locale.
+        seen_s: when it was taken.
+
+    Raises:
+        ValueError: it is not a picture.
+    """
+    s = settings.floor
+    floor_m = robot.world.floor_m(locale)
+    height_m = robot.mount.height_m - floor_m
+    grid = build_floor_grid(robot.camera, robot.mount, height_m, SIGHT_PART * s.sight_m)
+    eye = pose @ Pose2(robot.mount.forward_m, 0.0, 0.0)
+    if grid is None:
+        return _blind(locale, eye, seen_s), ()
+    sigma_rad = math.sqrt(max(float(covariance[2, 2]), 0.0))
+    margin_px = s.model_margin_px + 2.0 * sigma_rad * robot.camera.fx
+    model = predict_model_floor(robot, pose, grid, floor_m, s.max_rolled_over_m, margin_px)
+    picture = read_reduced(jpeg, robot.lens, robot.camera)
+    known = appearances.get(locale)
+    unlike, tells = find_unlike(picture[grid.top:], model, known, s)
+    regions = find_regions(unlike, tells, grid, s) if s.use_appearance else ()
+    built = [(region, _build_thing(region, grid, robot, pose, covariance, picture, earlier, s)) for region in regions]
+    things = [(region, thing) for region, thing in built if thing is not None]
+    scan = _scan(grid, model, tells, things, s)
+    learnt = _learn(robot, locale, pose, earlier, known, floor_m, settings)
+    return FreeFloor(
+        sense="camera", locale=locale, x_m=round(eye.x_m, 4), y_m=round(eye.y_m, 4),
+        bearings_rad=tuple(round(math.remainder(pose.heading_rad + b, math.tau), 5) for b in scan.bearings_rad),
+        near_m=scan.near_m, far_m=scan.far_m, ends=scan.ends, sigma_m=scan.sigma_m,
+        things=tuple(thing for _, thing in things), seen_s=seen_s), learnt
+
+
+@lru_cache(maxsize=16)
+def read_reduced(jpeg: bytes, lens: Camera, pinhole: Camera) -> NDArray[np.uint8]:
+    """The rectified picture (h, w, 3), red first, reduced by STEP_PX; the last few are cached, read-only."""
+    if lens.distortion is None:
+        image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_REDUCED_COLOR_2)
+        if image is None:
+            raise ValueError(f"expected the bytes of a JPEG picture, got {len(jpeg)} bytes that are not one")
+        small = np.ascontiguousarray(image[:, :, ::-1], np.uint8)
+    else:
+        whole = get_rectifier(lens, pinhole).rectify(decode_colour(jpeg))
+        small = np.asarray(cv2.resize(whole, (pinhole.width // STEP_PX, pinhole.height // STEP_PX),
+                                      interpolation=cv2.INTER_AREA), np.uint8)
+    small.setflags(write=False)
+    return small
+
+
+def find_unlike(
+    picture: NDArray[np.uint8], model: ModelFloor, known: FloorAppearance | None, settings: FloorSettings
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which pixels (rows, columns) do not look like the floor that the model has there, and where that tells anything.
+
+    The floor with most pixels tells how bright the picture is; a floor of which little is seen is compared by that.
+    """
+    looks = compute_looks(cv2.GaussianBlur(np.asarray(picture), (3, 3), 0.6).astype(np.float32))
+    unlike, tells = np.zeros(model.kinds.shape, bool), np.zeros(model.kinds.shape, bool)
+    most = 9.0 if not settings.max_unlike else settings.max_unlike**2
+    exposure: float | None = None
+    kinds, counts = np.unique(model.kinds[model.is_plain], return_counts=True)
+    for kind in kinds[np.argsort(-counts, kind="stable")]:
+        if np.isnan(model.colours[kind]).any():
+            continue
+        here = model.is_plain & (model.kinds == kind)
+        by_model = compute_looks(255.0 * model.colours[kind])
+        expected, is_learnt = by_model, False
+        if exposure is None and known is not None and known.samples > 0.0:
+            expected, is_learnt = compute_looks(np.array(known.mean)), True
+        elif exposure is not None:
+            expected, is_learnt = by_model + np.array([exposure, 0.0, 0.0]), True
+        fitted = fit_looks(looks[here], expected, is_learnt, settings)
+        if fitted is None and exposure is None:
+            continue
+        mean, covariance = fitted if fitted is not None else (expected, 4.0 * default_covariance(settings))
+        if exposure is None:
+            exposure = float(mean[0] - by_model[0])
+        unlike[here] = measure_unlike(looks[here], mean, covariance) > most
+        tells |= here
+    return unlike, tells
+
+
+class _Scan(NamedTuple):
+    bearings_rad: tuple[float, ...]
+    near_m: tuple[float, ...]
+    far_m: tuple[float, ...]
+    ends: tuple[FloorEnd, ...]
+    sigma_m: tuple[float, ...]
+
+
+def _scan(
+    grid: FloorGrid, model: ModelFloor, tells: NDArray[np.bool_], things: Sequence[tuple[Region, FloorThing]],
+    settings: FloorSettings,
+) -> _Scan:
+    """From the lower border up: as far as the model has floor, its looks are known, and no thing is in the way."""
+    rows, columns = grid.shape
+    blocked = np.zeros(grid.shape, bool)
+    for region, thing in things:
+        if thing.p_thing >= 0.5:
+            blocked |= region.mask
+    is_floor = model.kinds >= 0
+    up = np.arange(rows)[::-1]
+    first_thing, first_model = _first(blocked[up]), _first(~is_floor[up])
+    groups = np.array_split(np.arange(columns)[::-1], settings.bearings)  # bearings grow to the left
+    near, far, ends, sigmas, bearings = [], [], [], [], []
+    for group in groups:
+        bearings.append(float(grid.bearings_rad[group].mean()))
+        lowest_m = float(grid.ranges_m[-1, group].max())
+        near_m = lowest_m * max(0.0, 1.0 - settings.max_hidden_m / grid.camera_height_m)
+        at_thing, at_model = int(first_thing[group].min()), int(first_model[group].min())
+        stop = min(at_thing, at_model)
+        told = tells[up][:max(stop, 1), group].any()
+        range_m = settings.sight_m if stop >= rows else float(grid.ranges_m[rows - 1 - stop, group].min())
+        end: FloorEnd = "sight" if range_m >= settings.sight_m else "thing" if at_thing <= at_model else "model"
+        if stop == 0 or not told:  # nothing of the floor is seen, or its looks are not known
+            range_m = 0.0
+            end = end if stop == 0 else "sight"
+        near.append(round(near_m, 3))
+        far.append(round(min(range_m, settings.sight_m), 3))
+        ends.append(end)
+        sigmas.append(round(0.01 + STEP_PX * range_m**2 / (grid.camera_height_m * 400.0), 3))
+    return _Scan(tuple(bearings), tuple(near), tuple(far), tuple(ends), tuple(sigmas))
+
+
+def _first(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """The first row of each column that is set; the number of rows where none is."""
+    return np.where(mask.any(axis=0), np.argmax(mask, axis=0), len(mask))
+
+
+def _build_thing(
+    region: Region, grid: FloorGrid, robot: RobotModel, pose: Pose2, covariance: Floats,
+    picture: NDArray[np.uint8], earlier: Sequence[Seen], settings: FloorSettings,
+) -> FloorThing | None:
+    """What stands where a region is; None where it is lower than what is rolled over."""
+    height_m, sigma_height_m = measure_height(region, grid)
+    if height_m < settings.max_rolled_over_m and math.isfinite(sigma_height_m):
+        return None
+    odds = settings.p_seen_once / (1.0 - settings.p_seen_once)
+    how = "it does not look like the floor"
+    if settings.use_parallax and earlier:
+        then = earlier[0]
+        earlier_from_now = then.pose.inverse() @ pose
+        before = read_reduced(then.jpeg, robot.lens, robot.camera).astype(np.float32) @ GREY
+        grey = picture.astype(np.float32) @ GREY
+        told = compute_parallax_odds(region, grid, grey, before, earlier_from_now, robot.camera, robot.mount, settings)
+        odds *= told
+        how += "" if told == 1.0 else " and stands up from it" if told > 1.0 else ", but lies flat on it"
+    elif not settings.use_parallax:
+        odds = 1e6
+    corners = find_footprint(region, grid, settings)
+    world = [(pose @ Pose2(float(x), float(y), 0.0)).position for x, y in corners]
+    foot_m = float(np.linalg.norm(corners, axis=1).min())
+    spread = math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0) + foot_m**2 * float(covariance[2, 2]))
+    at, left_right = np.flatnonzero(region.mask.any(axis=1)), np.flatnonzero(region.mask.any(axis=0))
+    (left, top), (right, bottom) = grid.pixels[at[0], left_right[0]], grid.pixels[at[-1], left_right[-1]]
+    own = 0.3 if region.is_cut else STEP_PX * foot_m**2 / (grid.camera_height_m * robot.camera.fy)
+    return FloorThing(
+        footprint=tuple((round(x, 3), round(y, 3)) for x, y in world), sigma_m=round(math.hypot(spread, own), 4),
+        height_m=round(height_m, 3), sigma_height_m=round(sigma_height_m, 3), p_thing=round(odds / (1.0 + odds), 4),
+        box_px=(float(left), float(top), float(right), float(bottom)), evidence=how)
+
+
+def _learn(
+    robot: RobotModel, locale: str, pose: Pose2, earlier: Sequence[Seen], known: FloorAppearance | None, floor_m: float,
+    settings: Settings,
+) -> tuple[FloorAppearance, ...]:
+    """What the floor looks like where the robot has driven since the oldest picture, as that picture shows it."""
+    if not earlier:
+        return ()
+    then = earlier[-1]
+    now = then.pose.inverse() @ pose
+    s = settings.floor
+    grid = build_floor_grid(robot.camera, robot.mount, robot.mount.height_m - floor_m, SIGHT_PART * s.sight_m)
+    if grid is None or now.x_m <= 0.0:
+        return ()
+    away = math.hypot(*now.position)
+    ahead, aside = (grid.points_robot @ np.array(axis) / away for axis in (now.position, (-now.y_m, now.x_m)))
+    driven = (ahead > 0.0) & (ahead < away) & (np.abs(aside) < DRIVEN_HALF_WIDTH_M)
+    if not driven.any():
+        return ()
+    colours = read_reduced(then.jpeg, robot.lens, robot.camera)[grid.top:][driven].astype(float)
+    learnt = learn_appearance(known, locale, colours, s)
+    return () if learnt is None or learnt == known else (learnt,)
+
+
+def _blind(locale: str, eye: Pose2, seen_s: float) -> FreeFloor:
+    """Nothing is seen of the floor: the camera looks over it."""
+    return FreeFloor("camera", locale, eye.x_m, eye.y_m, (), (), (), (), (), (), seen_s)
