@@ -23,6 +23,7 @@ from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.action.motor import Motor
 from knowledge_sources.action.obstacle_finder import ObstacleFinder
 from knowledge_sources.action.path_follower import PathFollower
+from knowledge_sources.action.range_watcher import RangeWatcher
 from knowledge_sources.action.withdrawer import Withdrawer
 from knowledge_sources.goal.interpreter import Interpreter
 from knowledge_sources.goal.mission_monitor import MissionMonitor
@@ -61,6 +62,7 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     Relocalizer,
     FaultHandler,
     ModelReviser,
+    RangeWatcher,
     ObstacleFinder,
     DoorWatcher,
     Withdrawer,

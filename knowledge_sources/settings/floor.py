@@ -73,3 +73,25 @@ class FloorSettings:
     min_parallax_margin: float = setting(
         0.15, "1", "Smallest difference of the correlations of the two hypotheses that tells anything.",
         "engineering judgement")
+
+    # Ranges
+    max_belief_sigma_m: float = setting(
+        0.15, "m", "A less certain place tells of no free floor.", "engineering judgement")
+    max_range_age_s: float = setting(
+        5.0, "s", "A reading is compared with those that are no older.", "engineering judgement")
+    range_sigmas: float = setting(
+        3.0, "1", "Free floor ends so many standard deviations of a distance before an echo.", "engineering judgement")
+    range_slack_m: float = setting(
+        0.1, "m", "An echo that is nearer than the model's nearest wall or thing by no more is of that: what is flush "
+        "with a wall is not in the model.", "engineering judgement")
+    max_range_thing_m: float = setting(
+        2.0, "m", "A thing is concluded from an echo up to here from its sensor: further, its cone is too wide.",
+        "engineering judgement")
+    range_join_m: float = setting(
+        0.2, "m", "Echoes of neighbouring sensors that are no further apart are of one thing.", "engineering judgement")
+    range_depth_m: float = setting(
+        0.1, "m", "How deep a thing is taken to be that was ranged.", "engineering judgement")
+    echo_p: float = setting(
+        0.7, "1", "Probability of a thing after one echo that the model does not explain.", "engineering judgement")
+    max_range_p: float = setting(
+        0.99, "1", "Probability that many echoes come to.", "engineering judgement")
