@@ -43,3 +43,146 @@ NAMES = [source.__module__.rpartition(".")[2] for source in KNOWLEDGE_SOURCES]
 NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "fault_handler", "path_follower",
               "elevator_rider", "obstruction_finder", "model_reviser", "withdrawer", "obstacle_finder", "door_watcher",
               "range_watcher"}
+"""Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
+the move, ride in elevators, find what is before the camera or in the way, or take up what somebody tells."""
+
+
+@pytest.mark.parametrize("missing", NAMES)
+def test_without_any_one_of_them_the_outcome_is_clear(short_stage: Stage, missing: str) -> None:
+    refusals: list[str] = []
+
+    def sources(settings: Settings) -> Sequence[KnowledgeSource]:
+        return [ks for ks in knowledge_sources(settings) if ks.name != missing]
+
+    result = run_mission(short_stage, 3, sources=sources, sinks=[lambda d: refusals.append(d.refused)])
+    assert result.outcome in {"reached", "lost", "blocked", "failed"}
+    assert result.reason
+    assert not any(refusals)
+    if missing not in NOT_NEEDED:
+        assert result.outcome != "reached"
+
+
+@inference()
+@dataclass(frozen=True)
+class Counted:
+    """A kind of its own: what one motion report claims."""
+
+    text: str
+
+
+class Odometer(KnowledgeSource):
+    """A knowledge source of its own: counts motion reports."""
+
+    level = Level.ACTION
+    watches = (Watch(MotionReport, (Posted,)),)
+    writes = (Counted,)
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        yield Post(Counted(f"{trigger.entry.value.move_m:.2f} m"), (trigger.entry,))
+
+
+def test_adding_one_takes_one_line(short_stage: Stage) -> None:
+    said: list[str] = []
+
+    def listen(decision: Decision) -> None:
+        said.extend(c.entry.value.text for c in decision.made if c.entry.author == "odometer")
+
+    result = run_mission(
+        short_stage, 3, sources=lambda known: (*knowledge_sources(known), Odometer()), sinks=[listen])
+    assert result.outcome == "reached"
+    assert said
+
+
+def test_no_expert_holds_the_truth(short_stage: Stage) -> None:
+    """Neither the simulator nor the building or the robot can be reached from what a knowledge source holds."""
+    body = short_stage.body(3)
+    for source in knowledge_sources():
+        held = [thing for thing in _reachable(source) if isinstance(thing, OF_TRUTH | FROM_VIEW)]
+        assert held == [], source.name
+    assert any(isinstance(thing, Truth) for thing in _reachable(body))  # the walk does find it where it is
+
+
+TRUTH_TABLE = """
+[truth.camera]
+focal_px = 0.5
+[[truth.things]]
+thing = "allens-office/desk"
+missing = true
+[[truth.extra]]
+kind = "bin"
+locale = "allens-office"
+x_ft = 2.0
+y_ft = 6.0
+at_s = 3.0
+"""
+
+
+def test_nothing_of_a_truth_that_differs_is_on_the_board() -> None:
+    """Neither in an entry nor in a knowledge source after the mission; the robot believes in the scenario's camera."""
+    stage, entries, sources = build_stage(parse_scenario(OFFICE + TRUTH_TABLE)), [], list(knowledge_sources())
+
+    def listen(decision: Decision) -> None:
+        entries.extend(change.entry for change in (*decision.observed, *decision.made))
+
+    run_mission(stage, 3, sources=lambda _: sources, sinks=[listen])
+    assert entries and stage.building.gone
+    held = [thing for thing in _reachable((entries, sources)) if isinstance(thing, OF_TRUTH)]
+    assert held == []
+    texts = [thing for thing in _reachable(entries) if isinstance(thing, str)]
+    assert not [text for text in texts if "extra-0" in text or text == "bin"]
+    cameras = [entry.value for entry in entries if isinstance(entry.value, CameraState)]
+    assert [camera.lens.fx for camera in cameras] == [stage.scenario.camera.camera.fx]
+
+
+def _reachable(root: Any) -> Iterable[Any]:
+    """Every object that can be reached from one, code and modules left out."""
+    seen, todo = {id(root)}, [root]
+    while todo:
+        thing = todo.pop()
+        yield thing
+        for other in gc.get_referents(thing):
+            if id(other) not in seen and not isinstance(other, type | ModuleType | FunctionType):
+                seen.add(id(other))
+                todo.append(other)
+
+
+def test_rating_and_acting_are_pure(short_stage: Stage) -> None:
+    """Asked twice, every source gives the same rating and effects, and the board is as it was."""
+    checked = 0
+
+    class Asked(KnowledgeSource):
+        """Stands in for a knowledge source and asks it twice."""
+
+        def __init__(self, inner: KnowledgeSource) -> None:
+            self._inner = inner
+            self.level, self.closes = inner.level, inner.closes
+            self.watches, self.writes = inner.watches, inner.writes
+
+        @property
+        def name(self) -> str:
+            return self._inner.name
+
+        def rate(self, view: View, trigger: Change) -> float | None:
+            nonlocal checked
+            size, rating = len(view), self._inner.rate(view, trigger)
+            assert self._inner.rate(view, trigger) == rating
+            assert rating is None or 0.0 <= rating <= 1.0
+            assert len(view) == size
+            checked += 1
+            return rating
+
+        def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+            size = len(view)
+            first, second = tuple(self._inner.act(view, trigger)), tuple(self._inner.act(view, trigger))
+            assert [_plain(e) for e in first] == [_plain(e) for e in second]
+            assert len(view) == size
+            return first
+
+    result = run_mission(short_stage, 3, sources=lambda known: [Asked(ks) for ks in knowledge_sources(known)])
+    assert result.outcome == "reached", result.reason
+    assert checked > 100
+
+
+def _plain(effect: Effect) -> Any:
+    value = getattr(effect, "value", None)
+    return type(effect).__name__, None if value is None else plain(value)

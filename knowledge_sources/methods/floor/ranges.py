@@ -197,10 +197,7 @@ def _find_things(
             arcs.append((int(k), arc))
     for group in _join_neighbours(arcs, len(cones.axes_rad), settings.range_join_m):
         footprint = _build_footprint(cones, group, settings.range_depth_m)
-        hull = shapely.Polygon(footprint)
-        again = sum(any(hull.distance(shapely.Polygon(thing.footprint)) <= 3.0 * sigma_m for thing in before.things)
-                    for before in earlier)
-        echoes = len(group) + again
+        echoes = len(group)
         nearest_m = min(float(cones.away_m[k]) for k, _ in group)
         yield FloorThing(
             footprint, sigma_m, 0.0, math.inf, min(settings.max_range_p, 1.0 - (1.0 - settings.echo_p) ** echoes),
