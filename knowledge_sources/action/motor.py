@@ -12,6 +12,7 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.floor_ahead import FloorAhead
 from knowledge_sources.methods.motion.pure_pursuit import (
     compute_bearing,
     compute_chord_turn,
@@ -36,10 +37,14 @@ from knowledge_sources.questions import (
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import BodyFault, MotorCommand
+from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot import Drift
 from world_models.entries.task import Leg, Milestone, PlanSketch
 from world_models.frames import Pose2, wrap_angle
+
+MAX_LOOK_ERROR_RAD = math.radians(6.0)
+"""The robot faces the floor that it wants to see when its heading is off by no more than this."""
 
 
 class Motor(RobotKnowledgeSource):
@@ -47,7 +52,8 @@ class Motor(RobotKnowledgeSource):
 
     It begins a leg when a verified sketch has a primitive subgoal, and turns to where a milestone is to be looked for.
     It stands still while a command is being carried out or the body is at fault. While anything above the action level
-    is in doubt it does not drive, and turns only for the look that is to end the doubt.
+    is in doubt it does not drive, and turns only for the look that is to end the doubt. It moves only as far as the
+    floor is seen to be free; it looks at the floor behind a corner before it is there, and creeps where it cannot see.
     """
 
     level = Level.ACTION
@@ -112,8 +118,14 @@ class Motor(RobotKnowledgeSource):
         robot, drift = find_robot(view), view.latest(Drift)
         here = belief.value.world_from_robot(robot.world)
         curvature_per_m = 0.0 if drift is None else drift.value.curvature_per_m
-        command = self._plan_increment(robot.actuator, leg.value, here, curvature_per_m)
         seen = update_leg(leg.value, here, self._aim(leg.value, here))
+        scans: tuple[Entry[FreeFloor], ...] = ()
+        command = self._go_on_looking(seen, here, robot.actuator)
+        if command is None:
+            seen = replace(seen, looking_rad=None)
+            command = self._plan_increment(robot.actuator, seen, here, curvature_per_m)
+            if command is not None and command.move_m > 0.0 and self._settings.action.keeps_to_seen_floor:
+                seen, command, scans = self._keep_to_seen_floor(view, seen, belief, command)
         discrepancy = open_discrepancy(view, Level.ACTION)
         corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
         yield from corrected
@@ -122,7 +134,36 @@ class Motor(RobotKnowledgeSource):
             return
         step = Revise(leg, replace(seen, increments=seen.increments + 1), (leg, belief, *corrected))
         yield step
-        yield Post(command, (step, belief, *(() if drift is None else (drift,))))
+        yield Post(command, (step, belief, *(() if drift is None else (drift,)), *scans))
+
+    def _go_on_looking(self, leg: Leg, here: Pose2, actuator: ActuatorModel) -> MotorCommand | None:
+        """The turn to where the floor is to be seen; None when the robot faces there, or looks for none."""
+        if leg.looking_rad is None:
+            return None
+        turn = wrap_angle(leg.looking_rad - here.heading_rad)
+        return MotorCommand(_limit_turn(turn, actuator), 0.0) if abs(turn) > MAX_LOOK_ERROR_RAD else None
+
+    def _keep_to_seen_floor(
+        self, view: View, leg: Leg, belief: Entry[Hypothesis], command: MotorCommand
+    ) -> tuple[Leg, MotorCommand, tuple[Entry[FreeFloor], ...]]:
+        """A move only as far as the floor is seen to be free; before it a look at what will be needed behind the leg.
+
+        Returns the leg, the command, and the newest scan that it rests on.
+        """
+        s, actuator = self._settings.action, find_robot(view).actuator
+        floor = FloorAhead(view, leg, belief, s)
+        because, here = floor.scans[-1:], belief.value.world_from_robot(find_building(view))
+        look = floor.choose_look()
+        if look is not None:
+            looking = replace(leg, looking_rad=look.heading_rad, looks=(
+                *leg.looks, (here.x_m, here.y_m, look.heading_rad)))
+            turned = self._go_on_looking(looking, here, actuator)
+            if turned is not None:
+                return looking, turned, because
+        caution = floor.limit_move(actuator.reach * command.move_m)
+        move_m = min(command.move_m, actuator.compute_command_m(caution.move_m))
+        slowly = s.creep_speed_m_per_s if caution.creeps else None
+        return leg, MotorCommand(command.turn_rad, move_m, slowly), because
 
     def _plan_increment(
         self, actuator: ActuatorModel, leg: Leg, here: Pose2, curvature_per_m: float

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -11,6 +12,7 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.floor_ahead import FloorAhead
 from knowledge_sources.methods.motion.pure_pursuit import (
     compute_bearing,
     compute_curvature_to,
@@ -44,7 +46,8 @@ class PathFollower(RobotKnowledgeSource):
     """Drives a leg without stopping at each increment, and corrects the course by each picture.
 
     It stops at once when anything is in doubt, above the action level or beyond the action level's bound. It also stops
-    before the end of the leg: the motor drives the rest.
+    before the end of the leg: the motor drives the rest; and before floor that was not seen to be free, after it has
+    slowed.
     """
 
     level = Level.ACTION
@@ -89,9 +92,27 @@ class PathFollower(RobotKnowledgeSource):
         yield step
         wanted = compute_curvature_to(point, here) - (0.0 if drift is None else drift.value.curvature_per_m)
         curvature = min(max(wanted, -s.max_curvature_per_m), s.max_curvature_per_m)
-        new = Course(leg.id, robot.actuator.speed_m_per_s, curvature)
+        new = Course(leg.id, self._choose_speed(view, leg.value, belief, robot.actuator), curvature)
         because = (step, belief, *(() if drift is None else (drift,)))
         yield Post(new, because) if course is None else Revise(course, new, (course, *because))
+
+    def _choose_speed(self, view: View, leg: Leg, belief: Entry[Hypothesis], actuator: ActuatorModel) -> float:
+        """The full speed, or what can be stopped from before the floor ends that is seen to be free."""
+        free_m = self._measure_free_m(view, leg, belief, actuator) - self._settings.action.rolling_stop_margin_m
+        fastest = math.sqrt(2.0 * actuator.brake_m_per_s2 * max(0.0, free_m))
+        return min(actuator.speed_m_per_s, max(fastest, self._settings.action.creep_speed_m_per_s))
+
+    def _measure_free_m(self, view: View, leg: Leg, belief: Entry[Hypothesis], actuator: ActuatorModel) -> float:
+        """How far ahead the floor is seen to be free, as far as that matters at full speed."""
+        most_m = actuator.stopping_distance_m() + self._settings.action.min_rolling_leg_m
+        if not self._settings.action.keeps_to_seen_floor:
+            return most_m
+        return FloorAhead(view, leg, belief, self._settings.action).measure_free_m(most_m)
+
+    def _is_floor_ahead(self, view: View, leg: Leg, belief: Entry[Hypothesis], actuator: ActuatorModel) -> bool:
+        """Whether enough floor ahead is seen to be free to roll on."""
+        free_m = self._measure_free_m(view, leg, belief, actuator)
+        return free_m > 2.0 * self._settings.action.rolling_stop_margin_m
 
     def _may_start(self, view: View) -> bool:
         """Whether the robot stands before a leg that is long enough, and faces along it."""
@@ -103,7 +124,8 @@ class PathFollower(RobotKnowledgeSource):
         here = belief.value.world_from_robot(robot.world)
         leg, s = driving[0].value, self._settings.action
         is_long = self._is_long_enough(leg, here, robot.actuator)
-        return is_long and abs(self._aim_error(leg, here)) <= s.max_rolling_start_error_rad
+        is_ready = is_long and abs(self._aim_error(leg, here)) <= s.max_rolling_start_error_rad
+        return is_ready and leg.looking_rad is None and self._is_floor_ahead(view, leg, belief, robot.actuator)
 
     def _must_stop(self, view: View) -> bool:
         belief, driving = find_belief(view), current_leg(view)
@@ -113,7 +135,8 @@ class PathFollower(RobotKnowledgeSource):
         here = belief.value.world_from_robot(robot.world)
         leg, s = driving[0].value, self._settings.action
         is_long = self._is_long_enough(leg, here, robot.actuator)
-        return not is_long or abs(self._aim_error(leg, here)) > s.max_rolling_error_rad
+        is_astray = not is_long or abs(self._aim_error(leg, here)) > s.max_rolling_error_rad
+        return is_astray or not self._is_floor_ahead(view, leg, belief, robot.actuator)
 
     def _is_long_enough(self, leg: Leg, here: Pose2, actuator: ActuatorModel) -> bool:
         """Whether the robot can drive and still stop before the end of the leg."""

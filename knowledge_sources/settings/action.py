@@ -36,6 +36,40 @@ class ActionSettings:
     arrival_part: float = setting(
         0.8, "1", "Part of a leg's tolerance within which it has arrived.", "engineering judgement")
 
+    # Floor ahead: motor and path follower
+    keeps_to_seen_floor: bool = setting(
+        False, "yes/no", "Whether the robot drives only where it has seen the floor free; else it looks or creeps.",
+        "issue 18")
+    seen_margin_m: float = setting(
+        0.03, "m", "Margin round the robot's disc within which the floor must be seen to be free.",
+        "engineering judgement")
+    max_seen_age_s: float = setting(
+        60.0, "s", "What was seen to be free longer ago must be seen again.", "engineering judgement")
+    put_down_free_m: float = setting(
+        0.75, "m", "Round where it was put down the floor is free to this distance: a person sees it.",
+        "engineering judgement")
+    near_model_m: float = setting(
+        0.08, "m", "Nearer to a wall or a thing of the model the floor need not be seen.", "engineering judgement")
+    min_increment_m: float = setting(
+        0.2, "m", "Shortest move at full speed into floor that is seen to be free; less of it is crept.",
+        "engineering judgement")
+    creep_speed_m_per_s: float = setting(
+        0.08, "m/s", "Speed into floor that was not seen to be free.", "engineering judgement")
+    max_creep_m: float = setting(
+        0.35, "m", "Longest move at that speed before the next picture.", "engineering judgement")
+    look_ahead_m: float = setting(
+        1.1, "m", "So much of the way beyond a leg is looked at before it ends: what is too near to be seen then.",
+        "engineering judgement")
+    look_from_m: float = setting(
+        3.0, "m", "Distance from the end of a leg from which that begins.", "engineering judgement")
+    max_looks: int = setting(
+        4, "count", "Most looks round on one leg.", "engineering judgement")
+    look_turn_rad_per_s: float = setting(
+        math.radians(45.0), "rad/s", "How fast the robot turns, as far as the time that a look takes is weighed.",
+        "engineering judgement")
+    look_picture_s: float = setting(
+        0.2, "s", "Time that a picture with its command takes, weighed likewise.", "engineering judgement")
+
     # Path follower
     rolling_lookahead_m: float = setting(
         0.75, "m", "Distance ahead on the line at which the path follower steers (pure pursuit).",
@@ -43,6 +77,8 @@ class ActionSettings:
     min_rolling_leg_m: float = setting(
         0.3, "m", "Shortest rest of a leg, beyond the stopping distance, that is driven without stopping.",
         "engineering judgement")
+    rolling_stop_margin_m: float = setting(
+        0.1, "m", "The path follower stops so far before floor that was not seen to be free.", "engineering judgement")
     max_rolling_start_error_rad: float = setting(
         math.radians(3.0), "rad", "The path follower starts when it faces its aim to within this.",
         "engineering judgement")

@@ -138,7 +138,7 @@ class SimulatedBody:
         began_s = self._truth.time_s
         self._advance_time(self._wheels.parameters.command_s)
         self._turn(command.turn_rad)
-        done = self._move(command.move_m)
+        done = self._move(command.move_m, command.speed_m_per_s)
         turn, move = self._wheels.quantize(command.turn_rad, command.move_m * done)
         self._add_odometry(turn, move)
         now_s = self._truth.time_s
@@ -302,10 +302,11 @@ class SimulatedBody:
         blocked = self._building.obstacles.blocks(before, aside)
         self._drive_to(before @ Pose2(0.0, 0.0, done.heading_rad) if blocked else aside, self._wheels.turn_s(turn_rad))
 
-    def _move(self, move_m: float) -> float:
+    def _move(self, move_m: float, speed_m_per_s: float | None) -> float:
         """Move until it is done, in contact or broken off; returns the part that was done, 0..1."""
         steps = list(arc_steps(*self._wheels.sample_arc(move_m, self._wheel_rng)))
-        each_s = self._wheels.move_s(move_m) / max(1, len(steps))
+        slowed = 1.0 if speed_m_per_s is None else max(1.0, self._wheels.parameters.speed_m_per_s / speed_m_per_s)
+        each_s = slowed * self._wheels.move_s(move_m) / max(1, len(steps))
         for index, step in enumerate(steps):
             if self._is_broken_off():
                 return index / len(steps)

@@ -144,6 +144,8 @@ class DenningEmulator:
         match verb, words:
             case "GO", [turn, move]:
                 self._go(seq, float(turn), float(move))
+            case "GO", [turn, move, speed]:
+                self._go(seq, float(turn), float(move), float(speed))
             case "STOP", []:
                 self._stop(seq)
             case "BEAT", [question]:
@@ -174,19 +176,19 @@ class DenningEmulator:
         self._token, self._nonce, self._waiting = token, nonce, None
         self._seq, self._status, self._claim = 0, "ok", Claim(time_s=self._motion.claim.time_s)
 
-    def _go(self, seq: int, turn_rad: float, move_m: float) -> None:
+    def _go(self, seq: int, turn_rad: float, move_m: float, speed_m_per_s: float | None = None) -> None:
         if seq == self._seq:
             self._send_status()
         elif seq != self._seq + 1:
             self._send(self._token, seq, "NO", "number")
         elif self.moving:
             self._send(self._token, seq, "NO", "busy")
-        elif not (abs(turn_rad) <= MAX_TURN_RAD and 0.0 <= move_m <= MAX_MOVE_M):
+        elif not (abs(turn_rad) <= MAX_TURN_RAD and 0.0 <= move_m <= MAX_MOVE_M and _is_speed(speed_m_per_s)):
             self._send(self._token, seq, "NO", "range")
         else:
             self._seq, self._status = seq, "run"
             self.executed.append(Executed(self._token, seq, turn_rad, move_m))
-            self._motion.begin(turn_rad, move_m)
+            self._motion.begin(turn_rad, move_m, speed_m_per_s)
             self._follow()
             self._send_status()
 
@@ -239,3 +241,8 @@ class DenningEmulator:
     def _send(self, token: str, seq: int, verb: str, *words: str) -> None:
         body = " ".join((token, str(seq), verb, *words)).encode("ascii")
         self._out += b"#%b*%08X\n" % (body, binascii.crc32(body))
+
+
+def _is_speed(speed_m_per_s: float | None) -> bool:
+    """Whether a speed is none, or a finite one ahead."""
+    return speed_m_per_s is None or 0.0 < speed_m_per_s < math.inf

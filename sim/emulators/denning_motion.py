@@ -38,7 +38,7 @@ class Motion(Protocol):
     turn_rate: float
     speed: float
 
-    def begin(self, turn_rad: float, move_m: float) -> None:
+    def begin(self, turn_rad: float, move_m: float, speed_m_per_s: float | None = None) -> None:
         """Begin a command: TURN, then MOVE."""
         ...
 
@@ -90,8 +90,8 @@ class InstantMotion:
         self._claim = Claim()
         self._contact: Contact | None = None
 
-    def begin(self, turn_rad: float, move_m: float) -> None:
-        report = self._body.execute(MotorCommand(turn_rad, move_m))
+    def begin(self, turn_rad: float, move_m: float, speed_m_per_s: float | None = None) -> None:
+        report = self._body.execute(MotorCommand(turn_rad, move_m, speed_m_per_s))
         self._contact = self._body.take_contact()
         self._claim = Claim(report.turn_rad, report.move_m, report.duration_s, report.sim_time_s)
 
@@ -129,14 +129,16 @@ class ConstantSpeedMotion:
     def __init__(self, ground: Ground) -> None:
         self._ground = ground
         self._turn = self._move = 0.0
+        self._speed = self.speed
         self._began_s = ground.time_s
         self._claim = Claim(time_s=ground.time_s)
         self._ended = "ok"
         self._held_s = 0.0
         self._contact: Contact | None = None
 
-    def begin(self, turn_rad: float, move_m: float) -> None:
+    def begin(self, turn_rad: float, move_m: float, speed_m_per_s: float | None = None) -> None:
         self._turn, self._move, self._began_s = turn_rad, move_m, self._ground.time_s
+        self._speed = self.speed if speed_m_per_s is None else min(self.speed, speed_m_per_s)
         self._claim = Claim(time_s=self._began_s)
         self._ended, self._held_s, self._contact = "", 0.0, None
 
@@ -176,7 +178,7 @@ class ConstantSpeedMotion:
         if to_go == 0.0:
             self._ended = "ok"
             return 0.0
-        rate = self.turn_rate if turning else self.speed
+        rate = self.turn_rate if turning else self._speed
         step_s = min(max_s, abs(to_go) / rate)
         step = to_go if step_s < max_s or abs(to_go) <= rate * max_s else math.copysign(rate * step_s, to_go)
         rolled = self._ground.roll(step if turning else 0.0, 0.0 if turning else step, step_s)

@@ -42,17 +42,22 @@ class MotorCommand:
     Attributes:
         turn_rad: counter-clockwise [rad].
         move_m: forward, never negative [m].
+        speed_m_per_s: at most so fast in the move; None for the speed of the base.
     """
 
     turn_rad: float
     move_m: float
+    speed_m_per_s: float | None = None
 
     def __post_init__(self) -> None:
         if not self.move_m >= 0.0:
             raise ValueError(f"expected a move forward (>= 0 m), got {self.move_m}")
+        if self.speed_m_per_s is not None and not self.speed_m_per_s > 0.0:
+            raise ValueError(f"expected a speed above 0 m/s, got {self.speed_m_per_s}")
 
     def sentence(self) -> str:
-        return words.motion(self.turn_rad, self.move_m)
+        slowly = "" if self.speed_m_per_s is None else f", slowly, at {self.speed_m_per_s:.2f} m/s"
+        return words.motion(self.turn_rad, self.move_m) + slowly
 
 
 @request(keep=LAST_REQUESTS)

@@ -172,6 +172,8 @@ class Leg:
         to_go_m, left_m: what was left along the line, and how far to the left of it the robot was believed to be, when
             the last increment was decided; None before the first.
         aim_rad: how far to the left of its heading the point lay that it then steered at [rad].
+        looking_rad: the heading that the robot turns to, to see floor that it will need [rad, world]; None on the way.
+        looks: x, y and heading of each such look on this leg.
     """
 
     sketch: str
@@ -187,13 +189,20 @@ class Leg:
     to_go_m: float | None = None
     left_m: float | None = None
     aim_rad: float | None = None
+    looking_rad: float | None = None
+    looks: tuple[tuple[float, float, float], ...] = ()
 
     def sentence(self) -> str:
         length_m = math.hypot(self.x1_m - self.x0_m, self.y1_m - self.y0_m)
         return (f"straight leg of {words.metres(length_m)}, {self.status} after"
                 f" {words.count(self.increments, 'increment')}; from {words.point(self.x0_m, self.y0_m)} to"
                 f" {words.point(self.x1_m, self.y1_m)} in the world (subgoal {self.index} of {self.sketch}, near enough"
-                f" within {words.metres(self.tolerance_m)})")
+                f" within {words.metres(self.tolerance_m)}){self._tell_look()}")
+
+    def _tell_look(self) -> str:
+        if self.looking_rad is None:
+            return ""
+        return f"; looks at the floor ahead first, at heading {words.degrees(self.looking_rad)}"
 
 
 @inference(keep=2, when=is_closed)

@@ -13,7 +13,16 @@ from collections.abc import Iterator
 from harvey.hardware.drivers.bases.base import BaseKind, FaultKind
 from harvey.hardware.drivers.bases.counters import step
 from harvey.hardware.drivers.bases.create2_senses import build_ranges, find_contact
-from harvey.hardware.drivers.bases.create2_wire import SAFE_MODE, Decoder, Report, drive, safe, stream, wake
+from harvey.hardware.drivers.bases.create2_wire import (
+    SAFE_MODE,
+    Decoder,
+    Report,
+    drive,
+    is_permitted,
+    safe,
+    stream,
+    wake,
+)
 from harvey.hardware.drivers.bases.driver import LOOK_S, Driver
 from harvey.hardware.drivers.bases.guard import Guard
 from harvey.hardware.drivers.bases.link import Link
@@ -53,6 +62,14 @@ STALLED_S = 0.8
 ASTRAY = "its wheels did not go as they were told to"
 
 
+def find_speed(fast: int, most_m_per_s: float | None) -> int:
+    """The fastest wheel speed [mm/s] up to ``fast`` that may be sent and is no faster than asked for."""
+    if most_m_per_s is None:
+        return fast
+    most = max(1, min(fast, int(1000.0 * most_m_per_s)))
+    return next((speed for speed in range(most, 0, -1) if is_permitted(speed) and is_permitted(-speed)), 1)
+
+
 class Create2Base(Driver):
     """A base over the Open Interface."""
 
@@ -82,8 +99,10 @@ class Create2Base(Driver):
         self._halt()
         way = _Way(self)
         half_axle = AXLE_M / 2.0
-        self._go(way, abs(command.turn_rad) * half_axle, math.copysign(1.0, command.turn_rad), turning=True)
-        self._go(way, command.move_m, 1.0, turning=False)
+        sign = math.copysign(1.0, command.turn_rad)
+        self._go(way, abs(command.turn_rad) * half_axle, sign, (FAST_TURN, SLOW_TURN), turning=True)
+        fast = find_speed(FAST, command.speed_m_per_s)
+        self._go(way, command.move_m, 1.0, (fast, min(fast, SLOW)), turning=False)
         return way.report()
 
     def _halt(self) -> None:
@@ -142,9 +161,9 @@ class Create2Base(Driver):
     def _after_reopening(self) -> None:
         self._decoder.clear()
 
-    def _go(self, way: _Way, goal_m: float, sign: float, *, turning: bool) -> None:
-        """The wheels go this far, against each other or together, and stand."""
-        fast, slow = (FAST_TURN, SLOW_TURN) if turning else (FAST, SLOW)
+    def _go(self, way: _Way, goal_m: float, sign: float, speeds: tuple[int, int], *, turning: bool) -> None:
+        """The wheels go this far, against each other or together, fast and at last slowly, and stand."""
+        fast, slow = speeds
         ends_s = self._link.now() + 2.0 * goal_m / (slow / 1000.0) + 2.0
         way.begin(sign, turning)
         if goal_m < M_PER_COUNT:

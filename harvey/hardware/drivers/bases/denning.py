@@ -55,7 +55,8 @@ class DenningBase(Driver):
         self._ready()
         self._seq += 1
         self._unresolved = True
-        words = (number(command.turn_rad), number(command.move_m))
+        slowly = () if command.speed_m_per_s is None else (number(min(command.speed_m_per_s, self._speeds[1])),)
+        words = (number(command.turn_rad), number(command.move_m), *slowly)
         frame = Frame(self._token, self._seq, "GO", words)
         ends_s = self._link.now() + self._longest_s(command)
         for answer in self._answers(frame, ends_s):
@@ -202,6 +203,7 @@ class DenningBase(Driver):
     def _longest_s(self, command: MotorCommand) -> float:
         """Twice what the base's own speeds make of it, and some seconds."""
         turn_rate, speed = self._speeds
+        speed = speed if command.speed_m_per_s is None else min(speed, command.speed_m_per_s)
         return 2.0 * (abs(command.turn_rad) / turn_rate + command.move_m / speed) + 5.0
 
     @staticmethod

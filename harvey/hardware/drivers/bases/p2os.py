@@ -90,14 +90,15 @@ class P2osBase(Driver):
         if self._stop_asked.is_set():
             raise self._fault("stopped", "a stop was asked for", stopped=True)
         self._halt()
-        self._prepare()
+        speed = self._speed if command.speed_m_per_s is None else min(self._speed, command.speed_m_per_s)
+        self._prepare(speed)
         began_s = self._link.now()
         way = _Way(self, began_s)
         for part in _parts(command.turn_rad, TURN_PART_RAD):
             self._turn_by(way, part)
         way.end_turn()
         for part in _parts(command.move_m, MOVE_PART_M):
-            self._move_by(way, part)
+            self._move_by(way, part, speed)
         return way.report()
 
     def _halt(self) -> None:
@@ -137,10 +138,10 @@ class P2osBase(Driver):
     def _place(self) -> Odometry:
         return Odometry(self._x_m, self._y_m, wrap_angle(self._heading_rad), self._link.now())
 
-    def _prepare(self) -> None:
+    def _prepare(self, speed_m_per_s: float) -> None:
         """Settings, said again before each command, since one may have been lost; that the motors run is seen."""
-        settings = (encode(SETV, round(1000 * self._speed)), encode(SETRV, round(math.degrees(self._turn_speed))),
-                    encode(SONAR, int(self._sonars_wanted)))
+        settings = (encode(SETV, max(1, round(1000 * speed_m_per_s))),
+                    encode(SETRV, round(math.degrees(self._turn_speed))), encode(SONAR, int(self._sonars_wanted)))
         self._link.write(b"".join(settings))
         for status in self._statuses(encode(ENABLE, 1), 0.1, self._link.now() + 2.0):
             if status.enabled:
@@ -165,10 +166,10 @@ class P2osBase(Driver):
                 return
         self._gave_up("turn")
 
-    def _move_by(self, way: _Way, move_m: float) -> None:
+    def _move_by(self, way: _Way, move_m: float, speed_m_per_s: float) -> None:
         """What is left of the move is asked for again whenever the base stands short of its end."""
         goal_m, before_m, tries = way.gone_m + move_m, way.gone_m, 0
-        ends_s = self._link.now() + 2.0 * move_m / self._speed + 6.0
+        ends_s = self._link.now() + 2.0 * move_m / speed_m_per_s + 6.0
         while (left_m := goal_m - way.gone_m) > MAX_OFF_M or tries == 0:
             tries = tries + 1 if way.gone_m - before_m < 0.005 else 1
             if tries > 5 or self._link.now() > ends_s:

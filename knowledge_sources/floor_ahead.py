@@ -1,0 +1,188 @@
+"""Floor ahead (§5): how far the way ahead is seen to be free, and where to look for the rest; pure reads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from blackboard.board import View
+from blackboard.entry import Entry
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor.lookout import Costs, Look, choose_look, find_floor
+from knowledge_sources.methods.floor.seen_floor import (
+    SeenFloor,
+    Sweep,
+    measure_blind_end_m,
+    measure_free_m,
+    sample_sweep,
+)
+from knowledge_sources.questions import active_goal, deepest_sketch, find_robot
+from knowledge_sources.settings.action import ActionSettings
+from world_models.entries.body import Frame, MotionReport, RideReport
+from world_models.entries.floor import FreeFloor
+from world_models.entries.location import Hypothesis
+from world_models.entries.task import Goal, Leg, PlanSketch
+from world_models.frames import Pose2, wrap_angle
+from world_models.robot import RobotModel
+
+Point = tuple[float, float]
+MAX_GAP_M = 0.8
+"""Between two pictures that are no further apart the robot drove straight."""
+DRIVEN_STEP_M = 0.1
+
+
+class Caution(NamedTuple):
+    """How the next move is limited by what is not seen.
+
+    Attributes:
+        move_m: at most so far [m, true].
+        creeps: whether that leads into floor that was not seen to be free.
+    """
+
+    move_m: float
+    creeps: bool
+
+
+class FloorAhead:
+    """What the board tells of the floor along the way of one leg."""
+
+    def __init__(self, view: View, leg: Leg, belief: Entry[Hypothesis], settings: ActionSettings) -> None:
+        self._settings, self._leg = settings, leg
+        self._robot = find_robot(view)
+        self._here = belief.value.world_from_robot(self._robot.world)
+        self._way: list[Point] = [(self._here.x_m, self._here.y_m), (leg.x1_m, leg.y1_m)]
+        self._beyond, locales = _find_way_beyond(view, self._robot)
+        self._locales = tuple(sorted({belief.value.locale, *locales}))
+        self._floor = find_floor(self._robot.world, self._locales)
+        self._asked = shapely.buffer(self._floor, -settings.near_model_m)
+        self.scans = _find_scans(view, belief, settings)
+        self._seen = SeenFloor(
+            tuple(entry.value for entry in self.scans), self._list_discs(view),
+            tuple(np.asarray(corners) for name in self._locales for corners in self._robot.world.obstacles(name)))
+
+    def limit_move(self, move_m: float) -> Caution:
+        """How far, of a move to the leg's end, the robot may go at once; a move of any other kind is no longer."""
+        unseen = self._find_unseen(self._sweep(self._way, move_m))
+        return limit_move(unseen, move_m, self._settings)
+
+    def measure_free_m(self, most_m: float) -> float:
+        """How far towards the leg's end the floor is seen to be free."""
+        return measure_free_m(self._find_unseen(self._sweep(self._way, most_m)), most_m)
+
+    def choose_look(self) -> Look | None:
+        """A look from here at floor that is needed behind the end of this leg, where it is the best place for that."""
+        s, end = self._settings, (self._leg.x1_m, self._leg.y1_m)
+        to_go_m = math.dist(end, self._here.position)
+        if to_go_m > s.look_from_m or not self._beyond or len(self._leg.looks) >= s.max_looks:
+            return None
+        unseen = self._find_unseen(self._sweep([end, *self._beyond], s.look_ahead_m))
+        if len(unseen.points) == 0:
+            return None
+        actuator = self._robot.actuator
+        costs = Costs(s.look_turn_rad_per_s, s.look_picture_s, actuator.turn_increment_rad,
+                      1.0 / s.creep_speed_m_per_s - 1.0 / actuator.speed_m_per_s)
+        look = choose_look(self._robot, self._floor, self._here, self._list_poses_ahead(to_go_m), unseen, costs)
+        if look is None or self._was_tried(look.heading_rad):
+            return None
+        return look
+
+    def _was_tried(self, heading_rad: float) -> bool:
+        """Whether the robot has looked there already from about here."""
+        return any(math.dist((x, y), self._here.position) < 0.3 and abs(wrap_angle(heading_rad - there)) < 0.4
+                   for x, y, there in self._leg.looks)
+
+    def _list_poses_ahead(self, to_go_m: float) -> list[Pose2]:
+        """Where pictures will be taken on what is left of the leg, and at its end in the direction of the next."""
+        leg, step_m = self._leg, self._robot.actuator.increment_m
+        heading = math.atan2(leg.y1_m - self._here.y_m, leg.x1_m - self._here.x_m)
+        count = max(1, math.ceil(to_go_m / step_m - 0.1))
+        parts = [min(1.0, step_m * k / max(to_go_m, 1e-9)) for k in range(1, count + 1)]
+        poses = [Pose2(self._here.x_m + part * (leg.x1_m - self._here.x_m),
+                       self._here.y_m + part * (leg.y1_m - self._here.y_m), heading) for part in parts]
+        x, y = self._beyond[0]
+        return [*poses, Pose2(leg.x1_m, leg.y1_m, math.atan2(y - leg.y1_m, x - leg.x1_m))]
+
+    def _sweep(self, way: Sequence[Point], most_m: float) -> Sweep:
+        """What the robot sweeps on a way, but for where it begins."""
+        return sample_sweep(way, self._robot.radius_m + self._settings.seen_margin_m, most_m)
+
+    def _find_unseen(self, sweep: Sweep) -> Sweep:
+        """The part of a sweep that is not seen free, and not hard by something that the model has."""
+        asked = sweep.only(shapely.contains_xy(self._asked, sweep.points[:, 0], sweep.points[:, 1]))
+        return asked.only(~self._seen.find_free(asked.points))
+
+    def _list_discs(self, view: View) -> Floats:
+        """Floor that is free without being seen: under the robot, where it has driven, and where it was put down."""
+        radius_m = self._robot.radius_m
+        discs = [(self._here.x_m, self._here.y_m, radius_m + self._settings.seen_margin_m)]
+        for a, b in pairwise([e.value for e in self.scans if e.value.sense == "camera"]):
+            gap_m = math.dist((a.x_m, a.y_m), (b.x_m, b.y_m))
+            if DRIVEN_STEP_M < gap_m <= MAX_GAP_M:
+                parts = np.linspace(0.0, 1.0, math.ceil(gap_m / DRIVEN_STEP_M) + 1)
+                discs += [(a.x_m + part * (b.x_m - a.x_m), a.y_m + part * (b.y_m - a.y_m), radius_m) for part in parts]
+        goal = active_goal(view)
+        if goal is not None and goal.id == f"{Goal.__name__}-1" and view.latest(RideReport) is None:
+            start = goal.value.origin.in_world(self._robot.world)
+            discs.append((start.x_m, start.y_m, self._settings.put_down_free_m))
+        return np.array(discs)
+
+
+def limit_move(unseen: Sweep, move_m: float, settings: ActionSettings) -> Caution:
+    """How far of a move the robot may go, by what of its sweep is not seen; it creeps where the rest is too short."""
+    free_m = measure_free_m(unseen, move_m)
+    if free_m >= min(move_m, settings.min_increment_m):
+        return Caution(free_m, False)
+    return Caution(min(move_m, settings.max_creep_m, measure_blind_end_m(unseen, settings.min_increment_m)), True)
+
+
+def _find_scans(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> tuple[Entry[FreeFloor], ...]:
+    """What the robot saw of the floor that it is on, the oldest first."""
+    now_s = _tell_time_s(view)
+    ride = view.latest(RideReport)
+    since_s = max(now_s - settings.max_seen_age_s, -math.inf if ride is None else ride.value.sim_time_s)
+    return tuple(entry for entry in view.all(FreeFloor)
+                 if entry.value.seen_s >= since_s and _is_of(entry, belief))
+
+
+def _is_of(scan: Entry[FreeFloor], belief: Entry[Hypothesis]) -> bool:
+    """Whether a scan was placed by this belief, and not by one that was given up."""
+    beliefs = [ref.id for ref in scan.because if ref.id.startswith(f"{Hypothesis.__name__}-")]
+    return not beliefs or belief.id in beliefs
+
+
+def _tell_time_s(view: View) -> float:
+    frame, report = view.latest(Frame), view.latest(MotionReport)
+    return max(0.0 if frame is None else frame.value.sim_time_s, 0.0 if report is None else report.value.sim_time_s)
+
+
+def _find_way_beyond(view: View, robot: RobotModel) -> tuple[list[Point], set[str]]:
+    """The way behind the current leg, as far as the sketches say, and the locales of both."""
+    sketch = deepest_sketch(view)
+    if sketch is None:
+        return [], set()
+    goal_sketches = {entry.value.path: entry.value for entry in view.where(
+        PlanSketch, lambda s: s.is_active and s.goal == sketch.value.goal)}
+    world = robot.world
+    points: list[Point] = []
+    locales: set[str] = set()
+    current = sketch.value.current
+    if current is not None:
+        locales |= {current.origin.locale, current.destination.locale}
+    path = sketch.value.path
+    while path in goal_sketches:
+        level = goal_sketches[path]
+        for subgoal in level.subgoals[level.at + 1:]:
+            if subgoal.is_ride or len(points) >= 3:
+                return points, locales
+            there = subgoal.destination.in_world(world)
+            points.append((there.x_m, there.y_m))
+            locales |= {subgoal.origin.locale, subgoal.destination.locale}
+        if not path:
+            break
+        path = path[:-1]
+    return points, locales
