@@ -46,7 +46,8 @@ class IdealFloorWatcher(RobotKnowledgeSource):
 
 def scan_floor(
     floor: shapely.Geometry, pose: Pose2, locale: str = "room", seen_s: float = 0.0, *, forward_m: float = 0.1,
-    count: int = 64, things: Sequence[shapely.Geometry] = (), near_m: float = 1.26, half_rad: float = math.radians(32.0),
+    count: int = 64, things: Sequence[shapely.Geometry] = (), near_m: float = 1.26,
+    half_rad: float = math.radians(32.0),
 ) -> FreeFloor:
     """What a perfect eye sees of a floor with things on it."""
     x = pose.x_m + forward_m * math.cos(pose.heading_rad)

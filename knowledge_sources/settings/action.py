@@ -54,9 +54,9 @@ class ActionSettings:
         0.2, "m", "Shortest move at full speed into floor that is seen to be free; less of it is crept.",
         "engineering judgement")
     creep_speed_m_per_s: float = setting(
-        0.08, "m/s", "Speed into floor that was not seen to be free.", "engineering judgement")
+        0.09, "m/s", "Speed into floor that was not seen to be free.", "engineering judgement")
     max_creep_m: float = setting(
-        0.35, "m", "Longest move at that speed before the next picture.", "engineering judgement")
+        0.6, "m", "Longest move at that speed before the next picture.", "engineering judgement")
     look_ahead_m: float = setting(
         1.1, "m", "So much of the way beyond a leg is looked at before it ends: what is too near to be seen then.",
         "engineering judgement")
