@@ -70,13 +70,14 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
     trials = [trial for row in rows for trial in _trials(row, first, number)]
     folder = campaign_folder(f"obstacles-{missions}" if missions else "obstacles", seed, quick=quick)
     ends = run_trials(run_trial, trials, TrialEnd, folder, "mission")
+    seeds = [trial.seed for trial in trials]
     found = {row.name: [e for e in ends if e.row == row.name] for row in rows}
     picture = folder / "ways.png"
     _draw(found, picture)
     report = Report(
         "Missions among things that the model lacks", ("what", "required", "peer", *found), tuple(_table(found)),
         notes=(
-            f"Seeds {first} to {first + number - 1}, fewer in the columns further right; no constant was chosen on them."
+            f"Seeds {min(seeds)} to {max(seeds)}, fewer in the columns to the right; no constant was chosen on them."
             f" The robot moves at {SPEED_M_PER_S} m/s. In each tenth cluttered mission no way is left; good: reached,"
             " or blocked where a planner that knows the truth finds no way either. Bounds are one-sided, of 95 %, by"
             " Clopper and Pearson.",
