@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from world_models.bounds import Bounds, check_bounds
 from world_models.building.geometry.faces import Face
 from world_models.building.geometry.regions import Region
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +54,23 @@ def _shift(face: Face, moved: Sequence[MovedThing]) -> Face:
     if not moved:
         return face
     by_m = np.sum([(thing.x_m, thing.y_m, 0.0) for thing in moved], axis=0)
-    return replace(
-        face, polygon_world=face.polygon_world + by_m,
-        front=tuple(_shift_region(region, by_m) for region in face.front),
-        back=tuple(_shift_region(region, by_m) for region in face.back),
-    )
+    return _map_face(face, lambda polygon: polygon + by_m)
 
 
-def _shift_region(region: Region, by_m: NDArray[np.float64]) -> Region:
-    return replace(region, polygon_world=region.polygon_world + by_m)
+def displace_faces(faces: Sequence[Face], x_m: float, y_m: float, turn_rad: float = 0.0) -> tuple[Face, ...]:
+    """Faces, all shifted in the world frame, and turned counter-clockwise about the middle of what they cover."""
+    corners = np.concatenate([face.polygon_world[:, :2] for face in faces])
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    pivot, by_m = np.array([*middle, 0.0]), np.array([x_m, y_m, 0.0])
+    return tuple(_map_face(face, lambda polygon: (polygon - pivot) @ turn.T + pivot + by_m) for face in faces)
+
+
+def _map_face(face: Face, mapped: Callable[[Floats], Floats]) -> Face:
+    return replace(face, polygon_world=mapped(face.polygon_world), front=_map_regions(face.front, mapped),
+                   back=_map_regions(face.back, mapped))
+
+
+def _map_regions(regions: Sequence[Region], mapped: Callable[[Floats], Floats]) -> tuple[Region, ...]:
+    return tuple(replace(region, polygon_world=mapped(region.polygon_world)) for region in regions)

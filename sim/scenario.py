@@ -12,7 +12,7 @@ from sim.body.actuator import ActuatorParameters
 from sim.body.bumper import Bumper
 from sim.body.elevator import Helper
 from sim.body.range_ring import RangeRing
-from sim.differences.table import NO_DIFFERENCES, TruthTable, read_truth
+from sim.differences.table import NO_DIFFERENCES, TrueCamera, TruthTable, read_truth
 from sim.faults.fault import Fault
 from sim.faults.registry import read_fault
 from sim.moved_things import MovedThing
@@ -96,6 +96,7 @@ FORMAT = MissionFormat(
     {**TABLES, "limits": ScenarioLimits, "camera": CameraSettings, "render": Render, "actuator": ActuatorParameters,
      "sensor": SensorParameters, "bumper": Bumper, "ranges": RangeRing},
     ("details", "faults", "moved", "rides", "truth"),
+    {"truth.camera": TrueCamera},
 )
 
 

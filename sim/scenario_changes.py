@@ -10,8 +10,8 @@ import numpy as np
 from sim.differences.change import Change, compare_faces
 from sim.differences.leaf import build_leaf
 from sim.differences.shapes import build_thing, footprint
-from sim.differences.table import ExtraThing, TrueDoor, TrueThing
-from sim.moved_things import MovedThing, belongs_to, move_things
+from sim.differences.table import ExtraThing, TrueDoor, TrueThing, TrueWall
+from sim.moved_things import MovedThing, belongs_to, displace_faces
 from sim.scenario import Scenario
 from world_models.building.geometry.faces import Face
 from world_models.building.geometry.outlines import inside_polygon
@@ -41,13 +41,14 @@ def find_changes(scenario: Scenario, world: World, around: str, faces: Sequence[
     """The changes of a building with these faces, those of a locale (``around``), in the order of the file.
 
     Raises:
-        ScenarioError: there is no such door, thing or room, or something has no room where it is put.
+        ScenarioError: there is no such door, thing, wall or room, or something has no room where it is put.
     """
     truth = scenario.truth
     open_doors = {doorway.name: doorway for doorway in world.doorways} if truth.doors else {}
     return (
         *(_change_door(scenario, i, door, open_doors, world, around) for i, door in enumerate(truth.doors)),
         *(_change_thing(scenario, i, thing, world, faces) for i, thing in enumerate(truth.things)),
+        *(_change_wall(scenario, i, wall, faces) for i, wall in enumerate(truth.walls)),
         *(_add_thing(scenario, i, extra, world) for i, extra in enumerate(truth.extra)),
     )
 
@@ -84,16 +85,31 @@ def _open_door(
 
 
 def _change_thing(scenario: Scenario, i: int, thing: TrueThing, world: World, faces: Sequence[Face]) -> Change:
-    moved = MovedThing(thing.thing, thing.x_m, thing.y_m)
-    own = [face for face in faces if belongs_to(face, moved)]
+    own = [face for face in faces if belongs_to(face, MovedThing(thing.thing))]
     if not own:
         near = suggest_keys(thing.thing, [known.name for known in world.things])
         raise scenario.refused(("truth", "things", i, "thing"),
                                f"expected a thing of the building, {near}, got {thing.thing!r}")
-    there = () if thing.missing else move_things(own, [moved])
+    there = () if thing.missing else displace_faces(own, thing.x_m, thing.y_m, thing.heading_rad)
     for face in there:
         _check_within(scenario, ("truth", "things", i), thing.thing, face.polygon_world[:, :2], world, face.locale)
     return Change(thing, f"thing {thing.thing}", frozenset(face.name for face in own), there)
+
+
+def _change_wall(scenario: Scenario, i: int, wall: TrueWall, faces: Sequence[Face]) -> Change:
+    """A wall with all that belongs to it; doorways in it have no surface, and stay."""
+    walls = [face.name for face in faces if _is_wall(face)]
+    if wall.wall not in walls:
+        raise scenario.refused(("truth", "walls", i, "wall"),
+                               f"expected a wall of the building, {suggest_keys(wall.wall, walls)}, got {wall.wall!r}")
+    own = [face for face in faces if face.kind == "barrier" and wall.wall in (face.name, face.parent)]
+    there = () if wall.missing else displace_faces(own, wall.x_m, wall.y_m)
+    return Change(wall, f"wall {wall.wall}", frozenset(face.name for face in own), there)
+
+
+def _is_wall(face: Face) -> bool:
+    """Whether it is a whole side of a room."""
+    return face.kind == "barrier" and face.parent is None and face.name.endswith("-wall")
 
 
 def _add_thing(scenario: Scenario, i: int, extra: ExtraThing, world: World) -> Change:

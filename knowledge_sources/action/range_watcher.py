@@ -16,9 +16,6 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.floor import FreeFloor
 from world_models.entries.touch import Ranges
 
-EARLIER = 4
-"""Readings that the newest is compared with."""
-
 
 class RangeWatcher(RobotKnowledgeSource):
     """Concludes from a reading of range sensors where the floor is free, and what ends it.
@@ -44,9 +41,10 @@ class RangeWatcher(RobotKnowledgeSource):
             return
         robot, b = find_robot(view), belief.value
         pose = b.world_from_robot(robot.world)
-        before = islice((entry for entry in view.newest_first(FreeFloor) if entry.value.sense == "ranges"), EARLIER)
-        earlier = tuple(entry for entry in before
-                        if reading.value.when_s - entry.value.seen_s <= self._settings.floor.max_range_age_s)
+        s = self._settings.floor
+        before = (entry for entry in view.newest_first(FreeFloor) if entry.value.sense == "ranges")
+        earlier = tuple(entry for entry in islice(before, s.max_earlier_readings)
+                        if reading.value.when_s - entry.value.seen_s <= s.max_range_age_s)
         floor = see_ranges(robot, b.locale, pose, b.sigma_m, b.sigma_rad, reading.value,
-                           [entry.value for entry in earlier], self._settings.floor)
+                           [entry.value for entry in earlier], s)
         yield Post(floor, (reading, belief, *earlier[:1]))

@@ -87,6 +87,12 @@ class FloorSettings:
     max_range_thing_m: float = setting(
         2.0, "m", "A thing is concluded from an echo up to here from its sensor: further, its cone is too wide.",
         "engineering judgement")
+    range_bearings: int = setting(
+        120, "count", "Directions in which the free floor of a reading is written down.", "engineering judgement")
+    range_arc_points: int = setting(
+        9, "count", "Places on the arc of an echo that are asked after.", "engineering judgement")
+    max_earlier_readings: int = setting(
+        4, "count", "Readings that the newest is compared with.", "engineering judgement")
     range_join_m: float = setting(
         0.2, "m", "Echoes of neighbouring sensors that are no further apart are of one thing.", "engineering judgement")
     range_depth_m: float = setting(

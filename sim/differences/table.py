@@ -17,6 +17,8 @@ DOOR_STATES = ("shut", "ajar", "open")
 NEVER_S = float(MAX_NUMBER)
 """End of what never ends [s]."""
 COORDINATE = Bounds(-1e5, 1e5)
+SHIFT = Bounds(-1000.0, 1000.0)
+TURN = Bounds(-2.0 * math.pi, 2.0 * math.pi)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,18 +70,45 @@ class TrueThing(Lasting):
         thing: its name, as "allens-office/desk".
         missing: whether it is not there at all.
         x_m, y_m: its displacement in the world frame.
+        heading_rad: by how much it is turned, counter-clockwise, about the middle of what it takes of the floor.
     """
 
     thing: str = ""
     missing: bool = False
     x_m: float = 0.0
     y_m: float = 0.0
+    heading_rad: float = 0.0
 
     def __post_init__(self) -> None:
         Lasting.__post_init__(self)
-        check_bounds(self, {"x_m": Bounds(-1000.0, 1000.0), "y_m": Bounds(-1000.0, 1000.0)})
-        if self.missing == (self.x_m != 0.0 or self.y_m != 0.0):
-            raise ValueError(f"expected either missing = true or a displacement x_m, y_m of {self.thing or 'a thing'}, "
+        check_bounds(self, {"x_m": SHIFT, "y_m": SHIFT, "heading_rad": TURN})
+        if self.missing == any((self.x_m, self.y_m, self.heading_rad)):
+            raise ValueError(f"expected either missing = true or a displacement x_m, y_m or a turn heading_rad of "
+                             f"{self.thing or 'a thing'}, got {'both' if self.missing else 'neither'}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrueWall(Lasting):
+    """A wall of the model, as one room has it, that is elsewhere or nowhere: one of ``[[truth.walls]]``.
+
+    What belongs to the wall goes with it (baseboards, the frames of its doors), what hangs on it does not.
+
+    Attributes:
+        wall: its name: the room and the side, as "allens-office/south-wall".
+        missing: whether it is not there at all.
+        x_m, y_m: its displacement in the world frame.
+    """
+
+    wall: str = ""
+    missing: bool = False
+    x_m: float = 0.0
+    y_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        Lasting.__post_init__(self)
+        check_bounds(self, {"x_m": SHIFT, "y_m": SHIFT})
+        if self.missing == any((self.x_m, self.y_m)):
+            raise ValueError(f"expected either missing = true or a displacement x_m, y_m of {self.wall or 'a wall'}, "
                              f"got {'both' if self.missing else 'neither'}")
 
 
@@ -100,8 +129,7 @@ class ExtraThing(Lasting):
 
     def __post_init__(self) -> None:
         Lasting.__post_init__(self)
-        check_bounds(self, {"x_m": COORDINATE, "y_m": COORDINATE,
-                            "heading_rad": Bounds(-2.0 * math.pi, 2.0 * math.pi)})
+        check_bounds(self, {"x_m": COORDINATE, "y_m": COORDINATE, "heading_rad": TURN})
         _check_choice("kind", self.kind, tuple(SHAPES))
 
 
@@ -139,10 +167,11 @@ AS_BELIEVED = TrueCamera()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TruthTable:
-    """All that is otherwise; of several entries about the same door or thing, the last one that is due holds."""
+    """All that is otherwise; of several entries about the same door, thing or wall, the last one that is due holds."""
 
     doors: tuple[TrueDoor, ...] = ()
     things: tuple[TrueThing, ...] = ()
+    walls: tuple[TrueWall, ...] = ()
     extra: tuple[ExtraThing, ...] = ()
     camera: TrueCamera = AS_BELIEVED
 
@@ -152,10 +181,10 @@ NO_DIFFERENCES = TruthTable()
 
 def read_truth(node: Node) -> TruthTable:
     """The table of a file. Raises WorldError."""
-    node.table((), ("doors", "things", "extra", "camera"))
+    node.table((), ("doors", "things", "walls", "extra", "camera"))
     return TruthTable(
         doors=_read_all(node, "doors", TrueDoor), things=_read_all(node, "things", TrueThing),
-        extra=_read_all(node, "extra", ExtraThing),
+        walls=_read_all(node, "walls", TrueWall), extra=_read_all(node, "extra", ExtraThing),
         camera=read_settings(node["camera"], TrueCamera) if "camera" in node else AS_BELIEVED,
     )
 

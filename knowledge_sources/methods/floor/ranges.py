@@ -25,11 +25,6 @@ from world_models.entries.touch import Ranges
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
-BEARINGS = 120
-"""Directions round the robot for which free floor is told; each stands for all that are nearest to it."""
-ARC_POINTS = 9
-"""Places on the arc of an echo that are asked after."""
-
 
 @dataclass(frozen=True, slots=True)
 class Cones:
@@ -76,7 +71,8 @@ def see_ranges(
     slack_m = settings.range_slack_m + 3.0 * place_m
     is_new = cones.is_heard & (cones.away_m < expected - slack_m)
     is_known = cones.is_heard & (np.abs(cones.away_m - expected) <= slack_m)
-    bearings = (np.arange(BEARINGS) - BEARINGS // 2) * math.tau / BEARINGS
+    count = settings.range_bearings
+    bearings = (np.arange(count) - count // 2) * math.tau / count
     near, far, ended_by = find_free_intervals(cones, bearings, settings.range_sigmas * ranges.sigma_m)
     free = far > near
     ends: list[FloorEnd] = [
@@ -192,7 +188,7 @@ def _find_things(
     outlines = shapely.union_all([shapely.buffer(shapely.Polygon(building.outline(room)), -sigma_m) for room in rooms])
     arcs: list[tuple[int, Floats]] = []
     for k in np.flatnonzero(is_new):
-        arc = _cut_arc(cones, int(k), floor, earlier, 3.0 * sigma_m)
+        arc = _cut_arc(cones, int(k), floor, earlier, 3.0 * sigma_m, settings.range_arc_points)
         if shapely.contains_xy(outlines, *arc[len(arc) // 2]):
             arcs.append((int(k), arc))
     for group in _join_neighbours(arcs, len(cones.axes_rad), settings.range_join_m):
@@ -206,10 +202,10 @@ def _find_things(
 
 
 def _cut_arc(
-    cones: Cones, k: int, floor: FreeFloor, earlier: Sequence[FreeFloor], margin_m: float
+    cones: Cones, k: int, floor: FreeFloor, earlier: Sequence[FreeFloor], margin_m: float, points: int
 ) -> Floats:
     """The places (m, 2) on the arc of an echo where no cone finds free floor, nor did one before; else all of it."""
-    angles = cones.axes_rad[k] + np.linspace(-cones.half_beam_rad, cones.half_beam_rad, ARC_POINTS)
+    angles = cones.axes_rad[k] + np.linspace(-cones.half_beam_rad, cones.half_beam_rad, points)
     arc = cones.sensors[k] + cones.away_m[k] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     kept = np.ones(len(arc), bool)
     for seen in (floor, *earlier):

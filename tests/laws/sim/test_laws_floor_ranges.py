@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor.ranges import BEARINGS, see_ranges
+from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.settings.floor import FloorSettings
 from sim.body.collision import Obstacles
 from sim.body.range_ring import RangeRing
@@ -58,7 +58,7 @@ def read(solid: Floats, pose: Pose2, seed: int, dropout: float) -> FreeFloor | N
 
 def free_area(floor: FreeFloor) -> shapely.Geometry:
     """All of what it calls free: each bearing's interval, half a step to either side."""
-    half, parts = 0.5 * math.tau / BEARINGS, []
+    half, parts = 0.5 * math.tau / len(floor.bearings_rad), []
     for bearing, near, far in zip(floor.bearings_rad, floor.near_m, floor.far_m, strict=True):
         if far > near:
             angles = bearing + np.linspace(-half, half, 5)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from sim.differences.shapes import SHAPES
 from sim.differences.table import NO_DIFFERENCES, TrueCamera
-from sim.scenario import ScenarioError, load_scenario, parse_scenario
+from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings
 from sim.stage import build_stage
 from world_models.files.world_files import load_world
 from world_models.frames import Pose2
@@ -30,7 +31,7 @@ def test_the_table_is_read_in_the_files_units() -> None:
 
 
 @pytest.mark.parametrize(("text", "message"), [
-    ("[truth]\ndoor = 3\n", r"m\.toml:4: truth\.door: expected one of the keys doors, things, extra, camera"),
+    ("[truth]\ndoor = 3\n", r"m\.toml:4: truth\.door: expected one of the keys doors, things, walls, extra, camera"),
     ('[[truth.extra]]\nkind = "boks"\n', r"m\.toml:3: truth\.extra\.0: expected kind = one of box, got 'boks'"),
     (BOX + "at_s = 5\nuntil_s = 4\n", r"m\.toml:9: truth\.extra\.0\.until_s: expected a number above 5"),
     (BOX + "height_m = 2\n", r"m\.toml:8: truth\.extra\.0\.height_m: expected one of heading"),
@@ -38,6 +39,8 @@ def test_the_table_is_read_in_the_files_units() -> None:
     ('[[truth.doors]]\nname = "a"\nopen_deg = 200\n', r"m\.toml:5: truth\.doors\.0\.open_deg: expected a number above"),
     ('[[truth.things]]\nthing = "a/b"\n', r"m\.toml:3: truth\.things\.0: expected either missing = true or .* neither"),
     ('[[truth.things]]\nthing = "a/b"\nmissing = true\nx_m = 1\n', r"truth\.things\.0: expected either .* got both"),
+    ('[[truth.walls]]\nwall = "a/b"\n', r"m\.toml:3: truth\.walls\.0: expected either missing = true or .* neither"),
+    ('[[truth.things]]\nthing = "a/b"\nmissing = true\nheading_deg = 9\n', r"truth\.things\.0: expected .* got both"),
     ("[truth.camera]\ntilt_deg = 80\n", r"m\.toml:4: truth\.camera\.tilt_deg: expected a number from -28"),
 ])
 def test_a_malformed_table_is_pointed_at(text: str, message: str) -> None:
@@ -59,6 +62,9 @@ def test_a_malformed_table_is_pointed_at(text: str, message: str) -> None:
      r"m\.toml:4: truth\.things\.0\.thing: expected a thing of the building"),
     ('[[truth.things]]\nthing = "hallway/notices-by-students"\nx_ft = 500\n',
      r"m\.toml:3: truth\.things\.0: expected hallway/notices-by-students to stand within hallway"),
+    ('[[truth.walls]]\nwall = "hallway/nort-wall"\nmissing = true\n',
+     r"m\.toml:4: truth\.walls\.0\.wall: expected a wall of the building, one of hallway/north-wall.*'hallway/nort-"),
+    ('[[truth.walls]]\nwall = "hallway/floor"\nmissing = true\n', r"truth\.walls\.0\.wall: expected a wall of the"),
     ("[truth.camera]\nfocal_px = -1000\n", r"m\.toml:3: truth\.camera: expected a focal length above 0"),
 ])
 def test_what_does_not_go_with_the_building_is_pointed_at(text: str, message: str) -> None:
@@ -80,6 +86,43 @@ def test_a_missing_thing_is_gone_with_all_that_is_on_it() -> None:
     stage = build_stage(parse_scenario(text.replace("(hallway (4,4,0))", "(allens-office (7,4,0))")))
     assert stage.building.gone and not stage.building.added
     assert all(face.name.startswith("allens-office/desk") for face in stage.building.gone)
+
+
+def test_a_thing_can_be_turned_where_it_stands() -> None:
+    turned = '[[truth.things]]\nthing = "allens-office/file-cabinet-1"\nheading_deg = 90\nx_m = 0.5\ny_m = -0.5\n'
+    text = SMALL + turned
+    stage = build_stage(parse_scenario(text.replace("(hallway (4,4,0))", "(allens-office (7,4,0))")))
+    before, after = (np.concatenate([face.polygon_world for face in faces])
+                     for faces in (stage.building.gone, stage.building.added))
+    low, high, new_low, new_high = before.min(axis=0), before.max(axis=0), after.min(axis=0), after.max(axis=0)
+    np.testing.assert_allclose(new_high - new_low, (high - low)[[1, 0, 2]], atol=1e-9)
+    np.testing.assert_allclose(new_high + new_low, high + low + (1.0, -1.0, 0.0), atol=1e-9)
+
+
+def test_a_wall_can_be_missing_or_elsewhere() -> None:
+    plain = build_stage(parse_scenario(SMALL)).building
+    wall = '[[truth.walls]]\nwall = "hallway/south-wall"\n'
+    shifted, gone = (build_stage(parse_scenario(f"{SMALL}{wall}{how}\n")).building
+                     for how in ("y_m = 0.3", "missing = true"))
+    assert not gone.added and {face.name for face in gone.gone} == {face.name for face in shifted.added}
+    (own,) = [face for face in gone.gone if face.name == "hallway/south-wall"]
+    assert all(face.name == own.name or face.parent == own.name for face in gone.gone)
+    x, y = own.polygon_world[:, :2].mean(axis=0)
+    there = Pose2(float(x) + 1.0, float(y) + 0.7, 0.0)
+    clear = [building.obstacles.clearance_m(there) for building in (plain, shifted)]
+    assert clear[0] - clear[1] == pytest.approx(0.3, abs=0.02)
+
+
+def test_the_true_camera_can_be_set_from_the_command_line() -> None:
+    scenario = parse_scenario(SMALL + "[truth.camera]\ntilt_deg = 1\nfocal_px = 3\n")
+    changed = with_settings(scenario, {"truth.camera.tilt_rad": "0.01"})
+    assert changed.truth.camera == TrueCamera(tilt_rad=0.01, focal_px=3.0)
+    assert with_settings(parse_scenario(SMALL), {"truth.camera.tilt_deg": "1"}).truth.camera.tilt_rad == pytest.approx(
+        math.radians(1.0))
+    with pytest.raises(ScenarioError, match=r"--set truth\.camera\.tilt: expected one of truth\.camera\.tilt_"):
+        with_settings(scenario, {"truth.camera.tilt": "1"})
+    with pytest.raises(ScenarioError, match=r"truth\.camera\.tilt_deg.*: expected a number from -28"):
+        with_settings(scenario, {"truth.camera.tilt_deg": "80"})
 
 
 def test_a_closed_door_that_is_truly_open_can_be_driven_through() -> None:

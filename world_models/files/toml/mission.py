@@ -180,14 +180,17 @@ class MissionFormat:
     Attributes:
         tables: the settings class of each table.
         others: further keys at the top of the file, which the caller reads.
+        inner: the settings class of each table within one of these, as ``truth.camera``.
     """
 
     tables: Mapping[str, type[Any]]
     others: tuple[str, ...] = ()
+    inner: Mapping[str, type[Any]] = field(default_factory=dict)
 
     def keys(self) -> tuple[str, ...]:
         """Every key that :meth:`with_settings` understands."""
-        return (*TEXTS, *(f"{name}.{key}" for name, kind in self.tables.items() for key in known_keys(kind)))
+        named = (*self.tables.items(), *self.inner.items())
+        return (*TEXTS, *(f"{name}.{key}" for name, kind in named for key in known_keys(kind)))
 
     def with_settings(self, source: Source, settings: Mapping[str, Any]) -> Source:
         """The file with some values replaced, as ``{"servo.action": "off", "start.heading_deg": 90}``.
@@ -220,16 +223,23 @@ class MissionFormat:
         """Whether a key holds a text: then ``--set`` does not read its value as TOML."""
         if len(path) == 1:
             return True
-        kind = self.tables[path[0]]
-        return get_type_hints(kind)[known_keys(kind)[path[1]][0]] is str
+        kind = self._kind(path)
+        return get_type_hints(kind)[known_keys(kind)[path[-1]][0]] is str
+
+    def _kind(self, path: tuple[str, ...]) -> type[Any]:
+        """The settings class of the table that a key is in."""
+        return self.tables[path[0]] if len(path) == 2 else self.inner[".".join(path[:-1])]
 
     def _without_other_spellings(self, data: Mapping[str, Any], path: tuple[str, ...]) -> Mapping[str, Any]:
         """The tables without the same setting in another unit."""
-        if len(path) == 1 or not isinstance(table := data.get(path[0]), Mapping):
+        table: Any = data
+        for step in path[:-1]:
+            table = table.get(step) if isinstance(table, Mapping) else None
+        if len(path) == 1 or not isinstance(table, Mapping):
             return data
-        known = known_keys(self.tables[path[0]])
-        others = {key for key in table if key in known and known[key][0] == known[path[1]][0]}
-        return {**data, path[0]: {key: value for key, value in table.items() if key not in others}}
+        known = known_keys(self._kind(path))
+        others = {key for key in table if key in known and known[key][0] == known[path[-1]][0]}
+        return replace_value(data, path[:-1], {key: value for key, value in table.items() if key not in others})
 
 
 def named_file(text: str, shipped: Path, folder: Path) -> Path:
