@@ -86,6 +86,7 @@ class FloorPlan:
     symmetric: bool
     repeated: bool
     open_share: float
+    joined: bool = False
     corridors: dict[str, Table] = field(default_factory=dict)
     rooms: dict[str, Table] = field(default_factory=dict)
     doors: dict[str, Table] = field(default_factory=dict)
@@ -129,6 +130,10 @@ class FloorPlan:
                 at = bottom + width + WALL_FT if wall == "north" else bottom - WALL_FT - depth
                 self._add_room(f"room-{number}-{wall}-{i}", name, wall, (x0, x1), (round(at, 1), depth))
         self._add_doors(name, spans, length)
+        if self.joined:
+            for side, wall in ((0, "north"), (1, "south")):
+                for i in range(len(spans[side]) - 1):
+                    self._join_rooms(f"{number}-{wall}-{i}", f"{number}-{wall}-{i + 1}")
         return bottom + width + max(depths[0]) + 2 * WALL_FT
 
     def _draw_spans(self, rooms: int) -> list[tuple[float, float]]:
@@ -192,6 +197,21 @@ class FloorPlan:
                                              "open": True, "frame": str(self.rng.choice(FRAMES))}
                 self.sides[name, "west"].take(along, 3.4)
                 self.sides["gallery", "east"].take(locale["at"][1] + along, 3.4)
+
+    def _join_rooms(self, west: str, east: str) -> None:
+        """Add an open door between two neighbouring rooms, where they share enough of a wall."""
+        rooms = [f"room-{west}", f"room-{east}"]
+        begins = [self.rooms[room]["at"][1] for room in rooms]
+        ends = [begin + self.rooms[room]["size"][1] for room, begin in zip(rooms, begins, strict=True)]
+        low, high = max(begins) + DOOR_MARGIN_FT + 0.5, min(ends) - DOOR_MARGIN_FT - 0.5
+        if high <= low:
+            return
+        y = float(self.rng.uniform(low, high))
+        along = round(y - begins[0], 1)
+        self.doors[f"way-{west}"] = {"between": rooms, "wall": "east", "along": along, "width": DOOR_FT, "open": True,
+                                     **self._draw_door_look()}
+        self.sides[rooms[0], "east"].take(along, DOOR_MARGIN_FT + 0.3)
+        self.sides[rooms[1], "west"].take(y - begins[1], DOOR_MARGIN_FT + 0.3)
 
     # -- walls and things ------------------------------------------------------------------------------------------
 

@@ -1,0 +1,165 @@
+"""Missions on generated floors whose doors are otherwise than the model says, as files for campaigns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+import networkx as nx
+import numpy as np
+
+from sim.body.collision import Obstacles
+from sim.body.free_floor import find_free_floor, find_shortest_way, has_way, take_from_floor
+from sim.differences.leaf import build_leaf
+from sim.differences.table import TrueDoor
+from sim.made_up.generated_floors import Floor, generated_floor
+from sim.scenario import parse_scenario
+from sim.stage import Stage, build_stage
+from world_models.building.locales import Doorway
+from world_models.building.world import World
+from world_models.units import FOOT_M
+
+DoorCase = Literal["another way", "no way", "extra door", "stands open", "opens", "shuts", "ajar", "as filed"]
+"""What is otherwise about the doors: shut, with another way or with none; a door that the model lacks; one that stands
+open and is closed in the model; one that opens or shuts during the mission; one that is ajar, with another way."""
+CASES: tuple[DoorCase, ...] = get_args(DoorCase)
+ROOMS = 6
+MARGIN_FT = 2.5
+"""Start and goal are as far from the walls of their rooms."""
+ROOM_M, WAY_MARGIN_M = 0.35, 0.08
+"""Free floor round start and goal, and beside the robot on a way that counts as one."""
+OPENS_S, SHUTS_S = (20.0, 60.0), (5.0, 25.0)
+"""When a door opens, or shuts."""
+MAX_DRAWS = 200
+
+
+@dataclass(frozen=True)
+class DoorMission:
+    """A mission and what is otherwise.
+
+    Attributes:
+        path: the scenario's file.
+        door: the door that is otherwise; "" where none is.
+    """
+
+    path: Path
+    door: str
+
+
+def write_door_mission(folder: Path, seed: int, case: DoorCase) -> DoorMission:
+    """Write a scenario from one room of a generated floor to another, with the floor's files.
+
+    The same for the same arguments.
+
+    Raises:
+        ValueError: nothing that fits was found.
+    """
+    loops, rng = case not in ("no way", "stands open"), np.random.default_rng([seed, 3, CASES.index(case)])
+    floor = generated_floor(seed, ROOMS, open_share=0.6 if case == "stands open" else 1.0, joined=loops)
+    world, details = floor.write(folder)
+    for _ in range(MAX_DRAWS):
+        text = (f'description = "A generated floor; doors: {case}."\nworld = "{world.name}"\n'
+                f'details = ["{details.name}"]\n{_draw_goal(floor, rng)}\n[start]\n'
+                f"heading_deg = {math.degrees(rng.uniform(-math.pi, math.pi)):.1f}\n"
+                "put_down_sigma_m = 0.02\nput_down_sigma_deg = 1.0\n")
+        try:
+            stage = build_stage(parse_scenario(text, "doors", folder))
+            drawn = _draw_doors(stage, floor, case, rng)
+            if drawn is not None:
+                build_stage(parse_scenario(text + drawn[1], "doors", folder))
+        except ValueError:
+            continue
+        if drawn is not None:
+            path = folder / f"doors-{case.replace(' ', '-')}-{seed}.toml"
+            path.write_text(text + drawn[1], "utf-8")
+            return DoorMission(path, drawn[0])
+    raise ValueError(f"expected a mission with doors: {case} on floor {seed}, got none in {MAX_DRAWS} draws")
+
+
+def _draw_goal(floor: Floor, rng: np.random.Generator) -> str:
+    ends = []
+    for room in rng.choice(floor.rooms, 2, replace=False):
+        outline, margin_m = floor.world.locale(str(room)).outline, MARGIN_FT * FOOT_M
+        x, y = rng.uniform(outline.min(axis=0) + margin_m, outline.max(axis=0) - margin_m)
+        ends.append(f"({room} ({x / FOOT_M:.2f},{y / FOOT_M:.2f},0))")
+    return f'goal = "(ptrans {" ".join(ends)})"\n'
+
+
+def _draw_doors(stage: Stage, floor: Floor, case: DoorCase, rng: np.random.Generator) -> tuple[str, str] | None:
+    """The door that is otherwise, and its part of the scenario's file; None where this mission does not fit."""
+    start, goal = stage.start_world, stage.goal_world
+    obstacles = stage.building.obstacles
+    if min(obstacles.clearance_m(start), obstacles.clearance_m(goal)) < ROOM_M - 0.2:
+        return None
+    free = find_free_floor(obstacles, WAY_MARGIN_M)
+    if not has_way(free, start, goal):
+        return None
+    if case == "as filed":
+        return "", ""
+    if case == "extra door":
+        return _draw_extra_door(stage, rng)
+    if case == "stands open":
+        return _draw_open_door(floor, rng)
+    on_way = _list_on_way(stage, free)
+    if not on_way:
+        return None
+    door = on_way[int(rng.integers(len(on_way)))]
+    leaf = build_leaf(TrueDoor(name=door.name), door, stage.building.floor_m)
+    is_left = has_way(take_from_floor(free, Obstacles.of_faces(leaf, stage.building.floor_m), WAY_MARGIN_M), start, goal)
+    if is_left != (case != "no way"):
+        return None
+    if case != "no way" and _is_only_way(stage.world, door, stage):
+        return None
+    when = {"opens": f"until_s = {rng.uniform(*OPENS_S):.1f}\n", "shuts": f"at_s = {rng.uniform(*SHUTS_S):.1f}\n"}
+    state = "ajar" if case == "ajar" else "shut"
+    swing = ""
+    if state == "ajar":
+        swing = f'into = "{rng.choice(door.between)}"\nhinge = "{rng.choice(["left", "right"])}"\n'
+    return door.name, f'\n[[truth.doors]]\nname = "{door.name}"\nstate = "{state}"\n{swing}{when.get(case, "")}'
+
+
+def _list_on_way(stage: Stage, free: object) -> list[Doorway]:
+    """The doorways that the shortest way leads through."""
+    way = find_shortest_way(free, stage.start_world, stage.goal_world)  # type: ignore[arg-type]
+    if way is None:
+        return []
+    steps = np.concatenate([np.linspace(a, b, max(2, int(np.linalg.norm(b - a) / 0.05)))
+                            for a, b in zip(way, way[1:], strict=False)])
+    return [d for d in stage.world.doorways
+            if np.linalg.norm(steps - d.centre_world, axis=1).min() < 0.5 * d.width_m]
+
+
+def _is_only_way(world: World, door: Doorway, stage: Stage) -> bool:
+    """Whether the rooms where the mission begins and ends are apart without a door."""
+    graph = nx.MultiGraph([(*d.between, d.name) for d in world.doorways])
+    graph.remove_edge(*door.between, key=door.name)
+    ends = [world.locale_at(pose.position) for pose in (stage.start_world, stage.goal_world)]
+    return any(end not in graph for end in ends) or not nx.has_path(graph, *ends)
+
+
+def _draw_extra_door(stage: Stage, rng: np.random.Generator) -> tuple[str, str] | None:
+    """A leaf flat on a wall, as of a door that the model lacks."""
+    rooms: Sequence[str] = [room for room in stage.world.rooms if room.startswith("corridor")]
+    room = str(rng.choice(rooms))
+    low, high = (f(stage.world.locale(room).outline, axis=0) for f in (np.min, np.max))
+    x, north = float(rng.uniform(low[0] + 1.0, high[0] - 1.0)), bool(rng.integers(2))
+    y = float(high[1] - 0.07 if north else low[1] + 0.07)
+    at = stage.world.world_from_locale(room).apply(np.array([x, y, 0.0]))[:2]
+    if any(np.linalg.norm(d.centre_world - at) < d.width_m + 0.6 for d in stage.world.doorways):
+        return None
+    heading = math.pi if north else 0.0
+    return "", (f'\n[[truth.extra]]\nkind = "door-leaf"\nlocale = "{room}"\nx_m = {x:.4f}\ny_m = {y:.4f}\n'
+                f"heading_rad = {heading:.4f}\n")
+
+
+def _draw_open_door(floor: Floor, rng: np.random.Generator) -> tuple[str, str] | None:
+    """A door that the model has closed, and that stands open."""
+    opened = {d.name for d in floor.world.doorways}
+    closed = [f"door-{room[5:]}" for room in floor.rooms if f"door-{room[5:]}" not in opened]
+    if not closed:
+        return None
+    name = str(rng.choice(closed))
+    return name, f'\n[[truth.doors]]\nname = "{name}"\nstate = "open"\n'
