@@ -37,6 +37,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
     },
     "robustness": {
         "crash": "Missions killed at random moments and resumed",
+        "doors": "1,000 missions with doors otherwise than the model says",
         "imported-building": "Missions between the rooms of a house from IFC",
         "imported-floors": "Plans between floors of a university from IndoorGML",
         "kidnap": "Kidnaps to anywhere on generated floors of 40 rooms",

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal, get_args
 
 import networkx as nx
 import numpy as np
+import shapely
 
 from sim.body.collision import Obstacles
 from sim.body.free_floor import find_free_floor, find_shortest_way, has_way, take_from_floor
@@ -29,11 +31,13 @@ CASES: tuple[DoorCase, ...] = get_args(DoorCase)
 ROOMS = 6
 MARGIN_FT = 2.5
 """Start and goal are as far from the walls of their rooms."""
-ROOM_M, WAY_MARGIN_M = 0.35, 0.08
+ROOM_M, WAY_MARGIN_M = 0.3, 0.12
 """Free floor round start and goal, and beside the robot on a way that counts as one."""
 OPENS_S, SHUTS_S = (20.0, 60.0), (5.0, 25.0)
 """When a door opens, or shuts."""
-MAX_DRAWS = 200
+MAX_DRAWS = 60
+MAX_FLOORS, FLOORS_APART = 20, 100_000_000
+"""Where a floor has no such mission, one is looked for on another: so far are their seeds apart."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +61,18 @@ def write_door_mission(folder: Path, seed: int, case: DoorCase) -> DoorMission:
     Raises:
         ValueError: nothing that fits was found.
     """
-    loops, rng = case not in ("no way", "stands open"), np.random.default_rng([seed, 3, CASES.index(case)])
-    floor = generated_floor(seed, ROOMS, open_share=0.6 if case == "stands open" else 1.0, joined=loops)
+    for number in range(MAX_FLOORS):
+        mission = _write_on_floor(folder, seed, seed + number * FLOORS_APART, case)
+        if mission is not None:
+            return mission
+    raise ValueError(f"expected a mission with doors: {case} on {MAX_FLOORS} floors from {seed} on, got none")
+
+
+def _write_on_floor(folder: Path, seed: int, floor_seed: int, case: DoorCase) -> DoorMission | None:
+    loops, rng = case not in ("no way", "stands open"), np.random.default_rng([floor_seed, 3, CASES.index(case)])
+    floor = generated_floor(floor_seed, ROOMS, open_share=0.6 if case == "stands open" else 1.0, joined=loops)
+    if case == "stands open" and not 2 <= len(floor.world.doorways) < ROOMS:
+        return None
     world, details = floor.write(folder)
     for _ in range(MAX_DRAWS):
         text = (f'description = "A generated floor; doors: {case}."\nworld = "{world.name}"\n'
@@ -66,17 +80,16 @@ def write_door_mission(folder: Path, seed: int, case: DoorCase) -> DoorMission:
                 f"heading_deg = {math.degrees(rng.uniform(-math.pi, math.pi)):.1f}\n"
                 "put_down_sigma_m = 0.02\nput_down_sigma_deg = 1.0\n")
         try:
-            stage = build_stage(parse_scenario(text, "doors", folder))
-            drawn = _draw_doors(stage, floor, case, rng)
-            if drawn is not None:
-                build_stage(parse_scenario(text + drawn[1], "doors", folder))
+            drawn = _draw_doors(build_stage(parse_scenario(text, "doors", folder)), floor, case, rng)
+            if drawn is None:
+                continue
+            build_stage(parse_scenario(text + drawn[1], "doors", folder))
         except ValueError:
             continue
-        if drawn is not None:
-            path = folder / f"doors-{case.replace(' ', '-')}-{seed}.toml"
-            path.write_text(text + drawn[1], "utf-8")
-            return DoorMission(path, drawn[0])
-    raise ValueError(f"expected a mission with doors: {case} on floor {seed}, got none in {MAX_DRAWS} draws")
+        path = folder / f"doors-{case.replace(' ', '-')}-{seed}.toml"
+        path.write_text(text + drawn[1], "utf-8")
+        return DoorMission(path, drawn[0])
+    return None
 
 
 def _draw_goal(floor: Floor, rng: np.random.Generator) -> str:
@@ -92,7 +105,7 @@ def _draw_doors(stage: Stage, floor: Floor, case: DoorCase, rng: np.random.Gener
     """The door that is otherwise, and its part of the scenario's file; None where this mission does not fit."""
     start, goal = stage.start_world, stage.goal_world
     obstacles = stage.building.obstacles
-    if min(obstacles.clearance_m(start), obstacles.clearance_m(goal)) < ROOM_M - 0.2:
+    if min(obstacles.clearance_m(start), obstacles.clearance_m(goal)) < ROOM_M:
         return None
     free = find_free_floor(obstacles, WAY_MARGIN_M)
     if not has_way(free, start, goal):
@@ -108,7 +121,8 @@ def _draw_doors(stage: Stage, floor: Floor, case: DoorCase, rng: np.random.Gener
         return None
     door = on_way[int(rng.integers(len(on_way)))]
     leaf = build_leaf(TrueDoor(name=door.name), door, stage.building.floor_m)
-    is_left = has_way(take_from_floor(free, Obstacles.of_faces(leaf, stage.building.floor_m), WAY_MARGIN_M), start, goal)
+    solid = Obstacles.of_faces(leaf, stage.building.floor_m)
+    is_left = has_way(take_from_floor(free, solid, WAY_MARGIN_M), start, goal)
     if is_left != (case != "no way"):
         return None
     if case != "no way" and _is_only_way(stage.world, door, stage):
@@ -121,13 +135,13 @@ def _draw_doors(stage: Stage, floor: Floor, case: DoorCase, rng: np.random.Gener
     return door.name, f'\n[[truth.doors]]\nname = "{door.name}"\nstate = "{state}"\n{swing}{when.get(case, "")}'
 
 
-def _list_on_way(stage: Stage, free: object) -> list[Doorway]:
+def _list_on_way(stage: Stage, free: shapely.Geometry) -> list[Doorway]:
     """The doorways that the shortest way leads through."""
-    way = find_shortest_way(free, stage.start_world, stage.goal_world)  # type: ignore[arg-type]
+    way = find_shortest_way(free, stage.start_world, stage.goal_world)
     if way is None:
         return []
     steps = np.concatenate([np.linspace(a, b, max(2, int(np.linalg.norm(b - a) / 0.05)))
-                            for a, b in zip(way, way[1:], strict=False)])
+                            for a, b in pairwise(way)])
     return [d for d in stage.world.doorways
             if np.linalg.norm(steps - d.centre_world, axis=1).min() < 0.5 * d.width_m]
 

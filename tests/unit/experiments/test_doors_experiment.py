@@ -1,0 +1,71 @@
+"""Missions with doors otherwise than the model says: what is written, what is claimed, and the small version."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments import trials
+from experiments.robustness import doors
+from experiments.robustness.doors_trial import DoorResult, DoorTrial, run_door_mission
+from sim.made_up.door_missions import write_door_mission
+from sim.scenario import load_scenario
+from sim.stage import build_stage
+
+
+def end(trial: DoorTrial, **other: Any) -> DoorResult:
+    """A flawless end, or one with flaws."""
+    outcome = "blocked" if trial.case == "no way" else "reached"
+    values: dict[str, Any] = {
+        "door": "d", "outcome": outcome, "reason": "d is shut", "error_m": 0.01, "is_found": True, "false_states": [],
+        "false_accepts": 0, "collisions": 0, "relocations": 0, "robot_s": 60.0, "wall_s": 4.0}
+    return DoorResult(trial.case, trial.floor, **(values | other))
+
+
+def report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, work: Callable[[DoorTrial], DoorResult], **how: Any) -> Any:
+    def here(_: Any, jobs: Sequence[DoorTrial], *__: Any) -> list[DoorResult]:
+        return [work(job) for job in jobs]
+
+    monkeypatch.setattr(trials, "RUNS", tmp_path)
+    monkeypatch.setattr(doors, "run_trials", here)
+    return doors.run(seed=0, **how)
+
+
+@pytest.mark.parametrize("case", ["another way", "no way", "stands open"])
+def test_a_mission_is_written_the_same_again_and_can_be_staged(tmp_path: Path, case: Any) -> None:
+    one = write_door_mission(tmp_path, 3, case)
+    text = one.path.read_text("utf-8")
+    assert write_door_mission(tmp_path, 3, case).path.read_text("utf-8") == text
+    scenario = load_scenario(one.path)
+    assert [d.name for d in scenario.truth.doors] == ([one.door] if one.door else [])
+    build_stage(scenario)
+
+
+def test_flawless_missions_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    found = report(monkeypatch, tmp_path, end, quick=False)
+    assert found.failing == ()
+    assert sum(row[3] for row in found.rows) == 1_000
+
+
+@pytest.mark.parametrize(("flaw", "told"), [
+    ({"outcome": "lost"}, "another way"),
+    ({"outcome": "lost"}, "no way"),
+    ({"reason": "another-door is shut"}, "no way"),
+    ({"outcome": "blocked"}, "harms nothing"),
+    ({"false_states": ["d is shut at 3.0 s"]}, "as filed"),
+    ({"false_accepts": 1}, "no milestone"),
+])
+def test_a_flaw_fails_its_claim(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, flaw: dict[str, Any], told: str
+) -> None:
+    found = report(monkeypatch, tmp_path, lambda trial: end(trial, **flaw), quick=False, missions=30)
+    assert any(told in claim for claim in found.failing)
+
+
+def test_the_small_version_drives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    found = report(monkeypatch, tmp_path, run_door_mission, quick=True)
+    assert found.holds, found.text()
+    assert sum(row[3] for row in found.rows) == doors.QUICK_MISSIONS
