@@ -19,6 +19,7 @@ from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.action.door_watcher import DoorWatcher
 from knowledge_sources.action.elevator_rider import ElevatorRider
 from knowledge_sources.action.fault_handler import FaultHandler
+from knowledge_sources.action.floor_watcher import FloorWatcher
 from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.action.motor import Motor
 from knowledge_sources.action.obstacle_finder import ObstacleFinder
@@ -62,6 +63,7 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     Relocalizer,
     FaultHandler,
     ModelReviser,
+    FloorWatcher,
     RangeWatcher,
     ObstacleFinder,
     DoorWatcher,

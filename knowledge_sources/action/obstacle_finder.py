@@ -49,9 +49,6 @@ from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
 from world_models.entries.touch import Contact
 
-MAX_BEHIND_DOOR_M = 4.0
-"""Through a doorway a thing of the next room is seen so far behind it."""
-
 
 @dataclass
 class _Draft:
@@ -110,9 +107,8 @@ class ObstacleFinder(RobotKnowledgeSource):
         reach_m = s.touch_margin_m + 3.0 * belief.value.sigma_m
         known = _find_touched(view, touched, reach_m + 3.0 * sigma_m)
         if known is not None:
-            o = known.value
-            seen = replace(o, certainty=s.max_obstacle_certainty, seen_s=c.when_s, touched_s=c.when_s, status="there")
-            yield _Draft(known, seen, [contact, belief])
+            yield _Draft(known, self._touch_again(robot.world, known.value, touched, out, across, c.when_s),
+                         [contact, belief])
             return
         if find_nearest(robot.world, locale, pose.position)[0] <= robot.radius_m + reach_m:
             return
@@ -123,6 +119,17 @@ class ObstacleFinder(RobotKnowledgeSource):
             certainty=s.max_obstacle_certainty, seen_s=c.when_s, looked_s=c.when_s, touched_s=c.when_s, by="touch",
             evidence=c.sentence())
         yield _Draft(None, found, [contact, belief])
+
+    def _touch_again(
+        self, world: Building, known: Obstacle, touched: Floats, out: Floats, across: Floats, when_s: float
+    ) -> Obstacle:
+        """A known obstacle after it was touched: it reaches to where it was touched."""
+        s = self._settings.action
+        corner = build_polygon(_build_footprint(touched, out, across, 0.5 * s.obstacle_depth_m))
+        joined = shapely.convex_hull(shapely.union_all([build_polygon(known.footprint), corner]))
+        new = replace(known, footprint=list_corners(joined), certainty=s.max_obstacle_certainty, seen_s=when_s,
+                      looked_s=when_s, touched_s=when_s, status="there")
+        return _place(world, new, joined)
 
     # -- floor ---------------------------------------------------------------------------------------------------------
 
@@ -165,7 +172,7 @@ class ObstacleFinder(RobotKnowledgeSource):
     ) -> Obstacle | None:
         """A thing that was not known; None where walls and things of the model may be all that is seen."""
         world, f, s = find_building(view), scan.value, self._settings.action
-        locale = _find_room(world, shape, f.locale)
+        locale = _find_room(world, shape, f.locale, s.max_behind_door_m)
         margin_m = s.touch_margin_m + thing.sigma_m
         unexplained = shapely.intersection(shape, _find_open_floor(world, locale, margin_m))
         if unexplained.area < 0.3 * shape.area:
@@ -246,7 +253,9 @@ class ObstacleFinder(RobotKnowledgeSource):
         if known is None:
             return frame.changed(change)
         moved_m = measure_change_m(known.footprint, change.footprint)
-        if moved_m < s.min_footprint_change_m and abs(known.height_m - change.height_m) < s.min_height_change_m:
+        is_touched = obstacle.touched_s == obstacle.seen_s
+        same_height = abs(known.height_m - change.height_m) < s.min_height_change_m
+        if not is_touched and moved_m < s.min_footprint_change_m and same_height:
             return frame
         return frame.restored("extra", obstacle.name).changed(change)
 
@@ -294,19 +303,19 @@ def _find_same(known: Iterable[Entry[Obstacle]], shape: shapely.Polygon, sigma_m
     return None if best is None else best[1]
 
 
-def _find_room(world: Building, shape: shapely.Polygon, near: str) -> str:
+def _find_room(world: Building, shape: shapely.Polygon, near: str, reach_m: float) -> str:
     """The room in which most of a thing stands, of that where the robot is and those next to it."""
     if shapely.Polygon(world.outline(near)).contains(shape.centroid):
         return near
     doors = {doorway.other(near): doorway for doorway in world.doorways_of(near)}
-    rooms = [near, *(room for room, door in doors.items() if _is_seen_through(door, shape))]
+    rooms = [near, *(room for room, door in doors.items() if _measure_behind_m(door, shape) <= reach_m)]
     areas = [shapely.intersection(shapely.Polygon(world.outline(room)), shape).area for room in rooms]
     return rooms[int(np.argmax(areas))]
 
 
-def _is_seen_through(door: Doorway, shape: shapely.Polygon) -> bool:
-    """Whether a thing is near enough to a doorway to stand in it, or right behind it."""
-    return bool(shapely.MultiPoint(np.concatenate(door.thresholds_world)).distance(shape) < MAX_BEHIND_DOOR_M)
+def _measure_behind_m(door: Doorway, shape: shapely.Polygon) -> float:
+    """How far a thing is from a doorway."""
+    return float(shapely.MultiPoint(np.concatenate(door.thresholds_world)).distance(shape))
 
 
 def _find_open_floor(world: Building, locale: str, margin_m: float) -> shapely.Geometry:

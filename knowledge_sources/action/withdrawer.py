@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -15,14 +16,11 @@ from blackboard.level import Level
 from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.questions import active_goal, find_belief, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.settings.plan import PlanSettings
+from knowledge_sources.settings import Settings
 from world_models.entries.locale_frame import LocaleFrame
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.percepts import Tracks
 from world_models.entries.task import Milestone, PlanSketch
-
-SLACK_M = 0.03
-"""By so much less than the least clearance a leg may pass an obstacle: it is no better known."""
 
 
 class Withdrawer(RobotKnowledgeSource):
@@ -39,13 +37,13 @@ class Withdrawer(RobotKnowledgeSource):
     writes = (Milestone, PlanSketch, Tracks)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        return 1.0 if any(True for _ in _withdrawals(view, trigger.entry, self._settings.plan)) else None
+        return 1.0 if any(True for _ in _withdrawals(view, trigger.entry, self._settings)) else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        yield from _withdrawals(view, trigger.entry, self._settings.plan)
+        yield from _withdrawals(view, trigger.entry, self._settings)
 
 
-def _withdrawals(view: View, frame: Entry[LocaleFrame], settings: PlanSettings) -> Iterable[Effect]:
+def _withdrawals(view: View, frame: Entry[LocaleFrame], settings: Settings) -> Iterable[Effect]:
     """What is to be withdrawn after a frame was revised."""
     superseded = _find_misled(view, frame, settings)
     unverified: set[str] = set()
@@ -88,7 +86,7 @@ def _holds(view: View, milestone: Milestone) -> bool:
     return s.is_active and s.verified and s.at == milestone.index
 
 
-def _find_misled(view: View, frame: Entry[LocaleFrame], settings: PlanSettings) -> dict[str, None]:
+def _find_misled(view: View, frame: Entry[LocaleFrame], settings: Settings) -> dict[str, None]:
     """The ids of the active sketches, all of them, where one leads through what has changed."""
     if active_goal(view) is None:
         return {}
@@ -107,7 +105,7 @@ def _list_changed(view: View, frame: Entry[LocaleFrame]) -> list[Obstacle]:
     return [entry.value for entry in found if entry is not None and isinstance(entry.value, Obstacle)]
 
 
-def _meets(view: View, sketch: Entry[PlanSketch], obstacle: Obstacle, settings: PlanSettings) -> bool:
+def _meets(view: View, sketch: Entry[PlanSketch], obstacle: Obstacle, settings: Settings) -> bool:
     """Whether what is left of a sketch leads against an obstacle that is there, or round one that is gone."""
     belief = find_belief(view)
     if belief is None:
@@ -116,22 +114,36 @@ def _meets(view: View, sketch: Entry[PlanSketch], obstacle: Obstacle, settings: 
     world = robot.world
     footprint = build_polygon(obstacle.footprint)
     here = shapely.Point(belief.value.world_from_robot(world).position)
-    clearance_m = settings.clearances_m[-1] if obstacle.is_there else settings.clearances_m[0]
-    reach_m = robot.radius_m + clearance_m + (-SLACK_M if obstacle.is_there else SLACK_M)
+    clearance_m = settings.plan.clearances_m[-1] if obstacle.is_there else settings.plan.clearances_m[0]
+    slack_m = settings.action.leg_slack_m
+    reach_m = robot.radius_m + clearance_m + (-slack_m if obstacle.is_there else slack_m)
     for index, subgoal in enumerate(s.subgoals[s.at:]):
         if obstacle.locale not in (subgoal.origin.locale, subgoal.destination.locale):
             continue
         start, end = (shapely.Point(p.in_world(world).position) for p in (subgoal.origin, subgoal.destination))
+        if obstacle.is_there and obstacle.touched_s == obstacle.seen_s:
+            return True  # the robot stands at it
         if not obstacle.is_there:
             near_m = min(start.distance(footprint), end.distance(footprint))
-        elif subgoal.primitive:  # where the robot is too near already, it may still drive away from there
-            near_m = shapely.LineString([here if index == 0 else start, end]).distance(footprint)
-            reach_m = min(reach_m, here.distance(footprint) - SLACK_M)
+        elif subgoal.primitive:
+            near_m = _approach_m(shapely.LineString([here if index == 0 else start, end]), footprint, reach_m)
         else:
             near_m = end.distance(footprint)
         if near_m < reach_m:
             return True
     return False
+
+
+def _approach_m(
+    way: shapely.LineString, footprint: shapely.Polygon, reach_m: float, step_m: float = 0.05
+) -> float:
+    """How near a way comes to a footprint; where it begins nearer than ``reach_m``, not counting how it leads away."""
+    steps = max(2, math.ceil(way.length / step_m))
+    distances = [way.interpolate(step / steps, normalized=True).distance(footprint) for step in range(steps + 1)]
+    first = 0
+    while first < steps and distances[first] < reach_m and distances[first + 1] > distances[first] + 0.5 * step_m:
+        first += 1
+    return float(min(distances[first:]))
 
 
 def _leads_there(sketch: PlanSketch, frame: LocaleFrame) -> bool:

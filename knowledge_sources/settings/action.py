@@ -172,6 +172,13 @@ class ActionSettings:
         "engineering judgement")
     min_height_change_m: float = setting(
         0.15, "m", "The same of its height.", "engineering judgement")
+    max_behind_door_m: float = setting(
+        4.0, "m", "A thing that is seen through a doorway stands at most so far behind it.", "engineering judgement")
+
+    # Withdrawer
+    leg_slack_m: float = setting(
+        0.03, "m", "An obstacle that is nearer to a leg than the least clearance by so much blocks it.",
+        "engineering judgement")
 
     # Floor watcher
     max_floor_sigma_m: float = setting(

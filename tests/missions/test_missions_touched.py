@@ -1,9 +1,11 @@
-"""A thing that the model lacks is touched once, and driven round; what the model explains, or doubt leaves open, is no
-obstacle."""
+"""A thing that the model lacks is seen and driven round; what the camera misses is touched once, and driven round too.
+
+What the model explains, or doubt leaves open, is no obstacle."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -12,8 +14,11 @@ from blackboard.board import Blackboard
 from blackboard.change import Revised
 from blackboard.effect import Post, Revise
 from blackboard.journal import Decision
+from blackboard.knowledge_source import KnowledgeSource
 from harvey.simulation.run import build_robot_model, run_mission
+from harvey.wiring import knowledge_sources
 from knowledge_sources.action.obstacle_finder import ObstacleFinder
+from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario, parse_scenario
 from sim.stage import build_stage
 from world_models.building.world import World
@@ -44,10 +49,29 @@ put_down_sigma_deg = 1.0
 """
 
 
-def test_a_carton_that_the_model_lacks_is_touched_once_and_driven_round(tmp_path: Path) -> None:
+def without_floor_watcher(settings: Settings) -> Sequence[KnowledgeSource]:
+    """The knowledge sources of a robot whose camera misses what stands on the floor."""
+    return [source for source in knowledge_sources(settings) if source.name != "floor_watcher"]
+
+
+def test_a_carton_that_the_model_lacks_is_seen_and_driven_round(tmp_path: Path) -> None:
     (tmp_path / "carton.toml").write_text(CARTON, encoding="utf-8")
     decisions: list[Decision] = []
     result = run_mission(build_stage(parse_scenario(MISSION, "carton", tmp_path)), 1, sinks=[decisions.append])
+    made = [change.entry for d in decisions for change in d.made]
+    found = [e for e in made if isinstance(e.value, Obstacle) and e.value.is_there]
+    assert (result.outcome, result.collisions, result.false_accepts) == ("reached", 0, 0)
+    assert {e.value.name for e in found} == {"north-hall/obstacle-1"}
+    assert found[0].value.by == "camera" and found[0].value.x_m == pytest.approx(14 * 0.3048, abs=0.25)
+    assert found[0].because[0].id.startswith("FreeFloor-")
+    assert any(ref.id.startswith("Frame-") for e in made if e.ref == found[0].because[0] for ref in e.because)
+
+
+def test_a_carton_that_the_camera_misses_is_touched_once_and_driven_round(tmp_path: Path) -> None:
+    (tmp_path / "carton.toml").write_text(CARTON, encoding="utf-8")
+    decisions: list[Decision] = []
+    stage = build_stage(parse_scenario(MISSION, "carton", tmp_path))
+    result = run_mission(stage, 1, sources=without_floor_watcher, sinks=[decisions.append])
     found = [change.entry for d in decisions for change in d.made if isinstance(change.entry.value, Obstacle)]
     assert (result.outcome, result.collisions, result.false_accepts) == ("reached", 1, 0)
     assert result.error_m < 0.0254
@@ -105,7 +129,7 @@ def test_an_obstacle_of_which_the_robot_is_told_that_it_is_gone_is_forgotten(tmp
     told = '[[told]]\nat_s = 30.0\nwhat = "north-hall/obstacle-1"\nstate = "gone"\n'
     decisions: list[Decision] = []
     stage = build_stage(parse_scenario(MISSION + told, "carton", tmp_path))
-    result = run_mission(stage, 1, sinks=[decisions.append])
+    result = run_mission(stage, 1, sources=without_floor_watcher, sinks=[decisions.append])
     frames = [change.entry for d in decisions for change in d.made if isinstance(change.entry.value, LocaleFrame)]
     assert result.outcome == "reached"
     assert [len(frame.value.changes) for frame in frames] == [1, 0]

@@ -13,6 +13,8 @@ FloorSense = Literal["camera", "ranges"]
 FloorEnd = Literal["thing", "model", "sight"]
 LAST_FLOORS = 48
 """The newest that stay on the board."""
+LAST_VIEWS = 12
+"""The same of the pictures that later ones are compared with: the robot has driven over what the oldest show."""
 
 Point = tuple[float, float]
 
@@ -106,21 +108,24 @@ def picture_of(view: FloorView) -> Iterable[str]:
     return (view.frame,)
 
 
-@inference(keep=3, needs=picture_of)
+@inference(keep=LAST_VIEWS, needs=picture_of)
 @dataclass(frozen=True, slots=True)
 class FloorView:
     """A picture that later ones are compared with: what stands up from the floor moves otherwise than the floor.
 
     Attributes:
-        frame: id of the frame entry.
+        frame: id of the frame entry; belief: that of the hypothesis by which the place is known.
         x_m, y_m, heading_rad: where the robot was [world].
+        floor_m: height of the floor there [m, world].
         seen_s: when, by the body's clock.
     """
 
     frame: str
+    belief: str
     x_m: float
     y_m: float
     heading_rad: float
+    floor_m: float
     seen_s: float
 
     def sentence(self) -> str:

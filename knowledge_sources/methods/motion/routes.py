@@ -20,25 +20,41 @@ from world_models.building.building import Building
 SLACK_M = 1e-6
 """Distance below which two places are the same: rounding of shapely's geometry."""
 
+CORNER_STEPS = 4
+"""Corners of a quarter circle round what is no rectangle: the way round it is at most 2 % too near."""
 
 MAX_FREE_SPACES = 64
 """Size of the cache of free spaces."""
 
 
-def find_free_space(building: Building, locale: str, clearance_m: float) -> shapely.Geometry:
+def find_free_space(
+    building: Building, locale: str, clearance_m: float, *, is_round: bool = False
+) -> shapely.Geometry:
     """Where the robot's centre may be in a locale, ``clearance_m`` from walls and things; cached."""
-    return building.cached("free spaces", MAX_FREE_SPACES, (locale, clearance_m), lambda: compute_free_space(
-        building.outline(locale), building.obstacles(locale), clearance_m))
+    return building.cached("free spaces", MAX_FREE_SPACES, (locale, clearance_m, is_round), lambda: compute_free_space(
+        building.outline(locale), building.obstacles(locale), clearance_m, is_round=is_round))
 
 
-def compute_free_space(outline: Any, obstacles: Sequence[Any], clearance_m: float) -> shapely.Geometry:
-    """Where the robot's centre may be: the room's polygon (k, 2) shrunk, less the obstacles' (k, 2) grown."""
+def compute_free_space(
+    outline: Any, obstacles: Sequence[Any], clearance_m: float, *, is_round: bool = False
+) -> shapely.Geometry:
+    """Where the robot's centre may be: the room's polygon (k, 2) shrunk, less the obstacles' (k, 2) grown.
+
+    Ways round few corners have few legs: what is no rectangle is grown as the smallest rectangle round it, and corners
+    stay corners. With ``is_round`` all of the floor is free that is: obstacles are grown as they are, round at corners.
+    """
     room = shapely.Polygon(np.asarray(outline, float)).buffer(-clearance_m, join_style="mitre")
     if not len(obstacles):
         return room
     rings = shapely.linearrings(np.concatenate([np.asarray(o, float) for o in obstacles]),
                                 indices=np.repeat(np.arange(len(obstacles)), [len(o) for o in obstacles]))
-    grown = shapely.buffer(shapely.polygons(rings), clearance_m, join_style="mitre")
+    polygons = shapely.polygons(rings)
+    if is_round:
+        grown = shapely.buffer(polygons, clearance_m, quad_segs=CORNER_STEPS)
+    else:
+        other = np.array([len(corners) != 4 for corners in obstacles])
+        polygons[other] = shapely.oriented_envelope(polygons[other])
+        grown = shapely.buffer(polygons, clearance_m, join_style="mitre")
     return room.difference(shapely.union_all(grown))
 
 

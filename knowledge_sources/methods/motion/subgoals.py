@@ -98,8 +98,11 @@ class SubgoalPlanner:
         def floor() -> Geometry:
             return self._free_space(locale, -self._robot.radius_m)
 
-        for clearance in self._settings.clearances_m:
-            route = find_shortest_route(self._free_space(locale, clearance), here.position, there.position, floor)
+        least_m = self._settings.clearances_m[-1]
+        tried = (*((clearance_m, False) for clearance_m in self._settings.clearances_m), (least_m, True))
+        for clearance_m, is_round in tried:
+            free = self._free_space(locale, clearance_m, is_round=is_round)
+            route = find_shortest_route(free, here.position, there.position, floor)
             if route is not None:
                 break
         else:
@@ -113,9 +116,9 @@ class SubgoalPlanner:
             for i, (a, b) in enumerate(pairwise(places))
         )
 
-    def _free_space(self, locale: str, margin_m: float) -> Geometry:
+    def _free_space(self, locale: str, margin_m: float, *, is_round: bool = False) -> Geometry:
         """Where the robot's centre may be with a margin round the robot; cached."""
-        return find_free_space(self._building, locale, self._robot.radius_m + margin_m)
+        return find_free_space(self._building, locale, self._robot.radius_m + margin_m, is_round=is_round)
 
 
 def _divide(route: list[Floats], max_leg_m: float) -> list[Floats]:

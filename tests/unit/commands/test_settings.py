@@ -139,7 +139,9 @@ EXCEPTIONS = {
     ),
     "rounding: a guard against division by zero, or the end of a minimisation": (
         "matching/hough.py: MIN_LENGTH_PX", "matching/kernels.py: NEWTON_STEPS", "matching/pose_pairs.py: TINY",
-        "motion/routes.py: SLACK_M", "pose/numerics/finish.py: MIN_LENGTH_PX",
+        "motion/footprints.py: GRAIN_M", "motion/footprints.py: MIN_SIDE_M", "motion/routes.py: CORNER_STEPS",
+        "motion/routes.py: SLACK_M",
+        "pose/numerics/finish.py: MIN_LENGTH_PX",
         "pose/numerics/kernels.py: MIN_IMAGE_PART", "pose/numerics/kernels.py: MIN_POINT_STEP",
         "pose/numerics/kernels.py: MIN_RELATIVE_GAIN", "pose/numerics/kernels.py: MIN_STEP",
         "pose/numerics/kernels.py: TINY", "pose/numerics/levenberg_marquardt.py: MIN_RELATIVE_GAIN",

@@ -1,0 +1,90 @@
+"""Floor watcher (§4, §5): how far the floor is free, by each picture, before the next increment is decided."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from knowledge_sources.methods.floor.see_floor import Seen, see_free_floor
+from knowledge_sources.questions import (
+    find_belief,
+    find_robot,
+    is_in_doubt,
+    is_over,
+    is_up_to_date,
+)
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.body import Frame
+from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor
+from world_models.entries.location import Hypothesis
+from world_models.frames import Pose2
+
+CORRECTED_BY = ("milestone", "tracks", "relocalization")
+"""What the belief rests on when a picture has corrected it."""
+
+
+class FloorWatcher(RobotKnowledgeSource):
+    """Looks at the floor in each picture, once the belief was corrected by it.
+
+    It says how far the floor is free in each direction, and what ends it: something of the model, or a thing that the
+    model lacks. What the floor of a locale looks like it learns from where the robot has just driven. Some pictures are
+    kept to compare later ones with: what stands up from the floor moves otherwise than the floor. While the robot's
+    place is in doubt, or not known well, it does not look: it could not tell a wall from a thing.
+    """
+
+    level = Level.ACTION
+    watches = (
+        Watch(Frame, (Posted,), lambda f: f.purpose not in ("milestone", "probe")),
+        Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in CORRECTED_BY),
+    )
+    writes = (FreeFloor, FloorAppearance, FloorView)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        frame, belief = view.latest(Frame), find_belief(view)
+        if frame is None or belief is None or is_over(view) or is_in_doubt(view) or not is_up_to_date(view):
+            return None
+        s = self._settings.action
+        if belief.value.sigma_m > s.max_floor_sigma_m or belief.value.sigma_rad > s.max_floor_sigma_rad:
+            return None
+        return None if _is_seen(view, frame) else 0.8
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        frame, belief = view.latest(Frame), find_belief(view)
+        if frame is None or belief is None:
+            return
+        robot, locale = find_robot(view), belief.value.locale
+        pose, floor_m = belief.value.world_from_robot(robot.world), robot.world.floor_m(locale)
+        known = {entry.value.locale: entry for entry in view.all(FloorAppearance)}
+        kept = [entry for entry in view.newest_first(FloorView)
+                if entry.value.belief == belief.id and entry.value.floor_m == floor_m]
+        apart_m = self._settings.action.floor_view_distance_m
+        earlier = [entry for entry in kept if _measure_way_m(entry.value, pose) >= apart_m]
+        seen, learnt = see_free_floor(
+            robot.on_floor_of(locale), locale, pose, belief.value.covariance_world(robot.world), frame.value.jpeg,
+            [Seen(view[e.value.frame].value.jpeg, _pose_of(e.value)) for e in earlier],
+            {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings)
+        yield Post(seen, (frame, belief, *earlier[:1], *(known[name] for name in (locale,) if name in known)))
+        for appearance in learnt:
+            old, because = known.get(appearance.locale), (frame, belief, *earlier[-1:])
+            yield Post(appearance, because) if old is None else Revise(old, appearance, (*because, old))
+        if not kept or _measure_way_m(kept[0].value, pose) >= apart_m:
+            yield Post(FloorView(frame.id, belief.id, pose.x_m, pose.y_m, pose.heading_rad, floor_m,
+                                 frame.value.sim_time_s), (frame, belief))
+
+
+def _is_seen(view: View, frame: Entry[Frame]) -> bool:
+    """Whether the floor was looked at in a picture already."""
+    return any(frame.ref in seen.because for seen in view.newest_first(FreeFloor))
+
+
+def _pose_of(kept: FloorView) -> Pose2:
+    return Pose2(kept.x_m, kept.y_m, kept.heading_rad)
+
+
+def _measure_way_m(kept: FloorView, pose: Pose2) -> float:
+    return math.hypot(kept.x_m - pose.x_m, kept.y_m - pose.y_m)
