@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
     "paper": {
+        "covariance": "Ellipsoids of the pose solvers: do they hold?",
         "figure12": "Trace of the 2D matcher's local search (Figure 12)",
         "levels": "Missions with each servo level off (Figure 2)",
         "planning": "Planning time of Figure 17's mission (§7)",

@@ -18,6 +18,12 @@ class PoseSettings:
         5.0, "px", "How far beyond the end of its model line an observed segment may lie.", "engineering judgement")
     outlier_sigmas: float = setting(
         3.0, "1", "A line further than this many standard deviations from its model line is an outlier.", "§6.2.4")
+    max_residual_sigmas: float = setting(
+        1.5, "1", "Lines whose noise is this many times the stated one no longer decide a pose (of six unknowns).",
+        "experiment covariance")
+    shared_px: float = setting(
+        0.3, "px", "Error shared by all lines of a picture: of calibration and survey (six unknowns).",
+        "engineering judgement, experiment covariance")
 
     # A prior without a covariance
     weak_rotation_rad: float = setting(

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose.estimate import PoseEstimate
@@ -18,6 +19,7 @@ from knowledge_sources.methods.pose.numerics.finish import (
     check_in_front,
     find_rejections,
 )
+from knowledge_sources.methods.pose.numerics.image_error import compute_image_jacobian
 from knowledge_sources.methods.pose.numerics.levenberg_marquardt import invert_information
 from knowledge_sources.methods.pose.numerics.subsets import (
     compute_squared_distances,
@@ -28,7 +30,12 @@ from knowledge_sources.methods.pose.numerics.subsets import (
     solve_subsets,
 )
 from knowledge_sources.methods.pose.r_and_t import PoseState
-from knowledge_sources.methods.pose.r_and_t_ml import find_likeliest, r_and_t_ml
+from knowledge_sources.methods.pose.r_and_t_ml import (
+    compute_likeliest_covariance,
+    find_likeliest,
+    invert_covariance,
+    r_and_t_ml,
+)
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.pose import PoseSettings
 from world_models.camera import Camera
@@ -36,6 +43,8 @@ from world_models.frames import Pose
 
 MEDIAN_CHI2_2 = 1.386
 """Median of the chi-squared law with two degrees of freedom: a line has two residuals."""
+MAX_CHI2_6 = 27.86
+"""Of the chi-squared law with six degrees of freedom, 99.99 % is below."""
 SUBSET_SIZE = 3
 """Lines or landmarks in a subset: three lines decide six unknowns."""
 
@@ -50,6 +59,7 @@ def med_r_and_t(
     sigma_px: Any = 1.0,
     probability: float | None = None,
     rng: np.random.Generator | None = None,
+    prior_covariance: Any = None,
     settings: PoseSettings = DEFAULT.pose,
 ) -> PoseEstimate:
     """Camera pose by least median of squares: holds up to about 45 % of wrong lines.
@@ -65,16 +75,23 @@ def med_r_and_t(
         sigma_px: standard deviation of the segment ends across the line, one number or (n,).
         probability: ``None`` tries every subset; else so many are drawn (with ``rng``) that one is free of outliers
             with this probability.
+        prior_covariance: (6, 6) of the prior's left perturbation: the prior is one more measurement, and candidates
+            that it excludes are not looked at. ``None``: see :func:`r_and_t_ml`.
 
     Raises:
-        ValueError: as :func:`build_line_set`; ids that are not one a line; subsets must be drawn without ``rng``.
+        ValueError: as :func:`build_line_set`; ids that are not one a line; subsets must be drawn without ``rng``; a
+            covariance of another shape.
     """
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     outlier_part = settings.med_drawn_outlier_part
     candidates = compute_candidates(lines, prior, landmark_ids, probability, outlier_part, rng, settings)
     if candidates is None:
-        return r_and_t_ml(model_lines_world, segments_px, camera, prior, sigma_px=sigma_px, settings=settings)
+        return r_and_t_ml(
+            model_lines_world, segments_px, camera, prior, sigma_px=sigma_px, prior_covariance=prior_covariance,
+            settings=settings,
+        )
     rotations, translations = _add_concentrated(lines, *candidates, settings)
+    rotations, translations = keep_possible(lines, prior, prior_covariance, rotations, translations)
     errors = compute_squared_distances(lines, rotations, translations)
     medians = np.median(errors, axis=1)
     least = float(medians.min())
@@ -82,7 +99,8 @@ def med_r_and_t(
     tied = np.flatnonzero(medians <= max(least, _compute_tied_median(settings)))
     best = int(tied[np.argmin(np.minimum(errors[tied], bound).sum(axis=1))])
     start = rotations[best], translations[best]
-    return refine_on_inliers(lines, prior, start, errors[best] <= bound, bound, settings)
+    near = errors[best] <= bound
+    return refine_on_inliers(lines, prior, prior_covariance, landmark_ids, start, near, bound, settings)
 
 
 def compute_candidates(
@@ -105,8 +123,41 @@ def compute_candidates(
     return solve_subsets(lines, rows, real, prior, settings)
 
 
+def keep_possible(
+    lines: LineSet, prior: Pose, prior_covariance: Any, rotations: Floats, translations: Floats
+) -> tuple[Floats, Floats]:
+    """The candidates (k, 3, 3), (k, 3) that the prior does not exclude, and the prior itself; all if it is unknown.
+
+    A candidate has the noise of its subset: about that of all lines, over the subset's share of them.
+    """
+    if prior_covariance is None:
+        return rotations, translations
+    rotations = np.concatenate([rotations, prior.rotation[None]])
+    translations = np.concatenate([translations, prior.translation[None]])
+    slopes = compute_image_jacobian(lines, prior.rotation, prior.translation)[1] / lines.sigma_px[:, None, None]
+    slopes = slopes.reshape(-1, 6) * np.sqrt(SUBSET_SIZE / len(lines))
+    spread = np.asarray(prior_covariance, float) + invert_information(slopes.T @ slopes)
+    turns = rotations @ prior.rotation.T
+    moves = np.concatenate([Rotation.from_matrix(turns).as_rotvec(), translations - turns @ prior.translation], axis=1)
+    squares = np.sum(moves * np.linalg.solve(spread, moves.T).T, axis=1)
+    possible = squares <= MAX_CHI2_6
+    return rotations[possible], translations[possible]
+
+
+def find_doubtful(landmark_ids: LandmarkIds, kept: Mask) -> Mask:
+    """(n,) the kept lines of landmarks of which no more are kept than left out.
+
+    A landmark is matched wrongly as a whole: a line of it may be near its model line by chance.
+    """
+    out = np.zeros(len(kept), bool)
+    for rows in group_by_landmark(landmark_ids, len(kept)):
+        out[rows] = kept[rows] & (2 * np.count_nonzero(kept[rows]) <= len(rows))
+    return out
+
+
 def refine_on_inliers(
-    lines: LineSet, prior: Pose, start: PoseState, near: Mask, bound: float, settings: PoseSettings
+    lines: LineSet, prior: Pose, prior_covariance: Any, landmark_ids: LandmarkIds, start: PoseState, near: Mask,
+    bound: float, settings: PoseSettings,
 ) -> PoseEstimate:
     """The likeliest pose of the lines kept, with reasons for the others (§6.2.4, steps 3 and 4).
 
@@ -115,11 +166,12 @@ def refine_on_inliers(
     Args:
         near: (n,) the lines kept at ``start``. bound: of a line's squared distance over its variance.
     """
+    information, known = invert_covariance(prior_covariance)
     near = near & (lines.lengths_px > MIN_LENGTH_PX)
     if int(np.count_nonzero(near)) < SUBSET_SIZE:
-        return build_prior_estimate(lines, prior, NO_SUBSET, settings)
+        return build_prior_estimate(lines, prior, NO_SUBSET, settings, known)
     for _ in range(max(settings.max_refinements, 1)):
-        end, reason = find_likeliest(lines.take(near), prior, None, settings, start)
+        end, reason = find_likeliest(lines.take(near), prior, information, settings, start)
         start = rotation, translation = end.state
         fine = compute_squared_distances(lines, rotation, translation) <= bound
         rejected = find_rejections(lines, rotation, translation, fine, settings)
@@ -127,11 +179,12 @@ def refine_on_inliers(
         if np.array_equal(again, near) or int(np.count_nonzero(again)) < SUBSET_SIZE:
             break
         near = again
-    covariance = invert_information(end.normal.hessian)
+    doubtful = find_doubtful(landmark_ids, near)
+    covariance = compute_likeliest_covariance(lines, end, near.astype(float), rejected, settings, bound, doubtful)
     estimate = build_estimate(
-        lines, rotation, translation, covariance, rejected, end.normal.cost, end.iterations, reason
+        lines, rotation, translation, covariance, rejected, end.normal.cost, end.iterations, reason, settings
     )
-    return check_in_front(lines, prior, estimate, settings, near)
+    return check_in_front(lines, prior, estimate, settings, near, known)
 
 
 def _add_concentrated(

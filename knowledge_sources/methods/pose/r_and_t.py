@@ -16,6 +16,7 @@ from knowledge_sources.methods.pose.numerics.finish import (
     build_estimate,
     build_prior_estimate,
     check_in_front,
+    compute_covariance,
     reject_behind,
 )
 from knowledge_sources.methods.pose.numerics.kernels import PLANES, TINY
@@ -29,10 +30,10 @@ from knowledge_sources.methods.pose.numerics.levenberg_marquardt import (
 from knowledge_sources.methods.pose.numerics.plane_error import (
     Weighting,
     compute_camera_ends,
+    compute_gain,
     compute_line_weights,
     compute_plane_distances,
     compute_plane_jacobian,
-    propagate_covariance,
 )
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.pose import PoseSettings
@@ -95,9 +96,10 @@ def r_and_t(
     scale = np.ones((len(lines), 2))
     if objective == "E2":
         scale = 1.0 / np.maximum(np.sum(compute_camera_ends(lines, rotation, translation) ** 2, axis=-1), TINY)
-    covariance = propagate_covariance(lines, rotation, translation, weights[:, None] * scale)
+    gain = compute_gain(lines, rotation, translation, weights[:, None] * scale)
     kept = reject_behind(lines, rotation, translation)
-    estimate = build_estimate(lines, rotation, translation, covariance, kept, end.normal.cost, steps, None)
+    covariance = compute_covariance(lines, rotation, translation, kept, gain, settings)
+    estimate = build_estimate(lines, rotation, translation, covariance, kept, end.normal.cost, steps, None, settings)
     return check_in_front(lines, prior, estimate, settings)
 
 

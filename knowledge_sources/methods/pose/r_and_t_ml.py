@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose.estimate import BEHIND, PoseEstimate
 from knowledge_sources.methods.pose.line_set import (
     LandmarkIds,
@@ -25,7 +25,9 @@ from knowledge_sources.methods.pose.numerics.finish import (
     build_estimate,
     build_prior_estimate,
     check_in_front,
+    compute_covariance,
     compute_weak_information,
+    find_doubt,
     has_open_direction,
     is_mostly_in_front,
     reject_behind,
@@ -76,19 +78,37 @@ def r_and_t_ml(
             return estimate
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     check_landmarks(landmark_ids, len(lines))
-    information = _invert_covariance(prior_covariance)
+    information, known = invert_covariance(prior_covariance)
     if not len(lines):
-        return build_prior_estimate(lines, prior, FEW_LINES, settings)
+        return build_prior_estimate(lines, prior, FEW_LINES, settings, known)
     end, reason = find_likeliest(lines, prior, information, settings)
     rotation, translation = end.state
     if _compute_chi2(lines, rotation, translation) > _compute_chi2(lines, prior.rotation, prior.translation):
-        return build_prior_estimate(lines, prior, NOT_BETTER, settings)
-    covariance = invert_information(end.normal.hessian)
+        return build_prior_estimate(lines, prior, NOT_BETTER, settings, known)
     kept = reject_behind(lines, rotation, translation)
+    covariance = compute_likeliest_covariance(lines, end, np.ones(len(lines)), kept, settings)
     estimate = build_estimate(
-        lines, rotation, translation, covariance, kept, end.normal.cost, end.iterations, reason
+        lines, rotation, translation, covariance, kept, end.normal.cost, end.iterations, reason, settings
     )
-    return check_in_front(lines, prior, estimate, settings)
+    return check_in_front(lines, prior, estimate, settings, covariance=known)
+
+
+def compute_likeliest_covariance(
+    lines: LineSet, end: Minimum[PoseState], weights: Floats, rejected: tuple[str | None, ...], settings: PoseSettings,
+    bound: float | None = None, doubtful: Mask | None = None,
+) -> Floats:
+    """(6, 6) covariance of the likeliest pose: what the prior knew, and :func:`compute_covariance`.
+
+    Args:
+        end: where the minimisation over the lines with ``weights`` (n,) ended; its Hessian has the prior's information.
+    """
+    rotation, translation = end.state
+    inverse = invert_information(end.normal.hessian)
+    gain, normals_px = kernels.compute_gain(lines.arrays, weights, np.array(rotation), np.array(translation), inverse)
+    scaled = gain.reshape(-1, 6) * np.repeat(lines.sigma_px, 2)[:, None]
+    prior_part = inverse - scaled.T @ scaled
+    errors = compute_covariance(lines, rotation, translation, rejected, (gain, normals_px), settings, bound, doubtful)
+    return np.asarray(prior_part + errors)
 
 
 def find_likeliest(
@@ -137,13 +157,16 @@ def _solve_in_prior_basin(
     fine, rotation, translation, covariance, cost, steps, distances, front = kernels.solve_from_prior(
         model, camera.undistort(ends_px), (camera.fx, camera.fy, camera.cx, camera.cy), check_sigma(sigma_px, n),
         (np.array(prior.rotation), np.array(prior.translation)), np.array(compute_weak_information(settings)),
-        compute_max_chi2(freedom, settings), settings.max_beside_px, settings.max_iterations,
+        compute_max_chi2(freedom, settings), settings.max_beside_px, settings.max_iterations, settings.shared_px,
     )
     if not fine:
         return None
     fronts = front.tolist()
-    rejected = (None,) * n if all(fronts) else tuple(None if f else BEHIND for f in fronts)
-    return PoseEstimate(Pose(rotation, translation), covariance, front, distances, rejected, cost, steps)
+    if all(fronts):
+        return PoseEstimate(Pose(rotation, translation), covariance, front, distances, (None,) * n, cost, steps)
+    rejected = tuple(None if f else BEHIND for f in fronts)
+    doubt = find_doubt(distances / check_sigma(sigma_px, n)[:, None], rejected, settings)
+    return PoseEstimate(Pose(rotation, translation), covariance, front, distances, rejected, cost, steps, doubt)
 
 
 def _minimise_image(
@@ -155,14 +178,14 @@ def _minimise_image(
     return minimise_compiled(IMAGE, lines, weights, start, settings.max_iterations, prior, information)
 
 
-def _invert_covariance(covariance: Any) -> Floats | None:
-    """The inverse of a (6, 6) covariance, ``None`` for ``None``."""
+def invert_covariance(covariance: Any) -> tuple[Floats | None, Floats | None]:
+    """The inverse of a (6, 6) covariance and itself, ``None`` for ``None``."""
     if covariance is None:
-        return None
+        return None, None
     matrix = np.asarray(covariance, float)
     if matrix.shape != (6, 6):
         raise ValueError(f"expected a prior_covariance of shape (6, 6), got {matrix.shape}")
-    return np.asarray(np.linalg.inv(matrix))
+    return np.asarray(np.linalg.inv(matrix)), matrix
 
 
 def _find_start(lines: LineSet, prior: Pose, settings: PoseSettings) -> PoseState:

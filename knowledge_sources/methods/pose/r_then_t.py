@@ -14,6 +14,7 @@ from knowledge_sources.methods.pose.numerics.finish import (
     build_estimate,
     build_prior_estimate,
     check_in_front,
+    compute_covariance,
     reject_behind,
 )
 from knowledge_sources.methods.pose.numerics.levenberg_marquardt import (
@@ -33,6 +34,7 @@ from knowledge_sources.methods.pose.numerics.plane_error import (
     compute_plane_distances,
     compute_plane_jacobian,
     compute_translation,
+    shape_gain,
 )
 from knowledge_sources.methods.pose.r_and_t import MIN_LINES
 from knowledge_sources.settings import DEFAULT
@@ -67,9 +69,10 @@ def r_then_t(
     translation = compute_translation(lines, rotation, prior.translation, weights)
     misses = compute_plane_distances(lines, compute_camera_ends(lines, rotation, translation))
     cost = float(np.sum(weights[:, None] * misses**2))
-    covariance = _propagate_covariance(lines, rotation, translation, weights)
+    gain = _compute_gain(lines, rotation, translation, weights)
     kept = reject_behind(lines, rotation, translation)
-    estimate = build_estimate(lines, rotation, translation, covariance, kept, cost, end.iterations, None)
+    covariance = compute_covariance(lines, rotation, translation, kept, gain, settings)
+    estimate = build_estimate(lines, rotation, translation, covariance, kept, cost, end.iterations, None, settings)
     return check_in_front(lines, prior, estimate, settings)
 
 
@@ -87,8 +90,8 @@ def _minimise_rotation(lines: LineSet, prior: Pose, weights: Floats, settings: P
     return minimise(prior.rotation, linearise, retract, settings.max_iterations)
 
 
-def _propagate_covariance(lines: LineSet, rotation: Floats, translation: Floats, weights: Floats) -> Floats:
-    """(6, 6) covariance: the noise of the ends, propagated through both stages."""
+def _compute_gain(lines: LineSet, rotation: Floats, translation: Floats, weights: Floats) -> tuple[Floats, Floats]:
+    """How the pose moves with the observed ends, through both stages, see :func:`kernels.compute_gain`."""
     turned = lines.directions @ rotation.T
     jacobian = cross(turned, lines.normals)
     noise = compute_end_noise(lines, turned[:, None, :])[:, 0]
@@ -100,8 +103,7 @@ def _propagate_covariance(lines: LineSet, rotation: Floats, translation: Floats,
     moved += _spread_noise(compute_end_noise(lines, ends))
     normals = lines.normals * weights[:, None]
     shift = -invert_information(2.0 * normals.T @ lines.normals) @ np.einsum("ia,ikm->am", normals, moved)
-    both = np.vstack([turn, shift])
-    return np.asarray(both @ both.T)
+    return shape_gain(lines, np.vstack([turn, shift]))
 
 
 def _spread_noise(noise: Floats) -> Floats:

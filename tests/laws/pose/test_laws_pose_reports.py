@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -99,11 +100,70 @@ def test_the_covariance_says_how_far_off_the_pose_is(solver: Solver, scene: Pose
 def test_the_covariance_scales_with_the_variance_of_the_lines(
     solver: Solver, scene: PoseScene, seed: int, factor: float
 ) -> None:
-    """With exact lines and ``factor`` times the deviation, the covariance is ``factor`` squared times as large."""
+    """With exact lines and ``factor`` times the deviations, the covariance is ``factor`` squared times as large."""
     rng = np.random.default_rng(seed)
     prior = draw_prior(scene.camera_from_world, 0.1, 0.01, rng)
     first, second = (
-        solver(scene.lines_world, scene.segments_px, scene.camera, prior, landmark_ids=scene.landmark_ids, sigma_px=s)
-        for s in (SIGMA_PX, factor * SIGMA_PX)
+        solver(scene.lines_world, scene.segments_px, scene.camera, prior, landmark_ids=scene.landmark_ids,
+               sigma_px=by * SIGMA_PX, settings=replace(DEFAULT.pose, shared_px=by * DEFAULT.pose.shared_px))
+        for by in (1.0, factor)
     )
     np.testing.assert_allclose(second.covariance, factor**2 * first.covariance, rtol=1e-3, atol=1e-12)
+
+
+@by_solver(SOLVERS)
+@given(scene=scenes, seed=seeds)
+@quick
+def test_the_error_that_all_lines_share_is_a_floor_of_the_covariance(
+    solver: Solver, scene: PoseScene, seed: int
+) -> None:
+    """However small the noise of the lines and however many they are."""
+    rng = np.random.default_rng(seed)
+    prior = draw_prior(scene.camera_from_world, 0.1, 0.01, rng)
+    data = scene.lines_world, scene.segments_px, scene.camera, prior
+    none, some, small = (
+        solver(*data, sigma_px=sigma, landmark_ids=scene.landmark_ids, settings=replace(DEFAULT.pose, shared_px=shared))
+        for sigma, shared in ((SIGMA_PX, 0.0), (SIGMA_PX, 0.5), (0.01 * SIGMA_PX, 0.5))
+    )
+    floor = some.covariance - none.covariance
+    assert np.linalg.eigvalsh(floor)[0] > -1e-9 * np.linalg.eigvalsh(floor)[-1] and np.trace(floor) > 0.0
+    expected = floor + 1e-4 * none.covariance
+    np.testing.assert_allclose(small.covariance, expected, rtol=0.02, atol=1e-3 * np.abs(floor).max())
+
+
+@by_solver(SOLVERS)
+@given(scene=scenes, seed=seeds, count=st.integers(2, 5))
+@quick
+def test_fragments_of_a_line_count_once(solver: Solver, scene: PoseScene, seed: int, count: int) -> None:
+    """A line in ``count`` pieces, which together are as long, says no more than the line."""
+    rng = np.random.default_rng(seed)
+    prior = draw_prior(scene.camera_from_world, 0.1, 0.01, rng)
+    cuts = np.linspace(0.0, 1.0, count + 1)
+    a, span = scene.segments_px[:, None, 0], np.diff(scene.segments_px, axis=1)
+    ends = a + cuts[None, :, None] * span
+    pieces = np.stack([ends[:, :-1], ends[:, 1:]], axis=2).reshape(-1, 2, 2)
+    whole = solver(
+        scene.lines_world, scene.segments_px, scene.camera, prior, landmark_ids=scene.landmark_ids, sigma_px=SIGMA_PX)
+    cut = solver(
+        np.repeat(scene.lines_world, count, axis=0), pieces, scene.camera, prior,
+        landmark_ids=np.repeat(scene.landmark_ids, count), sigma_px=SIGMA_PX)
+    sizes = [np.linalg.slogdet(found.covariance)[1] / 12.0 for found in (whole, cut)]
+    assert sizes[1] > sizes[0] - 0.2, "log of the mean deviation"
+
+
+@by_solver(SOLVERS)
+@given(scene=scenes, seed=seeds, part=st.floats(0.0, 0.95))
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_ok_is_earned(solver: Solver, scene: PoseScene, seed: int, part: float) -> None:
+    """Never with fewer than 3 inliers, a minority of the lines, or residuals far above their deviation."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, len(scene) + 1))
+    scene = scene.take(np.sort(rng.permutation(len(scene))[:count]))
+    segments, _ = wrong_landmarks(scene, end_noise(scene.segments_px, SIGMA_PX, rng), int(part * count), rng)
+    found = solve(solver, scene, segments, rng)
+    kept = int(found.inliers.sum())
+    mean_square = float(np.sum((found.residuals_px[found.inliers] / SIGMA_PX) ** 2)) / max(2 * kept, 1)
+    if found.ok:
+        assert kept >= 3 and 2 * kept >= count
+        limit = DEFAULT.pose.max_residual_sigmas**2 * (1.0 + DEFAULT.pose.max_chi2_sigmas * (2.0 / (2.0 * kept)) ** 0.5)
+        assert mean_square <= limit * 1.001

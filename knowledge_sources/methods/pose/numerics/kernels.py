@@ -206,14 +206,14 @@ def measure_lines(
 @compiled
 def solve_from_prior(
     model: Floats, ends_px: Floats, intrinsics: tuple[float, float, float, float], sigma: Floats, prior: RigidMotion,
-    weak: Floats, max_cost: float, max_beside_px: float, iterations: int,
+    weak: Floats, max_cost: float, max_beside_px: float, iterations: int, shared_px: float,
 ) -> tuple[bool, Floats, Floats, Floats, float, int, Floats, Mask]:
     """The likeliest pose in the prior's own basin, and whether it explains the lines to their noise.
 
     Args:
         model: (n, 2, 3) [m]. ends_px: (n, 2, 2) without distortion. intrinsics: fx, fy, cx, cy. sigma: (n,) [px].
         weak: (6, 6) information that the lines must exceed in every direction.
-        max_cost: the highest cost at which the lines are explained.
+        max_cost: the highest cost at which the lines are explained. shared_px: see :func:`spread_errors`.
 
     Returns:
         whether they are (never, if a line is faulty), R, T, the covariance (6, 6), cost, steps, and the distances and
@@ -228,42 +228,161 @@ def solve_from_prior(
     )
     distances, front, _ = measure_lines(lines, rotation, translation, max_beside_px)
     fine = bool(fault == FINE and cost <= max_cost and 2 * np.sum(front) > n and _is_decided(hessian, weak))
-    covariance = _invert(hessian) if fine else hessian
+    covariance = hessian
+    if fine:
+        gain, normals_px = compute_gain(lines, np.ones(n), rotation, translation, _invert(hessian))
+        covariance = spread_errors(lines, gain, normals_px, 1.0, shared_px)
     return fine, _orthonormalise(rotation), translation, covariance, cost, steps, distances, front
 
 
 @compiled
+def compute_gain(
+    lines: LineArrays, weights: Floats, rotation: Floats, translation: Floats, covariance: Floats
+) -> tuple[Floats, Floats]:
+    """How the likeliest pose moves when the observed ends do.
+
+    Args:
+        weights: (n,) of the lines. covariance: (6, 6) inverse of the cost's Hessian.
+
+    Returns:
+        (n, 2, 6) left perturbation of the pose for each px that an end moves along its line's normal, and those
+        normals (n, 2) in the picture.
+    """
+    _, directions, moments, rays, _, _, sigma, focal = lines
+    n = len(directions)
+    gain, normals_px, row = np.zeros((n, 2, 6)), np.zeros((n, 2)), np.empty(6)
+    for i in range(n):
+        direction, plane, reach = _project_line(directions[i], moments[i], focal, rotation, translation)
+        normals_px[i, 0], normals_px[i, 1] = plane[0] / focal[0] / reach, plane[1] / focal[1] / reach
+        u, v = plane[0] / (focal[0] * focal[0]) / reach, plane[1] / (focal[1] * focal[1]) / reach
+        weight = weights[i] / (sigma[i] * sigma[i])
+        if weight == 0.0:
+            continue
+        for e in range(2):
+            ray = rays[i, e]
+            distance = _dot(ray, plane) / reach
+            slope = (ray[0] - distance * u) / reach, (ray[1] - distance * v) / reach, ray[2] / reach
+            turn, shift = _cross(plane, slope), _cross(direction, slope)
+            for a in range(3):
+                row[a], row[3 + a] = turn[a], shift[a]
+            for a in range(6):
+                for b in range(6):
+                    gain[i, e, a] -= weight * covariance[a, b] * row[b]
+    return gain, normals_px
+
+
+@compiled
+def spread_errors(
+    lines: LineArrays, gain: Floats, normals_px: Floats, noise: float, shared_px: float
+) -> Floats:
+    """(6, 6) covariance of a pose from the errors of the observed ends.
+
+    A line's own error moves its two ends independently; its fragments (equal model lines) are parts of one line, and
+    move with it: they count once. The shared error moves all lines alike: at (x, y) = ray / z the picture is displaced
+    by A (1, x, y), each element of A (2, 3) having the deviation ``shared_px``: as a wrong principal point, focal
+    length, skew or mounting does.
+
+    Args:
+        gain, normals_px: see :func:`compute_gain`. noise: factor on the variance of the lines' own errors.
+    """
+    points, _, _, rays, _, _, sigma, focal = lines
+    n = len(points)
+    out, done, first, last = np.zeros((6, 6)), np.zeros(n, np.bool_), np.empty(6), np.empty(6)
+    for i in range(n):
+        if done[i]:
+            continue
+        u, v, low, high, count = -normals_px[i, 1] * focal[0], normals_px[i, 0] * focal[1], math.inf, -math.inf, 0
+        for j in range(i, n):
+            if _is_same_line(points[i], points[j]) and np.any(gain[j] != 0.0):
+                count += 1
+                for e in range(2):
+                    along = rays[j, e, 0] * u + rays[j, e, 1] * v
+                    low, high = min(low, along), max(high, along)
+        first[:], last[:] = 0.0, 0.0
+        for j in range(i, n):
+            if done[j] or not _is_same_line(points[i], points[j]):
+                continue
+            done[j] = True
+            side = normals_px[i, 0] * normals_px[j, 0] + normals_px[i, 1] * normals_px[j, 1]
+            size = sigma[j] if side >= 0.0 else -sigma[j]
+            for e in range(2):
+                part = (rays[j, e, 0] * u + rays[j, e, 1] * v - low) / max(high - low, TINY)
+                if count <= 1:
+                    part = float(e)
+                for a in range(6):
+                    first[a] += (1.0 - part) * size * gain[j, e, a]
+                    last[a] += part * size * gain[j, e, a]
+        for a in range(6):
+            for b in range(6):
+                out[a, b] += noise * (first[a] * first[b] + last[a] * last[b])
+    if shared_px > 0.0:
+        for axis in range(2):
+            for c in range(3):
+                first[:] = 0.0
+                for i in range(n):
+                    for e in range(2):
+                        moved = normals_px[i, axis] * (1.0 if c == 0 else rays[i, e, c - 1])
+                        for a in range(6):
+                            first[a] += moved * gain[i, e, a]
+                for a in range(6):
+                    for b in range(6):
+                        out[a, b] += shared_px * shared_px * first[a] * first[b]
+    return out
+
+
+@compiled
+def _is_same_line(ends: Floats, other: Floats) -> bool:
+    """Whether the ends (2, 3) of two model lines are equal, in either order."""
+    same = swapped = True
+    for a in range(3):
+        same = same and ends[0, a] == other[0, a] and ends[1, a] == other[1, a]
+        swapped = swapped and ends[0, a] == other[1, a] and ends[1, a] == other[0, a]
+    return same or swapped
+
+
+@compiled
 def refine_truncated(
-    lines: LineArrays, start: RigidMotion, prior: RigidMotion, weak: Floats, bound: float, max_beside_px: float,
-    min_lines: int, rounds: int, iterations: int,
+    lines: LineArrays, start: RigidMotion, prior: RigidMotion, information: Floats, weak: Floats, bound: float,
+    max_beside_px: float, min_lines: int, rounds: int, iterations: int,
 ) -> tuple[Floats, Floats, float]:
     """Alternate inliers and least squares until they agree; the R, T of least truncated cost on the way, and that cost.
 
     Args:
+        information: (6, 6) of the prior, which counts as one more measurement, also in the cost; all zero: it does not.
         weak: (6, 6) information of the prior, which helps where the inliers leave a direction open.
         bound: of a line's squared distance over its variance; the first round admits lines up to twice as far.
     """
     best_rotation, best_translation = start[0].copy(), start[1].copy()
     near = compute_truncated_costs(lines, best_rotation, best_translation, 4.0 * bound, max_beside_px) < 4.0 * bound
     best = compute_truncated_costs(lines, best_rotation, best_translation, bound, max_beside_px).sum()
+    best += compute_prior_cost(prior, information, best_rotation, best_translation)
     rotation, translation = best_rotation, best_translation
     for _ in range(rounds):
         if np.sum(near) < min_lines:
             break
         weights = np.where(near, 1.0, 0.0)
         rotation, translation, hessian, _, _ = minimise_pose(
-            IMAGE, lines, weights, (rotation, translation), prior, np.zeros((6, 6)), iterations
+            IMAGE, lines, weights, (rotation, translation), prior, information, iterations
         )
         if not _is_decided(hessian, weak):
             rotation, translation, _, _, _ = minimise_pose(IMAGE, lines, weights, prior, prior, weak, iterations)
         costs = compute_truncated_costs(lines, rotation, translation, bound, max_beside_px)
-        if costs.sum() < best:
-            best, best_rotation, best_translation = costs.sum(), rotation, translation
+        cost = costs.sum() + compute_prior_cost(prior, information, rotation, translation)
+        if cost < best:
+            best, best_rotation, best_translation = cost, rotation, translation
         again = costs < bound
         if np.all(again == near):
             break
         near = again
     return best_rotation, best_translation, best
+
+
+@compiled
+def compute_prior_cost(prior: RigidMotion, information: Floats, rotation: Floats, translation: Floats) -> float:
+    """The prior's share of the cost at a pose; 0 without information."""
+    if information[0, 0] <= 0.0:
+        return 0.0
+    return _add_prior(prior, information, rotation, translation, np.zeros((6, 6)), np.zeros(6))
 
 
 @compiled

@@ -66,8 +66,8 @@ def compute_end_noise(lines: LineSet, vectors: Floats) -> Floats:
     return np.asarray(vectors @ np.swapaxes(planes, 1, 2))
 
 
-def propagate_covariance(lines: LineSet, rotation: Floats, translation: Floats, weights: Floats) -> Floats:
-    """(6, 6) covariance of the minimum of E1 with ``weights`` (n, 2): the noise of the ends, propagated.
+def compute_gain(lines: LineSet, rotation: Floats, translation: Floats, weights: Floats) -> tuple[Floats, Floats]:
+    """How the minimum of E1 with ``weights`` (n, 2) moves with the observed ends, see :func:`kernels.compute_gain`.
 
     E1 is not a likelihood, so the inverse Hessian is not its covariance. For E2 divide the weights by |q|^2.
     """
@@ -76,5 +76,15 @@ def propagate_covariance(lines: LineSet, rotation: Floats, translation: Floats, 
     weighted = jacobian * weights[..., None]
     hessian = np.einsum("ika,ikb->ab", weighted, jacobian)
     spread = np.einsum("ika,ikj->aij", weighted, compute_end_noise(lines, ends)).reshape(6, -1)
-    gain = invert_information(hessian) @ spread
-    return np.asarray(gain @ gain.T)
+    return shape_gain(lines, -invert_information(hessian) @ spread)
+
+
+def shape_gain(lines: LineSet, gain: Floats) -> tuple[Floats, Floats]:
+    """From the move (6, 2n) of a pose for each deviation of an end across its segment: gain and normals in the picture.
+
+    See :func:`kernels.compute_gain`.
+    """
+    along = (lines.rays[:, 1] - lines.rays[:, 0])[:, :2] * lines.focal_px
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(lines.lengths_px, TINY)[:, None]
+    rows = np.moveaxis(gain.reshape(6, len(lines), 2), 0, 2) / lines.sigma_px[:, None, None]
+    return np.ascontiguousarray(rows), across
