@@ -16,7 +16,7 @@ from knowledge_sources.settings.floor import FloorSettings
 
 MIN_ROWS = 3
 """A region of fewer rows is noise."""
-CUT_PART = 0.55
+CUT_PART = 0.6
 """Of a region that the lower border cuts off: its foot is taken to be at this part of the range of that border."""
 
 
@@ -100,8 +100,8 @@ def find_footprint(region: Region, grid: FloorGrid, settings: FloorSettings) -> 
     cut = region.feet[:, 0] >= grid.shape[0] - 2
     near = np.where(cut[:, None], eye + away * CUT_PART, points)
     nearest = float(np.linalg.norm(near - eye, axis=1).min())
-    far = points + away / lengths * np.clip(
-        nearest + settings.assumed_depth_m - lengths, 0.1, settings.assumed_depth_m)
+    deep = np.clip(nearest + settings.assumed_depth_m - lengths, 0.1, settings.assumed_depth_m)
+    far = points + away / lengths * np.where(cut[:, None], 0.0, deep)  # one that is cut off is nearer than its border
     hull = shapely.convex_hull(shapely.multipoints(np.concatenate([near, far])))
     if not isinstance(hull, shapely.Polygon):
         hull = hull.buffer(0.02, quad_segs=1)
