@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats
@@ -128,12 +129,14 @@ def find_unlike(
             continue
         here = model.is_plain & (model.kinds == kind)
         by_model = compute_looks(255.0 * model.colours[kind])
-        expected, is_learnt = by_model, False
+        expected, is_learnt = by_model, exposure is not None
+        if exposure is not None:
+            expected = by_model + np.array([exposure, 0.0, 0.0])
+        fitted = None
         if exposure is None and known is not None and known.samples > 0.0:
-            expected, is_learnt = compute_looks(np.array(known.mean)), True
-        elif exposure is not None:
-            expected, is_learnt = by_model + np.array([exposure, 0.0, 0.0]), True
-        fitted = fit_looks(looks[here], expected, is_learnt, settings)
+            fitted = fit_looks(looks[here], compute_looks(np.array(known.mean)), True, settings)
+        if fitted is None:
+            fitted = fit_looks(looks[here], expected, is_learnt, settings)
         if fitted is None and exposure is None:
             continue
         mean, covariance = fitted if fitted is not None else (expected, 4.0 * default_covariance(settings))
@@ -240,6 +243,10 @@ def _learn(
     away = math.hypot(*now.position)
     ahead, aside = (grid.points_robot @ np.array(axis) / away for axis in (now.position, (-now.y_m, now.x_m)))
     driven = (ahead > 0.0) & (ahead < away) & (np.abs(aside) < DRIVEN_HALF_WIDTH_M)
+    if driven.any():  # of this locale only: the next one may have another floor
+        c, sine = math.cos(then.pose.heading_rad), math.sin(then.pose.heading_rad)
+        there = grid.points_robot[driven] @ np.array([[c, sine], [-sine, c]]) + np.array(then.pose.position)
+        driven[driven] = shapely.contains_xy(shapely.Polygon(robot.world.outline(locale)), there)
     if not driven.any():
         return ()
     colours = read_reduced(then.jpeg, robot.lens, robot.camera)[grid.top:][driven].astype(float)
