@@ -27,7 +27,9 @@ from knowledge_sources.methods.motion.footprints import (
     list_corners,
     measure_change_m,
     measure_free_part,
+    measure_hull_part,
     measure_width_m,
+    take_free,
 )
 from knowledge_sources.methods.motion.routes import find_nearest
 from knowledge_sources.questions import (
@@ -144,13 +146,15 @@ class ObstacleFinder(RobotKnowledgeSource):
             if thing.p_thing < s.min_thing_certainty or thing.sigma_m > s.max_obstacle_sigma_m:
                 continue
             shape = deepen(thing.footprint, (f.x_m, f.y_m), s.obstacle_depth_m)
-            entry = _find_same([e for e in known.values() if e.id not in drafts], shape, thing.sigma_m)
+            entry = _find_same(
+                [e for e in known.values() if e.id not in drafts], shape, thing.sigma_m, s.max_hull_part)
             if entry is not None:
                 new = self._see_again(find_building(view), entry.value, thing, shape, free, scan)
                 if new is not None:
                     drafts[entry.id] = _Draft(entry, new, [scan])
                 continue
-            if _find_same([e for e in known.values() if e.id in drafts], shape, thing.sigma_m) is not None:
+            again = [build_polygon(draft.new.footprint) for draft in drafts.values()]
+            if any(shapely.intersection(polygon, shape).area > 0.5 * shape.area for polygon in again):
                 continue  # another part of what was joined already
             found = self._see_first(view, thing, shape, scan, fresh)
             if found is not None:
@@ -163,7 +167,7 @@ class ObstacleFinder(RobotKnowledgeSource):
                 continue
             polygon = build_polygon(entry.value.footprint)
             if not any(polygon.intersects(shape) for shape in seen):
-                gone = self._miss(entry.value, measure_free_part(entry.value.footprint, free), f.seen_s)
+                gone = self._miss(find_building(view), entry.value, free, f.seen_s)
                 if gone is not None:
                     yield _Draft(entry, gone, [scan, entry])
 
@@ -200,7 +204,7 @@ class ObstacleFinder(RobotKnowledgeSource):
             certainty = _combine(known.certainty, thing.p_thing / (1.0 - min(thing.p_thing, 0.999)))
         certainty = min(certainty, s.max_obstacle_certainty)
         own = shapely.intersection(shape, _find_open_floor(world, known.locale, 0.0))
-        joined = join_footprints(build_polygon(known.footprint), shape if own.is_empty else own, free, thing.sigma_m)
+        joined = join_footprints(build_polygon(known.footprint), shape if own.is_empty else own, free)
         footprint = list_corners(joined)
         moved = measure_change_m(known.footprint, footprint) >= s.min_footprint_change_m
         surer = certainty > known.certainty + 0.02 or _status(certainty, s) != known.status
@@ -213,14 +217,21 @@ class ObstacleFinder(RobotKnowledgeSource):
                       sigma_height_m=sigma, sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, scan))
         return _place(world, replace(new, footprint=footprint), joined) if moved and footprint else new
 
-    def _miss(self, known: Obstacle, free_part: float, seen_s: float) -> Obstacle | None:
-        """A known obstacle after its floor was seen free; None where not enough of it was seen."""
-        s = self._settings.action
-        if free_part < s.min_free_part or seen_s - known.looked_s < s.min_evidence_interval_s:
+    def _miss(self, world: Building, known: Obstacle, free: shapely.Geometry, seen_s: float) -> Obstacle | None:
+        """A known obstacle after its floor, or some of it, was seen free; None where that tells nothing."""
+        s, polygon = self._settings.action, build_polygon(known.footprint)
+        free_part = measure_free_part(known.footprint, free)
+        if seen_s - known.looked_s < s.min_evidence_interval_s:
             return None
-        certainty = _combine(known.certainty, s.free_floor_odds**free_part)
-        status: ObstacleStatus = "gone" if certainty < s.min_gone_certainty else known.status
-        return replace(known, certainty=certainty, looked_s=seen_s, status=status)
+        if free_part >= s.min_free_part:
+            certainty = _combine(known.certainty, s.free_floor_odds**free_part)
+            status: ObstacleStatus = "gone" if certainty < s.min_gone_certainty else known.status
+            return replace(known, certainty=certainty, looked_s=seen_s, status=status)
+        left = take_free(polygon, free)
+        footprint = list_corners(left)
+        if not footprint or measure_change_m(known.footprint, footprint) < s.min_footprint_change_m:
+            return None
+        return _place(world, replace(known, footprint=footprint, looked_s=seen_s), left)
 
     # -- board ---------------------------------------------------------------------------------------------------------
 
@@ -292,13 +303,19 @@ def _find_touched(view: View, touched: Floats, reach_m: float) -> Entry[Obstacle
     return entry if distance_m <= reach_m else None
 
 
-def _find_same(known: Iterable[Entry[Obstacle]], shape: shapely.Polygon, sigma_m: float) -> Entry[Obstacle] | None:
-    """The obstacle that a thing is another sight of: that of which it covers most, within the standard deviations."""
+def _find_same(
+    known: Iterable[Entry[Obstacle]], shape: shapely.Polygon, sigma_m: float, most_hull: float
+) -> Entry[Obstacle] | None:
+    """The obstacle that a thing is another sight of: that of which it covers most, within the standard deviations.
+
+    What lies beside an obstacle, so that a hull round both would take much floor that neither takes, is another thing.
+    """
     best: tuple[float, Entry[Obstacle]] | None = None
     for entry in known:
+        polygon = build_polygon(entry.value.footprint)
         reach_m = 2.0 * math.hypot(sigma_m, entry.value.sigma_m)
-        shared = shapely.intersection(build_polygon(entry.value.footprint).buffer(reach_m), shape).area
-        if shared > 0.0 and (best is None or shared > best[0]):
+        shared = shapely.intersection(polygon.buffer(reach_m), shape).area
+        if shared > 0.0 and (best is None or shared > best[0]) and measure_hull_part(polygon, shape) <= most_hull:
             best = shared, entry
     return None if best is None else best[1]
 

@@ -163,7 +163,10 @@ class ActionSettings:
         0.3, "s", "Pictures that follow each other faster are no further evidence of an obstacle.",
         "engineering judgement")
     max_obstacle_sigma_m: float = setting(
-        0.4, "m", "What is seen on the floor with a larger standard deviation is waited for until it is nearer.",
+        0.25, "m", "What is seen on the floor with a larger standard deviation is waited for until it is nearer.",
+        "engineering judgement")
+    max_hull_part: float = setting(
+        1.5, "1", "Two sights are of one thing where the hull round both is at most so much larger than both.",
         "engineering judgement")
     obstacle_depth_m: float = setting(
         0.3, "m", "Depth that something is taken to have of which only the near side is seen.", "engineering judgement")

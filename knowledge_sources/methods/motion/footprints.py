@@ -77,13 +77,21 @@ def deepen(footprint: Any, eye: Any, depth_m: float) -> shapely.Polygon:
     return build_polygon(np.concatenate([corners, corners + lacking * out]))
 
 
-def join_footprints(
-    known: shapely.Geometry, seen: shapely.Geometry, free: shapely.Geometry, sigma_m: float
-) -> shapely.Geometry:
-    """Both, without what is seen to be free by more than the standard deviation; at least what is seen now."""
-    kept = shapely.difference(known, shapely.buffer(free, -sigma_m))
-    parts = [part for part in shapely.get_parts(kept) if part.distance(seen) <= sigma_m]
-    return shapely.convex_hull(shapely.union_all([seen, *parts]))
+def join_footprints(known: shapely.Geometry, seen: shapely.Geometry, free: shapely.Geometry) -> shapely.Geometry:
+    """Both, without what of the known is seen to be free; at least what is seen now."""
+    return shapely.convex_hull(shapely.union(seen, take_free(known, free)))
+
+
+def take_free(known: shapely.Geometry, free: shapely.Geometry) -> shapely.Geometry:
+    """What is left of a footprint without the floor that is seen to be free: the hull of its largest piece."""
+    pieces = shapely.get_parts(shapely.difference(known, free))
+    return shapely.convex_hull(max(pieces, key=lambda piece: piece.area, default=shapely.Polygon()))
+
+
+def measure_hull_part(one: shapely.Geometry, other: shapely.Geometry) -> float:
+    """How many times as large as two footprints the hull round both is: 1 where they make one convex footprint."""
+    both = shapely.union(one, other)
+    return float(shapely.convex_hull(both).area / max(both.area, MIN_SIDE_M**2))
 
 
 def measure_free_part(footprint: Any, free: shapely.Geometry) -> float:
