@@ -6,7 +6,7 @@ from pathlib import Path
 
 import rerun.blueprint as rrb
 
-from logs.recording.loggers.building import building_view, log_building
+from logs.recording.loggers.surroundings.building import building_view, log_building
 from logs.recording.stream import RecordingStream
 from world_models.building.world import World
 

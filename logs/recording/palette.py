@@ -20,6 +20,7 @@ DOOR: Colour = (120, 200, 140, 255)
 NAME: Colour = (255, 255, 255, 255)
 KNOWN: Colour = (0, 200, 215, 170)
 REVISED: Colour = (255, 90, 215, 255)
+FREE: Colour = (80, 225, 190, 255)
 NOT_TESTABLE: Colour = (190, 130, 255, 255)
 
 LEVELS: Mapping[str, Colour] = {"action": (90, 170, 255, 255), "plan": (255, 160, 50, 255), "goal": (235, 90, 120, 255)}

@@ -14,6 +14,7 @@ TRUE_ADDED, TRUE_GONE = f"{WORLD}/truth/added", f"{WORLD}/truth/gone"
 CANDIDATES = f"{WORLD}/robot/candidates"
 CONTACTS, RANGES = f"{WORLD}/robot/contacts", f"{BELIEVED_ROBOT}/ranges"
 GOAL, PATH, LEG, LANDMARKS = f"{WORLD}/plan/goal", f"{WORLD}/plan/path", f"{WORLD}/plan/leg", f"{WORLD}/plan/landmarks"
+SEEN_FLOOR, OBSTACLES, DOORS = f"{WORLD}/seen/floor", f"{WORLD}/seen/obstacles", f"{WORLD}/seen/doors"
 FRAMES, FRAME_LIST = f"{WORLD}/frames", "frames"
 
 CAMERA = "camera"
@@ -22,6 +23,8 @@ EXPECTED, SEGMENTS, MATCHED = f"{IMAGE}/expected", f"{IMAGE}/segments", f"{IMAGE
 REJECTED, LANDMARK_NAMES = f"{IMAGE}/rejected", f"{IMAGE}/names"
 WINDOWS, DRIFTS = f"{IMAGE}/windows", f"{IMAGE}/drifts"
 OBSTRUCTION = f"{IMAGE}/obstruction"
+FREE_IN_PICTURE, FLOOR_BOUNDARY, THINGS = f"{IMAGE}/floor/free", f"{IMAGE}/floor/boundary", f"{IMAGE}/floor/things"
+DOOR_IN_PICTURE = f"{IMAGE}/door"
 WAITING = f"{CAMERA}/waiting"
 
 SKETCH = "sketch"

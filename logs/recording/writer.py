@@ -37,9 +37,10 @@ def logger_classes() -> tuple[type[Logger], ...]:
 
 
 def _find_built_in_loggers() -> Iterator[type[Logger]]:
-    """Those in the folder ``loggers``, in the order of their files' names."""
-    for module in pkgutil.iter_modules(built_in.__path__):
-        yield import_module(f"{built_in.__name__}.{module.name}").LOGGER
+    """Those in the folder ``loggers`` and below it, in the order of their files' names."""
+    for module in pkgutil.walk_packages(built_in.__path__, f"{built_in.__name__}."):
+        if not module.ispkg:
+            yield import_module(module.name).LOGGER
 
 
 def _foreign() -> Iterator[type[Logger]]:

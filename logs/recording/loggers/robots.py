@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from logs.recording.board_mirror import Mirror, Moment
 from logs.recording.logger import Logger, Subject
-from logs.recording.loggers.building import space_view
+from logs.recording.loggers.surroundings.building import space_view
 from logs.recording.palette import BELIEVED, CANDIDATE, TRUE, Colour, faint
 from logs.recording.panel import Panel
 from logs.recording.paths import (

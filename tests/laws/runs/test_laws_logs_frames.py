@@ -16,7 +16,7 @@ from blackboard.level import Level
 from logs.recording.belief import Belief
 from logs.recording.board_mirror import Mirror, Moment
 from logs.recording.logger import Subject
-from logs.recording.loggers.locale_frames import LocaleFrames, marks_path, outline_path
+from logs.recording.loggers.surroundings.locale_frames import LocaleFrames, marks_path, outline_path
 from logs.recording.palette import KNOWN, REVISED
 from logs.recording.paths import FRAME_LIST
 from logs.recording.stream import RecordingStream

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from logs.recording.loggers.building import _meshes
+from logs.recording.loggers.surroundings.building import _meshes
 from world_models.building.changes.removals import element_names, remove_element, remove_thing
 from world_models.building.changes.shut_doors import build_shut_faces, shut_door
 from world_models.building.geometry.faces import area_vector

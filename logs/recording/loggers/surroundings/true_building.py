@@ -9,7 +9,7 @@ import rerun as rr
 
 from logs.recording.board_mirror import Moment
 from logs.recording.logger import Logger
-from logs.recording.loggers.building import light_colours, triangles
+from logs.recording.loggers.surroundings.building import light_colours, triangles
 from logs.recording.palette import REJECTED, TRUE
 from logs.recording.paths import TRUE_ADDED, TRUE_GONE
 from logs.recording.stream import RecordingStream
