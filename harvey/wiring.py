@@ -29,6 +29,7 @@ from knowledge_sources.action.withdrawer import Withdrawer
 from knowledge_sources.goal.interpreter import Interpreter
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.goal.relocalizer import Relocalizer
+from knowledge_sources.plan.door_doubter import DoorDoubter
 from knowledge_sources.plan.escalator import Escalator
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.plan.matcher import Matcher
@@ -67,6 +68,7 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     RangeWatcher,
     ObstacleFinder,
     DoorWatcher,
+    DoorDoubter,
     Withdrawer,
     MissionMonitor,
 )

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from collections.abc import Iterable
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
+from knowledge_sources.doors_in_view import (
+    Watched,
+    find_door_state,
+    list_doors_in_view,
+    open_in_frames,
+    shut_in_frames,
+    with_door_open,
+)
 from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.doors.belief import update_door
 from knowledge_sources.methods.doors.leaf import decode_half, describe, measure_opening, weigh_leaf
-from knowledge_sources.methods.doors.opening import is_in_view, predict_opening
+from knowledge_sources.methods.doors.opening import predict_opening
 from knowledge_sources.questions import (
     find_belief,
     find_frames,
@@ -23,21 +30,11 @@ from knowledge_sources.questions import (
     is_up_to_date,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.building.building import Building
-from world_models.building.locales import Doorway
 from world_models.entries.body import Frame
 from world_models.entries.door_state import DoorPicture, DoorState
-from world_models.entries.locale_frame import FrameChange, LocaleFrame
+from world_models.entries.locale_frame import LocaleFrame
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Milestone
-from world_models.frame_building import FrameBuilding
-
-
-class Watched(NamedTuple):
-    """A doorway in view, and whether it is believed to be shut."""
-
-    doorway: Doorway
-    is_shut: bool
 
 
 class DoorWatcher(RobotKnowledgeSource):
@@ -60,14 +57,14 @@ class DoorWatcher(RobotKnowledgeSource):
         belief, frame = find_belief(view), view.latest(Frame)
         if belief is None or frame is None or not self._is_trusted(view, belief.value):
             return None
-        return 0.8 if any(True for _ in self._list_in_view(view, belief.value)) else None
+        return 0.8 if any(True for _ in list_doors_in_view(view, belief.value, self._settings.doors)) else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, frame = find_belief(view), view.latest(Frame)
         if belief is None or frame is None:
             return
         image = None
-        for watched in list(self._list_in_view(view, belief.value)):
+        for watched in list(list_doors_in_view(view, belief.value, self._settings.doors)):
             image = decode_half(frame.value.jpeg) if image is None else image
             yield from self._watch(view, watched, belief, frame, image)
 
@@ -78,16 +75,6 @@ class DoorWatcher(RobotKnowledgeSource):
             return False
         return belief.sigma_m <= s.max_sigma_m and belief.sigma_rad <= s.max_sigma_rad
 
-    def _list_in_view(self, view: View, belief: Hypothesis) -> Iterator[Watched]:
-        """The doorways of the robot's room that a picture may show."""
-        locale = belief.locale
-        robot = find_robot_in(view, locale)
-        pose = belief.world_from_robot(robot.world)
-        for frame in find_frames(view, (locale,)):
-            doors = [Watched(d, is_shut=False) for d in frame.value.doorways]
-            doors += [Watched(d, is_shut=True) for d in frame.value.shut_doorways]
-            yield from (w for w in doors if is_in_view(robot, pose, w.doorway, locale, self._settings.doors))
-
     def _watch(
         self, view: View, watched: Watched, belief: Entry[Hypothesis], frame: Entry[Frame], image: Image
     ) -> Iterable[Effect]:
@@ -96,12 +83,12 @@ class DoorWatcher(RobotKnowledgeSource):
         robot = find_robot_in(view, locale)
         pose, covariance = belief.value.world_from_robot(robot.world), belief.value.covariance_world(robot.world)
         frames = find_frames(view, door.between)
-        beyond = _with_door_open(view, door.name, frames) if watched.is_shut else robot.world
+        beyond = with_door_open(view, door.name, frames) if watched.is_shut else robot.world
         opening = predict_opening(robot, pose, covariance, door, locale, beyond, s)
         evidence = None if opening is None else measure_opening(robot, opening, image, s)
         if opening is None or evidence is None:
             return
-        known = view.latest(DoorState, lambda state: state.door == door.name)
+        known = find_door_state(view, door.name)
         ratio = weigh_leaf(evidence, s)
         picture = DoorPicture(frame.id, opening.box_px, pose.x_m, pose.y_m, pose.heading_rad, ratio,
                               describe(evidence, ratio))
@@ -115,13 +102,7 @@ class DoorWatcher(RobotKnowledgeSource):
         found = Post(now, because) if known is None else Revise(known, now, because)
         yield found
         if now.state == "shut" and not watched.is_shut:
-            for entry in frames:
-                yield Revise(entry, entry.value.changed(FrameChange("shut", door.name, self.name)), (found, entry))
+            yield from shut_in_frames(door.name, self.name, frames, found)
         elif now.state == "open" and watched.is_shut:
-            for entry in frames:
-                yield Revise(entry, entry.value.restored("shut", door.name), (found, entry))
+            yield from open_in_frames(door.name, frames, found)
 
-
-def _with_door_open(view: View, door: str, frames: Iterable[Entry[LocaleFrame]]) -> Building:
-    """The building as it would be known if a door were open that is believed to be shut."""
-    return FrameBuilding(view, [entry.value.restored("shut", door) for entry in frames])

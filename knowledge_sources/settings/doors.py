@@ -72,3 +72,19 @@ class DoorSettings:
         0.1, "m", "Largest standard deviation of the robot's place when it judges a door.", _JUDGED)
     max_sigma_rad: float = setting(
         0.035, "rad", "Largest standard deviation of its heading when it does.", _JUDGED)
+
+    # When a milestone was refuted
+    max_doubted_sigma_m: float = setting(
+        0.3, "m", "Largest standard deviation of the place at which a shut door may explain a picture.", _JUDGED)
+    max_doubted_sigma_rad: float = setting(
+        0.07, "rad", "Largest standard deviation of the believed heading at which it may.", _JUDGED)
+    max_doubted_sigmas: float = setting(
+        3.0, "1", "Standard deviations of the belief within which the explained pose must be.", _JUDGED)
+    min_explained_better: float = setting(
+        10.0, "1", "Least ratio by which the pose is likelier to be wrong with the door open.", _JUDGED)
+    refuted_log_ratio: float = setting(
+        4.6, "1", "What a milestone that is refuted at a trusted place adds for a door that explains it.",
+        _JUDGED)
+    min_few_lines: int = setting(
+        3, "count", "Fewest lines that must be there where they are too few to tell the place by ...", _JUDGED)
+    min_few_share: float = setting(0.6, "1", "... and the least share of those expected.", _JUDGED)

@@ -31,6 +31,8 @@ def update_door(
     most = settings.max_log_odds
     log_odds = min(max(log_odds + gain, -most), most)
     state = _name_state(log_odds, count, known, settings)
+    if known is not None and (state, log_odds) == (known.state, known.log_odds):
+        return None
     p_shut = 1.0 / (1.0 + math.exp(-log_odds))
     certainty = 1.0 - p_shut if state == "open" else p_shut
     return DoorState(door, between, state, certainty, log_odds, count, picture, seen_s)

@@ -1,0 +1,64 @@
+"""The doors that a picture may show, and what revises the frames of their rooms; for several knowledge sources."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+from blackboard.board import View
+from blackboard.effect import Effect, Revise
+from blackboard.entry import Entry
+from knowledge_sources.methods.doors.opening import is_in_view
+from knowledge_sources.questions import find_frames, find_robot_in
+from knowledge_sources.settings.doors import DoorSettings
+from world_models.building.locales import Doorway
+from world_models.entries.door_state import DoorState
+from world_models.entries.locale_frame import FrameChange, LocaleFrame
+from world_models.entries.location import Hypothesis
+from world_models.frame_building import FrameBuilding
+
+Frames = tuple[Entry[LocaleFrame], ...]
+
+
+class Watched(NamedTuple):
+    """A doorway in view, and whether it is believed to be shut."""
+
+    doorway: Doorway
+    is_shut: bool
+
+
+def list_doors_in_view(view: View, belief: Hypothesis, settings: DoorSettings) -> Iterator[Watched]:
+    """The doorways of the robot's room that a picture may show."""
+    robot = find_robot_in(view, belief.locale)
+    pose = belief.world_from_robot(robot.world)
+    for frame in find_frames(view, (belief.locale,)):
+        doors = [Watched(doorway, is_shut=False) for doorway in frame.value.doorways]
+        doors += [Watched(doorway, is_shut=True) for doorway in frame.value.shut_doorways]
+        yield from (w for w in doors if is_in_view(robot, pose, w.doorway, belief.locale, settings))
+
+
+def find_door_state(view: View, door: str) -> Entry[DoorState] | None:
+    """What is known of a door."""
+    return view.latest(DoorState, lambda state: state.door == door)
+
+
+def with_door_open(view: View, door: str, frames: Frames) -> FrameBuilding:
+    """The building as it would be known if a door were open that is believed to be shut."""
+    return FrameBuilding(view, [entry.value.restored("shut", door) for entry in frames])
+
+
+def with_door_shut(view: View, door: str, frames: Frames) -> FrameBuilding:
+    """The building as it would be known if a door were shut that is believed to be open."""
+    return FrameBuilding(view, [entry.value.changed(FrameChange("shut", door, "")) for entry in frames])
+
+
+def shut_in_frames(door: str, by: str, frames: Frames, because: Effect) -> Iterable[Revise]:
+    """What says in the frames of both its rooms that a door is shut."""
+    for entry in frames:
+        yield Revise(entry, entry.value.changed(FrameChange("shut", door, by)), (because, entry))
+
+
+def open_in_frames(door: str, frames: Frames, because: Effect) -> Iterable[Revise]:
+    """What takes that back."""
+    for entry in frames:
+        yield Revise(entry, entry.value.restored("shut", door), (because, entry))

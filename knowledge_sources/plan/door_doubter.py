@@ -1,0 +1,143 @@
+"""Door doubter (§4: models are incomplete): before the robot believes that it is lost, is a door ahead shut?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from blackboard.board import View
+from blackboard.change import Change, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.doors_in_view import (
+    Watched,
+    find_door_state,
+    list_doors_in_view,
+    shut_in_frames,
+    with_door_shut,
+)
+from knowledge_sources.methods.doors.explanation import Explanation, explain_picture
+from knowledge_sources.methods.doors.leaf import decode_half, describe, measure_opening, weigh_leaf
+from knowledge_sources.methods.doors.opening import predict_opening
+from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
+from knowledge_sources.questions import (
+    find_belief,
+    find_frames,
+    find_robot_in,
+    is_over,
+    is_up_to_date,
+    open_discrepancy,
+)
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.body import Frame
+from world_models.entries.door_state import DoorPicture, DoorState
+from world_models.entries.locale_frame import LocaleFrame
+from world_models.entries.location import Hypothesis
+from world_models.entries.percepts import Segments
+from world_models.entries.task import Milestone
+from world_models.frames import Pose2, wrap_angle
+
+
+class DoorDoubter(RobotKnowledgeSource):
+    """Holds "I am where I believe, and this door is shut" against a picture by which a milestone was refuted.
+
+    Through a door that is shut nothing is seen of what was expected there, so that the picture does not fit the belief.
+    It acts before the discrepancy climbs to the goal level. The door is shut where lines and colors that are predicted
+    with it shut tell the believed place for certain, which they do not with it open, and its opening shows a leaf in
+    its frame. Then the discrepancy is corrected: by the model, not by the belief.
+    """
+
+    level = Level.PLAN
+    watches = (Watch(Milestone, (Revised,), lambda m: m.status in ("refuted", "not testable")),)
+    writes = (DoorState, LocaleFrame, Discrepancy)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        belief, doubt = find_belief(view), open_discrepancy(view, Level.PLAN)
+        if belief is None or doubt is None or not doubt.value.exceeds or is_over(view) or not is_up_to_date(view):
+            return None
+        if open_discrepancy(view, Level.GOAL) is not None or _find_segments(view, trigger.entry) is None:
+            return None
+        s = self._settings.doors
+        if belief.value.sigma_m > s.max_doubted_sigma_m or belief.value.sigma_rad > s.max_doubted_sigma_rad:
+            return None
+        return 1.0 if any(not w.is_shut for w in list_doors_in_view(view, belief.value, s)) else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        belief, segments = find_belief(view), _find_segments(view, trigger.entry)
+        doubt = open_discrepancy(view, Level.PLAN)
+        if belief is None or segments is None or doubt is None:
+            return
+        for watched in list(list_doors_in_view(view, belief.value, self._settings.doors)):
+            if not watched.is_shut:
+                found = self._hold_against(view, watched, trigger.entry, belief, segments)
+                if found is not None:
+                    yield found
+                    frames = find_frames(view, watched.doorway.between)
+                    yield from shut_in_frames(watched.doorway.name, self.name, frames, found)
+                    yield Revise(doubt, doubt.value.corrected(), (found,))
+                    return
+
+    def _hold_against(
+        self, view: View, watched: Watched, milestone: Entry[Milestone], belief: Entry[Hypothesis],
+        segments: Entry[Segments],
+    ) -> Post | Revise | None:
+        """The door's state, where the picture says that it is shut and the robot where it believes to be."""
+        s, door, locale = self._settings.doors, watched.doorway, belief.value.locale
+        frame: Entry[Frame] = view[segments.value.frame]
+        robot, frames = find_robot_in(view, locale), find_frames(view, door.between)
+        before, covariance = belief.value.world_from_robot(robot.world), belief.value.covariance_world(robot.world)
+        as_shut = robot.in_building(with_door_shut(view, door.name, frames))
+        held = [explain_picture(r, before, covariance, segments.value.segments_px, frame.value.jpeg, self._settings)
+                for r in (as_shut, robot)]
+        shut, opened = held
+        if shut is None or not self._is_explained(shut, opened, belief.value):
+            return None
+        pose = shut.pose
+        if not _is_near(before, pose, belief.value, s.max_doubted_sigmas):
+            return None
+        opening = predict_opening(robot, pose, shut.covariance, door, locale, robot.world, s)
+        evidence = None if opening is None else measure_opening(robot, opening, decode_half(frame.value.jpeg), s)
+        if opening is None or evidence is None:
+            return None
+        ratio = weigh_leaf(evidence, s)
+        if ratio < s.min_log_ratio:
+            return None
+        odds = min(ratio - s.prior_log_odds + s.refuted_log_ratio, s.max_log_odds)
+        if odds < s.shut_log_odds:
+            return None
+        shows = (f"{describe(evidence, ratio)}, and with it shut {shut.matched} of {shut.expected} lines are where"
+                 f" they should be, while {milestone.value.what.partition(', because')[0]} is {milestone.value.status}")
+        picture = DoorPicture(frame.id, opening.box_px, pose.x_m, pose.y_m, pose.heading_rad, ratio, shows)
+        known = find_door_state(view, door.name)
+        count = 1 if known is None else known.value.pictures + 1
+        now = DoorState(door.name, door.between, "shut", 1.0 / (1.0 + math.exp(-odds)), odds, count, picture,
+                        frame.value.sim_time_s)
+        because = (frame, milestone, belief, segments)
+        return Post(now, because) if known is None else Revise(known, now, (*because, known))
+
+    def _is_explained(self, shut: Explanation, opened: Explanation | None, belief: Hypothesis) -> bool:
+        """Whether a picture tells the place with the door shut, and does not with it open.
+
+        Where too few lines are in view to tell the place by, the belief must be sure, and these lines be there.
+        """
+        s = self._settings.doors
+        if not shut.is_solved:
+            is_sure = belief.sigma_m <= s.max_sigma_m and belief.sigma_rad <= s.max_sigma_rad
+            return is_sure and shut.matched >= max(s.min_few_lines, s.min_few_share * shut.expected)
+        if not POSE_CONFIDENCE.accepts(shut.p_false):
+            return False
+        return opened is None or not opened.is_solved or opened.p_false > s.min_explained_better * shut.p_false
+
+
+def _find_segments(view: View, milestone: Entry[Milestone]) -> Entry[Segments] | None:
+    """The lines of the picture by which a milestone was judged, as long as that picture is there."""
+    found = view.latest(Segments, lambda segments: segments.milestone == milestone.id)
+    return found if found is not None and view.get(found.value.frame) is not None else None
+
+
+def _is_near(before: Pose2, after: Pose2, belief: Hypothesis, sigmas: float) -> bool:
+    """Whether a pose is where the robot believes to be."""
+    off_rad = abs(wrap_angle(after.heading_rad - before.heading_rad))
+    return before.distance_to(after) <= sigmas * belief.sigma_m + 0.05 and off_rad <= sigmas * belief.sigma_rad + 0.02

@@ -1,0 +1,187 @@
+"""Laws of doors: what a picture says of an opening, and what pictures together say of a door."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from knowledge_sources.methods.doors.belief import update_door
+from knowledge_sources.methods.doors.leaf import (
+    LeafEvidence,
+    decode_half,
+    describe,
+    find_largest_share,
+    measure_opening,
+    weigh_leaf,
+)
+from knowledge_sources.methods.doors.opening import is_in_view, predict_opening
+from knowledge_sources.settings import DEFAULT
+from sim.body.building import Building
+from sim.differences.leaf import build_leaf
+from sim.differences.table import TrueDoor
+from sim.render.sensor import SensorParameters, compress_jpeg, expose
+from sim.scenario import CameraSettings
+from world_models.actuator import ActuatorModel
+from world_models.building.locales import Doorway
+from world_models.building.world import World
+from world_models.entries.door_state import DoorPicture, DoorState
+from world_models.files.world_files import WORLDS, load_world
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+
+S = DEFAULT.doors
+HALL, DOOR = "north-hall", "archive-north-door"
+SURE = np.diag([0.01**2, 0.01**2, 0.005**2])
+RATIOS = st.floats(-S.max_log_ratio, S.max_log_ratio)
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return load_world(WORLDS / "two_ways.toml")
+
+
+@pytest.fixture(scope="module")
+def robot(world: World) -> RobotModel:
+    camera = CameraSettings()
+    return RobotModel(world, camera.camera, camera.mount, ActuatorModel())
+
+
+@pytest.fixture(scope="module")
+def doorway(world: World) -> Doorway:
+    return next(d for d in world.doorways if d.name == DOOR)
+
+
+@pytest.fixture(scope="module")
+def buildings(world: World, doorway: Doorway) -> dict[str, Building]:
+    leaf = build_leaf(TrueDoor(name=DOOR), doorway, world.floor_m(HALL))
+    return {"open": Building.of_faces(world.faces), "shut": Building.of_faces([*world.faces, *leaf])}
+
+
+def weigh(robot: RobotModel, doorway: Doorway, building: Building, pose: Pose2, gain: float = 1.0) -> float | None:
+    """What a picture of the door says."""
+    opening = predict_opening(robot, pose, SURE, doorway, HALL, robot.world)
+    if opening is None:
+        return None
+    radiance = gain * building.renderer.radiance(robot.lens, robot.camera_from_world(pose))
+    sensor = SensorParameters()
+    jpeg = compress_jpeg(expose(radiance, sensor, np.random.default_rng(1)), sensor.jpeg_quality)
+    evidence = measure_opening(robot, opening, decode_half(jpeg))
+    return None if evidence is None else weigh_leaf(evidence)
+
+
+def before_door(doorway: Doorway, away_m: float, aside_m: float) -> Pose2:
+    """A pose in the hall that faces the door."""
+    at = doorway.pose_from(HALL) @ Pose2(-away_m, aside_m, 0.0)
+    middle = doorway.pose_from(HALL)
+    return Pose2(at.x_m, at.y_m, math.atan2(middle.y_m - at.y_m, middle.x_m - at.x_m))
+
+
+@pytest.mark.parametrize("gain", [0.5, 1.0])
+@pytest.mark.parametrize(("away_m", "aside_m"), [(1.6, 0.2), (2.5, -0.3), (4.0, 0.4), (5.5, 0.0)])
+def test_a_leaf_is_told_from_what_is_beyond_in_any_light(
+    robot: RobotModel, doorway: Doorway, buildings: dict[str, Building], away_m: float, aside_m: float, gain: float
+) -> None:
+    pose = before_door(doorway, away_m, aside_m)
+    shut, opened = (weigh(robot, doorway, buildings[state], pose, gain) for state in ("shut", "open"))
+    assert shut is not None and shut >= S.min_log_ratio
+    assert opened is not None and opened <= -S.min_log_ratio
+
+
+def test_a_wall_where_the_door_should_be_is_no_leaf(
+    robot: RobotModel, doorway: Doorway, buildings: dict[str, Building]
+) -> None:
+    """A robot that is elsewhere sees no frame where it expects it."""
+    pose = before_door(doorway, 2.5, 0.0)
+    opening = predict_opening(robot, pose, SURE, doorway, HALL, robot.world)
+    assert opening is not None
+    elsewhere = Pose2(pose.x_m, pose.y_m, pose.heading_rad + 0.5 * math.pi)
+    sensor = SensorParameters()
+    radiance = buildings["open"].renderer.radiance(robot.lens, robot.camera_from_world(elsewhere))
+    jpeg = compress_jpeg(expose(radiance, sensor, np.random.default_rng(1)), sensor.jpeg_quality)
+    evidence = measure_opening(robot, opening, decode_half(jpeg))
+    assert evidence is None or weigh_leaf(evidence) <= 0.0
+
+
+def test_a_door_that_is_far_behind_or_seen_from_the_side_is_not_looked_at(robot: RobotModel, doorway: Doorway) -> None:
+    middle = doorway.pose_from(HALL)
+    assert is_in_view(robot, before_door(doorway, 3.0, 0.0), doorway, HALL)
+    assert not is_in_view(robot, before_door(doorway, S.max_distance_m + 0.5, 0.0), doorway, HALL)
+    assert not is_in_view(robot, middle @ Pose2(-3.0, 0.0, math.pi), doorway, HALL)
+    assert not is_in_view(robot, middle @ Pose2(-0.3, 1.0, -1.3), doorway, HALL)
+
+
+@given(st.lists(st.tuples(*[st.floats(0.0, 6.0)] * 3), min_size=1, max_size=30), st.floats(-2.0, 2.0))
+def test_the_largest_share_is_at_least_one_sample_and_the_same_in_any_light(
+    colors: list[tuple[float, float, float]], gain: float
+) -> None:
+    logs = np.round(np.array(colors), 3)
+    share = find_largest_share(logs, 0.2, 0.08)
+    assert 1.0 / len(logs) <= share <= 1.0
+    assert find_largest_share(np.repeat(logs[:1], 5, axis=0) + gain, 0.2, 0.08) == 1.0
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(0.0, 2.0) | st.just(math.nan),
+       st.floats(0.0, 2.0) | st.just(math.nan), st.floats(0.0, 1.0) | st.just(math.nan), st.floats(0.0, 1.0))
+def test_one_picture_says_no_more_than_it_may_and_nothing_for_a_leaf_without_a_frame(
+    uniform: float, expected: float, agreeing: float, foot: float, expected_foot: float, frame: float, own: float
+) -> None:
+    evidence = LeafEvidence(200, 150, uniform, expected, agreeing, foot, expected_foot, frame, own)
+    ratio = weigh_leaf(evidence)
+    assert abs(ratio) <= S.max_log_ratio
+    assert weigh_leaf(replace(evidence, frame=math.nan)) <= 0.0
+    assert weigh_leaf(replace(evidence, frame_leaf=1.0)) <= 0.0
+    assert describe(evidence, ratio)
+
+
+def picture(ratio: float, x_m: float = 0.0) -> DoorPicture:
+    return DoorPicture("Frame-1", (0.0, 0.0, 9.0, 9.0), x_m, 0.0, 0.0, ratio, "something")
+
+
+def look(ratios: list[tuple[float, float]], *, is_shut: bool = False) -> list[DoorState | None]:
+    """The states of a door after pictures (ratio, place)."""
+    known: DoorState | None = None
+    states = []
+    for ratio, x_m in ratios:
+        now = update_door(known, "d", ("a", "b"), picture(ratio, x_m), 1.0, is_believed_shut=is_shut)
+        known = now or known
+        states.append(known)
+    return states
+
+
+@given(st.lists(st.tuples(RATIOS, st.floats(0.0, 5.0)), max_size=12))
+def test_a_door_is_shut_only_at_its_odds_and_by_pictures_from_two_places(looks: list[tuple[float, float]]) -> None:
+    before: DoorState | None = None
+    for state in look(looks):
+        if state is not None:
+            assert abs(state.log_odds) <= S.max_log_odds and 0.0 <= state.certainty <= 1.0
+            if state.state == "shut" and (before is None or before.state != "shut"):
+                assert state.log_odds >= S.shut_log_odds and state.pictures >= S.min_pictures
+                assert state.certainty >= 0.98
+        before = state
+
+
+@given(RATIOS, st.integers(2, 9))
+def test_the_same_view_again_says_nothing_new(ratio: float, times: int) -> None:
+    states = look([(ratio, 0.0)] * times)
+    assert len({None if s is None else s.log_odds for s in states}) == 1
+    assert all(s is None or s.state != "shut" for s in states)
+
+
+def test_two_pictures_shut_a_door_and_a_few_open_it_again() -> None:
+    shut = look([(4.5, 0.0), (4.5, 1.0)])
+    assert [s and s.state for s in shut] == ["unknown", "shut"]
+    again = look([(4.5, 0.0), (4.5, 1.0), (-4.5, 2.0), (-4.5, 3.0)])
+    assert [s and s.state for s in again] == ["unknown", "shut", "shut", "open"]
+    told = look([(-4.5, 0.0), (-4.5, 1.0)], is_shut=True)
+    assert told[-1] is not None and told[-1].state == "open"
+
+
+def test_a_state_says_what_is_seen() -> None:
+    state = look([(4.5, 0.0), (4.5, 1.0)])[-1]
+    assert state is not None and not state.is_passable
+    assert state.sentence() == "d is shut: its opening shows something; 99.3% by 2 pictures, the last at 1.0 s"
