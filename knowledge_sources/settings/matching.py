@@ -79,6 +79,14 @@ class MatchingSettings:
         30.0, "px", "How far beyond a model line's end a segment may lie besides.", "engineering judgement")
     max_gate_rad: float = setting(
         0.6, "rad", "Pairs that differ more in direction are never looked at.", "engineering judgement")
+    max_allowed_pairs: int = setting(
+        60000, "count", "Most pairs that are looked at; of more, each model line's longest.", "experiment matcher")
+    max_start_pairs: int = setting(
+        12000, "count", "Most pairs that the starts are refined with; of more, each model line's longest.",
+        "experiment matcher")
+    max_near_pairs: int = setting(
+        2500, "count", "Most pairs near a pose that are searched; of more, each model line's longest.",
+        "experiment matcher")
 
     # With a pose: starts
     grid_sigmas: float = setting(

@@ -43,8 +43,9 @@ def test_figure_12_falls_at_each_step_and_ends_where_the_figure_does() -> None:
 def test_the_matcher_finds_the_truth_as_problems_grow(tmp_path: Path) -> None:
     """Times depend on what else the machine does, so they are not asserted."""
     report = matcher.run(quick=True, seed=0, trials=3)
-    assert [row[0] for row in report.rows] == [f"{m} model x {k} data lines" for m, k in matcher.SIZES]
-    assert [claim for claim in report.failing if "median" not in claim] == []
+    sizes = [f"{m} model x {k} data lines" for m, k in matcher.SIZES]
+    assert [row[0] for row in report.rows[:-3]] == sizes
+    assert [claim for claim in report.failing if "in at most" not in claim] == []
     assert (tmp_path / "experiments" / "matcher" / "quick-0" / "growth.png").read_bytes().startswith(PNG)
 
 

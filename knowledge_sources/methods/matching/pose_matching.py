@@ -22,6 +22,7 @@ from knowledge_sources.methods.matching.pose_pairs import (
     build_scene,
     find_allowed_pairs,
     find_near_pairs,
+    keep_longest,
     linearise_pairs,
     project_model,
 )
@@ -148,11 +149,12 @@ def _match(
     scene = build_scene(model_lines_world, data_px, camera, parameters)
     lengths = project_model(scene, parameters.prior)[1]
     terms = build_likelihood_terms(lengths, len(scene.data), sigma_px, pair_px, settings)
-    wide = find_allowed_pairs(scene, settings)
+    wide = keep_longest(find_allowed_pairs(scene, settings), settings.max_allowed_pairs)
     tries = []
-    for pose in find_start_poses(scene, wide, settings):
+    for pose in find_start_poses(scene, keep_longest(wide, settings.max_start_pairs), settings):
         pairs = linearise_pairs(scene, pose, wide.model, wide.data)
         pairs = pairs.take(find_near_pairs(pairs, pair_px, settings.max_pose_pair_rad))
+        pairs = keep_longest(pairs, settings.max_near_pairs)
         space, first = _build_space(scene, pose, pairs, pair_px, sigma_px, settings)
         result = search_pairs(space, terms, first, settings, strategy="steepest", exchange=True, keep_trace=False)
         tries.append((space, pairs, pose, result))

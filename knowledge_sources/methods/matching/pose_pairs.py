@@ -120,6 +120,23 @@ def find_allowed_pairs(scene: LineScene, settings: MatchingSettings) -> PosePair
     )
 
 
+def keep_longest(pairs: PosePairs, most: int) -> PosePairs:
+    """At most ``most`` pairs: of each model line as many as of any other that has so many, the longest ones.
+
+    Short segments are many and say little; where a wide prior allows hundreds of them for each model line, the long
+    ones decide which pose it is.
+    """
+    model = pairs.model
+    if len(model) <= most:
+        return pairs
+    order = np.lexsort((np.arange(len(model)), -pairs.shares, model))
+    counts = np.bincount(model)
+    ranks = np.empty(len(model), np.intp)
+    ranks[order] = np.arange(len(model)) - np.repeat(np.cumsum(counts) - counts, counts)
+    sizes = np.cumsum(np.bincount(ranks))
+    return pairs.take(ranks < np.searchsorted(sizes, most, side="right"))
+
+
 def linearise_pairs(scene: LineScene, pose: Pose, i: Indices, k: Indices) -> PosePairs:
     """Model lines ``i`` (p,) with data lines ``k`` (p,), linearised at a pose."""
     px, lengths, _ = project_model(scene, pose)

@@ -75,11 +75,13 @@ def solve_all(settings: PoseSettings) -> bytes:
             data: Any = (scene.lines_world[:count], segments, scene.camera, far)
             for solver in (r_then_t, r_and_t, r_and_t_ml):
                 estimate = solver(*data, sigma_px=SIGMA_PX, settings=settings)
-                out += [estimate.camera_from_world.translation, estimate.covariance, estimate.inliers, np.array([estimate.ok])]
+                out += [estimate.camera_from_world.translation, estimate.covariance, estimate.inliers]
+                out.append(np.array([estimate.ok]))
             for robust, sigma_px in product((med_r_and_t, trunc_r_and_t), (TIGHT_PX, SIGMA_PX)):
                 drawn = np.random.default_rng(seed)
                 estimate = robust(*data, sigma_px=sigma_px, probability=0.99, rng=drawn, settings=settings)
-                out += [estimate.camera_from_world.translation, estimate.covariance, estimate.inliers, np.array([estimate.ok])]
+                out += [estimate.camera_from_world.translation, estimate.covariance, estimate.inliers]
+                out.append(np.array([estimate.ok]))
         lines, segments = observe(rng)
         prior = Pose2(TRUTH.x_m + rng.uniform(-1.0, 1.0), TRUTH.y_m + 0.5, TRUTH.heading_rad + rng.uniform(-0.2, 0.2))
         for part, count in ((0.0, len(lines)), (0.5, len(lines)), (0.6, len(lines)), (0.0, 2), (0.0, 5)):
