@@ -146,8 +146,10 @@ class ObstacleFinder(RobotKnowledgeSource):
             if thing.p_thing < s.min_thing_certainty or thing.sigma_m > s.max_obstacle_sigma_m:
                 continue
             shape = deepen(thing.footprint, (f.x_m, f.y_m), s.obstacle_depth_m)
-            entry = _find_same(
-                [e for e in known.values() if e.id not in drafts], shape, thing.sigma_m, s.max_hull_part)
+            rest, whole = [e for e in known.values() if e.id not in drafts], s.max_hull_part
+            if f.sense == "ranges":  # an echo tells how far a thing is, not where in its cone: any in it may be heard
+                rest, whole = [e for e in rest if _may_be_there(e.value)], math.inf
+            entry = _find_same(rest, shape, thing.sigma_m, whole)
             if entry is not None:
                 new = self._see_again(find_building(view), entry.value, thing, shape, free, scan)
                 if new is not None:
@@ -204,7 +206,11 @@ class ObstacleFinder(RobotKnowledgeSource):
             certainty = _combine(known.certainty, thing.p_thing / (1.0 - min(thing.p_thing, 0.999)))
         certainty = min(certainty, s.max_obstacle_certainty)
         own = shapely.intersection(shape, _find_open_floor(world, known.locale, 0.0))
-        joined = join_footprints(build_polygon(known.footprint), shape if own.is_empty else own, free)
+        polygon = build_polygon(known.footprint)
+        if scan.value.sense == "ranges" and known.status != "gone":  # nor how wide it is
+            joined = take_free(polygon, free)
+        else:
+            joined = join_footprints(polygon, shape if own.is_empty else own, free)
         footprint = list_corners(joined)
         moved = measure_change_m(known.footprint, footprint) >= s.min_footprint_change_m
         surer = certainty > known.certainty + 0.02 or _status(certainty, s) != known.status

@@ -85,7 +85,7 @@ class FloorSettings:
         0.1, "m", "An echo that is nearer than the model's nearest wall or thing by no more is of that: what is flush "
         "with a wall is not in the model.", "engineering judgement")
     max_range_thing_m: float = setting(
-        2.0, "m", "A thing is concluded from an echo up to here from its sensor: further, its cone is too wide.",
+        1.2, "m", "A thing is concluded from an echo up to here from its sensor: further, its cone is too wide.",
         "engineering judgement")
     range_bearings: int = setting(
         120, "count", "Directions in which the free floor of a reading is written down.", "engineering judgement")

@@ -204,7 +204,10 @@ def _find_things(
 def _cut_arc(
     cones: Cones, k: int, floor: FreeFloor, earlier: Sequence[FreeFloor], margin_m: float, points: int
 ) -> Floats:
-    """The places (m, 2) on the arc of an echo where no cone finds free floor, nor did one before; else all of it."""
+    """The middle half (m, 2) of the places on the arc of an echo where no cone finds free floor, nor did one before.
+
+    Where all of the arc was free before, what is heard has come since then.
+    """
     angles = cones.axes_rad[k] + np.linspace(-cones.half_beam_rad, cones.half_beam_rad, points)
     arc = cones.sensors[k] + cones.away_m[k] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     kept = np.ones(len(arc), bool)
@@ -213,7 +216,9 @@ def _cut_arc(
         if not rest.any():  # it has come since then
             break
         kept = rest
-    return np.asarray(arc[kept])
+    left = np.flatnonzero(kept)
+    quarter = len(left) // 4
+    return np.asarray(arc[left[quarter : len(left) - quarter]])
 
 
 def _join_neighbours(
