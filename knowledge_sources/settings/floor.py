@@ -58,7 +58,7 @@ class FloorSettings:
     assumed_depth_m: float = setting(
         0.3, "m", "Depth that a thing is taken to have behind what is seen of it.", "engineering judgement")
     max_thing_depth_m: float = setting(
-        1.0, "m", "Feet of one thing are at most so much further than its nearest.", "engineering judgement")
+        0.8, "m", "Feet of one thing are at most so much further than its nearest.", "engineering judgement")
     p_seen_once: float = setting(
         0.7, "1", "Probability that what does not look like the floor stands on it, before parallax tells.",
         "engineering judgement")

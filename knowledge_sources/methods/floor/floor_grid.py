@@ -20,7 +20,7 @@ class FloorGrid:
 
     Attributes:
         top: first row of the reduced picture that belongs to it.
-        camera_height_m: above the floor.
+        camera_height_m: above the floor; eye_robot: (2,) of the camera in the robot's frame [m].
         pixels: (rows, columns, 2) of the rectified picture [px].
         points_robot: (rows, columns, 2) where they meet the floor, in the robot's frame [m].
         ranges_m: (rows, columns) from the point below the camera.
@@ -29,6 +29,7 @@ class FloorGrid:
 
     top: int
     camera_height_m: float
+    eye_robot: Floats
     pixels: Floats
     points_robot: Floats
     ranges_m: Floats
@@ -57,6 +58,7 @@ def build_floor_grid(
     if not len(near) or near[-1] != len(v) - 1:
         return None
     top = int(near[0])
-    points = around[top:] + np.array([mount.forward_m, 0.0])
+    eye = np.array([mount.forward_m, 0.0])
+    points = around[top:] + eye
     bearings = np.arctan2(around[-1, :, 1], around[-1, :, 0])
-    return FloorGrid(top, camera_height_m, pixels[top:], points, ranges[top:], bearings)
+    return FloorGrid(top, camera_height_m, eye, pixels[top:], points, ranges[top:], bearings)

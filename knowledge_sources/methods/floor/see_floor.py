@@ -35,6 +35,8 @@ from world_models.robot import RobotModel
 
 DRIVEN_HALF_WIDTH_M = 0.25
 """Half the width of the strip that was driven over, from which the floor's looks are learnt."""
+CUT_SIGMA_M = 0.18
+"""Of a foot that the picture's lower border cuts off: it is anywhere between where that starts and the robot's rim."""
 GREY = np.array([0.299, 0.587, 0.114], np.float32)
 SIGHT_PART = 2.0
 """Pixels are looked at up to so many times the sight, for the tops of things."""
@@ -220,7 +222,7 @@ def _build_thing(
     spread = math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0) + foot_m**2 * float(covariance[2, 2]))
     at, left_right = np.flatnonzero(region.mask.any(axis=1)), np.flatnonzero(region.mask.any(axis=0))
     (left, top), (right, bottom) = grid.pixels[at[0], left_right[0]], grid.pixels[at[-1], left_right[-1]]
-    own = 0.3 if region.is_cut else STEP_PX * foot_m**2 / (grid.camera_height_m * robot.camera.fy)
+    own = CUT_SIGMA_M if region.is_cut else STEP_PX * foot_m**2 / (grid.camera_height_m * robot.camera.fy)
     return FloorThing(
         footprint=tuple((round(x, 3), round(y, 3)) for x, y in world), sigma_m=round(math.hypot(spread, own), 4),
         height_m=round(height_m, 3), sigma_height_m=round(sigma_height_m, 3), p_thing=round(odds / (1.0 + odds), 4),

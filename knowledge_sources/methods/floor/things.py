@@ -16,6 +16,8 @@ from knowledge_sources.settings.floor import FloorSettings
 
 MIN_ROWS = 3
 """A region of fewer rows is noise."""
+MAX_STEP = 0.06
+"""Neighbouring columns of one foot, as a wall's, differ in range by no more than this part."""
 CUT_PART = 0.6
 """Of a region that the lower border cuts off: its foot is taken to be at this part of the range of that border."""
 
@@ -47,7 +49,7 @@ def find_regions(
     Args:
         unlike: (rows, columns) what does not look like the floor; tells: where that tells anything.
     """
-    seen = unlike & tells
+    seen = _drop_slivers(unlike & tells, tells)
     near = cv2.dilate(seen.astype(np.uint8), np.ones((3, 3), np.uint8))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(near, connectivity=8)
     found = []
@@ -79,7 +81,7 @@ def _describe_region(
     nearest = float(ranges[stands].min())
     if nearest > settings.sight_m:
         return None
-    is_foot = stands & (ranges <= nearest + settings.max_thing_depth_m)
+    is_foot = _find_feet(columns, ranges, stands, cut, nearest, settings)
     highest = np.argmax(mask[:, columns], axis=0)
     k = int(np.argmin(highest))
     above = max(0, int(highest[k]) - 2)
@@ -88,13 +90,44 @@ def _describe_region(
     return Region(mask, feet, bool(cut[is_foot].any()), is_clipped, (int(highest[k]), int(columns[k])))
 
 
+def _find_feet(
+    columns: NDArray[np.intp], ranges: Floats, stands: NDArray[np.bool_], cut: NDArray[np.bool_], nearest: float,
+    settings: FloorSettings,
+) -> NDArray[np.bool_]:
+    """Which columns (k,) of a region have a foot on the floor, by the ranges (k,) at which it seems to stand.
+
+    What hangs over the floor seems to stand much further off than the feet do: a foot is within the depth of a thing
+    from the nearest, or its column is next to such a one and stands about as far off. Where the picture's border cuts
+    the feet off, only what is as near as that border tells where they are.
+    """
+    deep_m = 0.5 * settings.assumed_depth_m if cut.any() else settings.max_thing_depth_m
+    is_foot = stands & (ranges <= nearest + deep_m)
+    for order in (range(1, len(columns)), range(len(columns) - 2, -1, -1)):
+        for i in order:
+            j = i - order.step
+            is_next = columns[i] - columns[j] == order.step
+            if is_foot[j] and stands[i] and is_next and abs(ranges[i] - ranges[j]) <= MAX_STEP * ranges[j]:
+                is_foot[i] = True
+    return is_foot
+
+
+def _drop_slivers(seen: NDArray[np.bool_], tells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Without the columns of pixels that are few and end at the model's own parts: an edge that is a little off."""
+    thick = cv2.erode(seen.astype(np.uint8), np.ones((MIN_ROWS, 1), np.uint8), borderValue=1)
+    thick = cv2.dilate(thick, np.ones((MIN_ROWS, 1), np.uint8))
+    above = np.zeros_like(seen)
+    above[MIN_ROWS:] = ~tells[:-MIN_ROWS]
+    above[:MIN_ROWS] = True
+    return np.asarray(seen & ((thick > 0) | ~above))
+
+
 def find_footprint(region: Region, grid: FloorGrid, settings: FloorSettings) -> Floats:
     """(k, 2) corners, counter-clockwise, robot's frame, of what a region takes of the floor [m].
 
     It is the hull of its feet, and of the same points further off by the depth that is assumed.
     """
     points = grid.points_robot[region.feet[:, 0], region.feet[:, 1]]
-    eye = grid.points_robot[-1].mean(axis=0) * 0.0
+    eye = grid.eye_robot
     away = points - eye
     lengths = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
     cut = region.feet[:, 0] >= grid.shape[0] - 2
