@@ -83,12 +83,15 @@ class Sketcher(RobotKnowledgeSource):
         here, planner = _place_of(belief.value), self._planner(view)
         unfit = planner.explain_unfit(goal.value.destination)
         if unfit:
-            yield Post(Outcome("blocked", f"the goal {goal.value.destination} {unfit}"), because)
+            near = _find_obstacles(view, (goal.value.destination.locale,))
+            named = [entry for entry in near if entry.value.name in unfit]
+            reason = f"the goal {goal.value.destination} {unfit}{_name_obstacles(named)}"
+            yield Post(Outcome("blocked", reason), (*because, *named))
             return
         subgoals = planner.plan_between_locales(here, goal.value.destination, self._settings.plan.goal_tolerance_m)
         if subgoals is None:
             why = self._explain_no_way(view, here.locale, goal.value.destination.locale)
-            yield Post(Outcome("blocked", why), because)
+            yield Post(Outcome("blocked", why), (*because, *_find_obstacles(view)))
         else:
             yield Post(PlanSketch(goal.id, (), "", subgoals), (*because, *find_frames(view, _list_locales(subgoals))))
 
@@ -103,9 +106,10 @@ class Sketcher(RobotKnowledgeSource):
             yield Revise(sketch, replace(s, status="done", verified=True), (milestone, belief))
         else:
             go = Revise(sketch, replace(s, verified=True, adjustments=0), (milestone, belief))
-            yield go
             current = s.subgoals[s.at]
-            if not current.primitive and not current.is_ride:
+            if current.primitive or current.is_ride:
+                yield go
+            else:
                 yield from self._refine(view, sketch, current, belief, go)
 
     def _is_off(self, view: View, belief: Hypothesis, subgoal: Subgoal) -> bool:
@@ -144,12 +148,27 @@ class Sketcher(RobotKnowledgeSource):
         else:
             parts = planner.plan_between_locales(_place_of(belief.value), subgoal.destination, subgoal.tolerance_m)
         if parts is None:
-            obstacles = _find_obstacles(view, (locale,))
+            obstacles, goal = _find_obstacles(view, (locale,)) or _find_obstacles(view), view.get(s.goal)
+            if obstacles and goal is not None and self._leads_otherwise(view, goal.value, belief.value):
+                yield from self._begin(view, goal)
+                return
+            yield go
             reason = f"no way through {locale} to {subgoal.destination}{_name_obstacles(obstacles)}"
             yield Post(Outcome("blocked", reason), (go, *obstacles))
         else:
+            yield go
             frames = find_frames(view, _list_locales(parts))
             yield Post(PlanSketch(s.goal, (*s.path, s.at), locale, parts), (go, belief, *frames))
+
+    def _leads_otherwise(self, view: View, goal: Goal, belief: Hypothesis) -> bool:
+        """Whether a way leads to the goal by other passages than those of the sketch that is being carried out."""
+        drawn = view.latest(PlanSketch, lambda s: s.is_active and not s.path)
+        parts = self._planner(view).plan_between_locales(
+            _place_of(belief), goal.destination, self._settings.plan.goal_tolerance_m)
+        if parts is None:
+            return False
+        left = () if drawn is None else drawn.value.subgoals[drawn.value.at:]
+        return [step.passage for step in parts if step.passage] != [step.passage for step in left if step.passage]
 
     def _close(self, view: View, done: Entry[PlanSketch]) -> Iterable[Effect]:
         """A sketch is done: so is the subgoal of its parent, or the goal itself."""
@@ -162,27 +181,29 @@ class Sketcher(RobotKnowledgeSource):
         if goal is not None and goal.value.is_active:
             yield Revise(goal, replace(goal.value, status="reached"), (done,))
     def _planner(self, view: View) -> SubgoalPlanner:
-        return SubgoalPlanner(find_robot(view), self._settings.plan)
+        return SubgoalPlanner(find_robot(view), self._settings.plan, [e.value for e in _find_obstacles(view)])
 
     def _explain_no_way(self, view: View, here: str, there: str) -> str:
         """Why no sketch leads from one locale to another."""
         building = find_building(view)
         if building.route(here, there) is not None:
-            named = _name_obstacles(view.where(Obstacle, lambda obstacle: obstacle.is_there))
-            return f"something stands before a passage on the way from {here} to {there}{named}"
+            obstacles = _find_obstacles(view)
+            if obstacles:
+                return f"no way is left from {here} to {there}{_name_obstacles(obstacles)}"
+            return f"something stands before a passage on the way from {here} to {there}"
         shut = "".join(f"; {doorway.name} is shut" for doorway in building.shut_doorways())
         by_stairs = building.is_walkable(here, there, self._settings.plan.max_walked_rooms)
         stairs = "; people can walk there, by stairs" * by_stairs
         return f"no passage for wheels leads from {here} to {there}{shut}{stairs}"
 
 
-def _find_obstacles(view: View, locales: Collection[str]) -> tuple[Entry[Obstacle], ...]:
-    """What stands in the way in some locales, and is not in the file."""
-    return view.where(Obstacle, lambda obstacle: obstacle.is_there and obstacle.locale in locales)
+def _find_obstacles(view: View, locales: Collection[str] | None = None) -> tuple[Entry[Obstacle], ...]:
+    """What stands in the way in some locales, or in any, and is not in the file."""
+    return view.where(Obstacle, lambda o: o.is_there and (locales is None or o.locale in locales))
 
 
 def _name_obstacles(obstacles: Sequence[Entry[Obstacle]]) -> str:
-    return f"; in the way is {' and '.join(entry.value.words() for entry in obstacles)}" if obstacles else ""
+    return f"; blocked by {' and '.join(entry.value.words() for entry in obstacles)}" if obstacles else ""
 
 
 def _list_locales(subgoals: Iterable[Subgoal]) -> set[str]:

@@ -167,11 +167,15 @@ class Building(ABC):
         base = self.floor_m(name)
         return base - FLOOR_MARGIN_M <= z_m <= base + self.locale(name).height_m + FLOOR_MARGIN_M
 
-    def route(self, origin: str, destination: str) -> Route | None:
-        """The route from room to room at the highest level at which they differ; None where there is none."""
+    def route(self, origin: str, destination: str, avoided: Iterable[Doorway | Link] = ()) -> Route | None:
+        """The route from room to room at the highest level at which they differ; None where there is none.
+
+        Args:
+            avoided: passages that are not to be used, beside those that are believed shut.
+        """
         for name in (origin, destination):
             self.locale(name)
-        return find_route(self.locale_source, origin, destination, self.shut_doorways())
+        return find_route(self.locale_source, origin, destination, (*self.shut_doorways(), *avoided))
 
     def shut_doorways(self) -> tuple[Doorway, ...]:
         """The doorways that the file has open and that are believed shut."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from shapely import Geometry, Point
+from shapely import Geometry, LineString, Point
 
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.methods.motion.routes import (
     find_free_space,
     find_nearest,
@@ -17,16 +19,24 @@ from knowledge_sources.methods.motion.routes import (
 )
 from knowledge_sources.settings.plan import PlanSettings
 from world_models.building.locales import Link, Passage
+from world_models.building.passages import Route
 from world_models.entries.location import Hypothesis, Place
+from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Subgoal
 from world_models.robot import RobotModel
+
+MAX_ROUTES = 24
+"""So many routes are tried for one that obstacles leave free."""
 
 
 class SubgoalPlanner:
     """Plans the subgoals of a sketch, for one robot in the building as it is known now."""
 
-    def __init__(self, robot: RobotModel, settings: PlanSettings) -> None:
+    def __init__(self, robot: RobotModel, settings: PlanSettings, obstacles: Sequence[Obstacle] = ()) -> None:
+        """``obstacles``: what stands somewhere and is not in the file; ways are sought round it, and by other doors."""
         self._robot, self._building, self._settings = robot, robot.world, settings
+        self._obstacles = tuple(obstacle for obstacle in obstacles if obstacle.is_there)
+        self._cluttered = frozenset(obstacle.locale for obstacle in self._obstacles)
 
     def explain_unfit(self, there: Place) -> str:
         """Why the robot cannot stand at a place, as far as it knows; "" where it can."""
@@ -41,10 +51,50 @@ class SubgoalPlanner:
                 f" and the {margin_m:.2f} m that it keeps round itself")
 
     def plan_between_locales(self, here: Place, destination: Place, tolerance_m: float) -> tuple[Subgoal, ...] | None:
-        """Subgoals through each passage to the destination, at the highest level where they differ (Figure 9)."""
-        route = self._building.route(here.locale, destination.locale)
-        if route is None:
-            return None
+        """Subgoals through each passage to the destination, at the highest level where they differ (Figure 9).
+
+        Where what the model lacks leaves no way through a room or to a passage, other passages are tried.
+        """
+        tried: set[frozenset[str]] = set()
+        todo: list[tuple[Passage, ...]] = [()]
+        while todo and len(tried) < MAX_ROUTES:
+            avoided = todo.pop(0)
+            names = frozenset(passage.name for passage in avoided)
+            if names in tried:
+                continue
+            tried.add(names)
+            route = self._building.route(here.locale, destination.locale, avoided)
+            if route is None:
+                continue
+            blocked = self._find_blocked(route, here, destination)
+            if not blocked:
+                return self._plan_route(route, here, destination, tolerance_m)
+            todo += [(*avoided, passage) for passage in blocked]
+        return None
+
+    def _find_blocked(self, route: Route, here: Place, destination: Place) -> list[Passage]:
+        """The passages at the ends of the first part of a route on which obstacles leave no way, if any."""
+        came: Passage | None = None
+        for step in route.steps:
+            ends = [self._find_place_before(step.passage, side) for side in (step.origin, step.destination)]
+            if None in ends:
+                return [step.passage]
+            if ends[0] is not None and not self._has_way(here, ends[0]):
+                return [step.passage, *([] if came is None else [came])]
+            assert ends[1] is not None
+            here, came = ends[1], step.passage
+        return [came] if came is not None and not self._has_way(here, destination) else []
+
+    def _has_way(self, here: Place, there: Place) -> bool:
+        """Whether a way leads round the obstacles of one room; where there are none, the model says so already."""
+        if here.locale != there.locale or here.locale not in self._cluttered:
+            return True
+        start, end = here.in_world(self._building), there.in_world(self._building)
+        return self._find_way(here.locale, start.position, end.position) is not None
+
+    def _plan_route(
+        self, route: Route, here: Place, destination: Place, tolerance_m: float
+    ) -> tuple[Subgoal, ...] | None:
         subgoals: list[Subgoal] = []
         for step in route.steps:
             before = self._find_place_before(step.passage, step.origin)
@@ -75,7 +125,12 @@ class SubgoalPlanner:
         middle, outward = passage.threshold_of(locale).mean(axis=0), passage.outward_from(locale)
         free = self._free_space(locale, self._settings.clearances_m[-1])
         distances = self._settings.doorway_distances_m
-        away = next((m for m in distances if free.covers(Point(middle - m * outward))), distances[0])
+        fit = (m for m in distances if free.covers(Point(middle - m * outward)))
+        if locale in self._cluttered:
+            fit = (m for m in fit if self._is_passed(middle, middle - m * outward, locale))
+        away = next(fit, None if locale in self._cluttered else distances[0])
+        if away is None:
+            return None
         x, y = middle - away * outward
         if not is_clear(self._free_space(locale, -self._robot.radius_m), middle, (x, y)):
             return None
@@ -94,18 +149,8 @@ class SubgoalPlanner:
         """Straight legs round the obstacles of one locale, none longer than ``max_leg_m``."""
         locale = subgoal.destination.locale
         here, there = belief.world_from_robot(self._building), subgoal.destination.in_world(self._building)
-
-        def floor() -> Geometry:
-            return self._free_space(locale, -self._robot.radius_m)
-
-        least_m = self._settings.clearances_m[-1]
-        tried = (*((clearance_m, False) for clearance_m in self._settings.clearances_m), (least_m, True))
-        for clearance_m, is_round in tried:
-            free = self._free_space(locale, clearance_m, is_round=is_round)
-            route = find_shortest_route(free, here.position, there.position, floor)
-            if route is not None:
-                break
-        else:
+        route = self._find_way(locale, here.position, there.position)
+        if route is None:
             return None
         points = _divide(route, self._settings.max_leg_m)
         places = [Place.of_world(self._building, locale, float(x), float(y)) for x, y in points]
@@ -115,6 +160,26 @@ class SubgoalPlanner:
             Subgoal(a, b, True, tolerance_m=subgoal.tolerance_m if i == last else self._settings.way_tolerance_m)
             for i, (a, b) in enumerate(pairwise(places))
         )
+
+    def _find_way(self, locale: str, start: Floats, end: Floats) -> list[Floats] | None:
+        """The shortest way across a locale, with the largest margin that leaves one; None where none does."""
+        def floor() -> Geometry:
+            return self._free_space(locale, -self._robot.radius_m)
+
+        least_m = self._settings.clearances_m[-1]
+        tried = (*((clearance_m, False) for clearance_m in self._settings.clearances_m), (least_m, True))
+        for clearance_m, is_round in tried:
+            free = self._free_space(locale, clearance_m, is_round=is_round)
+            route = find_shortest_route(free, start, end, floor)
+            if route is not None:
+                return route
+        return None
+
+    def _is_passed(self, middle: Floats, before: Floats, locale: str) -> bool:
+        """Whether the robot clears all obstacles of a locale between a doorway and a place before it."""
+        line, reach_m = LineString([middle, before]), self._robot.radius_m + self._settings.clearances_m[-1]
+        return all(line.distance(build_polygon(obstacle.footprint)) >= reach_m
+                   for obstacle in self._obstacles if obstacle.locale == locale)
 
     def _free_space(self, locale: str, margin_m: float, *, is_round: bool = False) -> Geometry:
         """Where the robot's centre may be with a margin round the robot; cached."""
