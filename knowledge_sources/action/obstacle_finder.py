@@ -151,7 +151,7 @@ class ObstacleFinder(RobotKnowledgeSource):
                 rest, whole = [e for e in rest if _may_be_there(e.value)], math.inf
             entry = _find_same(rest, shape, thing.sigma_m, whole)
             if entry is not None:
-                new = self._see_again(find_building(view), entry.value, thing, shape, free, scan)
+                new = self._see_again(view, entry, thing, shape, free, scan)
                 if new is not None:
                     drafts[entry.id] = _Draft(entry, new, [scan])
                 continue
@@ -194,15 +194,18 @@ class ObstacleFinder(RobotKnowledgeSource):
         return _place(world, found, own)
 
     def _see_again(
-        self, world: Building, known: Obstacle, thing: FloorThing, shape: shapely.Polygon, free: shapely.Geometry,
+        self, view: View, entry: Entry[Obstacle], thing: FloorThing, shape: shapely.Polygon, free: shapely.Geometry,
         scan: Entry[FreeFloor],
     ) -> Obstacle | None:
-        """A known obstacle after it was seen once more; None where that tells nothing that matters."""
-        s, seen_s = self._settings.action, scan.value.seen_s
-        certainty = known.certainty
+        """A known obstacle after it was seen once more; None where that tells nothing that matters.
+
+        What deceives the eye once does so again from the same place: only another sight is further evidence.
+        """
+        s, seen_s, known, world = self._settings.action, scan.value.seen_s, entry.value, find_building(view)
+        certainty = max(known.certainty, thing.p_thing)
         if known.status == "gone":
             certainty = thing.p_thing
-        elif seen_s - known.looked_s >= s.min_evidence_interval_s:
+        elif _measure_way_m(view, entry, scan) >= s.floor_view_distance_m / 2.0:
             certainty = _combine(known.certainty, thing.p_thing / (1.0 - min(thing.p_thing, 0.999)))
         certainty = min(certainty, s.max_obstacle_certainty)
         own = shapely.intersection(shape, _find_open_floor(world, known.locale, 0.0))
@@ -213,7 +216,7 @@ class ObstacleFinder(RobotKnowledgeSource):
             joined = join_footprints(polygon, shape if own.is_empty else own, free)
         footprint = list_corners(joined)
         moved = measure_change_m(known.footprint, footprint) >= s.min_footprint_change_m
-        surer = certainty > known.certainty + 0.02 or _status(certainty, s) != known.status
+        surer = certainty > known.certainty + 0.005 or _status(certainty, s) != known.status
         higher = thing.sigma_height_m < 0.7 * known.sigma_height_m
         if not (moved or surer or higher or seen_s - known.seen_s >= 2.0):
             return None
@@ -324,6 +327,15 @@ def _find_same(
         if shared > 0.0 and (best is None or shared > best[0]) and measure_hull_part(polygon, shape) <= most_hull:
             best = shared, entry
     return None if best is None else best[1]
+
+
+def _measure_way_m(view: View, obstacle: Entry[Obstacle], scan: Entry[FreeFloor]) -> float:
+    """How far the eye is from where the sight was taken on which an obstacle rests; infinite where that is gone."""
+    last = next((ref.id for ref in obstacle.because if ref.id.startswith(FreeFloor.__name__)), "")
+    before = view.get(last)
+    if before is None:
+        return math.inf
+    return math.hypot(scan.value.x_m - before.value.x_m, scan.value.y_m - before.value.y_m)
 
 
 def _find_room(world: Building, shape: shapely.Polygon, near: str, reach_m: float) -> str:

@@ -53,7 +53,7 @@ class Hall:
         self.board.apply([*map(Post, self.robot.entries()), *frames, Post(self._belief)], author="test", cycle=1)
         self.source, self.cycle = ObstacleFinder(), 1
 
-    def see(self, *things: FloorThing, seen_s: float, far_m: float = 4.0) -> tuple[Change, ...]:
+    def see(self, *things: FloorThing, seen_s: float, far_m: float = 4.0, ahead_m: float = 0.0) -> tuple[Change, ...]:
         """One sight of the floor: free up to ``far_m``, with some things on it."""
         bearings = np.linspace(-0.5, 0.5, 41)
         far = np.full(41, far_m)
@@ -62,7 +62,7 @@ class Hall:
             angles = np.arctan2(corners[:, 1], corners[:, 0])
             hit = (bearings >= angles.min() - 0.02) & (bearings <= angles.max() + 0.02)
             far[hit] = np.minimum(far[hit], np.linalg.norm(corners, axis=1).min())
-        scan = FreeFloor("camera", HALL, HERE.x_m, HERE.y_m, tuple(bearings.tolist()), (1.5,) * 41,
+        scan = FreeFloor("camera", HALL, HERE.x_m + ahead_m, HERE.y_m, tuple(bearings.tolist()), (1.5,) * 41,
                          tuple(far.tolist()), ("sight",) * 41, (0.02,) * 41, things, seen_s)
         self.cycle += 1
         (posted,) = self.board.apply([Post(scan)], author="floor_watcher", cycle=self.cycle)
@@ -106,9 +106,9 @@ def test_one_sure_picture_makes_an_obstacle_and_says_which_pixels(hall: Hall) ->
 def test_an_unsure_picture_makes_a_suspicion_and_a_second_one_an_obstacle(hall: Hall) -> None:
     hall.see(carton(0.8), seen_s=1.0)
     assert [o.status for o in hall.obstacles] == ["suspected"] and not hall.frame.changes
-    hall.see(carton(0.8), seen_s=1.03)  # the next picture on the move tells nothing new
+    hall.see(carton(0.8), seen_s=1.03, ahead_m=0.02)  # a picture from the same place tells nothing new
     assert [o.status for o in hall.obstacles] == ["suspected"] and not hall.frame.changes
-    hall.see(carton(0.8), seen_s=3.0)
+    hall.see(carton(0.8), seen_s=3.0, ahead_m=0.3)
     assert [o.status for o in hall.obstacles] == ["there"] and len(hall.frame.changes) == 1
 
 
