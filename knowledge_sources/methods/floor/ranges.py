@@ -72,17 +72,18 @@ def see_ranges(
     is_new = cones.is_heard & (cones.away_m < expected - slack_m)
     is_known = cones.is_heard & (np.abs(cones.away_m - expected) <= slack_m)
     count = settings.range_bearings
-    bearings = (np.arange(count) - count // 2) * math.tau / count
+    bearings = (np.arange(count + 1) - count // 2) * math.tau / count  # the last is the first again
     near, far, ended_by = find_free_intervals(cones, bearings, settings.range_sigmas * ranges.sigma_m)
     free = far > near
-    ends: list[FloorEnd] = [
-        "thing" if is_new[k] else "model" if is_known[k] else "sight" for k in ended_by]
+    ends: list[FloorEnd] = ["thing" if is_new[k] else "model" if is_known[k] else "sight" for k in ended_by]
+    touching_m = _find_touching(cones, is_new, bearings)
+    far = np.where(free, far, touching_m)
+    ends = [end if is_free else "thing" if there > 0.0 else "sight"
+            for end, is_free, there in zip(ends, free, touching_m, strict=True)]
     sigmas = np.hypot(place_m, sigma_rad * np.maximum(far, 0.0))
     floor = FreeFloor(
         "ranges", locale, pose.x_m, pose.y_m, _rounded(bearings), _rounded(np.where(free, near, cones.rim_m)),
-        _rounded(np.where(free, far, 0.0)),
-        tuple(end if is_free else "sight" for end, is_free in zip(ends, free, strict=True)), _rounded(sigmas), (),
-        ranges.when_s)
+        _rounded(far), tuple(ends), _rounded(sigmas), (), ranges.when_s)
     is_new &= cones.away_m <= settings.max_range_thing_m
     things = _find_things(cones, is_new, floor, earlier, rooms, robot.world, place_m, settings)
     return _with_things(floor, tuple(things))
@@ -149,7 +150,7 @@ def find_free_intervals(cones: Cones, bearings_rad: Floats, margin_m: float) -> 
     All bearings that are nearer to one of them than to another are free as it is. Where ``far`` is not above ``near``
     nothing is known.
     """
-    half_step = 0.5 * math.tau / len(bearings_rad)
+    half_step = 0.5 * math.tau / (len(bearings_rad) - 1)
     off = np.abs(np.remainder(bearings_rad[:, None] - cones.axes_rad + math.pi, math.tau) - math.pi) + half_step
     clear = np.where(cones.is_heard, cones.away_m, 0.0) - margin_m  # (n,) free distance from each sensor
     rim, tangent = cones.rim_m, math.tan(cones.half_beam_rad)
@@ -165,6 +166,14 @@ def find_free_intervals(cones: Cones, bearings_rad: Floats, margin_m: float) -> 
     return np.where(joins, near, np.inf).min(axis=1), far[rows, ended_by], ended_by
 
 
+def _find_touching(cones: Cones, is_new: Mask, bearings_rad: Floats) -> Floats:
+    """(m,) how far from the robot's axis something new is, so near that no floor before it is heard free; else 0."""
+    off = np.abs(np.remainder(bearings_rad[:, None] - cones.axes_rad + math.pi, math.tau) - math.pi)
+    within = is_new & (cones.away_m < cones.rim_m) & (off <= cones.half_beam_rad)
+    away = np.where(within, cones.away_m, np.inf).min(axis=1, initial=np.inf)
+    return np.where(np.isfinite(away), cones.rim_m + away - 1e-3, 0.0)
+
+
 def _build_cones(robot: RobotModel, pose: Pose2, ranges: Ranges) -> Cones:
     away = [math.inf if distance is None else max(0.0, distance - robot.radius_m) for distance in ranges.distances_m]
     axes = np.array(ranges.directions_rad, float) + pose.heading_rad
@@ -175,8 +184,8 @@ def is_free_at(floor: FreeFloor, points: Floats, margin_m: float) -> Mask:
     """Which points (n, 2) [m, world] a floor of :func:`see_ranges` has found free, by more than a margin."""
     off = points - (floor.x_m, floor.y_m)
     away, bearing = np.hypot(off[:, 0], off[:, 1]), np.arctan2(off[:, 1], off[:, 0])
-    step = math.tau / len(floor.bearings_rad)
-    index = np.round((bearing - floor.bearings_rad[0]) / step).astype(int) % len(floor.bearings_rad)
+    count = len(floor.bearings_rad) - 1
+    index = np.round((bearing - floor.bearings_rad[0]) * count / math.tau).astype(int) % count
     return np.asarray((away >= np.array(floor.near_m)[index]) & (away < np.array(floor.far_m)[index] - margin_m))
 
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.ranges import see_ranges
+from knowledge_sources.methods.floor.seen_floor import SeenFloor
 from knowledge_sources.settings.floor import FloorSettings
 from sim.body.collision import Obstacles
 from sim.body.range_ring import RangeRing
@@ -58,7 +59,7 @@ def read(solid: Floats, pose: Pose2, seed: int, dropout: float) -> FreeFloor | N
 
 def free_area(floor: FreeFloor) -> shapely.Geometry:
     """All of what it calls free: each bearing's interval, half a step to either side."""
-    half, parts = 0.5 * math.tau / len(floor.bearings_rad), []
+    half, parts = 0.5 * math.tau / (len(floor.bearings_rad) - 1), []
     for bearing, near, far in zip(floor.bearings_rad, floor.near_m, floor.far_m, strict=True):
         if far > near:
             angles = bearing + np.linspace(-half, half, 5)
@@ -131,6 +132,18 @@ def test_more_readings_make_it_narrower() -> None:
     first, last = found[-1].things, found[0].things
     assert len(first) == len(last) == 1
     assert shapely.Polygon(last[0].footprint).area < shapely.Polygon(first[0].footprint).area
+
+
+def test_what_touches_the_robot_ends_the_floor_there() -> None:
+    name, pose = place(0, 0.5, 0.5)
+    solid = np.concatenate([SOLID.segments_world, box(pose.x_m + 0.56, pose.y_m, 0.4, 0.0)])
+    reading = RangeRing(24, sigma_m=0.0, dropout=0.0).measure(solid, pose, np.random.default_rng(1), 0.0)
+    assert reading is not None
+    floor = see_ranges(ROBOT, name, pose, 0.01, 0.002, reading, (), SETTINGS)
+    ahead = int(np.argmin(np.abs(floor.bearings_rad)))
+    assert floor.ends[ahead] == "thing" and floor.far_m[ahead] <= 0.36
+    assert not SeenFloor((floor,), np.array([[pose.x_m, pose.y_m, 0.5]])).find_free(
+        np.array([[pose.x_m + 0.42, pose.y_m]])).any()
 
 
 def test_without_an_echo_nothing_is_free() -> None:
