@@ -23,6 +23,7 @@ from knowledge_sources.methods.floor.seen_floor import (
 )
 from knowledge_sources.questions import active_goal, deepest_sketch, find_robot
 from knowledge_sources.settings.action import ActionSettings
+from world_models.building.things import EXTRA_KIND
 from world_models.entries.body import Frame, MotionReport, RideReport
 from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis
@@ -59,7 +60,9 @@ class FloorAhead:
         self._beyond, locales = _find_way_beyond(view, self._robot)
         self._locales = tuple(sorted({belief.value.locale, *locales}))
         self._floor = find_floor(self._robot.world, self._locales)
-        self._asked = shapely.buffer(self._floor, -settings.near_model_m)
+        found = [shapely.Polygon(thing.footprint_world) for name in self._locales
+                 for thing in self._robot.world.things_of(name) if thing.kind == EXTRA_KIND]
+        self._asked = shapely.buffer(shapely.union_all([self._floor, *found]), -settings.near_model_m)
         self.scans = _find_scans(view, belief, settings)
         self._seen = SeenFloor(
             tuple(entry.value for entry in self.scans), self._list_discs(view),

@@ -45,6 +45,7 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings.action import ActionSettings
 from world_models.building.building import Building
 from world_models.building.locales import Doorway
+from world_models.building.things import EXTRA_KIND
 from world_models.entries.floor import FloorThing, FreeFloor
 from world_models.entries.locale_frame import FrameChange, LocaleFrame
 from world_models.entries.location import Hypothesis, Place
@@ -359,7 +360,7 @@ def _find_open_floor(world: Building, locale: str, margin_m: float) -> shapely.G
                 for doorway in world.doorways_of(locale)]
     floor = shapely.union_all([shapely.Polygon(world.outline(locale)), *openings])
     things = [shapely.Polygon(thing.footprint_world) for thing in world.things_of(locale)
-              if thing.is_obstacle and thing.kind != "obstacle"]
+              if thing.is_obstacle and thing.kind != EXTRA_KIND]
     return shapely.difference(shapely.buffer(floor, -margin_m), shapely.buffer(shapely.union_all(things), margin_m))
 
 

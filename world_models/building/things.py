@@ -16,6 +16,9 @@ STEP_M = 0.03
 MAX_FLUSH_M = 0.06
 """A thing that protrudes from its wall by no more than this is no obstacle: the robot keeps clear of the wall."""
 
+EXTRA_KIND = "obstacle"
+"""The kind of a thing that the file lacks."""
+
 
 @dataclass(frozen=True, slots=True)
 class Finding:

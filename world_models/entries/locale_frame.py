@@ -25,7 +25,7 @@ from world_models.building.changes.shut_doors import shut_door
 from world_models.building.extents import LocaleExtent
 from world_models.building.locale_source import LocaleGeometry, PassageEdge
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.things import ROBOT_TOP_M, Thing
+from world_models.building.things import EXTRA_KIND, ROBOT_TOP_M, Thing
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, PlanSketch
 from world_models.frames import frozen
@@ -206,7 +206,7 @@ class LocaleFrame:
 def _to_thing(change: FrameChange, locale: str) -> Thing:
     """What stands there and the file lacks; where nobody knows how high it is, it is in the way at every height."""
     footprint = frozen(change.footprint, (None, 2))
-    return Thing(change.name, locale, "obstacle", footprint, 0.0, change.height_m or ROBOT_TOP_M, None, change.by)
+    return Thing(change.name, locale, EXTRA_KIND, footprint, 0.0, change.height_m or ROBOT_TOP_M, None, change.by)
 
 
 FRAME_OF: Index[LocaleFrame] = Index(LocaleFrame, lambda frame: frame.name, "frame")
