@@ -16,6 +16,7 @@ from harvey.why.journal import JournalHistory
 from harvey.why.model.element import stories_of
 from harvey.why.model.world_file import WorldFile
 from harvey.why.on_the_way import levels_off, on_the_way
+from harvey.why.questions import answers, is_question
 from harvey.why.story import LEGEND, Story, lines_of
 from harvey.why.trace import cycle_lines
 from harvey.why.walk import explain
@@ -26,7 +27,8 @@ def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN", help="a run directory")
     parser.add_argument("entry", metavar="NAME", nargs="?",
                         help="as MotorCommand-12 (its last revision) or Leg-3.2, or a landmark, door or room as"
-                             " allens-office/desk; without one: how the mission ended")
+                             " allens-office/desk, or a question as 'what is in the way?'; without one: how the"
+                             " mission ended")
     parser.add_argument("--at", metavar="CYCLE", type=whole, help="explain what this cycle did")
     parser.add_argument("--milestone", metavar="NAME", help="tell a milestone's story: Milestone-3, or M1 of hallway")
     parser.add_argument("--not", metavar="KS|ENTRY", dest="not_",
@@ -41,8 +43,10 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     asked = [name for name in ("entry", "milestone", "not_") if getattr(args, name) is not None]
     asked += ["--check"] * args.check
-    if len(asked) + (args.at is not None and not args.not_) > 1:
-        raise BadInput("expected one of NAME, --at, --milestone, --not and --check; --not also goes with --at")
+    with_at = args.not_ or (args.entry is not None and is_question(args.entry))
+    if len(asked) + (args.at is not None and not with_at) > 1:
+        raise BadInput("expected one of NAME, --at, --milestone, --not and --check; --not and a question also go with"
+                       " --at")
     run = open_run(args.run)
     history = JournalHistory(run.journal)
     if args.check:
@@ -73,6 +77,9 @@ def _describe_unfinished(run: RunDirectory, cycle: int) -> str:
 
 def _stories(run: RunDirectory, history: History, args: Namespace) -> Iterator[Story]:
     world = WorldFile(run)
+    if args.entry is not None and is_question(args.entry):
+        yield from answers(history, args.entry, args.at)
+        return
     if args.milestone is None:
         yield from stories_of(history, args.entry if args.at is None else args.at, world)
         return
@@ -82,13 +89,13 @@ def _stories(run: RunDirectory, history: History, args: Namespace) -> Iterator[S
 
 
 def _paragraphs(history: History, args: Namespace, stories: list[Story]) -> Iterator[str]:
-    if args.at is not None:
+    if args.at is not None and args.entry is None:
         yield from cycle_lines(history.decision(args.at), history.candidates(args.at))
         yield ""
     for number, one in enumerate(stories):
         yield from ("",) * (number > 0)
         yield from lines_of(one)
-    refs = [one.ref for one in stories if args.milestone is None and history.find(one.ref) is not None]
+    refs = [one.ref for one in stories if args.milestone is None and one.ref and history.find(one.ref) is not None]
     if args.depth is not None and refs:
         yield "\nEntry by entry:"
         yield from explain(history, refs, args.depth)
@@ -135,6 +142,10 @@ COMMAND = Command(
         ("harvey why runs/lab-to-allens-office-0 --milestone 'M1 of hallway'", "what was expected, seen and judged"),
         ("harvey why runs/lab-to-allens-office-0 --not relocalizer --at 88", "why a knowledge source did not act then"),
         ("harvey why runs/lab-to-allens-office-0 --not Hypothesis-1.20", "what came of an entry, and what instead"),
+        ("harvey why runs/box-in-the-way-0 'what is in the way?'", "each thing that the model lacks, down to pixels"),
+        ("harvey why runs/box-in-the-way-0 'why did you stop?' --at 120", "the last stop up to cycle 120"),
+        ("harvey why runs/box-in-the-way-0 'why that detour?'", "for what plans were withdrawn, and what came instead"),
+        ("harvey why runs/door-found-shut-0 'is the door shut?'", "what pictures show in its opening"),
         ("harvey why runs/lab-to-allens-office-0 --check", "whether every decision rests on something"),
         ("harvey why runs/lab-to-allens-office-0 --depth 12", "the whole web of reasons, twelve steps down"),
     ),

@@ -312,6 +312,8 @@ LABELS: Mapping[str, str] = {
     "Ride": "ride", "RideReport": "ride", "Obstruction": "hidden", "Quiescence": "stillness", "Outcome": "the end",
     "Resumed": "resumed", "Drift": "wheels", "LocaleFrame": "known", "FrameRequest": "asked", "CameraState": "camera",
     "Wheels": "wheels", "Footprint": "body", "Contact": "touched", "Ranges": "ranges", "Told": "told",
+    "FreeFloor": "floor", "FloorView": "floor", "FloorAppearance": "floor", "Obstacle": "in the way",
+    "DoorState": "door",
 }
 FOLDED = frozenset({"PoseFix", "LineMatch", "Segments", "Certificate"})
 """Told by the sentences of what rests on them."""
@@ -345,7 +347,7 @@ FOLLOW: Mapping[str, tuple[str, ...]] = {
 
 def lines_of(told: Story) -> Iterator[str]:
     """A story as paragraphs: label, sentences and the entries that say so."""
-    yield _wrap(f"{told.headline}  [{told.ref}]")
+    yield _wrap(f"{told.headline}  [{told.ref}]" if told.ref else told.headline)
     if told.decided:
         yield _wrap(told.decided)
     width = max((len(step.label) for step in told.steps), default=0)
