@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from two_doors import two_doors
 
 from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
 from knowledge_sources.settings import DEFAULT
+from two_doors import two_doors
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
