@@ -52,6 +52,11 @@ from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
 from world_models.entries.touch import Contact
 
+VAGUE_M = 0.05
+"""Standard deviation from which on a sight of a thing is vague: its feet are not seen, or far away."""
+MIN_COMMON_PART = 0.2
+"""Of two vague sights of one thing: the part of the smaller that both have, at least."""
+
 
 @dataclass
 class _Draft:
@@ -214,7 +219,7 @@ class ObstacleFinder(RobotKnowledgeSource):
         if scan.value.sense == "ranges" and known.status != "gone":  # nor how wide it is
             joined = take_free(polygon, free)
         else:
-            joined = join_footprints(polygon, shape if own.is_empty else own, free)
+            joined = _weigh_footprints(polygon, shape if own.is_empty else own, free, known.sigma_m, thing.sigma_m)
         footprint = list_corners(joined)
         moved = measure_change_m(known.footprint, footprint) >= s.min_footprint_change_m
         surer = certainty > known.certainty + 0.005 or _status(certainty, s) != known.status
@@ -279,6 +284,23 @@ class ObstacleFinder(RobotKnowledgeSource):
         if not is_touched and moved_m < s.min_footprint_change_m and same_height:
             return frame
         return frame.restored("extra", obstacle.name).changed(change)
+
+
+def _weigh_footprints(
+    known: shapely.Geometry, seen: shapely.Geometry, free: shapely.Geometry, known_sigma_m: float, sigma_m: float
+) -> shapely.Geometry:
+    """The footprint by two sights: the sharper one decides; of two vague ones, only what both leave open is taken.
+
+    A sight of which the feet are not seen says where the thing may stand, and not what it covers.
+    """
+    if sigma_m >= 2.0 * known_sigma_m + VAGUE_M:
+        return take_free(known, free)
+    if known_sigma_m >= 2.0 * sigma_m + VAGUE_M:
+        return seen
+    if min(sigma_m, known_sigma_m) >= 2.0 * VAGUE_M:
+        both = shapely.intersection(known, seen)
+        return both if both.area >= MIN_COMMON_PART * min(known.area, seen.area) else take_free(known, free)
+    return join_footprints(known, seen, free)
 
 
 def _may_be_there(obstacle: Obstacle) -> bool:

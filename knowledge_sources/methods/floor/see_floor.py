@@ -35,7 +35,7 @@ from world_models.robot import RobotModel
 
 DRIVEN_HALF_WIDTH_M = 0.25
 """Half the width of the strip that was driven over, from which the floor's looks are learnt."""
-CUT_SIGMA_M = 0.18
+CUT_SIGMA_M = 0.15
 """Of a foot that the picture's lower border cuts off: it is anywhere between where that starts and the robot's rim."""
 GREY = np.array([0.299, 0.587, 0.114], np.float32)
 SIGHT_PART = 2.0

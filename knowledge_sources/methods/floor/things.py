@@ -18,7 +18,7 @@ MIN_ROWS = 3
 """A region of fewer rows is noise."""
 MAX_STEP = 0.06
 """Neighbouring columns of one foot, as a wall's, differ in range by no more than this part."""
-CUT_PART = 0.6
+CUT_PART = 0.72
 """Of a region that the lower border cuts off: its foot is taken to be at this part of the range of that border."""
 
 
