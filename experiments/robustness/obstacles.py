@@ -18,8 +18,6 @@ from experiments.chart import OURS, PAPER, PEER, chart
 from experiments.report import Cell, Report
 from experiments.robustness.obstacles_trial import RING, Pairs, Trial, TrialEnd, make_trials, run_trial
 from experiments.trials import RESULTS, campaign_folder, run_trials
-from harvey.agent_settings import names
-from sim.scenario import FORMAT
 
 MISSIONS, QUICK_MISSIONS = 1_000, 2
 FIRST_SEED, SEEDS_APART = 1_000_000, 10_000
@@ -28,7 +26,8 @@ CAMERA, WITH_RING, EMPTY, EMPTY_UNSEEN = "camera", "and ranges", "empty", "empty
 NO_APPEARANCE: Pairs = (("floor.use_appearance", "false"),)
 NO_PARALLAX: Pairs = (("floor.use_parallax", "false"),)
 NO_RANGES: Pairs = (("floor.use_ranges", "false"),)
-UNSEEN: Pairs = (*NO_APPEARANCE, *NO_PARALLAX, *NO_RANGES)
+UNSEEN: Pairs = (*NO_APPEARANCE, *NO_PARALLAX, *NO_RANGES, ("action.keeps_to_seen_floor", "false"))
+"""The floor is not looked at, and the robot drives without having seen it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,12 +103,7 @@ def _trials(row: Row, first: int, number: int) -> list[Trial]:
     """So many that a barred floor is among those of a small campaign, too."""
     part = max(1, math.ceil(number / row.part))
     begin = first if number >= 10 or row.empty else first + 10 - number
-    return list(make_trials(row.name, begin, part, settings=_known(row.settings), empty=row.empty))
-
-
-def _known(settings: Pairs) -> Pairs:
-    """Without the switches of parts that this version does not have."""
-    return tuple((key, value) for key, value in settings if key in (*names(), *FORMAT.keys()))
+    return list(make_trials(row.name, begin, part, settings=row.settings, empty=row.empty))
 
 
 def _table(found: Found) -> Iterator[tuple[Cell, ...]]:
