@@ -102,13 +102,15 @@ class DoorDoubter(RobotKnowledgeSource):
         if opening is None or evidence is None:
             return None
         ratio = weigh_leaf(evidence, s)
-        if ratio < s.min_log_ratio:
+        if ratio < s.min_log_ratio or (shut.matched < s.min_few_lines and evidence.frame < s.min_sure_frame_share):
             return None
         odds = min(ratio - s.prior_log_odds + s.refuted_log_ratio, s.max_log_odds)
         if odds < s.shut_log_odds:
             return None
-        shows = (f"{describe(evidence, ratio)}, and with it shut {shut.matched} of {shut.expected} lines are where"
-                 f" they should be, while {milestone.value.what.partition(', because')[0]} is {milestone.value.status}")
+        told = f"with it shut {shut.matched} of {shut.expected} lines are where they should be"
+        told = told if shut.matched >= s.min_few_lines else "in its frame"
+        what = milestone.value.what.partition(", because")[0]
+        shows = f"{describe(evidence, ratio)}, {told}, while {what} is {milestone.value.status}"
         picture = DoorPicture(frame.id, opening.box_px, pose.x_m, pose.y_m, pose.heading_rad, ratio, shows)
         known = find_door_state(view, door.name)
         count = 1 if known is None else known.value.pictures + 1
@@ -120,12 +122,14 @@ class DoorDoubter(RobotKnowledgeSource):
     def _is_explained(self, shut: Explanation, opened: Explanation | None, belief: Hypothesis) -> bool:
         """Whether a picture tells the place with the door shut, and does not with it open.
 
-        Where too few lines are in view to tell the place by, the belief must be sure, and these lines be there.
+        Where too few lines are in view to tell the place by, the belief must be sure, and these lines be there; of
+        none, or next to none, the frame of the opening must do.
         """
         s = self._settings.doors
         if not shut.is_solved:
             is_sure = belief.sigma_m <= s.max_sigma_m and belief.sigma_rad <= s.max_sigma_rad
-            return is_sure and shut.matched >= max(s.min_few_lines, s.min_few_share * shut.expected)
+            are_there = shut.matched >= s.min_few_share * shut.expected
+            return is_sure and (are_there or shut.expected < s.min_few_lines)
         if not POSE_CONFIDENCE.accepts(shut.p_false):
             return False
         return opened is None or not opened.is_solved or opened.p_false > s.min_explained_better * shut.p_false

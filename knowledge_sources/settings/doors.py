@@ -86,5 +86,7 @@ class DoorSettings:
         4.6, "1", "What a milestone that is refuted at a trusted place adds for a door that explains it.",
         _JUDGED)
     min_few_lines: int = setting(
-        3, "count", "Fewest lines that must be there where they are too few to tell the place by ...", _JUDGED)
-    min_few_share: float = setting(0.6, "1", "... and the least share of those expected.", _JUDGED)
+        3, "count", "Fewest lines by which a frame is told, where they are too few to tell the place by.", _JUDGED)
+    min_few_share: float = setting(0.6, "1", "Least share of these that must be there.", _JUDGED)
+    min_sure_frame_share: float = setting(
+        0.8, "1", "Where there are fewer, least share of the opening's frame that has the model's color.", _JUDGED)
