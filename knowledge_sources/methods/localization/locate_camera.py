@@ -18,7 +18,7 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats, Indices
 from knowledge_sources.methods.features.lines import LineSegments, find_lines, remove_duplicates
 from knowledge_sources.methods.matching import match_in_space
-from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, trunc_r_and_t
+from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml, trunc_r_and_t
 from knowledge_sources.methods.verification.agreement import Agreement, compute_agreement
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import Camera
@@ -129,7 +129,7 @@ class _Search:
         pose = rough[0].camera_from_world
         near = self._find_near(pose)
         solved = self._solve(near, pose, tuning.camera_second_prior**2 * self.covariance, fine, med_r_and_t)
-        return None if solved is None else self._judge(*solved, near)
+        return None if solved is None else self._judge(self._state_as_seen(*solved, near), solved[1], near)
 
     def is_same(self, pose: Pose, other: Pose) -> bool:
         """Whether two poses are within the tolerances."""
@@ -185,17 +185,27 @@ class _Search:
         coverage = agreement.covered_length(lengths)
         if agreement.matched < tuning.camera_min_matched_lines or agreement.p_false > tuning.camera_max_p_false:
             verdict = PoseVerdict.REFUTED
-        elif estimate.ok and coverage >= tuning.camera_min_coverage and self._is_precise(estimate):
+        elif estimate.ok and coverage >= tuning.camera_min_coverage and self._is_precise(estimate.covariance):
             verdict = PoseVerdict.VERIFIED
         else:
             verdict = PoseVerdict.NOT_TESTABLE
         return CameraFix(estimate, pairs, near, agreement, coverage, verdict)
 
-    def _is_precise(self, estimate: PoseEstimate) -> bool:
-        """Whether the worst deviations fit into the tolerances, the covariance being scaled by the residuals."""
-        squares = (estimate.residuals_px[estimate.inliers] / self.settings.features.sigma_across_px) ** 2
-        freedom = max(squares.size - 6, 1)
-        covariance = np.asarray(estimate.covariance * float(np.sum(squares)) / freedom)
+    def _state_as_seen(self, estimate: PoseEstimate, pairs: Indices, near: Floats) -> PoseEstimate:
+        """The estimate with the covariance that the noise of its own residuals gives, and the shared error."""
+        kept, sigma_px = estimate.inliers, self.settings.features.sigma_across_px
+        squares = (estimate.residuals_px[kept] / sigma_px) ** 2
+        if not estimate.ok or squares.size <= 6:
+            return estimate
+        i, k = pairs[kept].T
+        seen_px = sigma_px * max(math.sqrt(float(np.sum(squares)) / (squares.size - 6)), self.settings.pose.min_noise_part)
+        again = r_and_t_ml(
+            self.model[i], near[k], self.camera, estimate.camera_from_world, sigma_px=seen_px,
+            settings=self.settings.pose)
+        return replace(estimate, covariance=again.covariance) if again.ok else estimate
+
+    def _is_precise(self, covariance: Floats) -> bool:
+        """Whether the worst deviations fit into the tolerances."""
         sigmas = self.settings.localization.camera_tolerance_sigmas
         turn, shift = (float(np.linalg.eigvalsh(covariance[a : a + 3, a : a + 3])[-1]) for a in (0, 3))
         return sigmas * math.sqrt(turn) <= self.tolerance_rad and sigmas * math.sqrt(shift) <= self.tolerance_m
