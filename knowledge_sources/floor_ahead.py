@@ -130,9 +130,17 @@ class FloorAhead:
                 discs += [(a.x_m + part * (b.x_m - a.x_m), a.y_m + part * (b.y_m - a.y_m), radius_m) for part in parts]
         goal = active_goal(view)
         if goal is not None and goal.id == f"{Goal.__name__}-1" and view.latest(RideReport) is None:
-            start = goal.value.origin.in_world(self._robot.world)
-            discs.append((start.x_m, start.y_m, self._settings.put_down_free_m))
+            start = self._find_start(view, goal.value)
+            discs.append((*start, self._settings.put_down_free_m))
         return np.array(discs)
+
+    def _find_start(self, view: View, goal: Goal) -> Point:
+        """Where the robot was put down: by the first picture, if it is still on the board, else by what was said."""
+        first = view.get(f"{FreeFloor.__name__}-1")
+        start = goal.origin.in_world(self._robot.world)
+        if first is None or math.dist((first.value.x_m, first.value.y_m), start.position) > MAX_GAP_M:
+            return start.x_m, start.y_m
+        return first.value.x_m, first.value.y_m
 
 
 def limit_move(unseen: Sweep, move_m: float, settings: ActionSettings) -> Caution:

@@ -119,7 +119,9 @@ class Relocalizer(RobotKnowledgeSource):
         for c in result.candidates:
             yield Post(_to_hypothesis(building, c, belief.value, "candidate", c.weight), (segments, seen, belief))
         if result.status is LocalizationStatus.PROBE and result.next_action is not None and not is_last:
-            yield Post(MotorCommand(result.next_action.turn_rad, result.next_action.move_m), (segments, lost, seen))
+            s, action = self._settings.action, result.next_action  # while lost, no floor is known to be free
+            slowly = s.creep_speed_m_per_s if s.keeps_to_seen_floor and action.move_m > 0.0 else None
+            yield Post(MotorCommand(action.turn_rad, action.move_m, slowly), (segments, lost, seen))
 
     def _list_rooms(self, view: View, belief: Hypothesis) -> list[str]:
         """The rooms of the floor, the nearest to the last belief first; other floors are not searched."""
