@@ -198,7 +198,8 @@ class _Search:
         if not estimate.ok or squares.size <= 6:
             return estimate
         i, k = pairs[kept].T
-        seen_px = sigma_px * max(math.sqrt(float(np.sum(squares)) / (squares.size - 6)), self.settings.pose.min_noise_part)
+        seen = math.sqrt(float(np.sum(squares)) / (squares.size - 6))
+        seen_px = sigma_px * max(seen, self.settings.pose.min_noise_part)
         again = r_and_t_ml(
             self.model[i], near[k], self.camera, estimate.camera_from_world, sigma_px=seen_px,
             settings=self.settings.pose)
