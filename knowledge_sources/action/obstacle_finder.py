@@ -54,8 +54,8 @@ from world_models.entries.touch import Contact
 
 VAGUE_M = 0.05
 """Standard deviation from which on a sight of a thing is vague: its feet are not seen, or far away."""
-MIN_COMMON_PART = 0.2
-"""Of two vague sights of one thing: the part of the smaller that both have, at least."""
+MIN_COMMON_PART = 0.6
+"""A vague sight tells nothing new where so much of its directions is that of what is known."""
 
 
 @dataclass
@@ -219,7 +219,8 @@ class ObstacleFinder(RobotKnowledgeSource):
         if scan.value.sense == "ranges" and known.status != "gone":  # nor how wide it is
             joined = take_free(polygon, free)
         else:
-            joined = _weigh_footprints(polygon, shape if own.is_empty else own, free, known.sigma_m, thing.sigma_m)
+            joined = _weigh_footprints(polygon, shape if own.is_empty else own, free, known.sigma_m, thing.sigma_m,
+                                       np.array([scan.value.x_m, scan.value.y_m]))
         footprint = list_corners(joined)
         moved = measure_change_m(known.footprint, footprint) >= s.min_footprint_change_m
         surer = certainty > known.certainty + 0.005 or _status(certainty, s) != known.status
@@ -287,20 +288,32 @@ class ObstacleFinder(RobotKnowledgeSource):
 
 
 def _weigh_footprints(
-    known: shapely.Geometry, seen: shapely.Geometry, free: shapely.Geometry, known_sigma_m: float, sigma_m: float
+    known: shapely.Geometry, seen: shapely.Geometry, free: shapely.Geometry, known_sigma_m: float, sigma_m: float,
+    eye: Floats,
 ) -> shapely.Geometry:
-    """The footprint by two sights: the sharper one decides; of two vague ones, only what both leave open is taken.
+    """The footprint by two sights: the sharper one decides.
 
-    A sight of which the feet are not seen says where the thing may stand, and not what it covers.
+    A sight of which the feet are not seen tells in which directions the thing is, and that it is nearer than the
+    picture's lower border: it adds to what is known only in directions in which nothing was known.
     """
-    if sigma_m >= 2.0 * known_sigma_m + VAGUE_M:
-        return take_free(known, free)
     if known_sigma_m >= 2.0 * sigma_m + VAGUE_M:
         return seen
-    if min(sigma_m, known_sigma_m) >= 2.0 * VAGUE_M:
-        both = shapely.intersection(known, seen)
-        return both if both.area >= MIN_COMMON_PART * min(known.area, seen.area) else take_free(known, free)
+    is_vague = sigma_m >= 2.0 * known_sigma_m + VAGUE_M or min(sigma_m, known_sigma_m) >= 2.0 * VAGUE_M
+    if is_vague and _measure_common_directions(known, seen, eye) >= MIN_COMMON_PART:
+        return take_free(known, free)
     return join_footprints(known, seen, free)
+
+
+def _measure_common_directions(known: shapely.Geometry, seen: shapely.Geometry, eye: Floats) -> float:
+    """Which part of the directions in which a thing is seen from an eye (2,) is that of what is known, 0..1."""
+    corners = [shapely.get_coordinates(shape) - eye for shape in (known, seen)]
+    middle = corners[1].mean(axis=0)
+    ends = []
+    for to in corners:
+        aside = np.arctan2(middle[0] * to[:, 1] - middle[1] * to[:, 0], to @ middle)
+        ends.append((float(aside.min()), float(aside.max())))
+    (a, b), (low, high) = ends
+    return max(0.0, min(b, high) - max(a, low)) / max(high - low, 1e-6)
 
 
 def _may_be_there(obstacle: Obstacle) -> bool:
