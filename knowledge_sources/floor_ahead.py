@@ -35,6 +35,8 @@ Point = tuple[float, float]
 MAX_GAP_M = 0.8
 """Between two pictures that are no further apart the robot drove straight."""
 DRIVEN_STEP_M = 0.1
+LAST_SCANS = 3
+"""The newest sights of the floor, by whose things the robot stops short when it creeps."""
 
 
 class Caution(NamedTuple):
@@ -71,7 +73,18 @@ class FloorAhead:
     def limit_move(self, move_m: float) -> Caution:
         """How far, of a move to the leg's end, the robot may go at once; a move of any other kind is no longer."""
         unseen = self._find_unseen(self._sweep(self._way, move_m))
-        return limit_move(unseen, move_m, self._settings)
+        caution = limit_move(unseen, move_m, self._settings)
+        short_m = max(self._settings.min_creep_m, self._measure_to_things_m())
+        return caution._replace(move_m=min(caution.move_m, short_m)) if caution.creeps else caution
+
+    def _measure_to_things_m(self) -> float:
+        """How far the robot can go towards the leg's end before it meets what the newest pictures have there."""
+        way = shapely.LineString(self._way)
+        around_m = self._robot.radius_m + self._settings.seen_margin_m
+        things = [shapely.Polygon(thing.footprint).buffer(around_m) for entry in self.scans[-LAST_SCANS:]
+                  for thing in entry.value.things if thing.p_thing >= 0.5]
+        met = shapely.intersection(way, shapely.union_all(things))
+        return math.inf if met.is_empty else float(met.distance(shapely.Point(self._here.position)))
 
     def measure_free_m(self, most_m: float) -> float:
         """How far towards the leg's end the floor is seen to be free."""

@@ -55,6 +55,9 @@ class ActionSettings:
         "engineering judgement")
     creep_speed_m_per_s: float = setting(
         0.09, "m/s", "Speed into floor that was not seen to be free.", "engineering judgement")
+    min_creep_m: float = setting(
+        0.05, "m", "Shortest move into floor that was not seen to be free, before what may stand there.",
+        "engineering judgement")
     max_creep_m: float = setting(
         0.6, "m", "Longest move at that speed before the next picture.", "engineering judgement")
     look_ahead_m: float = setting(

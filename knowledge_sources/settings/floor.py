@@ -62,6 +62,10 @@ class FloorSettings:
     p_seen_once: float = setting(
         0.7, "1", "Probability that what does not look like the floor stands on it, before parallax tells.",
         "engineering judgement")
+    min_clear_rows: int = setting(
+        10, "count", "A region of at least so many rows, of half the picture's, is large.", "engineering judgement")
+    p_seen_large: float = setting(
+        0.92, "1", "The same probability of a large region.", "engineering judgement")
 
     # Parallax
     min_parallax_px: float = setting(
