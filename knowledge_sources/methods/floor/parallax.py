@@ -19,6 +19,9 @@ HALF = 4
 """Patches are squares of 2 HALF + 1 pixels of the reduced picture."""
 COLUMNS = 8
 """Places of a region's upper border that are compared."""
+PLACES = (0.5, 0.75, 1.0, 1.25)
+"""Where its top may be between the floor behind it (0) and right above its foot (1): what is deep has its upper border
+further back than its foot, and the foot of what is cut off is nearer than it is taken to be."""
 MIN_DEVIATION = 4.0
 """A patch with less contrast than this [grey levels] tells nothing."""
 
@@ -48,13 +51,19 @@ def compute_parallax_odds(
     foot_m = np.array([foot_of.get(int(column), min(foot_of.values())) for column in columns])
     part = np.minimum(foot_m / ranges, 1.0)
     flat = np.column_stack([points, np.zeros(len(points))])
-    solid = np.column_stack([eye + (points - eye) * part[:, None], grid.camera_height_m * (1.0 - part)])
-    then_flat, then_solid = (_project(p, earlier_from_now, camera, mount, grid) for p in (flat, solid))
-    apart = np.linalg.norm(then_flat - then_solid, axis=1) * STEP_PX
+    then_flat = _project(flat, earlier_from_now, camera, mount, grid)
+    then_solid = []
+    for share in PLACES:
+        at = 1.0 - share * (1.0 - part)
+        solid = np.column_stack([eye + (points - eye) * at[:, None], grid.camera_height_m * (1.0 - at)])
+        then_solid.append(_project(solid, earlier_from_now, camera, mount, grid))
+    apart = np.array([np.linalg.norm(then_flat - there, axis=1) * STEP_PX for there in then_solid])
     votes = 0
-    for i in np.flatnonzero(apart >= settings.min_parallax_px):
+    for i in np.flatnonzero((apart >= settings.min_parallax_px).any(axis=0)):
         patch = _cut(picture, grid.top + int(rows[i]), int(columns[i]))
-        as_flat, as_solid = (_correlate(earlier, patch, there[i]) for there in (then_flat, then_solid))
+        as_flat = _correlate(earlier, patch, then_flat[i])
+        as_solid = max(_correlate(earlier, patch, there[i]) for there, away in zip(then_solid, apart, strict=True)
+                       if away[i] >= settings.min_parallax_px)
         is_found = max(as_flat, as_solid) >= settings.min_parallax_correlation
         if is_found and abs(as_solid - as_flat) >= settings.min_parallax_margin:
             votes += 1 if as_solid > as_flat else -1
