@@ -17,6 +17,9 @@ from world_models.visibility.portals import image_window
 
 MIN_UP = 0.99
 """A surface whose normal has at least this upward part is level."""
+DEPTHS_M = ((0.0, 0.6), (0.6, 1.0), (1.0, 2.0), (2.0, 4.0))
+"""What of the model is so near moves aside in the picture by the error of the robot's place."""
+MIN_DEPTH_M = 0.4
 STEP = 2
 """Rays are cast through every second row and column of the grid."""
 
@@ -37,13 +40,15 @@ class ModelFloor:
 
 
 def predict_model_floor(
-    robot: RobotModel, pose: Pose2, grid: FloorGrid, floor_m: float, rolled_over_m: float, margin_px: float
+    robot: RobotModel, pose: Pose2, grid: FloorGrid, floor_m: float, rolled_over_m: float, margin_px: float,
+    aside_px_m: float = 0.0,
 ) -> ModelFloor:
     """Predict the floor from a pose.
 
     Args:
         floor_m: height of the floor [m, world]; what is level and at most ``rolled_over_m`` above it is floor too.
         margin_px: pixels of the picture that are so near to another part of the model are not plain.
+        aside_px_m: what is added to that for a part of the model, divided by its depth: the place is not exactly known.
     """
     camera_from_world = robot.camera_from_world(pose)
     rays = robot.camera.rays(grid.pixels[::STEP, ::STEP].reshape(-1, 2))
@@ -62,7 +67,15 @@ def predict_model_floor(
     keys, kind_of = np.unique(np.round(colours, 4), axis=0, return_inverse=True)
     kinds = np.where(is_floor, kind_of.ravel()[surface], -1).reshape(-1, columns)
     kinds = np.repeat(np.repeat(kinds, STEP, axis=0), STEP, axis=1)[: grid.shape[0], : grid.shape[1]]
-    return ModelFloor(kinds, keys, _find_plain(kinds, margin_px))
+    depths = np.where(is_floor, np.inf, depth).reshape(-1, columns)
+    depths = np.repeat(np.repeat(depths, STEP, axis=0), STEP, axis=1)[: grid.shape[0], : grid.shape[1]]
+    is_plain = _find_plain(kinds, margin_px)
+    for least_m, most_m in DEPTHS_M:
+        near = ((depths > least_m) & (depths <= most_m)).astype(np.uint8)
+        if aside_px_m > 0.0 and near.any():
+            half = int(np.ceil((margin_px + aside_px_m / max(least_m, MIN_DEPTH_M)) / STEP_PX))
+            is_plain &= cv2.dilate(near, np.ones((1, 2 * half + 1), np.uint8)) == 0
+    return ModelFloor(kinds, keys, is_plain)
 
 
 def _find_plain(kinds: Ints, margin_px: float) -> NDArray[np.bool_]:

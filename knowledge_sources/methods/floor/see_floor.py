@@ -82,7 +82,9 @@ def see_free_floor(
         return _blind(locale, eye, seen_s), ()
     sigma_rad = math.sqrt(max(float(covariance[2, 2]), 0.0))
     margin_px = s.model_margin_px + 2.0 * sigma_rad * robot.camera.fx
-    model = predict_model_floor(robot, pose, grid, floor_m, s.max_rolled_over_m, margin_px)
+    sigma_m = math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0))
+    model = predict_model_floor(
+        robot, pose, grid, floor_m, s.max_rolled_over_m, margin_px, 2.0 * sigma_m * robot.camera.fx)
     picture = read_reduced(jpeg, robot.lens, robot.camera)
     known = appearances.get(locale)
     unlike, tells = find_unlike(picture[grid.top:], model, known, s)
