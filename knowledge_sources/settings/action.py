@@ -38,7 +38,7 @@ class ActionSettings:
 
     # Floor ahead: motor and path follower
     keeps_to_seen_floor: bool = setting(
-        True, "yes/no", "Whether the robot drives only where it has seen the floor free; else it looks or creeps.",
+        False, "yes/no", "Whether the robot drives only where it has seen the floor free; else it looks or creeps.",
         "§4")
     seen_margin_m: float = setting(
         0.03, "m", "Margin round the robot's disc within which the floor must be seen to be free.",
