@@ -32,11 +32,6 @@ from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 Point = tuple[float, float]
-MAX_GAP_M = 0.8
-"""Between two pictures that are no further apart the robot drove straight."""
-DRIVEN_STEP_M = 0.1
-LAST_SCANS = 3
-"""The newest sights of the floor, by whose things the robot stops short when it creeps."""
 
 
 class Caution(NamedTuple):
@@ -81,7 +76,8 @@ class FloorAhead:
         """How far the robot can go towards the leg's end before it meets what the newest pictures have there."""
         way = shapely.LineString(self._way)
         around_m = self._robot.radius_m + self._settings.seen_margin_m
-        things = [shapely.Polygon(thing.footprint).buffer(around_m) for entry in self.scans[-LAST_SCANS:]
+        newest = self.scans[-self._settings.newest_scans:]
+        things = [shapely.Polygon(thing.footprint).buffer(around_m) for entry in newest
                   for thing in entry.value.things if thing.p_thing >= 0.5]
         met = shapely.intersection(way, shapely.union_all(things))
         return math.inf if met.is_empty else float(met.distance(shapely.Point(self._here.position)))
@@ -135,11 +131,12 @@ class FloorAhead:
     def _list_discs(self, view: View) -> Floats:
         """Floor that is free without being seen: under the robot, where it has driven, and where it was put down."""
         radius_m = self._robot.radius_m
+        step_m = 0.3 * radius_m  # so near to one another they leave no gap at the sides
         discs = [(self._here.x_m, self._here.y_m, radius_m + self._settings.seen_margin_m)]
         for a, b in pairwise([e.value for e in self.scans if e.value.sense == "camera"]):
             gap_m = math.dist((a.x_m, a.y_m), (b.x_m, b.y_m))
-            if DRIVEN_STEP_M < gap_m <= MAX_GAP_M:
-                parts = np.linspace(0.0, 1.0, math.ceil(gap_m / DRIVEN_STEP_M) + 1)
+            if step_m < gap_m <= self._settings.max_driven_gap_m:
+                parts = np.linspace(0.0, 1.0, math.ceil(gap_m / step_m) + 1)
                 discs += [(a.x_m + part * (b.x_m - a.x_m), a.y_m + part * (b.y_m - a.y_m), radius_m) for part in parts]
         goal = active_goal(view)
         if goal is not None and goal.id == f"{Goal.__name__}-1" and view.latest(RideReport) is None:
@@ -151,7 +148,8 @@ class FloorAhead:
         """Where the robot was put down: by the first picture, if it is still on the board, else by what was said."""
         first = view.get(f"{FreeFloor.__name__}-1")
         start = goal.origin.in_world(self._robot.world)
-        if first is None or math.dist((first.value.x_m, first.value.y_m), start.position) > MAX_GAP_M:
+        most_m = self._settings.max_driven_gap_m
+        if first is None or math.dist((first.value.x_m, first.value.y_m), start.position) > most_m:
             return start.x_m, start.y_m
         return first.value.x_m, first.value.y_m
 

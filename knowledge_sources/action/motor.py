@@ -43,9 +43,6 @@ from world_models.entries.robot import Drift
 from world_models.entries.task import Leg, Milestone, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 
-MAX_LOOK_ERROR_RAD = math.radians(6.0)
-"""The robot faces the floor that it wants to see when its heading is off by no more than this."""
-
 
 class Motor(RobotKnowledgeSource):
     """Commands the next increment of a leg, steered from the believed pose by pure pursuit.
@@ -141,7 +138,8 @@ class Motor(RobotKnowledgeSource):
         if leg.looking_rad is None:
             return None
         turn = wrap_angle(leg.looking_rad - here.heading_rad)
-        return MotorCommand(_limit_turn(turn, actuator), 0.0) if abs(turn) > MAX_LOOK_ERROR_RAD else None
+        most = self._settings.action.max_look_error_rad
+        return MotorCommand(_limit_turn(turn, actuator), 0.0) if abs(turn) > most else None
 
     def _keep_to_seen_floor(
         self, view: View, leg: Leg, belief: Entry[Hypothesis], command: MotorCommand

@@ -52,11 +52,6 @@ from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
 from world_models.entries.touch import Contact
 
-VAGUE_M = 0.05
-"""Standard deviation from which on a sight of a thing is vague: its feet are not seen, or far away."""
-MIN_COMMON_PART = 0.6
-"""A vague sight tells nothing new where so much of its directions is that of what is known."""
-
 
 @dataclass
 class _Draft:
@@ -220,7 +215,7 @@ class ObstacleFinder(RobotKnowledgeSource):
             joined = take_free(polygon, free)
         else:
             joined = _weigh_footprints(polygon, shape if own.is_empty else own, free, known.sigma_m, thing.sigma_m,
-                                       np.array([scan.value.x_m, scan.value.y_m]))
+                                       np.array([scan.value.x_m, scan.value.y_m]), s)
         footprint = list_corners(joined)
         moved = measure_change_m(known.footprint, footprint) >= s.min_footprint_change_m
         surer = certainty > known.certainty + 0.005 or _status(certainty, s) != known.status
@@ -289,17 +284,18 @@ class ObstacleFinder(RobotKnowledgeSource):
 
 def _weigh_footprints(
     known: shapely.Geometry, seen: shapely.Geometry, free: shapely.Geometry, known_sigma_m: float, sigma_m: float,
-    eye: Floats,
+    eye: Floats, settings: ActionSettings,
 ) -> shapely.Geometry:
     """The footprint by two sights: the sharper one decides.
 
     A sight of which the feet are not seen tells in which directions the thing is, and that it is nearer than the
     picture's lower border: it adds to what is known only in directions in which nothing was known.
     """
-    if known_sigma_m >= 2.0 * sigma_m + VAGUE_M:
+    if known_sigma_m >= 2.0 * sigma_m + settings.vague_sigma_m:
         return seen
-    is_vague = sigma_m >= 2.0 * known_sigma_m + VAGUE_M or min(sigma_m, known_sigma_m) >= 2.0 * VAGUE_M
-    if is_vague and _measure_common_directions(known, seen, eye) >= MIN_COMMON_PART:
+    vague_m = settings.vague_sigma_m
+    is_vague = sigma_m >= 2.0 * known_sigma_m + vague_m or min(sigma_m, known_sigma_m) >= 2.0 * vague_m
+    if is_vague and _measure_common_directions(known, seen, eye) >= settings.min_common_directions:
         return take_free(known, free)
     return join_footprints(known, seen, free)
 

@@ -55,6 +55,20 @@ class ActionSettings:
         "engineering judgement")
     creep_speed_m_per_s: float = setting(
         0.09, "m/s", "Speed into floor that was not seen to be free.", "engineering judgement")
+    max_driven_gap_m: float = setting(
+        0.8, "m", "Between two pictures that are no further apart the robot drove straight.", "engineering judgement")
+    newest_scans: int = setting(
+        3, "count", "The robot creeps only up to what the newest so many sights of the floor have in the way.",
+        "engineering judgement")
+    max_look_error_rad: float = setting(
+        math.radians(6.0), "rad", "The robot looks where the floor is to be seen when it faces there to within this.",
+        "engineering judgement")
+    vague_sigma_m: float = setting(
+        0.05, "m", "Sights of an obstacle whose standard deviations differ by this and twofold are not joined.",
+        "engineering judgement")
+    min_common_directions: float = setting(
+        0.6, "1", "A sight without feet tells nothing new where this part of its directions is that of what is known.",
+        "engineering judgement")
     min_creep_m: float = setting(
         0.05, "m", "Shortest move into floor that was not seen to be free, before what may stand there.",
         "engineering judgement")

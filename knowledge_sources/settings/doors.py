@@ -67,7 +67,7 @@ class DoorSettings:
     min_pictures: int = setting(2, "count", "Fewest pictures by which a door is shut.", _JUDGED)
     min_step_m: float = setting(0.3, "m", "Pictures of a door that count both are taken so far from each other ...",
                                 _JUDGED)
-    min_turn_rad: float = setting(0.17, "rad", "... or turned so much.", _JUDGED)
+    min_turn_rad: float = setting(0.17, "rad", "Or turned by so much.", _JUDGED)
     max_sigma_m: float = setting(
         0.1, "m", "Largest standard deviation of the robot's place when it judges a door.", _JUDGED)
     max_sigma_rad: float = setting(

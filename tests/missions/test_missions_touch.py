@@ -15,7 +15,7 @@ from harvey.run_files.records import EntryRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
-from harvey.simulation.run import resume_mission, run_mission
+from harvey.simulation.run import build_head, resume_mission, run_mission
 from harvey.why.journal import JournalHistory
 from harvey.why.on_the_way import read_turning_points
 from harvey.why.story import tell_stories
@@ -34,6 +34,10 @@ y_m = 1.0
 """
 
 
+BLIND = (("floor.use_appearance", "false"), ("floor.use_ranges", "false"))
+"""It sees and ranges nothing on the floor: it is touch that tells."""
+
+
 @pytest.fixture(scope="module")
 def stage() -> Stage:
     return build_stage(parse_scenario(OFFICE + IN_THE_WAY, "into-a-desk"))
@@ -42,7 +46,7 @@ def stage() -> Stage:
 @pytest.fixture(scope="module")
 def touched(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> tuple[MissionResult, Path]:
     out = tmp_path_factory.mktemp("touch") / "run"
-    return run_mission(stage, 1, out=out), out
+    return run_mission(stage, 1, out=out, head=build_head(stage, 1, settings=BLIND)), out
 
 
 def observed(out: Path, kind: str) -> list[EntryRecord]:

@@ -54,7 +54,7 @@ def test_a_landmark_that_is_taken_away_is_a_revision_of_its_locales_frame(
     assert revision.because == (f"{frame}.0",) and answer.revised == (revision.ref,)
     assert revision.value["locale"] == "allens-office"
     assert revision.value["changes"] == [
-        {"what": "removed", "name": DESK, "by": "what if", "footprint": []}]
+        {"what": "removed", "name": DESK, "by": "what if", "footprint": [], "height_m": 0.0}]
     observed = next(r.observed for r in read_records(other.journal) if revision in r.observed)
     assert f"{frame}.0" in [entry.ref for entry in observed]
     expects = [json.dumps(e.value) for r in read_records(other.journal) for e in r.made if e.type == "Milestone"]

@@ -185,11 +185,11 @@ def test_without_the_worlds_file_it_answers_and_says_so(
     else:
         head = json.loads((copy / "run.json").read_text(encoding="utf-8"))
         (copy / "run.json").write_text(json.dumps({**head, "world": "nowhere.toml"}), encoding="utf-8")
-    for name in ("MotorCommand-12", DOOR, "north-hall", "LocaleFrame-4"):
+    for name in ("MotorCommand-2", DOOR, "north-hall", "LocaleFrame-4"):
         assert main(["why", str(copy), name]) == 0
         out = " ".join(capsys.readouterr().out.split())
         assert "cannot be told: " in out
         assert ("run.json" if lost == "the head" else "nowhere.toml") in out
-    model = step(told(history, "MotorCommand-12.0", RunDirectory(copy)), "model")
+    model = step(told(history, "MotorCommand-2.0", RunDirectory(copy)), "model")
     assert "come from what is known of " in model.text and model.refs
-    assert "\n".join(lines_of(told(history, "MotorCommand-12.0")))
+    assert "\n".join(lines_of(told(history, "MotorCommand-2.0")))

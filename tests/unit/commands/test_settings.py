@@ -22,7 +22,7 @@ from world_models.entries.body import LAST_REQUESTS
 from world_models.entries.percepts import LAST_SEGMENTS
 
 ROWS, ROBOT_ROWS = list_rows(), list_robot_rows()
-UNITS = {"px", "m", "rad", "s", "1", "count", "1/m", "grey levels", "grey levels/px", "name", "yes/no"}
+UNITS = {"px", "m", "rad", "s", "m/s", "rad/s", "1", "count", "1/m", "grey levels", "grey levels/px", "name", "yes/no"}
 FOLDER = Path(__file__).parents[3] / "knowledge_sources"
 WORDS = {word for path in FOLDER.rglob("*.py") if path.parent.name != "settings"
          for word in re.findall(r"\w+", path.read_text(encoding="utf-8"))}
@@ -152,6 +152,20 @@ EXCEPTIONS = {
     "the size of a cache, on which no result depends": (
         "localization/visibility_map.py: MAX_MAPS", "motion/routes.py: MAX_FREE_SPACES",
         "tracking/template_tracking.py: MAX_TEMPLATES", "verification/predicted_colors.py: MAX_PACKETS",
+    ),
+    "of methods that are new: those of them that somebody may want to tune become settings": (
+        "doors/leaf.py: ALIKE_FOOT", "doors/leaf.py: FULL_FOOT", "doors/leaf.py: LEAST_UNIFORM",
+        "doors/leaf.py: MAX_COMPARED", "doors/leaf.py: WEIGHTS", "doors/opening.py: OWN_SURFACE_M",
+        "floor/appearance.py: DARK", "floor/appearance.py: ROUNDS", "floor/appearance.py: TRIM",
+        "floor/floor_grid.py: STEP_PX", "floor/lookout.py: BORDER_PX", "floor/lookout.py: HEADINGS",
+        "floor/lookout.py: MAX_FLOORS", "floor/lookout.py: MIN_DEPTH_M", "floor/model_floor.py: DEPTHS_M",
+        "floor/model_floor.py: MIN_DEPTH_M", "floor/model_floor.py: MIN_UP", "floor/model_floor.py: STEP",
+        "floor/parallax.py: COLUMNS", "floor/parallax.py: HALF", "floor/parallax.py: MIN_DEVIATION",
+        "floor/parallax.py: PLACES", "floor/see_floor.py: CUT_SIGMA_M", "floor/see_floor.py: DRIVEN_HALF_WIDTH_M",
+        "floor/see_floor.py: GREY", "floor/see_floor.py: SIGHT_PART", "floor/seen_floor.py: HIDDEN_M",
+        "floor/seen_floor.py: MIN_POINTS", "floor/seen_floor.py: SPACING_M", "floor/seen_floor.py: WINDOW_M",
+        "floor/things.py: CUT_PART", "floor/things.py: MAX_STEP", "floor/things.py: MIN_ROWS",
+        "motion/subgoals.py: MAX_ROUTES",
     ),
     "a drawing, or a place-holder": (
         "calibration/chessboard.py: _UNKNOWN_PX", "calibration/picture.py: CORNER", "calibration/picture.py: GRID",

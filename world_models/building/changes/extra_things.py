@@ -6,8 +6,6 @@ import zlib
 from typing import Any
 
 import numpy as np
-import shapely
-from shapely.geometry.polygon import orient
 
 from world_models.building.geometry.faces import Face, build_barrier
 from world_models.building.geometry.regions import UNKNOWN
@@ -43,6 +41,9 @@ def build_extra_faces(name: str, locale: str, footprint: Any, floor_m: float, he
 
     What it is nobody knows, so nothing of it is expected to be seen, and no colour is claimed; it hides what is behind.
     """
+    import shapely  # slow to import, and what reads a journal needs none of it
+    from shapely.geometry.polygon import orient
+
     hull = shapely.convex_hull(shapely.multipoints(np.asarray(footprint, float).reshape(-1, 2)))
     if not isinstance(hull, shapely.Polygon) or hull.area < MIN_AREA_M2 or height_m <= 0.0:
         return ()
