@@ -62,13 +62,6 @@ class FloorSettings:
     p_seen_once: float = setting(
         0.7, "1", "Probability that what does not look like the floor stands on it, before parallax tells.",
         "engineering judgement")
-    min_clear_rows: int = setting(
-        10, "count", "A region of at least so many rows, of half the picture's, is large.", "engineering judgement")
-    min_clear_columns: int = setting(
-        5, "count", "And it has at least so many columns: a sliver at the picture's border may be a part of the model.",
-        "engineering judgement")
-    p_seen_large: float = setting(
-        0.92, "1", "The same probability of a large region.", "engineering judgement")
 
     # Parallax
     min_parallax_px: float = setting(

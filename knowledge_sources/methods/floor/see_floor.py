@@ -206,10 +206,7 @@ def _build_thing(
     height_m, sigma_height_m = measure_height(region, grid)
     if height_m < settings.max_rolled_over_m and math.isfinite(sigma_height_m):
         return None
-    rows, columns = (np.count_nonzero(region.mask.any(axis=axis)) for axis in (1, 0))
-    is_large = rows >= settings.min_clear_rows and columns >= settings.min_clear_columns
-    p_once = settings.p_seen_large if is_large else settings.p_seen_once
-    odds = p_once / (1.0 - p_once)
+    odds = settings.p_seen_once / (1.0 - settings.p_seen_once)
     how = "it does not look like the floor"
     if settings.use_parallax and earlier:
         then = earlier[0]

@@ -152,7 +152,7 @@ def test_a_finished_run_says_so(whole: RunDirectory, capsys: pytest.CaptureFixtu
 def test_a_simulator_that_answers_otherwise_is_found_out(
     whole: RunDirectory, short_stage: Stage, tmp_path: Path
 ) -> None:
-    run = cut(whole, tmp_path / "run", 25)  # 5 of them ask for locale frames
+    run = cut(whole, tmp_path / "run", 40)  # 5 of them ask for locale frames
     head = json.loads((run.path / "run.json").read_text())
     (run.path / "run.json").write_text(json.dumps({**head, "seed": SEED + 1}))
     assert main(["resume", str(run.path)]) == 2
