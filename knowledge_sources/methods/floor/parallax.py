@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +22,6 @@ PLACES = (0.5, 0.75, 1.0, 1.25)
 further back than its foot, and the foot of what is cut off is nearer than it is taken to be."""
 MIN_DEVIATION = 4.0
 """A patch with less contrast than this [grey levels] tells nothing."""
-
-Project = Callable[[Floats], Floats]
 
 
 def compute_parallax_odds(

@@ -125,7 +125,6 @@ def find_unlike(
     """
     looks = compute_looks(cv2.GaussianBlur(np.asarray(picture), (3, 3), 0.6).astype(np.float32))
     unlike, tells = np.zeros(model.kinds.shape, bool), np.zeros(model.kinds.shape, bool)
-    most = 9.0 if not settings.max_unlike else settings.max_unlike**2
     exposure: float | None = None
     kinds, counts = np.unique(model.kinds[model.is_plain], return_counts=True)
     for kind in kinds[np.argsort(-counts, kind="stable")]:
@@ -146,7 +145,7 @@ def find_unlike(
         mean, covariance = fitted if fitted is not None else (expected, 4.0 * default_covariance(settings))
         if exposure is None:
             exposure = float(mean[0] - by_model[0])
-        unlike[here] = measure_unlike(looks[here], mean, covariance) > most
+        unlike[here] = measure_unlike(looks[here], mean, covariance) > settings.max_unlike**2
         tells |= here
     return unlike, tells
 
