@@ -28,6 +28,8 @@ MAX_COVERED = 0.6
 """A space of which others, no larger, cover more than this part is no room: a zone, or described twice."""
 MAX_SKEW_RAD = math.radians(8.0)
 """Sides within this angle of an axis are made parallel to it."""
+MIN_TURN_RAD = math.radians(0.2)
+"""A building turned by less is left as it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,19 +52,23 @@ def clean_outline(points: Floats) -> Floats | None:
     return extract_outline(polygon if polygon.is_valid else shapely.make_valid(polygon))
 
 
-def extract_outline(shape: shapely.Geometry) -> Floats | None:
-    """The outline (k, 2) of the largest polygon of a shape, simplified; None where it has none."""
+def extract_outline(shape: shapely.Geometry, is_simplified: bool = False) -> Floats | None:
+    """The outline (k, 2) of the largest polygon of a shape, simplified; None where it has none.
+
+    ``is_simplified``: it was made of simplified outlines. The coarse tolerance would close the thin wall between them.
+    """
     polygons = [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon" and p.area > MIN_AREA_M2]
     if not polygons:
         return None
     best = cut_holes_open(max(polygons, key=lambda p: p.area))
-    for tolerance_m in (FINE_TOLERANCE_M, COARSE_TOLERANCE_M):
+    for tolerance_m in (FINE_TOLERANCE_M,) if is_simplified else (FINE_TOLERANCE_M, COARSE_TOLERANCE_M):
         ring = shapely.Polygon(best.exterior).simplify(tolerance_m)
         outline = np.round(shapely.get_coordinates(shapely.orient_polygons(ring).exterior)[:-1], 4)
-        outline = _remove_short_sides(outline)
+        outline = next((o for o in (_remove_short_sides(outline), _remove_short_sides(outline, False))
+                        if len(o) >= 3 and is_simple(o)), outline[:0])
         if len(outline) <= MAX_CORNERS:
             break
-    return outline if len(outline) >= 3 and is_simple(outline) else None
+    return outline if len(outline) >= 3 else None
 
 
 def cut_holes_open(polygon: shapely.Polygon) -> shapely.Polygon:
@@ -81,18 +87,33 @@ def cut_holes_open(polygon: shapely.Polygon) -> shapely.Polygon:
     return polygon
 
 
-def _remove_short_sides(outline: Floats) -> Floats:
+def _remove_short_sides(outline: Floats, with_steps: bool = True) -> Floats:
     while len(outline) > 3:
         lengths = np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1)
         at = int(np.argmin(lengths))
         straight = _corner_heights(outline) < 1e-3
         if lengths[at] < MIN_SIDE_M:
-            outline = np.delete(outline, (at + 1) % len(outline), axis=0)
+            outline = _remove_side(outline, at, with_steps)
         elif straight.any():
             outline = np.delete(outline, int(np.argmax(straight)), axis=0)
         else:
             break
     return outline
+
+
+def _remove_side(outline: Floats, at: int, with_steps: bool) -> Floats:
+    """The outline without a short side: of a step, the shorter side beside it moves onto the line of the longer."""
+    before, start, end, after = (outline[(at + k) % len(outline)] for k in (-1, 0, 1, 2))
+    one, other = start - before, after - end
+    are_along = float(one @ other) > 0.99 * float(np.linalg.norm(one) * np.linalg.norm(other))
+    if not (with_steps and are_along and len(outline) > 5):
+        return np.asarray(np.delete(outline, (at + 1) % len(outline), axis=0))
+    moved = outline.copy()
+    if float(one @ one) >= float(other @ other):
+        moved[(at + 2) % len(outline)] = after + (start - end)
+    else:
+        moved[at - 1] = before + (end - start)
+    return np.asarray(np.delete(moved, [at, (at + 1) % len(outline)], axis=0))
 
 
 def _corner_heights(outline: Floats) -> Floats:
@@ -121,7 +142,7 @@ def separate_outlines(outlines: Mapping[str, Floats]) -> tuple[dict[str, Floats]
             smaller = other.area < shape.area or shared < 0.05
             rest = rest.difference(other.buffer(THIN_WALL_M / 2, join_style="mitre")) if smaller else rest.difference(
                 other.buffer(-0.3, join_style="mitre"))
-        outline = extract_outline(rest) if near else outlines[name]
+        outline = extract_outline(rest, is_simplified=True) if near else outlines[name]
         if near:
             changed.append(name)
         if outline is not None:
@@ -164,6 +185,20 @@ def _find_runs(level: NDArray[np.bool_]) -> list[list[int]]:
                 run.append((run[-1] + 1) % count)
             runs.append(run)
     return runs
+
+
+def find_turn(sides: Floats) -> float:
+    """The angle [rad], within 45 degrees, between most of these sides (n, 2) and the axes; 0 where none prevails."""
+    quarter = math.pi / 2
+    length, angle = np.linalg.norm(sides, axis=1), np.mod(np.arctan2(sides[:, 1], sides[:, 0]), quarter)
+    away = np.abs(np.mod(angle[:, None] - angle + quarter / 2, quarter) - quarter / 2) < math.radians(1.0)
+    best = int(np.argmax(away @ length))
+    if length[away[best]].sum() < 0.25 * length.sum():
+        return 0.0
+    off = np.mod(angle[away[best]] - angle[best] + quarter / 2, quarter) - quarter / 2
+    turn = float(np.average(off, weights=length[away[best]]) + angle[best])
+    turn = (turn + quarter / 2) % quarter - quarter / 2
+    return turn if abs(turn) > MIN_TURN_RAD else 0.0
 
 
 def find_facing_stretches(a: str, outline_a: Floats, b: str, outline_b: Floats, min_gap_m: float = 1e-3,

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 import shapely
 
-from world_models.files.importers.polygons import Floats, side_of
+from world_models.files.importers.polygons import Floats, find_turn, side_of
 
 MAX_ORIGIN_DISTANCE_M = 1000.0
 """A building further from the file's zero is moved near it."""
-MIN_TURN_RAD = math.radians(0.2)
 LEVEL_TOLERANCE_M = 0.05
 MIN_DOOR_WIDTH_M = 0.3
 
@@ -74,21 +73,7 @@ def find_plan_origin(bodies: Iterable[Body]) -> PlanOrigin:
     outlines = [floor[0].exterior for world, triangles in worlds
                 if (floor := find_floor(world - [*zero, 0.0], triangles)) is not None]
     sides = [np.diff(shapely.get_coordinates(outline), axis=0) for outline in outlines]
-    return PlanOrigin(zero, _find_turn(np.concatenate(sides)) if sides else 0.0)
-
-
-def _find_turn(sides: Floats) -> float:
-    """The angle [rad], within 45 degrees, between most of these sides (n, 2) and the axes; 0 where none prevails."""
-    quarter = math.pi / 2
-    length, angle = np.linalg.norm(sides, axis=1), np.mod(np.arctan2(sides[:, 1], sides[:, 0]), quarter)
-    away = np.abs(np.mod(angle[:, None] - angle + quarter / 2, quarter) - quarter / 2) < math.radians(1.0)
-    best = int(np.argmax(away @ length))
-    if length[away[best]].sum() < 0.25 * length.sum():
-        return 0.0
-    off = np.mod(angle[away[best]] - angle[best] + quarter / 2, quarter) - quarter / 2
-    turn = float(np.average(off, weights=length[away[best]]) + angle[best])
-    turn = (turn + quarter / 2) % quarter - quarter / 2
-    return turn if abs(turn) > MIN_TURN_RAD else 0.0
+    return PlanOrigin(zero, find_turn(np.concatenate(sides)) if sides else 0.0)
 
 
 def find_floor(world: Floats, triangles: Any) -> tuple[shapely.Polygon, bool, bool] | None:

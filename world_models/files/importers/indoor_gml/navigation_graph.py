@@ -10,10 +10,12 @@ from itertools import combinations, pairwise
 import networkx as nx
 import numpy as np
 
+from world_models.files.importers.indoor_gml.gml import elements, identifier, positions, references, texts
 from world_models.files.importers.polygons import Floats
 
-GML = "{http://www.opengis.net/gml/3.2}"
-HREF = "{http://www.w3.org/1999/xlink}href"
+STATES, TRANSITIONS = ("State", "Node"), ("Transition", "Edge")
+"""Their names in IndoorGML 1 and 2."""
+LAYERS = ("SpaceLayer", "spaceLayer", "DualSpaceLayer")
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +23,8 @@ class Layer:
     """One space layer.
 
     Attributes:
-        graph: a node for each state with ``at`` (3,), in the file's units, and ``text``; edges carry ``text``.
+        graph: a node for each state with ``at`` (3,), in the file's units, and ``text``; edges carry ``text`` and
+            ``name``, the id.
         cell_of: the cell that a state is dual to, where it is to one.
     """
 
@@ -30,57 +33,30 @@ class Layer:
     cell_of: dict[str, str] = field(default_factory=dict)
 
 
-def read_layers(root: ET.Element) -> list[Layer]:
-    """All layers, in the order of the file."""
-    return [_read_layer(element) for element in elements(root, "SpaceLayer")]
+def read_layers(root: ET.Element, origin: Floats) -> list[Layer]:
+    """All layers, in the order of the file; places are less ``origin`` (3,)."""
+    found = [layer for layer in elements(root, *LAYERS) if len(elements(layer, *LAYERS)) == 1]
+    if not found and elements(root, *STATES):
+        found = [root]
+    return [_read_layer(element, origin) for element in found]
 
 
-def _read_layer(element: ET.Element) -> Layer:
+def _read_layer(element: ET.Element, origin: Floats) -> Layer:
+    """A transition joins states; some writers name the cells instead."""
     graph: nx.Graph = nx.Graph()
     cells: dict[str, str] = {}
-    for state in elements(element, "State"):
-        name, points = state.get(f"{GML}id", ""), positions(state)
+    for state in elements(element, *STATES):
+        name, points = identifier(state), positions(state, origin)
         if name and len(points):
             graph.add_node(name, at=points[0], text=" ".join(texts(state, "name", "description")))
             cells.update((name, cell) for cell in references(state, "duality")[:1])
-    for transition in elements(element, "Transition"):
-        ends = references(transition, "connects")
+    state_of = {cell: state for state, cell in cells.items()}
+    for transition in elements(element, *TRANSITIONS):
+        ends = [end if end in graph else state_of.get(end, end) for end in references(transition, "connects")]
         if len(ends) == 2 and ends[0] != ends[1] and all(end in graph for end in ends):
-            graph.add_edge(*ends, text=" ".join(texts(transition, "name", "description")))
-    return Layer(element.get(f"{GML}id", "") or "layer", graph, cells)
-
-
-def elements(root: ET.Element, name: str) -> list[ET.Element]:
-    """All elements with this name below one, whatever their namespace."""
-    return [e for e in root.iter() if isinstance(e.tag, str) and e.tag.rpartition("}")[2] == name]
-
-
-def references(element: ET.Element, name: str) -> list[str]:
-    """Ids that the elements with this name refer to; a reversed boundary counts as that boundary."""
-    found = [e.get(HREF, "").removeprefix("#").removesuffix("-REVERSE") for e in elements(element, name)]
-    return [text for text in found if text]
-
-
-def texts(element: ET.Element, *names: str) -> list[str]:
-    """Texts of an element's GML children with these names."""
-    return [text.strip() for name in names if (text := element.findtext(f"{GML}{name}"))]
-
-
-def positions(element: ET.Element) -> Floats:
-    """(n, 3) the points of an element; z is 0 where it lacks; empty where they are not numbers."""
-    rows: list[list[float]] = []
-    try:
-        for child in element.iter():
-            kind = child.tag.rpartition("}")[2] if isinstance(child.tag, str) else ""
-            if kind == "pos":
-                rows.append(([float(word) for word in (child.text or "").split()] + [0.0, 0.0, 0.0])[:3])
-            elif kind == "posList":
-                flat = [float(word) for word in (child.text or "").split()]
-                rows += [flat[i : i + 3] for i in range(0, len(flat) - 2, 3)]
-    except ValueError:
-        return np.zeros((0, 3))
-    points = np.array(rows, float).reshape(-1, 3)
-    return points if np.isfinite(points).all() and np.abs(points).max(initial=0.0) < 1e6 else np.zeros((0, 3))
+            name, text = identifier(transition), " ".join(texts(transition, "name", "description"))
+            graph.add_edge(*ends, text=text, name=name.removesuffix("-REVERSE"))
+    return Layer(identifier(element) or "layer", graph, cells)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -23,22 +25,41 @@ from world_models.files.importers.building_plan import (
     WallOpening,
     slug,
 )
-from world_models.files.importers.indoor_gml.navigation_graph import (
-    GML,
-    Layer,
-    NavigationGraph,
-    elements,
-    positions,
-    read_layers,
-    texts,
+from world_models.files.importers.indoor_gml.cells import (
+    CELLS,
+    Boundary,
+    Cell,
+    find_origin,
+    find_outline,
+    read_boundaries,
+    read_cells,
 )
+from world_models.files.importers.indoor_gml.gml import elements
+from world_models.files.importers.indoor_gml.navigation_graph import Layer, NavigationGraph, read_layers
 from world_models.files.importers.indoor_gml.xml_reader import read_xml
-from world_models.files.importers.polygons import Floats, clean_outline, find_facing_stretches, side_of, square_outline
+from world_models.files.importers.openings import MIN_DOOR_M
+from world_models.files.importers.polygons import (
+    Floats,
+    find_facing_stretches,
+    find_turn,
+    side_of,
+    square_outline,
+)
 
 STOREY_M = 3.5
 CEILING_M = 2.8
 DOOR_M = (1.2, 2.1)
 """Width and height of a door where the file does not give its size."""
+USUAL_DOOR_M = 0.9
+"""Width of most doors, by which a file whose unit is not the metre is scaled."""
+MAX_CEILING_M = 8.0
+"""Where the middle one of all ceilings is higher, the unit is not the metre."""
+MIN_STOREY_M = 1.2
+"""Floors whose heights differ by less are one storey, with steps."""
+MAX_STEP_M = 0.3
+TOUCHING_M = 0.01
+MAX_DOORWAY_M = 1.6
+"""Rooms that touch along more are not parted by a wall; along less they are joined by a doorway of that width."""
 MAX_ROOM_DISTANCE_M = 1.5
 """A node further from every room is between rooms."""
 MAX_NODE_DISTANCE_M = 8.0
@@ -48,113 +69,138 @@ MAX_NEIGHBOURS = 8
 """Neighbours of a node between rooms that are joined directly when it is removed."""
 
 Place = tuple[str, Floats]
-"""A room and a point (3,) in it, in the file's units."""
+"""A room and a point (3,) in it [m]."""
 
 
 def read_indoor_gml(path: Path) -> tuple[BuildingPlan, NavigationGraph | None]:
     """The building plan of an IndoorGML file, and its navigation graph, if any. Raises BuildingError."""
     root = read_xml(path)
-    cells = [cell for element in elements(root, "CellSpace") if (cell := _read_cell(element)) is not None]
+    origin = find_origin(root)
+    cells = read_cells(root, origin)
     if not cells or len(cells) > MAX_CELLS:
         raise BuildingError(f"{path.name}: expected an IndoorGML file with 1 to {MAX_CELLS} cells that have a floor, "
                             f"got {len(cells)}")
-    return _Reader(path, root, cells).read()
-
-
-@dataclass(frozen=True, eq=False)
-class _Cell:
-    """A cell of the file: outline (k, 2) of its floor, z from ``low`` to ``high``, in the file's units; its texts."""
-
-    id: str
-    label: str
-    storey: str
-    is_door: bool
-    outline: Floats
-    low: float
-    high: float
-
-
-def _read_cell(element: ET.Element) -> _Cell | None:
-    """None for one that has no level face with an area."""
-    faces = [p for ring in elements(element, "LinearRing") if len(p := positions(ring)) > 3]
-    level = [p for p in faces if np.ptp(p[:, 2]) < 1e-3]
-    if not level:
-        return None
-    floor = min(level, key=lambda p: float(p[0, 2]))
-    outline = clean_outline(floor[:, :2])
-    if outline is None:
-        return None
-    names, description = texts(element, "name"), " ".join(texts(element, "description"))
-    storey = re.search(r'storey\s*=\s*"?([\w.-]+)', description)
-    label = names[0] if names else element.get(f"{GML}id", "")
-    key = element.get(f"{GML}id", "")
-    tall = np.concatenate(faces)[:, 2]
-    kind = element.tag.rpartition("}")[2]
-    is_door = slug(key).startswith("door") or slug(label).startswith("door") or kind in ("ConnectionSpace", "Door")
-    return _Cell(key, label, storey.group(1) if storey else "", is_door, outline, float(floor[0, 2]), float(tall.max()))
+    return _Reader(path, root, origin, cells).read()
 
 
 @dataclass
 class _Reader:
     path: Path
     root: ET.Element
-    cells: list[_Cell]
+    origin: Floats
+    cells: list[Cell]
     plan: BuildingPlan = field(init=False)
     rooms: dict[str, str] = field(default_factory=dict)
     floors: dict[float, str] = field(default_factory=dict)
+    """Storeys by the height of their lowest floor [m]."""
     shapes: dict[str, shapely.Geometry] = field(default_factory=dict)
+    boundaries: list[Boundary] = field(default_factory=list)
     is_index: bool = False
+    scale: float = 1.0
+    turn_rad: float = 0.0
 
     def read(self) -> tuple[BuildingPlan, NavigationGraph | None]:
         title = slug(self.path.stem) or "building"
         self.plan, names = BuildingPlan(title, self.path.name), Names(title)
+        self.boundaries = read_boundaries(self.root, self.origin)
+        self._find_units()
         self._read_storeys(names)
         self._read_spaces(names)
-        layers = read_layers(self.root)
+        if not self.plan.spaces:
+            raise BuildingError(f"{self.path.name}: expected cells that are rooms, got only doors and walls")
+        layers = [self._place_layer(layer) for layer in read_layers(self.root, self.origin)]
         self._read_doors([layer for layer in layers if layer.cell_of])
         network = self._build_navigation_graph(layers)
         self._read_crossings(layers)
         self._write_report(layers, network)
         return self.plan, network
 
+    # -- units and axes ----------------------------------------------------------------------------------------------
+
+    def _find_units(self) -> None:
+        """What one unit of the file is in metres, whether z counts floors, and how the building is turned."""
+        levels = {round(cell.low, 3) for cell in self.cells}
+        tall = [cell.high - cell.low for cell in self.cells]
+        self.is_index = all(level.is_integer() for level in levels) and max(tall) <= 1.01
+        guessed = self.plan.report.guessed
+        if self.is_index:
+            guessed.append(f"z counts floors; each is taken to be {STOREY_M} m high, a ceiling {CEILING_M} m; x and y "
+                           "are taken to be metres")
+        elif float(np.median(tall)) > MAX_CEILING_M:
+            widths = [float(np.linalg.norm(b.ends[1] - b.ends[0])) for b in self.boundaries]
+            widths = [width for width in widths if width > 0.0]
+            self.scale = USUAL_DOOR_M / float(np.median(widths)) if widths else STOREY_M / float(np.median(tall))
+            by = f"doors are {USUAL_DOOR_M} m wide" if widths else f"storeys are {STOREY_M} m high"
+            guessed.append(f"ceilings are {np.median(tall):g} units high, so the unit is not the metre; a unit is "
+                           f"taken to be {self.scale:.3f} m, so that most {by}")
+        if self.origin.any():
+            guessed.append(f"projected coordinates: the plan's origin is ({self.origin[0]:.0f}, {self.origin[1]:.0f})")
+        rings = [shapely.get_coordinates(part.exterior) for cell in self.cells
+                 for part in shapely.get_parts(cell.floor) if part.geom_type == "Polygon"]
+        self.turn_rad = find_turn(np.concatenate([np.diff(ring, axis=0) for ring in rings])) if rings else 0.0
+        if self.turn_rad:
+            guessed.append(f"the plan is turned by {math.degrees(-self.turn_rad):.1f} degrees, so that most walls run "
+                           "along x and y")
+
+    def _place(self, points: Floats) -> Floats:
+        """Points (..., 2 or 3) of the file in the plan's frame [m]."""
+        c, s = math.cos(self.turn_rad), math.sin(self.turn_rad)
+        flat = self.scale * points[..., :2] @ np.array([[c, -s], [s, c]])
+        return np.concatenate([flat, self._height_m(points[..., 2:])], axis=-1)
+
+    def _height_m(self, z: Any) -> Any:
+        return z * (STOREY_M if self.is_index else self.scale)
+
+    def _place_layer(self, layer: Layer) -> Layer:
+        for _, data in layer.graph.nodes(data=True):
+            data["at"] = self._place(data["at"])
+        return layer
+
     # -- floors and rooms --------------------------------------------------------------------------------------------
 
     def _read_storeys(self, names: Names) -> None:
-        levels = sorted({round(cell.low, 3) for cell in self.cells})
-        whole = all(float(level).is_integer() for level in levels)
-        self.is_index = whole and all(cell.high - cell.low <= 1.01 for cell in self.cells)
-        for level in levels:
-            given = [c.storey for c in self.cells if round(c.low, 3) == level and c.storey]
-            name = names.new(max(sorted(set(given)), key=given.count) if given else f"floor {level:g}", "floor")
-            self.floors[level] = name
-            self.plan.storeys.append(Storey(name, level * STOREY_M if self.is_index else level))
-        if self.is_index:
-            self.plan.report.guessed.append(f"z counts floors; each is taken to be {STOREY_M} m high, a ceiling "
-                                             f"{CEILING_M} m; x and y are taken to be metres")
+        """Floors less than MIN_STOREY_M apart are one storey; the name is the one that most of its cells give."""
+        groups: list[list[Cell]] = []
+        for cell in sorted(self.cells, key=lambda cell: cell.low):
+            if groups and self._height_m(cell.low - groups[-1][0].low) < MIN_STOREY_M:
+                groups[-1].append(cell)
+            else:
+                groups.append([cell])
+        for group in groups:
+            given = [cell.storey for cell in group if cell.storey]
+            name = names.new(max(sorted(set(given)), key=given.count) if given else f"floor {group[0].low:g}", "floor")
+            low_m = float(self._height_m(group[0].low))
+            self.floors[low_m] = name
+            self.plan.storeys.append(Storey(name, low_m))
 
     def _read_spaces(self, names: Names) -> None:
         moved = 0.0
         for cell in self.cells:
-            if cell.is_door:
+            if cell.is_door or cell.is_solid:
                 continue
-            outline = square_outline(cell.outline)
-            before, after = shapely.Polygon(cell.outline), shapely.Polygon(outline)
-            moved = max(moved, float(shapely.hausdorff_distance(after, before)))
+            outline = find_outline(cell.floor, self.scale, self.turn_rad)
+            if outline is None:
+                self.plan.report.left_out.append(f"cell {cell.id}: its floor has no simple border")
+                continue
+            before = shapely.Polygon(outline)
+            outline = square_outline(outline)
+            moved = max(moved, float(shapely.hausdorff_distance(shapely.Polygon(outline), before)))
             title = cell.id if slug(cell.id) == slug(cell.label) or not cell.label.isascii() else (
                 f"{cell.id} {cell.label}")
             name = names.new(title, "room")
             self.rooms[cell.id] = name
-            level = round(cell.low, 3)
-            low = level * STOREY_M if self.is_index else level
-            high = CEILING_M if self.is_index or cell.high - cell.low < 1.5 else cell.high - cell.low
-            kind = re.sub(r"\d+", "", slug(cell.id)) or "room"
-            self.plan.spaces.append(Space(name, kind, cell.label, self.floors[level], outline, low, round(high, 3)))
+            low_m, tall_m = float(self._height_m(cell.low)), float(self._height_m(cell.high - cell.low))
+            high_m = CEILING_M if self.is_index or not tall_m >= 1.5 else min(tall_m, MAX_CEILING_M)
+            kind = cell.kind if cell.kind not in CELLS else re.sub(r"\d+", "", slug(cell.id)) or "room"
+            self.plan.spaces.append(Space(name, slug(kind) or "room", cell.label, self._find_floor(low_m), outline,
+                                          low_m, round(high_m, 3)))
             self.shapes[name] = shapely.Polygon(outline)
         self.plan.report.guessed.append("walls within 8 degrees of the axes are made straight: corners moved by up "
                                          f"to {moved:.2f} m")
 
-    def _find_floor(self, z: float) -> str:
-        return self.floors[min(self.floors, key=lambda level: (abs(level - z), level))]
+    def _find_floor(self, z_m: float) -> str:
+        """The storey of a height: the highest whose floor is not above it by more than a step."""
+        return self.floors[max((low for low in self.floors if low <= z_m + MAX_STEP_M), default=min(self.floors))]
 
     def _find_room(self, at: Floats, near_m: float) -> str | None:
         """The room that a place (3,) is in, or else the nearest one on its floor."""
@@ -167,22 +213,58 @@ class _Reader:
     # -- doors -------------------------------------------------------------------------------------------------------
 
     def _read_doors(self, layers: list[Layer]) -> None:
-        """Cells that are doors, between the rooms that the graph joins them to; and rooms joined directly."""
+        """Doors: cells that are one, boundaries that a way passes, and short stretches where joined rooms touch."""
         joined: nx.Graph = nx.Graph()
+        cells_of: dict[str, tuple[str, str]] = {}
         for layer in layers:
-            for a, b in layer.graph.edges:
+            for a, b, way in layer.graph.edges(data="name"):
                 if a in layer.cell_of and b in layer.cell_of:
                     joined.add_edge(layer.cell_of[a], layer.cell_of[b])
+                    cells_of[way] = layer.cell_of[a], layer.cell_of[b]
         for cell in (cell for cell in self.cells if cell.is_door):
-            low, high = cell.outline.min(axis=0), cell.outline.max(axis=0)
             rooms = [self.rooms[c] for c in joined.adj.get(cell.id, ()) if c in self.rooms]
-            self._add_opening(cell.id, self.floors[round(cell.low, 3)], (low + high) / 2, float((high - low).max()),
-                      tuple(rooms) if len(rooms) == 2 else ())
+            self._add_door_cell(cell, tuple(rooms) if len(rooms) == 2 else ())
+        with_door = self._read_door_boundaries(cells_of)
         for a, b in joined.edges:
-            if a in self.rooms and b in self.rooms:
-                one, other = self.rooms[a], self.rooms[b]
-                if self.plan.space(one).storey == self.plan.space(other).storey:
-                    self.plan.without_wall.add(frozenset((one, other)))
+            if a in self.rooms and b in self.rooms and frozenset((a, b)) not in with_door:
+                self._join(self.rooms[a], self.rooms[b])
+
+    def _add_door_cell(self, cell: Cell, rooms: tuple[str, ...]) -> None:
+        corners = self._place(np.column_stack([shapely.get_coordinates(cell.floor), np.zeros(
+            shapely.count_coordinates(cell.floor))]))[:, :2]
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        storey = self._find_floor(float(self._height_m(cell.low)))
+        self._add_opening(cell.id, storey, (low + high) / 2, float((high - low).max()), rooms)
+
+    def _read_door_boundaries(self, cells_of: dict[str, tuple[str, str]]) -> set[frozenset[str]]:
+        """The doors that boundaries dual to a transition are; and the pairs of cells that they join."""
+        found = set()
+        for boundary in self.boundaries:
+            pair = cells_of.get(boundary.way, ("", ""))
+            ends = self._place(np.column_stack([boundary.ends, [boundary.low] * 2]))
+            width_m = float(np.linalg.norm(ends[1, :2] - ends[0, :2]))
+            if frozenset(pair) in found or not all(cell in self.rooms for cell in pair) or width_m > 2 * MAX_DOORWAY_M:
+                continue
+            one, other = (self.plan.space(self.rooms[cell]) for cell in pair)
+            if one.storey == other.storey:
+                found.add(frozenset(pair))
+                self._add_opening(f"{one.name}-to-{other.name}", one.storey, ends[:, :2].mean(axis=0),
+                                  max(width_m, MIN_DOOR_M), (one.name, other.name))
+        return found
+
+    def _join(self, one: str, other: str) -> None:
+        """Two rooms that a way joins, with no door of the file between them."""
+        storey = self.plan.space(one).storey
+        if storey != self.plan.space(other).storey:
+            return
+        shared = self.shapes[one].boundary.intersection(self.shapes[other].buffer(TOUCHING_M, join_style="mitre"))
+        pieces = [piece for piece in shapely.get_parts(shapely.line_merge(shared)) if piece.length > 0.3]
+        widest = max(pieces, key=lambda piece: piece.length, default=None)
+        if widest is None or widest.length > MAX_DOORWAY_M:
+            self.plan.without_wall.add(frozenset((one, other)))
+            return
+        middle = shapely.get_coordinates(widest.interpolate(0.5, normalized=True))[0]
+        self._add_opening(f"{one}-to-{other}", storey, middle, widest.length, (one, other))
 
     def _add_opening(self, name: str, storey: str, centre: Floats, width: float, rooms: tuple[str, ...]) -> None:
         self.plan.openings.append(WallOpening(slug(name) or "door", storey, centre, width, DOOR_M[1], rooms))
@@ -226,7 +308,8 @@ class _Reader:
             report.left_out.append(f"a way of the graph from {one.name} to {other.name}, which share no wall")
 
     def _link_kind(self, text: str, *rooms: str) -> str:
-        words = f"{text} {' '.join(f'{room} {self.plan.space(room).label}' for room in rooms)}".lower()
+        spaces = [self.plan.space(room) for room in rooms]
+        words = f"{text} {' '.join(f'{s.name} {s.label} {s.kind}' for s in spaces)}".lower()
         return "elevator" if re.search(r"elev|lift", words) and "stair" not in text.lower() else "stairs"
 
     # -- the network -------------------------------------------------------------------------------------------------
@@ -240,9 +323,8 @@ class _Reader:
         for node, data in best.graph.nodes(data=True):
             room = self.rooms.get(best.cell_of.get(node, "")) or self._find_room(data["at"], MAX_ROOM_DISTANCE_M)
             graph.add_node(node, floor=self._find_floor(float(data["at"][2])), room=room)
-        tall = STOREY_M if self.is_index else 1.0
         for a, b in best.graph.edges:
-            start, end = (best.graph.nodes[n]["at"] * (1.0, 1.0, tall) for n in (a, b))
+            start, end = (best.graph.nodes[n]["at"] for n in (a, b))
             level = graph.nodes[a]["floor"] == graph.nodes[b]["floor"]
             text = " ".join(best.graph.nodes[n]["text"] + " " + str(graph.nodes[n]["room"]) for n in (a, b))
             kind = "floor" if level else "elevator" if re.search("elev|lift", text.lower()) else "stairs"
@@ -267,7 +349,7 @@ class _Reader:
         plan, report = self.plan, self.plan.report
         doors = len([cell for cell in self.cells if cell.is_door])
         report.used.append(f"IndoorGML: {len(plan.storeys)} floors, {len(self.cells)} of "
-                            f"{len(elements(self.root, 'CellSpace'))} cells, {doors} of them doors, layers "
+                            f"{len(elements(self.root, *CELLS))} cells, {doors} of them doors, layers "
                             f"{', '.join(layer.name for layer in layers)}")
         report.guessed.append("all doors between rooms stand open; colours are ours")
         landmarks = [layer.name for layer in layers if network is None or layer.name != network.layer]
