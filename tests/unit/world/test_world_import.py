@@ -102,6 +102,19 @@ def test_the_university_is_a_world_without_faults(university: Building) -> None:
     assert [round(world.locale(f).properties["elevation_m"], 2) for f in ("f2", "f3", "f4")] == [0.0, 3.5, 7.0]
 
 
+@pytest.mark.parametrize(("name", "rooms", "open_doors"), [
+    ("FJK-Haus_IndoorGML_withEXR-corrected_1_0_3", 14, 12), ("201-2019-05-24-corrected", 80, 79),
+    ("KU-EngBuilding-IndoorGML-2019-02-12_with_NRG", 7, 6)])
+def test_indoor_gml_by_others_is_a_world_without_faults(name: str, rooms: int, open_doors: int, tmp_path: Path) -> None:
+    if not (DATA / f"{name}.gml").is_file():
+        pytest.skip(f"needs {name}.gml")
+    path = tmp_path / "building.toml"
+    path.write_text(import_building(DATA / f"{name}.gml").text, encoding="utf-8")
+    world = load_world(path)
+    assert check_world(world) == []
+    assert (len(world.rooms), len(world.doorways)) == (rooms, open_doors)
+
+
 @no_gml
 def test_the_university_plans_between_any_two_rooms_of_different_floors(university: Building) -> None:
     made, world = university
