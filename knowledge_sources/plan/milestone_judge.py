@@ -81,7 +81,7 @@ class MilestoneJudge(RobotKnowledgeSource):
     The evidence are lines and the colours of faces
     (:class:`knowledge_sources.methods.verification.pose_evidence.PoseEvidence`), weighted as fitted on rendered floors.
     The largest deviation is what the wheels can do since the belief was sure; where the belief is in doubt, it is the
-    matcher's window (§6.1.4).
+    matcher's window (§6.1.4). Before the first milestone it is what the mission says of how the robot is put down.
     """
 
     level = Level.PLAN
@@ -102,7 +102,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         yield Revise(milestone, replace(milestone.value, status=verdict.kind), (certificate,))
         if self._may_look_again(verdict, milestone.value):
             return
-        most_px = self._settings.plan.max_deviation_px
+        most_px = max(self._settings.plan.max_deviation_px, weighed.tolerance_px)
         is_measured = verdict.kind == "verified" or weighed.shift_px > most_px
         magnitude = weighed.shift_px if is_measured else math.inf
         what = f"{milestone.value.what.partition(', because')[0]} is {verdict.kind}"
@@ -132,8 +132,9 @@ class MilestoneJudge(RobotKnowledgeSource):
         motion_px = compute_motion_tolerance_px(robot, lines, before, covariance, s.verification)
         tolerance_px = s.action.min_tolerance_px + motion_px
         is_sure = POSE_CONFIDENCE.accepts(p_false)  # so much agrees at the right place only
+        is_as_put_down = belief is not None and belief.value.basis == "command"
         if is_sure or in_doubt:
-            tolerance_px = s.plan.max_deviation_px
+            tolerance_px = max(s.plan.max_deviation_px, tolerance_px * is_as_put_down)
         p_wrong = s.plan.p_wrong_followed if followed else s.plan.p_wrong_unfollowed
         return Weighed(
             robot=robot,
@@ -147,7 +148,7 @@ class MilestoneJudge(RobotKnowledgeSource):
             p_false=p_false,
             is_enough=POSE_CONFIDENCE.accepts(p_false, s.plan.p_wrong_in_doubt if in_doubt else p_wrong),
             shift_px=_median_shift(np.array(milestone.expected_px, float).reshape(-1, 2, 2), agreed.projected_px),
-            tolerance_px=min(tolerance_px, s.plan.max_deviation_px),
+            tolerance_px=tolerance_px if is_as_put_down else min(tolerance_px, s.plan.max_deviation_px),
             is_weak=in_doubt or not followed,
         )
 
