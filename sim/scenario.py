@@ -12,6 +12,7 @@ from sim.body.actuator import ActuatorParameters
 from sim.body.bumper import Bumper
 from sim.body.elevator import Helper
 from sim.body.range_ring import RangeRing
+from sim.differences.inexact import TrueInexact
 from sim.differences.table import NO_DIFFERENCES, TrueCamera, TruthTable, read_truth
 from sim.faults.fault import Fault
 from sim.faults.registry import read_fault
@@ -96,7 +97,7 @@ FORMAT = MissionFormat(
     {**TABLES, "limits": ScenarioLimits, "camera": CameraSettings, "render": Render, "actuator": ActuatorParameters,
      "sensor": SensorParameters, "bumper": Bumper, "ranges": RangeRing},
     ("details", "faults", "moved", "rides", "truth"),
-    {"truth.camera": TrueCamera},
+    {"truth.camera": TrueCamera, "truth.inexact": TrueInexact},
 )
 
 

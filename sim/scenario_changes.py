@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sim.differences.change import Change, compare_faces
+from sim.differences.inexact import EXACT, displace
 from sim.differences.leaf import build_leaf
 from sim.differences.shapes import build_thing, footprint
 from sim.differences.table import ExtraThing, TrueDoor, TrueThing, TrueWall
@@ -23,6 +24,13 @@ from world_models.files.world_files import WorldError, load_world
 
 MAX_OUTSIDE_M = 0.15
 """A thing may reach this far out of its room's outline [m]."""
+
+
+def load_true_world(scenario: Scenario, opened: tuple[str, ...] = ()) -> World:
+    """The building with its details, as inexactly as its model describes it. Raises WorldError."""
+    inexact = scenario.truth.inexact
+    altered = None if inexact == EXACT else lambda spec: displace(spec, inexact).spec
+    return load_world(scenario.world, details=scenario.details, opened=opened, altered=altered)
 
 
 def find_changed_locales(scenario: Scenario, world: World) -> list[str]:
@@ -75,7 +83,7 @@ def _open_door(
         raise scenario.refused(("truth", "doors", i, "name"), "expected a door that is open in the model, "
                                f"{suggest_keys(door.name, open_doors)}, got {door.name!r}")
     try:
-        opened = load_world(scenario.world, details=scenario.details, opened=(door.name,))
+        opened = load_true_world(scenario, opened=(door.name,))
     except WorldError as error:
         raise scenario.refused(("truth", "doors", i, "name"), str(error)) from None
     if door.name not in [doorway.name for doorway in opened.doorways]:

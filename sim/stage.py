@@ -14,7 +14,7 @@ from sim.body.elevator import Elevators
 from sim.body.simulated_body import SimulatedBody
 from sim.differences.changing_faces import ChangingFaces, State
 from sim.scenario import Scenario
-from sim.scenario_changes import find_changed_locales, find_changes
+from sim.scenario_changes import find_changed_locales, find_changes, load_true_world
 from sim.scenario_checks import check_names, check_room, find_named_locales, move_scenario_things
 from sim.truth import Score, Truth, score
 from world_models.building.geometry.outlines import inside_polygon
@@ -23,7 +23,7 @@ from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.commands import parse_command
 from world_models.entries.location import Place
-from world_models.files.world_files import WorldError, load_world
+from world_models.files.world_files import WorldError
 from world_models.frames import Pose2
 
 MAX_FLOOR_STEP_M = 0.5
@@ -95,7 +95,7 @@ def build_stage(scenario: Scenario) -> Stage:
 def _world(scenario: Scenario) -> World:
     """Load the world with its details. Raises ScenarioError where one cannot be read."""
     try:
-        return load_world(scenario.world, details=scenario.details)
+        return load_true_world(scenario)
     except WorldError as error:
         of_details = str(error).startswith(tuple(map(str, scenario.details)))
         raise scenario.refused(("details" if of_details else "world",), str(error)) from None

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+from sim.differences.inexact import EXACT, TrueInexact
 from sim.differences.shapes import SHAPES
 from world_models.bounds import Bounds, check_bounds
 from world_models.camera import Camera, CameraMount
@@ -174,6 +175,7 @@ class TruthTable:
     walls: tuple[TrueWall, ...] = ()
     extra: tuple[ExtraThing, ...] = ()
     camera: TrueCamera = AS_BELIEVED
+    inexact: TrueInexact = EXACT
 
 
 NO_DIFFERENCES = TruthTable()
@@ -181,11 +183,12 @@ NO_DIFFERENCES = TruthTable()
 
 def read_truth(node: Node) -> TruthTable:
     """The table of a file. Raises WorldError."""
-    node.table((), ("doors", "things", "walls", "extra", "camera"))
+    node.table((), ("doors", "things", "walls", "extra", "camera", "inexact"))
     return TruthTable(
         doors=_read_all(node, "doors", TrueDoor), things=_read_all(node, "things", TrueThing),
         walls=_read_all(node, "walls", TrueWall), extra=_read_all(node, "extra", ExtraThing),
         camera=read_settings(node["camera"], TrueCamera) if "camera" in node else AS_BELIEVED,
+        inexact=read_settings(node["inexact"], TrueInexact) if "inexact" in node else EXACT,
     )
 
 

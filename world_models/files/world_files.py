@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -22,7 +22,7 @@ __all__ = ["SUFFIXES", "WORLDS", "WorldError", "compile_file", "fingerprint", "l
 
 
 def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[str]] = (),
-               opened: Collection[str] = ()) -> World:
+               opened: Collection[str] = (), altered: Callable[[WorldSpec], WorldSpec] | None = None) -> World:
     """The world of a TOML file, or of a compiled one, which is read one locale at a time.
 
     Args:
@@ -30,6 +30,7 @@ def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[st
         details: further files that add parts, finishes and things (no rooms or doors). A compiled world contains its
             details: here they must be those that it was compiled with, and only their names count.
         opened: closed doors between two locales that are built open; a compiled world has none.
+        altered: makes another description of the one that was read; of a compiled world there is none.
 
     Raises:
         WorldError: a file cannot be read or does not describe a world; names file, line, what was expected and got.
@@ -38,8 +39,10 @@ def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[st
     if path.suffix in SUFFIXES:
         if opened:
             raise WorldError(f"{path}: expected a TOML file where closed doors are opened, got a compiled world")
+        if altered is not None:
+            raise WorldError(f"{path}: expected a TOML file where the description is altered, got a compiled world")
         return World(SqliteLocales(path, [Path(detail).stem for detail in details]))
-    return read_world(Source.read(path), [Source.read(Path(detail)) for detail in details], opened)
+    return read_world(Source.read(path), [Source.read(Path(detail)) for detail in details], opened, altered)
 
 
 def fingerprint(path: str | PathLike[str]) -> str:
@@ -57,14 +60,16 @@ def compile_file(path: str | PathLike[str], out: str | PathLike[str],
     return layers[-1]
 
 
-def read_world(base: Source, details: Sequence[Source] = (), opened: Collection[str] = ()) -> World:
+def read_world(base: Source, details: Sequence[Source] = (), opened: Collection[str] = (),
+               altered: Callable[[WorldSpec], WorldSpec] | None = None) -> World:
     """The world of files already read; see :func:`load_world`."""
     reader = WorldReader(base)
     reader.read_base()
     for source in details:
         reader.read_details(source)
     spec = reader.spec()
-    return build_world(_with_open_doors(spec, opened) if opened else spec)
+    spec = _with_open_doors(spec, opened) if opened else spec
+    return build_world(spec if altered is None else altered(spec))
 
 
 def _with_open_doors(spec: WorldSpec, opened: Collection[str]) -> WorldSpec:

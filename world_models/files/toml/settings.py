@@ -1,6 +1,7 @@
 """Typed settings: tables of a scenario file read into frozen dataclasses, with units in the keys.
 
-A field ``height_m`` may be written ``height_m``, ``height_ft`` or ``height_in``; ``tilt_rad`` also ``tilt_deg``.
+A field ``height_m`` may be written ``height_m``, ``height_cm``, ``height_ft`` or ``height_in``; ``tilt_rad`` also
+``tilt_deg``.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ def spellings(field: str) -> dict[str, float]:
     if "_rad" in field:
         out[field.replace("_rad", "_deg")] = math.pi / 180.0
     if field.endswith("_m") and not field.endswith("_per_m"):
-        out |= {field[:-1] + "ft": FOOT_M, field[:-1] + "in": INCH_M}
+        out |= {field[:-1] + "cm": 0.01, field[:-1] + "ft": FOOT_M, field[:-1] + "in": INCH_M}
     return out
 
 
