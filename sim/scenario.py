@@ -17,6 +17,7 @@ from sim.differences.table import NO_DIFFERENCES, TrueCamera, TruthTable, read_t
 from sim.faults.fault import Fault
 from sim.faults.registry import read_fault
 from sim.moved_things import MovedThing
+from sim.render.light.lighting import Lighting
 from sim.render.optics import check_lens
 from sim.render.rasterizer import sample_offsets
 from sim.render.sensor import SensorParameters
@@ -96,8 +97,8 @@ class ScenarioLimits(Limits):
 FORMAT = MissionFormat(
     {**TABLES, "limits": ScenarioLimits, "camera": CameraSettings, "render": Render, "actuator": ActuatorParameters,
      "sensor": SensorParameters, "bumper": Bumper, "ranges": RangeRing},
-    ("details", "faults", "moved", "rides", "truth"),
-    {"truth.camera": TrueCamera, "truth.inexact": TrueInexact},
+    ("details", "faults", "light", "moved", "rides", "truth"),
+    {"truth.camera": TrueCamera, "truth.inexact": TrueInexact, "light": Lighting},
 )
 
 
@@ -111,6 +112,7 @@ class Scenario(Mission):
         moved: things that stand elsewhere than in the robot's model.
         rides: who presses the buttons of elevators.
         truth: what is otherwise than the robot's model says.
+        light: lamps, daylight and how the camera adapts; None: light that is the same everywhere.
     """
 
     details: tuple[Path, ...]
@@ -125,6 +127,7 @@ class Scenario(Mission):
     moved: tuple[MovedThing, ...] = ()
     rides: tuple[Helper, ...] = ()
     truth: TruthTable = NO_DIFFERENCES
+    light: Lighting | None = None
 
     def refused(self, key: Key, why: str) -> ScenarioError:
         """The error to raise where one of its values does not fit the building."""
@@ -193,5 +196,6 @@ def _scenario(source: Source, name: str, folder: Path) -> Scenario:
         moved=tuple(read_settings(item, MovedThing) for item in node["moved"].items()) if "moved" in node else (),
         rides=tuple(read_settings(item, Helper) for item in node["rides"].items()) if "rides" in node else (),
         truth=read_truth(node["truth"]) if "truth" in node else NO_DIFFERENCES,
+        light=read_settings(node["light"], Lighting) if "light" in node else None,
         **shared,
     )

@@ -13,6 +13,8 @@ from sim.body.building import Building
 from sim.body.elevator import Elevators
 from sim.body.simulated_body import SimulatedBody
 from sim.differences.changing_faces import ChangingFaces, State
+from sim.render.light.lamps import Room
+from sim.render.light.lights import Lights
 from sim.scenario import Scenario
 from sim.scenario_changes import find_changed_locales, find_changes, load_true_world
 from sim.scenario_checks import check_names, check_room, find_named_locales, move_scenario_things
@@ -56,7 +58,7 @@ class Stage:
         return SimulatedBody(
             self.building, self.start_world, camera, mount,
             seed=seed, actuator=s.actuator, sensor=s.sensor, bumper=s.bumper, ranges=s.ranges,
-            faults=s.faults,
+            faults=s.faults, lighting=s.light,
             put_down_sigma_m=s.start.put_down_sigma_m, put_down_sigma_rad=s.start.put_down_sigma_rad,
         )
 
@@ -81,7 +83,9 @@ def build_stage(scenario: Scenario) -> Stage:
     named = (*find_named_locales(scenario), *find_changed_locales(scenario, world))
     around = _around(world, (start.locale, goal.locale, *named))
     faces = move_scenario_things(scenario, world, world.faces_within(around))
-    changing = ChangingFaces(faces, find_changes(scenario, world, around, faces), scenario.render.samples)
+    changes = find_changes(scenario, world, around, faces)
+    lights = Lights(scenario.light, _lit_rooms(world, around)) if scenario.light else None
+    changing = ChangingFaces(faces, changes, scenario.render.samples, lights)
     elevators = Elevators.of_links(_links_in(world, around), world, scenario.rides)
     on_floor = _storeys(world, around, changing, elevators)
     building = on_floor(world.floor_m(start.locale))
@@ -151,6 +155,15 @@ def _storeys(
         return at_time(floor_m, 0.0)
 
     return on_floor
+
+
+def _lit_rooms(world: World, around: str) -> tuple[Room, ...]:
+    """The rooms in a locale and those beyond their doorways: whose faces are built."""
+    inside = tuple(world.rooms_in(around))
+    beyond = [doorway.other(room) for room in inside for doorway in world.locale_source.doorways(room)]
+    return tuple(
+        Room(world.outline(name), world.floor_m(name), world.floor_m(name) + world.locale(name).height_m)
+        for name in dict.fromkeys((*inside, *beyond)))
 
 
 def _links_in(world: World, around: str) -> tuple[Link, ...]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.body.building import Building
 from sim.body.continuous_motion import ContinuousMotion
+from sim.render.light.auto_exposure import AutoExposure, vignette
+from sim.render.light.lighting import Lighting
 from sim.render.occluder import Occluder
 from sim.render.optics import Optics
 from sim.render.sensor import SensorParameters, compress_jpeg, expose, skip_noise_draws
@@ -29,12 +32,17 @@ class BodyCamera:
         frames: how many pictures were taken.
     """
 
-    def __init__(self, camera: Camera, mount: CameraMount, sensor: SensorParameters, rng: np.random.Generator) -> None:
-        """``rng`` draws the noise of pictures, and nothing else."""
+    def __init__(
+        self, camera: Camera, mount: CameraMount, sensor: SensorParameters, rng: np.random.Generator,
+        lighting: Lighting | None = None,
+    ) -> None:
+        """``rng`` draws the noise of pictures, and nothing else; with ``lighting`` the camera adapts as that says."""
         self.sensor, self.frames = sensor, 0
         self._optics, self._mount, self._rng = Optics.of(camera), mount, rng
         self._occluders: tuple[Occluder, ...] = ()
         self._recorded: Mapping[int, bytes] = {}
+        self._exposure = AutoExposure.of(lighting) if lighting else None
+        self._vignette = vignette(camera.height, camera.width, lighting.vignetting) if lighting else None
 
     def add_occluder(self, occluder: Occluder) -> None:
         """Put something before the camera, until its time is over."""
@@ -48,10 +56,15 @@ class BodyCamera:
         """The next frame, numbered from 0, for the purpose of the request."""
         number, self.frames = self.frames, self.frames + 1
         jpeg = self._recorded.get(number)
+        if self._exposure is not None and number == 0:
+            settled = self._exposure.settle(self._radiance(building, truth, motion), self.sensor.gain)
+            self._exposure = replace(settled, time_s=truth.time_s)
         if jpeg is None:
             jpeg = self.take_jpeg(building, truth, motion)
         else:
             skip_noise_draws(self._rng)
+        if self._exposure is not None:
+            self._exposure = self._exposure.after(jpeg, truth.time_s)
         return Frame(jpeg=jpeg, number=number, sim_time_s=truth.time_s, purpose=purpose)
 
     def take_jpeg(self, building: Building, truth: Truth, motion: ContinuousMotion) -> bytes:
@@ -60,7 +73,12 @@ class BodyCamera:
         for occluder in self._occluders:
             if truth.time_s < occluder.until_s:
                 radiance = occluder.cover(radiance)
-        image = expose(radiance, self.sensor, self._rng, lights_on=truth.lights_on)
+        sensor = self.sensor
+        if self._exposure is not None and self._vignette is not None:
+            radiance = radiance * (self._exposure.gains * self._vignette)
+            noisier = self._exposure.amplification
+            sensor = replace(sensor, read_noise=sensor.read_noise * noisier, shot_noise=sensor.shot_noise * noisier)
+        image = expose(radiance, sensor, self._rng, lights_on=truth.lights_on)
         return compress_jpeg(image, self.sensor.jpeg_quality)
 
     def _radiance(self, building: Building, truth: Truth, motion: ContinuousMotion) -> NDArray[np.float32]:

@@ -16,6 +16,7 @@ from sim.body.continuous_motion import ContinuousMotion
 from sim.body.range_ring import RangeRing
 from sim.faults.fault import DeviceFault, Fault
 from sim.faults.schedule import FaultSchedule
+from sim.render.light.lighting import Lighting
 from sim.render.occluder import Occluder
 from sim.render.sensor import SensorParameters
 from sim.truth import Truth
@@ -53,6 +54,7 @@ class SimulatedBody:
         bumper: Bumper | None = None,
         ranges: RangeRing | None = None,
         faults: tuple[Fault, ...] = (),
+        lighting: Lighting | None = None,
         put_down_sigma_m: float = 0.0,
         put_down_sigma_rad: float = 0.0,
     ) -> None:
@@ -60,7 +62,7 @@ class SimulatedBody:
         streams = [np.random.default_rng(stream) for stream in np.random.SeedSequence(seed).spawn(5)]
         put_down_rng, self._wheel_rng, pixel_rng, self.fault_rng, self._range_rng = streams
         self._building = building
-        self._camera = BodyCamera(camera, mount, sensor or SensorParameters(), pixel_rng)
+        self._camera = BodyCamera(camera, mount, sensor or SensorParameters(), pixel_rng, lighting)
         self._bumper, self._ring = bumper or Bumper(), ranges or RangeRing()
         self._wheels = Wheels.draw(actuator or ActuatorParameters(), self._wheel_rng)
         self._schedule = FaultSchedule.of(faults)

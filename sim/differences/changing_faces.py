@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from sim.body.collision import Obstacles
 from sim.differences.change import Change, find_active
+from sim.render.light.lights import Lights
 from sim.render.renderer import Renderer
 from world_models.building.geometry.faces import Face
 
@@ -16,15 +17,18 @@ State = tuple[int, ...]
 class ChangingFaces:
     """The faces of a building with its changes.
 
-    What no change concerns is prepared once, and shared by all states.
+    What no change concerns is prepared once, and shared by all states; with ``lights`` each state is lit by itself.
     """
 
-    def __init__(self, faces: Sequence[Face], changes: Sequence[Change] = (), samples: int = 8) -> None:
+    def __init__(
+        self, faces: Sequence[Face], changes: Sequence[Change] = (), samples: int = 8, lights: Lights | None = None
+    ) -> None:
         self._changes = tuple(changes)
         passing = frozenset[str]().union(*(change.gone for change in self._changes))
         self._lasting = tuple(face for face in faces if face.name not in passing)
         self._passing = tuple(face for face in faces if face.name in passing)
-        self._renderer = Renderer.of_faces(self._lasting, samples)
+        self._samples, self._lights = samples, lights
+        self._renderer = None if lights else Renderer.of_faces(self._lasting, samples)
         self._renderers: dict[State, Renderer] = {}
         self._obstacles: dict[float, Obstacles] = {}
 
@@ -49,8 +53,14 @@ class ChangingFaces:
     def renderer(self, state: State) -> Renderer:
         """What is seen."""
         if state not in self._renderers:
-            self._renderers[state] = self._renderer.with_faces(self._varying(state))
+            self._renderers[state] = self._build_renderer(state)
         return self._renderers[state]
+
+    def _build_renderer(self, state: State) -> Renderer:
+        if self._lights is not None:
+            return self._lights.renderer((*self._lasting, *self._varying(state)), self._samples)
+        assert self._renderer is not None
+        return self._renderer.with_faces(self._varying(state))
 
     def obstacles(self, state: State, floor_m: float) -> Obstacles:
         """What is solid for a robot on the floor of this height [m]."""

@@ -40,6 +40,7 @@ class View:
         textures: (P, 2, 3); a texture coordinate [m] is ``(textures @ (u, v, 1)) / inverse_depth + bases``.
         bases_m: (P, 2).
         vertices_camera: (V, 3) [m].
+        reaches: (P,) minus the camera's distance before a patch's plane [m]; -1 where it does not face the camera.
     """
 
     facing: NDArray[np.bool_]
@@ -47,6 +48,7 @@ class View:
     textures: NDArray[np.float64]
     bases_m: NDArray[np.float64]
     vertices_camera: NDArray[np.float64]
+    reaches: NDArray[np.float64]
 
 
 def project_mesh(mesh: Mesh, lens: Pinhole, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> View:
@@ -62,6 +64,7 @@ def project_mesh(mesh: Mesh, lens: Pinhole, rotation: NDArray[np.float64], trans
         textures=_pixel_forms(mesh.axes_world @ rotation.T, lens),
         bases_m=mesh.axes_world @ centre - mesh.origins_m,
         vertices_camera=mesh.vertices_world @ rotation.T + translation,
+        reaches=reach,
     )
 
 

@@ -246,7 +246,8 @@ def _points(n: int) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-def _background(bare: Any) -> Any:
+def background(bare: Any) -> Any:
+    """The image (height, width, 3) float32 of the background alone; ``bare`` is the part of each pixel that sees it."""
     image = np.empty((*bare.shape, 3), np.float32)
     for y in range(image.shape[0]):
         for x in range(image.shape[1]):
@@ -262,7 +263,7 @@ def shade(pieces: Any, appearances: Any, table: Any, haze_per_m: float) -> Any:
     ``appearances`` (P, 17) holds of each patch: the forms of 1/z, s z^-1 and t z^-1 (9), the texture's base (2), cells
     per metre, lit colour (3), texture code and seed.
     """
-    image = _background(pieces.bare)
+    image = background(pieces.bare)
     p, colours = _points(BATCH + image.shape[1]), np.empty((3, BATCH + image.shape[1]), np.float32)
     for patch in range(len(appearances)):
         start, last = pieces.first[patch], pieces.first[patch + 1]
@@ -272,6 +273,23 @@ def shade(pieces: Any, appearances: Any, table: Any, haze_per_m: float) -> Any:
             _scatter(pieces, start, end, colours, image)
             start = end
     return image
+
+
+@njit(cache=True, error_model="numpy")
+def shade_pieces(pieces: Any, appearances: Any, table: Any, haze_per_m: float) -> Any:
+    """The colours (n, 3) of the pixels of all pieces, in the order of ``pieces.order``; see :func:`shade`."""
+    out, at = np.empty((np.sum(pieces.length), 3), np.float32), 0
+    p, colours = _points(BATCH + len(pieces.bare[0])), np.empty((3, BATCH + len(pieces.bare[0])), np.float32)
+    for patch in range(len(appearances)):
+        start, last = pieces.first[patch], pieces.first[patch + 1]
+        while start < last:
+            n, start = _gather(pieces, start, last, p)
+            _find_colours(p, n, appearances[patch], table, haze_per_m, colours)
+            for k in range(n):
+                for c in range(3):
+                    out[at + k, c] = colours[c, k]
+            at += n
+    return out
 
 
 @njit(cache=True, error_model="numpy")

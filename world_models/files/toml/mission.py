@@ -180,7 +180,7 @@ class MissionFormat:
     Attributes:
         tables: the settings class of each table.
         others: further keys at the top of the file, which the caller reads.
-        inner: the settings class of each table within one of these, as ``truth.camera``.
+        inner: the settings class of each table that is one of these or within one, as ``truth.camera``.
     """
 
     tables: Mapping[str, type[Any]]
@@ -228,7 +228,8 @@ class MissionFormat:
 
     def _kind(self, path: tuple[str, ...]) -> type[Any]:
         """The settings class of the table that a key is in."""
-        return self.tables[path[0]] if len(path) == 2 else self.inner[".".join(path[:-1])]
+        table = ".".join(path[:-1])
+        return self.tables[table] if table in self.tables else self.inner[table]
 
     def _without_other_spellings(self, data: Mapping[str, Any], path: tuple[str, ...]) -> Mapping[str, Any]:
         """The tables without the same setting in another unit."""
