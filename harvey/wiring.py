@@ -29,6 +29,7 @@ from knowledge_sources.action.withdrawer import Withdrawer
 from knowledge_sources.goal.interpreter import Interpreter
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.goal.relocalizer import Relocalizer
+from knowledge_sources.plan.camera_calibrator import CameraCalibrator
 from knowledge_sources.plan.door_doubter import DoorDoubter
 from knowledge_sources.plan.escalator import Escalator
 from knowledge_sources.plan.line_finder import LineFinder
@@ -59,6 +60,7 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     Matcher,
     MedRAndT,
     MilestoneJudge,
+    CameraCalibrator,
     PlanAdjuster,
     Escalator,
     Relocalizer,

@@ -37,16 +37,16 @@ def find_belief(view: View) -> Entry[Hypothesis] | None:
     return view.newest(HELD, True)
 
 
-def find_robot(view: View) -> RobotModel:
-    """The robot as the board knows it, in the building as the board knows it.
+def find_robot(view: View, camera: CameraState | None = None) -> RobotModel:
+    """The robot as the board knows it, in the building as the board knows it; with another ``camera`` if one is given.
 
     Raises:
         LookupError: nobody has told of its camera, wheels or footprint.
     """
-    camera, wheels, footprint = view.latest(CameraState), view.latest(Wheels), view.latest(Footprint)
-    if camera is None or wheels is None or footprint is None:
+    known, wheels, footprint = view.latest(CameraState), view.latest(Wheels), view.latest(Footprint)
+    if known is None or wheels is None or footprint is None:
         raise LookupError("expected the robot's camera, wheels and footprint on the board, got not all of them")
-    return _build_robot(camera.value, wheels.value, footprint.value).in_building(FrameBuilding(view))
+    return _build_robot(camera or known.value, wheels.value, footprint.value).in_building(FrameBuilding(view))
 
 
 @lru_cache(maxsize=8)
@@ -56,10 +56,10 @@ def _build_robot(camera: CameraState, wheels: Wheels, footprint: Footprint) -> R
                       wheels.continuous)
 
 
-def find_robot_in(view: View, locale: str) -> RobotModel:
-    """The robot on the floor of a locale, with what is known to stand before its camera."""
-    obstruction = view.latest(Obstruction)
-    return find_robot(view).with_obstruction(None if obstruction is None else obstruction.value).on_floor_of(locale)
+def find_robot_in(view: View, locale: str, camera: CameraState | None = None) -> RobotModel:
+    """The robot on the floor of a locale, with what is known to stand before its camera; with another ``camera``."""
+    obstruction, robot = view.latest(Obstruction), find_robot(view, camera)
+    return robot.with_obstruction(None if obstruction is None else obstruction.value).on_floor_of(locale)
 
 
 def find_building(view: View) -> FrameBuilding:

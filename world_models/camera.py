@@ -206,18 +206,50 @@ class CameraMount:
         height_m: optical centre above the floor [m].
         forward_m: optical centre ahead of the turning axis [m].
         tilt_rad: downward tilt of the optical axis [rad].
+        roll_rad: about the optical axis, clockwise as the camera looks: its right side is low [rad].
+        yaw_rad: of the optical axis from the robot's heading, positive to the left [rad].
     """
 
     height_m: float
     forward_m: float = 0.0
     tilt_rad: float = 0.0
+    roll_rad: float = 0.0
+    yaw_rad: float = 0.0
 
     @property
     def camera_from_robot(self) -> Pose:
         c, s = math.cos(self.tilt_rad), math.sin(self.tilt_rad)
         # Rows are the camera's axes (right, down, forward) in the robot's frame.
         rotation = np.array([[0.0, -1.0, 0.0], [-s, 0.0, -c], [c, 0.0, -s]])
+        if self.yaw_rad:
+            c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+            rotation = rotation @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        if self.roll_rad:
+            c, s = math.cos(self.roll_rad), math.sin(self.roll_rad)
+            rotation = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ rotation
         return Pose(rotation, -rotation @ np.array([self.forward_m, 0.0, self.height_m]))
+
+
+CAMERA_UNKNOWNS = ("tilt_rad", "roll_rad", "yaw_rad", "height_m", "focal", "cx_px", "cy_px")
+"""What is learnt of a camera, in this order: its mounting [rad, m], its focal lengths as a part of them, and its
+principal point [px]."""
+YAW = CAMERA_UNKNOWNS.index("yaw_rad")
+
+
+def move_camera(camera: Camera, mount: CameraMount, step: Any) -> tuple[Camera, CameraMount]:
+    """A camera and its mounting after a step (7,) of :data:`CAMERA_UNKNOWNS`; both focal lengths grow by one factor."""
+    tilt, roll, yaw, height, focal, cx, cy = (float(part) for part in step)
+    lens = camera if focal == cx == cy == 0.0 else replace(
+        camera, fx=camera.fx * (1.0 + focal), fy=camera.fy * (1.0 + focal), cx=camera.cx + cx, cy=camera.cy + cy)
+    return lens, CameraMount(mount.height_m + height, mount.forward_m, mount.tilt_rad + tilt, mount.roll_rad + roll,
+                             mount.yaw_rad + yaw)
+
+
+def subtract_cameras(camera: Camera, mount: CameraMount, other: Camera, other_mount: CameraMount) -> tuple[float, ...]:
+    """The step (7,) of :data:`CAMERA_UNKNOWNS` that takes the other camera and its mounting to these."""
+    return (mount.tilt_rad - other_mount.tilt_rad, mount.roll_rad - other_mount.roll_rad,
+            mount.yaw_rad - other_mount.yaw_rad, mount.height_m - other_mount.height_m, camera.fx / other.fx - 1.0,
+            camera.cx - other.cx, camera.cy - other.cy)
 
 
 @dataclass(frozen=True, slots=True)

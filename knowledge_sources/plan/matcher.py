@@ -12,7 +12,9 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
-from knowledge_sources.methods.matching import FloorMatch, Match, match_lines, match_on_floor
+from knowledge_sources.camera_knowledge import compute_camera_covariance, compute_camera_px, find_camera
+from knowledge_sources.methods.localization.camera_matching import match_with_camera
+from knowledge_sources.methods.matching import Match, PoseMatch, match_lines, match_on_floor
 from knowledge_sources.questions import find_belief, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis
@@ -28,7 +30,8 @@ class Matcher(RobotKnowledgeSource):
     """Matches the lines that a milestone expects to the segments of the picture.
 
     Search, objective and starts are §6.1's. Where the belief is sure enough, the projected model is fitted as a rigid
-    figure in the image; else it is fitted by a pose on the floor near the believed one.
+    figure in the image; else it is fitted by a pose on the floor near the believed one. Where the camera is not well
+    known, the pose and the camera's state are fitted together.
     """
 
     level = Level.PLAN
@@ -52,7 +55,8 @@ class Matcher(RobotKnowledgeSource):
             yield Post(LineMatch(milestone.id, segments.id, none, frozen(lines_world), frozen(data_px[:0]), 0.0,
                                  frozen(np.zeros(0))), (segments, milestone, belief))
             return
-        found = self._match(find_robot(view), m, lines_world, data_px, belief.value)
+        camera = compute_camera_covariance(find_camera(view), self._settings.camera_state)
+        found = self._match(find_robot(view), m, lines_world, data_px, belief.value, camera)
         pairs = np.asarray(found.pairs, np.int64).reshape(-1, 2)
         yield Post(
             LineMatch(
@@ -63,15 +67,22 @@ class Matcher(RobotKnowledgeSource):
         )
 
     def _match(
-        self, robot: RobotModel, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
-    ) -> Match | FloorMatch:
+        self, robot: RobotModel, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis,
+        camera_covariance: Floats,
+    ) -> Match | PoseMatch:
         s = self._settings.plan
+        there = robot.on_floor_of(belief.locale)
+        if (compute_camera_px(robot.camera, camera_covariance, s.rigid_distance_m)
+                > self._settings.camera_state.max_known_px):
+            return match_with_camera(
+                lines_world, data_px, robot.camera, there.mount, belief.world_from_robot(robot.world),
+                belief.covariance_world(robot.world), camera_covariance, self._settings)
         sigma_px = robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / s.rigid_distance_m)
         if sigma_px <= s.max_rigid_sigma_px:
             model_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
             return match_lines(model_px, data_px, self._settings.matching)
         return match_on_floor(
-            lines_world, data_px, robot.camera, robot.on_floor_of(belief.locale).mount.camera_from_robot,
+            lines_world, data_px, robot.camera, there.mount.camera_from_robot,
             belief.world_from_robot(robot.world), belief.covariance_world(robot.world),
             self._settings.matching,
         )

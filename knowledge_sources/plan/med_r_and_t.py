@@ -10,19 +10,26 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
+from knowledge_sources.camera_knowledge import compute_camera_covariance, find_camera, has_counted, to_tuples
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.pose import planar_from_lines
+from knowledge_sources.methods.pose.estimate import PlanarEstimate
+from knowledge_sources.methods.pose.with_camera import CameraEstimate, estimate_camera_and_pose
 from knowledge_sources.questions import find_belief, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.percepts import LineMatch, PoseFix
 from world_models.entries.task import Milestone
-from world_models.frames import frozen
+from world_models.frames import Pose2, frozen
+from world_models.robot import RobotModel
 
 
 class MedRAndT(RobotKnowledgeSource):
     """Solves for the pose on the floor, and names the pairs that are outliers.
 
     The mounting of the camera is known (§3.2), so three of the six unknowns of §6.2 are left. Subsets of lines propose
-    poses, the median residual of all lines chooses one, and the inliers refine it.
+    poses, the median residual of all lines chooses one, and the inliers refine it. How well the camera is known is
+    known too: what the lines say of it beside the pose is posted with the pose, and its uncertainty is part of the
+    pose's covariance.
     """
 
     level = Level.PLAN
@@ -37,24 +44,57 @@ class MedRAndT(RobotKnowledgeSource):
         if belief is None or milestone is None:
             return
         m: Milestone = milestone.value
-        s, robot = self._settings.plan, find_robot(view).on_floor_of(belief.value.locale)
+        s, locale = self._settings.plan, belief.value.locale
+        robot, camera = find_robot(view).on_floor_of(locale), find_camera(view)
+        here = belief.value.world_from_robot(robot.world)
         prior = s.prior_covariance_factor * belief.value.covariance_world(robot.world)
         prior = prior + np.diag([s.prior_sigma_m**2, s.prior_sigma_m**2, s.prior_sigma_rad**2])
-        found = planar_from_lines(
-            match.value.lines_world,
-            match.value.segments_px,
-            robot.camera,
-            robot.mount.camera_from_robot,
-            belief.value.world_from_robot(robot.world),
-            prior_covariance=prior,
-            landmark_ids=[m.landmark_of[i] for i in match.value.pairs[:, 0]],
-            sigma_px=self._settings.features.sigma_across_px,
-            settings=self._settings.pose,
-        )
+        known = compute_camera_covariance(camera, self._settings.camera_state)
+        learnt = self._learn(robot, match.value, here, prior, known)
+        moves = learnt is not None and not has_counted(
+            camera, learnt.world_from_robot, self._settings.camera_state)
+        if learnt is not None and moves:
+            robot = find_robot(view, camera.moved(tuple(learnt.step.tolist()))).on_floor_of(locale)
+        found = self._solve(robot, match.value, here, prior, [m.landmark_of[i] for i in match.value.pairs[:, 0]])
+        covariance = found.covariance
+        if learnt is not None:
+            spread = learnt.covariance if moves else known
+            covariance = covariance + learnt.pose_slopes @ spread @ learnt.pose_slopes.T
         yield Post(
             PoseFix(
-                match.id, found.world_from_robot, frozen(found.covariance), np.asarray(found.inliers, bool),
+                match.id, found.world_from_robot, frozen(covariance), np.asarray(found.inliers, bool),
                 frozen(found.residuals_px), tuple(reason or "" for reason in found.rejected),
+                () if learnt is None or not moves else tuple(learnt.step.tolist()),
+                () if learnt is None or not moves else to_tuples(learnt.covariance),
+                0.0 if learnt is None or not moves else learnt.prior_chi2,
             ),
             (match, belief),
+        )
+
+    def _learn(
+        self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, known: Floats
+    ) -> CameraEstimate | None:
+        """The camera's state beside the pose; None where the lines say too little."""
+        s = self._settings.camera_state
+        if len(match.pairs) < s.min_lines:
+            return None
+        found = estimate_camera_and_pose(
+            match.lines_world, match.segments_px, robot.camera, robot.mount, here, prior, known,
+            sigma_px=s.line_sigma_px, settings=s)
+        return found if np.count_nonzero(found.inliers) >= s.min_lines else None
+
+    def _solve(
+        self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, landmarks: list[int]
+    ) -> PlanarEstimate:
+        """The pose with a camera that is taken as it is."""
+        return planar_from_lines(
+            match.lines_world,
+            match.segments_px,
+            robot.camera,
+            robot.mount.camera_from_robot,
+            here,
+            prior_covariance=prior,
+            landmark_ids=landmarks,
+            sigma_px=self._settings.features.sigma_across_px,
+            settings=self._settings.pose,
         )

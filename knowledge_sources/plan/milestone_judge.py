@@ -15,6 +15,7 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.camera_knowledge import find_camera
 from knowledge_sources.methods.localization.aliasing import find_strongest_alias
 from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors, decode_small_color
 from knowledge_sources.methods.verification.line_check import LineCheck, check_lines
@@ -49,6 +50,7 @@ class Weighed:
         shift_px: median distance of the lines from where they were expected.
         tolerance_px: the largest that may be.
         is_weak: whether what was believed before adds little: it is in doubt, or no landmarks were followed.
+        camera_chi2: squared distance of the camera, as solved for, from what was believed of it.
     """
 
     robot: RobotModel
@@ -64,6 +66,7 @@ class Weighed:
     shift_px: float
     tolerance_px: float
     is_weak: bool
+    camera_chi2: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +120,8 @@ class MilestoneJudge(RobotKnowledgeSource):
         segments: Segments = view[match.segments].value
         frame: Frame = view[segments.frame].value
         pose, belief = fix.world_from_robot, find_belief(view)
-        robot = find_robot(view) if belief is None else find_robot_in(view, belief.value.locale)
+        camera = find_camera(view).moved(fix.camera_step) if fix.camera_step else None
+        robot = find_robot(view, camera) if belief is None else find_robot_in(view, belief.value.locale, camera)
         before = pose if belief is None else belief.value.world_from_robot(robot.world)
         covariance = fix.covariance if belief is None else belief.value.covariance_world(robot.world)
         lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
@@ -132,6 +136,9 @@ class MilestoneJudge(RobotKnowledgeSource):
         motion_px = compute_motion_tolerance_px(robot, lines, before, covariance, s.verification)
         tolerance_px = s.action.min_tolerance_px + motion_px
         is_sure = POSE_CONFIDENCE.accepts(p_false)  # so much agrees at the right place only
+        expected_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
+        if camera is not None:  # how far the robot is from where it was believed, not the camera
+            expected_px = robot.camera.project_segments(lines, robot.camera_from_world(before))[0]
         is_as_put_down = belief is not None and belief.value.basis == "command"
         if is_sure or in_doubt:
             tolerance_px = max(s.plan.max_deviation_px, tolerance_px * is_as_put_down)
@@ -147,9 +154,10 @@ class MilestoneJudge(RobotKnowledgeSource):
             faces=faces,
             p_false=p_false,
             is_enough=POSE_CONFIDENCE.accepts(p_false, s.plan.p_wrong_in_doubt if in_doubt else p_wrong),
-            shift_px=_median_shift(np.array(milestone.expected_px, float).reshape(-1, 2, 2), agreed.projected_px),
+            shift_px=_median_shift(expected_px, agreed.projected_px),
             tolerance_px=tolerance_px if is_as_put_down else min(tolerance_px, s.plan.max_deviation_px),
             is_weak=in_doubt or not followed,
+            camera_chi2=fix.camera_chi2,
         )
 
     def _decide(self, view: View, weighed: Weighed) -> Verdict:
@@ -173,6 +181,8 @@ class MilestoneJudge(RobotKnowledgeSource):
         if w.p_false >= POSE_CONFIDENCE.refute:
             return "refuted", f"{found}; at a wrong place {a.chance:.0%} are by chance"
         where = f"{found}, {w.shift_px:.1f} px from where expected"
+        if w.camera_chi2 > self._settings.camera_state.max_chi2:
+            return "refuted", f"{where}: only with a camera that is mounted otherwise than it can be"
         if not w.is_enough or a.matched < self._settings.verification.min_matched_lines:
             return "not testable", f"{where}: not enough to tell the place by"
         if w.shift_px > w.tolerance_px:

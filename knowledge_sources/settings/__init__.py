@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from knowledge_sources.settings.action import ActionSettings
 from knowledge_sources.settings.calibration import CalibrationSettings
+from knowledge_sources.settings.camera_state import CameraStateSettings
 from knowledge_sources.settings.doors import DoorSettings
 from knowledge_sources.settings.features import FeaturesSettings
 from knowledge_sources.settings.floor import FloorSettings
@@ -32,6 +33,7 @@ class Settings:
     localization: LocalizationSettings = field(default_factory=LocalizationSettings)
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
     calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
+    camera_state: CameraStateSettings = field(default_factory=CameraStateSettings)
     doors: DoorSettings = field(default_factory=DoorSettings)
     action: ActionSettings = field(default_factory=ActionSettings)
     plan: PlanSettings = field(default_factory=PlanSettings)

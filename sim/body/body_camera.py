@@ -48,6 +48,12 @@ class BodyCamera:
         """Put something before the camera, until its time is over."""
         self._occluders += (occluder,)
 
+    def turn_mount(self, tilt_rad: float, roll_rad: float, yaw_rad: float) -> None:
+        """Turn the mounting: downward, clockwise as the camera looks, to the left."""
+        m = self._mount
+        self._mount = replace(m, tilt_rad=m.tilt_rad + tilt_rad, roll_rad=m.roll_rad + roll_rad,
+                              yaw_rad=m.yaw_rad + yaw_rad)
+
     def use_recorded(self, pictures: Mapping[int, bytes]) -> None:
         """Deliver these pictures (JPEG, by frame number) instead of rendering them; later noise is the same."""
         self._recorded = pictures

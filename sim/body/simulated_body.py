@@ -396,6 +396,10 @@ class SimulatedBody:
         """Put something before the camera, until its time is over."""
         self._camera.add_occluder(occluder)
 
+    def turn_camera(self, tilt_rad: float, roll_rad: float, yaw_rad: float) -> None:
+        """Turn the camera's mounting: downward, clockwise as it looks, to the left."""
+        self._camera.turn_mount(tilt_rad, roll_rad, yaw_rad)
+
     def start_device_fault(self, fault: DeviceFault) -> None:
         """Let a device fail for the fault's duration."""
         self._device_faults[fault.kind] = fault, self._truth.time_s

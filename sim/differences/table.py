@@ -139,15 +139,19 @@ class TrueCamera:
     """By how much the true camera differs from the one that the robot believes in: ``[truth.camera]``.
 
     Attributes:
-        tilt_rad: of its mounting, positive downward; height_m: of its mounting; focal_px: of its focal length.
+        tilt_rad: of its mounting, positive downward; roll_rad: clockwise as the camera looks; yaw_rad: to the left.
+        height_m: of its mounting; focal_px: of its focal length.
     """
 
     tilt_rad: float = 0.0
+    roll_rad: float = 0.0
+    yaw_rad: float = 0.0
     height_m: float = 0.0
     focal_px: float = 0.0
 
     def __post_init__(self) -> None:
-        check_bounds(self, {"tilt_rad": Bounds(-0.5, 0.5), "height_m": Bounds(-1.0, 1.0),
+        angle = Bounds(-0.5, 0.5)
+        check_bounds(self, {"tilt_rad": angle, "roll_rad": angle, "yaw_rad": angle, "height_m": Bounds(-1.0, 1.0),
                             "focal_px": Bounds(-2000.0, 2000.0)})
 
     def mounted(self, camera: Camera, mount: CameraMount) -> tuple[Camera, CameraMount]:
@@ -160,7 +164,8 @@ class TrueCamera:
             raise ValueError(f"expected a focal length above 0 px and a height above 0 m, "
                              f"got {min(focal):g} px and {height_m:g} m")
         return (replace(camera, fx=focal[0], fy=focal[1]),
-                replace(mount, height_m=height_m, tilt_rad=mount.tilt_rad + self.tilt_rad))
+                replace(mount, height_m=height_m, tilt_rad=mount.tilt_rad + self.tilt_rad,
+                        roll_rad=mount.roll_rad + self.roll_rad, yaw_rad=mount.yaw_rad + self.yaw_rad))
 
 
 AS_BELIEVED = TrueCamera()

@@ -53,6 +53,10 @@ class FaultTarget(Protocol):
         """Put something before the camera, until its time is over."""
         ...
 
+    def turn_camera(self, tilt_rad: float, roll_rad: float, yaw_rad: float) -> None:
+        """Turn the camera's mounting from now on: downward, clockwise as it looks, to the left."""
+        ...
+
     def start_device_fault(self, fault: DeviceFault) -> None:
         """Let a device fail from now on, for the fault's duration."""
         ...

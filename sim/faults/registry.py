@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sim.faults.base_faults import LinkLost, Nonsense, Stall
-from sim.faults.camera_faults import CameraUnplugged, DroppedFrames, LateFrames
+from sim.faults.camera_faults import CameraKnocked, CameraUnplugged, DroppedFrames, LateFrames
 from sim.faults.displacement import Bump, Kidnap
 from sim.faults.fault import Fault
 from sim.faults.lights_off import LightsOff
@@ -16,6 +16,7 @@ GROUP = "harvey.faults"
 """Entry points of this group name fault classes; an entry point's name is the ``kind`` of its class."""
 BUILT_IN: tuple[type[Fault], ...] = (
     Bump, Kidnap, LightsOff, Occlusion, LinkLost, Nonsense, Stall, CameraUnplugged, LateFrames, DroppedFrames,
+    CameraKnocked,
 )
 
 

@@ -42,9 +42,10 @@ OF_TRUTH = Truth | SimulatedBody | Stage | TrueBuilding | Lasting | TrueCamera |
 NAMES = [source.__module__.rpartition(".")[2] for source in KNOWLEDGE_SOURCES]
 NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "fault_handler", "path_follower",
               "elevator_rider", "obstruction_finder", "model_reviser", "withdrawer", "obstacle_finder", "door_watcher",
-              "door_doubter", "range_watcher", "floor_watcher"}
+              "door_doubter", "range_watcher", "floor_watcher", "camera_calibrator"}
 """Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
-the move, ride in elevators, find what is before the camera or in the way, or take up what somebody tells."""
+the move, ride in elevators, find what is before the camera or in the way, take up what somebody tells, or learn of the
+camera."""
 
 
 @pytest.mark.parametrize("missing", NAMES)
@@ -118,7 +119,8 @@ at_s = 3.0
 
 
 def test_nothing_of_a_truth_that_differs_is_on_the_board() -> None:
-    """Neither in an entry nor in a knowledge source after the mission; the robot believes in the scenario's camera."""
+    """Neither in an entry nor in a knowledge source after the mission; the robot is told the scenario's camera,
+    and learns the rest."""
     stage, entries, sources = build_stage(parse_scenario(OFFICE + TRUTH_TABLE)), [], list(knowledge_sources())
 
     def listen(decision: Decision) -> None:
@@ -130,8 +132,9 @@ def test_nothing_of_a_truth_that_differs_is_on_the_board() -> None:
     assert held == []
     texts = [thing for thing in _reachable(entries) if isinstance(thing, str)]
     assert not [text for text in texts if "extra-0" in text or text == "bin"]
-    cameras = [entry.value for entry in entries if isinstance(entry.value, CameraState)]
-    assert [camera.lens.fx for camera in cameras] == [stage.scenario.camera.camera.fx]
+    told, *learnt = [entry for entry in entries if isinstance(entry.value, CameraState)]
+    assert told.value.lens.fx == stage.scenario.camera.camera.fx and told.author == "robot"
+    assert {entry.author for entry in learnt} == {"camera_calibrator"}
 
 
 def _reachable(root: Any) -> Iterable[Any]:

@@ -168,6 +168,7 @@ class LineMatch:
         lines_world: (p, 2, 3), segments_px: (p, 2, 2): the pairs themselves.
         error: value of the objective function (§6.1.3).
         coverage: (m,) part of each expected line that is accounted for.
+        is_camera_open: whether the camera may be mounted otherwise than was learnt of it, as after a knock.
     """
 
     milestone: str
@@ -177,6 +178,7 @@ class LineMatch:
     segments_px: NDArray[np.float64]
     error: float
     coverage: NDArray[np.float64]
+    is_camera_open: bool = False
 
     def sentence(self) -> str:
         lines, segments = (len(set(column.tolist())) for column in self.pairs.reshape(-1, 2).T)
@@ -196,6 +198,8 @@ class PoseFix:
         inliers: (p,) which pairs agree with it.
         residuals_px: (p, 2) distances of both segment ends from the projected model line.
         rejected: (p,) why a pair was rejected, "" for inliers.
+        camera_step: (7,) by how much the camera is otherwise than believed, as the lines say; () for as believed.
+        camera_covariance: (7, 7) of the camera then. camera_chi2: squared distance from what was believed.
     """
 
     match: str
@@ -204,6 +208,9 @@ class PoseFix:
     inliers: NDArray[np.bool_]
     residuals_px: NDArray[np.float64]
     rejected: tuple[str, ...]
+    camera_step: tuple[float, ...] = ()
+    camera_covariance: tuple[tuple[float, ...], ...] = ()
+    camera_chi2: float = 0.0
 
     def sentence(self) -> str:
         pose = self.world_from_robot

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 from blackboard.kinds import inference, observation
 from world_models import words
 from world_models.actuator import MAX_INNOVATION_SIGMAS, ActuatorModel
-from world_models.camera import Camera, CameraMount
+from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, move_camera
 from world_models.frames import wrap_angle
 
 
@@ -22,7 +23,9 @@ class CameraState:
         lens: the physical camera, with its distortion.
         mount: where it is on the robot.
         sigma_tilt_rad, sigma_height_m, sigma_forward_m, sigma_focal: standard deviations of the mounting and, as a part
-            of it, of the focal length; 0 where nobody has stated any: it is taken for exact.
+            of it, of the focal length; 0 where nobody has stated any.
+        covariance: (7, 7) over :data:`~world_models.camera.CAMERA_UNKNOWNS`, once it is learnt from milestones, or ().
+        counted: the poses (x [m], y [m], heading [rad], world) of the pictures by which it was learnt, the newest last.
     """
 
     lens: Camera
@@ -31,6 +34,13 @@ class CameraState:
     sigma_height_m: float = 0.0
     sigma_forward_m: float = 0.0
     sigma_focal: float = 0.0
+    covariance: tuple[tuple[float, ...], ...] = ()
+    counted: tuple[tuple[float, ...], ...] = ()
+
+    def moved(self, step: Sequence[float]) -> CameraState:
+        """The state with its camera after a step (7,) of :data:`~world_models.camera.CAMERA_UNKNOWNS`."""
+        lens, mount = move_camera(self.lens, self.mount, step)
+        return replace(self, lens=lens, mount=mount)
 
     @cached_property
     def pinhole(self) -> Camera:
@@ -39,13 +49,21 @@ class CameraState:
 
     def sentence(self) -> str:
         lens, mount = self.lens, self.mount
+        turned = "".join(f", {name} {words.degrees(angle)}" for name, angle in (
+            ("rolled", mount.roll_rad), ("turned to the left", mount.yaw_rad)) if angle)
         return (f"camera of {lens.width} x {lens.height} px, focal length {lens.fx:.1f} px, mounted"
-                f" {words.metres(mount.height_m)} above the floor, looking {words.degrees(mount.tilt_rad)} down;"
-                f" {words.metres(mount.forward_m)} ahead of the axis; {self._certainty()}")
+                f" {words.metres(mount.height_m)} above the floor, looking {words.degrees(mount.tilt_rad)}"
+                f" down{turned}; {words.metres(mount.forward_m)} ahead of the axis; {self._certainty()}")
 
     def _certainty(self) -> str:
+        if self.covariance:
+            deviations = (math.sqrt(row[i]) for i, row in enumerate(self.covariance))
+            sigma = dict(zip(CAMERA_UNKNOWNS, deviations, strict=True))
+            return (f"tilt +-{math.degrees(sigma['tilt_rad']):.2f}, roll +-{math.degrees(sigma['roll_rad']):.2f}, yaw"
+                    f" +-{math.degrees(sigma['yaw_rad']):.2f} degrees, +-{1000 * sigma['height_m']:.0f} mm up, focal"
+                    f" length +-{sigma['focal']:.2%}, by {words.count(len(self.counted), 'picture')}")
         if not any((self.sigma_tilt_rad, self.sigma_height_m, self.sigma_forward_m, self.sigma_focal)):
-            return "taken for exact"
+            return "nobody has stated how exactly"
         return (f"+-{math.degrees(self.sigma_tilt_rad):.2f} degrees, +-{1000 * self.sigma_height_m:.0f} mm up,"
                 f" +-{1000 * self.sigma_forward_m:.0f} mm ahead, focal length +-{self.sigma_focal:.2%}")
 

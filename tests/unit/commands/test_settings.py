@@ -128,6 +128,7 @@ EXCEPTIONS = {
         "verification/predicted_colors.py: WHITE",
     ),
     "the shape of an array, or a flag of compiled code": (
+        "localization/camera_matching.py: MOUNTING", "pose/with_camera.py: POSE",
         "features/line_bands.py: _MAP_WIDTH", "features/manhattan.py: _SMOOTHING", "matching/fit.py: POSE_STEP",
         "matching/kernels.py: RIGID", "matching/kernels.py: SCALED", "matching/kernels.py: STEP",
         "pose/numerics/kernels.py: FINE", "pose/numerics/kernels.py: IMAGE", "pose/numerics/kernels.py: NOT_FINITE",
@@ -139,6 +140,7 @@ EXCEPTIONS = {
         "features/line_regions.py: _STEPS_PER_LEVEL", "features/correlation.py: _MARGIN_PX",
     ),
     "rounding: a guard against division by zero, or the end of a minimisation": (
+        "localization/camera_matching.py: STEP", "pose/with_camera.py: STEPS", "pose/with_camera.py: TINY",
         "matching/hough.py: MIN_LENGTH_PX", "matching/kernels.py: NEWTON_STEPS", "matching/pose_pairs.py: TINY",
         "motion/footprints.py: GRAIN_M", "motion/footprints.py: MIN_SIDE_M", "motion/routes.py: CORNER_STEPS",
         "motion/routes.py: SLACK_M",

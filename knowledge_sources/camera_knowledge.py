@@ -1,0 +1,77 @@
+"""How well the camera is known: its covariance on the board, and what a picture that counts makes of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from blackboard.board import View
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.settings.camera_state import CameraStateSettings
+from world_models.camera import Camera
+from world_models.entries.robot import CameraState
+from world_models.frames import Pose2, wrap_angle
+
+
+def find_camera(view: View) -> CameraState:
+    """The camera as the board knows it. Raises LookupError where nobody has told of it."""
+    camera = view.latest(CameraState)
+    if camera is None:
+        raise LookupError("expected the robot's camera on the board, got none")
+    return camera.value
+
+
+def compute_camera_covariance(camera: CameraState, settings: CameraStateSettings) -> Floats:
+    """(7, 7) over :data:`~world_models.camera.CAMERA_UNKNOWNS`: as learnt, as stated, or as settings have it."""
+    return np.array(camera.covariance) if camera.covariance else compute_first_covariance(camera, settings)
+
+
+def compute_first_covariance(camera: CameraState, settings: CameraStateSettings) -> Floats:
+    """(7, 7) before anything is learnt: what was stated, and the settings where nothing was."""
+    s = settings
+    sigmas = (camera.sigma_tilt_rad or s.sigma_tilt_rad, s.sigma_roll_rad, s.sigma_yaw_rad,
+              camera.sigma_height_m or s.sigma_height_m, camera.sigma_focal or s.sigma_focal,
+              s.sigma_centre_px, s.sigma_centre_px)
+    return np.asarray(np.diag(np.square(sigmas)))
+
+
+def compute_knocked_covariance(camera: CameraState, settings: CameraStateSettings) -> Floats:
+    """(7, 7) of a camera that may have been knocked: its directions are open again, height and lens as they were."""
+    s = settings
+    covariance = compute_camera_covariance(camera, settings)
+    opened = np.square((s.sigma_tilt_rad, s.sigma_roll_rad, s.sigma_yaw_rad, 0.0, 0.0, 0.0, 0.0))
+    return np.asarray(covariance + np.diag(opened))
+
+
+def compute_camera_px(camera: Camera, covariance: Floats, distance_m: float) -> float:
+    """How far a covariance (7, 7) moves the picture of what is so far away [px], but for the yaw: root mean square."""
+    tilt, roll, _, height, focal, _, _ = np.sqrt(np.diag(covariance))
+    aside_px = 0.25 * math.hypot(camera.width, camera.height)
+    return math.hypot(camera.fy * tilt, aside_px * roll, camera.fy * height / distance_m, aside_px * focal)
+
+
+def has_counted(camera: CameraState, pose: Pose2, settings: CameraStateSettings) -> bool:
+    """Whether a picture from about this pose (world) has counted already: it would be evidence counted twice."""
+    return any(
+        math.hypot(pose.x_m - x, pose.y_m - y) < settings.min_move_m
+        and abs(wrap_angle(pose.heading_rad - heading)) < settings.min_turn_rad
+        for x, y, heading in camera.counted)
+
+
+def learn(
+    camera: CameraState, step: tuple[float, ...], covariance: Floats, pose: Pose2, settings: CameraStateSettings
+) -> CameraState:
+    """The state after a picture from a pose (world); no covariance below the floor of what lines have in common."""
+    s = settings
+    floors = np.array([s.floor_rad, s.floor_rad, s.floor_rad, s.floor_m, s.floor_focal, s.floor_centre_px,
+                       s.floor_centre_px])
+    raised = covariance + np.diag(np.maximum(floors**2 - np.diag(covariance), 0.0))
+    looks = (*camera.counted, (pose.x_m, pose.y_m, pose.heading_rad))[-s.counted:]
+    return replace(camera.moved(step), covariance=to_tuples(raised), counted=looks)
+
+
+def to_tuples(matrix: Floats) -> tuple[tuple[float, ...], ...]:
+    """A symmetric matrix as nested tuples, so that a value that holds it can be compared."""
+    return tuple(map(tuple, (0.5 * (matrix + matrix.T)).tolist()))

@@ -1,0 +1,98 @@
+"""Matching where the camera's own mounting and focal length are uncertain: more than a pose on the floor explains."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from knowledge_sources.methods.arrays import Floats, Indices
+from knowledge_sources.methods.matching.pose_matching import PoseMatch, match_in_space
+from knowledge_sources.methods.pose.with_camera import CameraEstimate, estimate_camera_and_pose
+from knowledge_sources.methods.verification.agreement import compute_coverage
+from knowledge_sources.settings import DEFAULT, Settings
+from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, move_camera
+from world_models.frames import Pose, Pose2
+
+STEP = 1e-5
+"""Of the numeric derivatives [m, rad]."""
+MOUNTING = 4
+"""The first unknowns of a camera are those of its mounting."""
+FOCAL = CAMERA_UNKNOWNS.index("focal")
+
+
+def match_with_camera(
+    model_lines_world: Any, data_px: Any, camera: Camera, mount: CameraMount, prior: Pose2, prior_covariance: Floats,
+    camera_covariance: Floats, settings: Settings = DEFAULT,
+) -> PoseMatch:
+    """Match model lines to data lines within what the priors of pose and camera allow.
+
+    The mounting and the pose on the floor move the camera in six unknowns; of several focal lengths the one is taken
+    with which the lines of the model are covered best.
+
+    Args:
+        model_lines_world: (m, 2, 3) [m]. data_px: (k, 2, 2), rectified. camera: without distortion.
+        prior, prior_covariance: ``world_from_robot`` and (3, 3). camera_covariance: (7, 7).
+
+    Raises:
+        ValueError: no model line, or a wrong shape.
+    """
+    s = settings.camera_state
+    lines, data = np.asarray(model_lines_world, float), np.asarray(data_px, float)
+    spread = compute_space_covariance(mount, prior, prior_covariance, camera_covariance)
+    expected = mount.camera_from_robot @ prior.lifted().inverse()
+    found: list[tuple[float, PoseMatch]] = []
+    for sigmas in s.focal_starts:
+        factor = 1.0 + sigmas * float(np.sqrt(camera_covariance[FOCAL, FOCAL]))
+        zoomed = replace(camera, fx=factor * camera.fx, fy=factor * camera.fy)
+        match = match_in_space(lines, data, zoomed, expected, spread, settings.matching,
+                               pair_px=s.pair_px, sigma_px=s.match_sigma_px)
+        pairs: Indices = match.pairs
+        if len(pairs) >= s.min_lines:
+            estimate = estimate_camera_and_pose(
+                lines[pairs[:, 0]], data[pairs[:, 1]], camera, mount, prior, prior_covariance, camera_covariance,
+                sigma_px=s.line_sigma_px, settings=s)
+            found.append((compute_sharp_part(lines, data, camera, mount, estimate, settings), match))
+        else:
+            found.append((0.0, match))
+    return max(found, key=lambda tried: tried[0])[1]
+
+
+def compute_sharp_part(
+    lines_world: Floats, data_px: Floats, camera: Camera, mount: CameraMount, estimate: CameraEstimate,
+    settings: Settings = DEFAULT,
+) -> float:
+    """Which part of the length in view of model lines (m, 2, 3) segments (k, 2, 2) cover sharply, 0..1."""
+    lens, mounted = move_camera(camera, mount, estimate.step)
+    camera_from_world = mounted.camera_from_robot @ estimate.world_from_robot.lifted().inverse()
+    seen, _ = lens.project_segments(lines_world, camera_from_world)
+    s = settings.verification
+    covered = compute_coverage(seen, data_px, settings.camera_state.sharp_px, s.line_tolerance_rad, s)
+    lengths = np.minimum(np.nan_to_num(np.linalg.norm(seen[:, 1] - seen[:, 0], axis=1)), s.max_line_weight_px)
+    total = float(lengths.sum())
+    return float(np.sum(np.nan_to_num(covered) * lengths)) / total if total > 0.0 else 0.0
+
+
+def compute_space_covariance(
+    mount: CameraMount, pose: Pose2, pose_covariance: Floats, camera_covariance: Floats
+) -> Floats:
+    """(6, 6) of the left perturbation (rotation, translation) of ``camera_from_world`` by pose and mounting."""
+    robot_from_world = pose.lifted().inverse()
+    expected = mount.camera_from_robot @ robot_from_world
+
+    def perturbation(moved: Pose) -> Floats:
+        apart = moved @ expected.inverse()
+        return np.concatenate([apart.rotation_vector, apart.translation]) / STEP
+
+    by_pose = np.stack([
+        perturbation(mount.camera_from_robot @ Pose2(pose.x_m + x, pose.y_m + y, pose.heading_rad + turn)
+                     .lifted().inverse())
+        for x, y, turn in STEP * np.eye(3)], axis=1)
+    dummy = Camera(1.0, 1.0, 0.0, 0.0, 1, 1)
+    by_mount = np.stack([
+        perturbation(move_camera(dummy, mount, step)[1].camera_from_robot @ robot_from_world)
+        for step in STEP * np.eye(len(CAMERA_UNKNOWNS))[:MOUNTING]], axis=1)
+    mounting = camera_covariance[:MOUNTING, :MOUNTING]
+    spread = by_pose @ pose_covariance @ by_pose.T + by_mount @ mounting @ by_mount.T
+    return np.asarray(spread + 1e-10 * np.eye(6))

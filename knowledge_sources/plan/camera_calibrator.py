@@ -1,0 +1,41 @@
+"""Camera calibrator (§3.2): learns the camera's own state from the milestones that are verified."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Revise
+from blackboard.level import Level
+from knowledge_sources.camera_knowledge import learn
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.percepts import PoseFix
+from world_models.entries.robot import CameraState
+from world_models.entries.task import Certificate
+
+
+class CameraCalibrator(RobotKnowledgeSource):
+    """Takes over what the lines of a verified milestone say of the camera: tilt, roll, height, lens.
+
+    The pose was solved for with the same camera, so it acts before the plan adjuster takes the pose over.
+    """
+
+    level = Level.PLAN
+    watches = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
+    writes = (CameraState,)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        fix = view.get(trigger.entry.value.fix)
+        return 1.0 if fix is not None and fix.value.camera_step else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        fix, camera = view.get(trigger.entry.value.fix), view.latest(CameraState)
+        if fix is None or camera is None:
+            return
+        f: PoseFix = fix.value
+        state = learn(camera.value, f.camera_step, np.array(f.camera_covariance), f.world_from_robot,
+                      self._settings.camera_state)
+        yield Revise(camera, state, (trigger.entry, fix, camera))
