@@ -42,6 +42,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "imported-building": "Missions between the rooms of a house from IFC",
         "imported-floors": "Plans between floors of a university from IndoorGML",
         "kidnap": "Kidnaps to anywhere on generated floors of 40 rooms",
+        "light": "1,000 missions under lamps, sun and reflections",
         "malformed-worlds": "World and building files with errors put in",
         "missions": "1,000 missions without trouble and 1,000 with",
         "obstacles": "1,000 missions among things that the model lacks",

@@ -105,7 +105,7 @@ def _smooth(light: Floats, places: LightMap) -> Floats:
         columns, rows = sizes[p]
         here = slice(places.first[p], places.first[p] + columns * rows)
         out[here] = uniform_filter(light[here].reshape(rows, columns, 3), (3, 3, 1), mode="nearest").reshape(-1, 3)
-    return out
+    return np.maximum(out, 0.0)  # a running sum can end just below
 
 
 def _fill_covered(light: Floats, places: LightMap, tree: RayTree) -> Floats:

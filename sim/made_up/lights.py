@@ -1,0 +1,58 @@
+"""Made-up light: kinds of it, each drawn at random within what buildings and cameras have."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, get_args
+
+import numpy as np
+
+LightKind = Literal["flat", "lamps", "half the lamps off", "dim", "sun", "glossy floor", "glass", "coloured walls",
+                    "slow camera", "all at once"]
+"""flat: no ``[light]``, the same everywhere. lamps: panels in every room, auto exposure. The others have them too. dim:
+1 to 6 % of their light. sun: daylight, and hard patches of sun. coloured walls: other colours than the model's, tinted
+lamps, and a white balance. slow camera: exposure and white balance lag by 1 to 3 s, with half the lamps off."""
+LIGHT_KINDS: tuple[LightKind, ...] = get_args(LightKind)
+Values = dict[str, float | list[float]]
+
+
+def draw_light(kind: LightKind, seed: int) -> Values | None:
+    """The settings of ``[light]``, the same for the same arguments; None for flat light."""
+    if kind == "flat":
+        return None
+    rng = np.random.default_rng([seed, 5, LIGHT_KINDS.index(kind)])
+    values: Values = {"seed": int(rng.integers(10**6)), "lamps": rng.uniform(0.5, 1.2),
+                      "lamp_spacing_m": rng.uniform(1.8, 3.2), "exposure_lag_s": rng.uniform(0.2, 0.6)}
+    for part in (kind,) if kind != "all at once" else LIGHT_KINDS:
+        values |= _draw_part(part, rng)
+    if kind == "all at once" and rng.random() < 0.7:
+        values["lamps"] = rng.uniform(0.3, 1.2)  # mostly not dim: there is daylight
+    return {key: [round(v, 3) for v in value] if isinstance(value, list) else round(value, 4)
+            for key, value in values.items()}
+
+
+def _draw_part(kind: LightKind, rng: np.random.Generator) -> Values:
+    if kind == "half the lamps off":
+        return {"lamps_off": rng.uniform(0.3, 0.7)}
+    if kind == "dim":
+        return {"lamps": rng.uniform(0.01, 0.06)}
+    if kind == "sun":
+        return {"sky": rng.uniform(1.0, 6.0), "sun": rng.uniform(4.0, 12.0),
+                "sun_azimuth_rad": rng.uniform(0.0, math.tau), "sun_elevation_rad": rng.uniform(0.2, 0.9)}
+    if kind == "glossy floor":
+        return {"floor_gloss": rng.uniform(0.5, 1.0)}
+    if kind == "glass":
+        return {"glass": rng.uniform(0.5, 1.0)}
+    if kind == "coloured walls":
+        warm = rng.uniform(-0.3, 0.3)
+        return {"wall_colours": rng.uniform(0.4, 1.0), "lamp_colour": [1.0 + warm, 1.0, 1.0 - warm],
+                "white_balance_lag_s": rng.uniform(0.3, 1.0)}
+    if kind == "slow camera":
+        return {"lamps_off": 0.5, "exposure_lag_s": rng.uniform(1.0, 3.0), "white_balance_lag_s": rng.uniform(1.0, 3.0),
+                "vignetting": rng.uniform(0.2, 0.6)}
+    return {}
+
+
+def format_light(values: Values | None) -> str:
+    """The ``[light]`` table of a scenario's file; nothing for flat light."""
+    return "\n[light]\n" + "".join(f"{key} = {value}\n" for key, value in values.items()) if values else ""
