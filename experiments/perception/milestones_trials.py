@@ -33,11 +33,12 @@ BLOCK = 60
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """Cases of a floor, ``count`` from number ``first`` on."""
+    """Cases of a floor, ``count`` from number ``first`` on; ``inexact_m`` as for :func:`get_site`."""
 
     floor: int
     first: int
     count: int
+    inexact_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +78,9 @@ class TrialResult:
 
 def judge_trial(trial: Trial) -> TrialResult:
     """Judge every case of a trial."""
-    site = get_site(trial.floor)
-    out = [_judge_case(site, trial.floor, number, case)
-           for number, case in enumerate(generate_cases(trial.floor, trial.first, trial.count), trial.first)]
+    site = get_site(trial.floor, trial.inexact_m)
+    cases = generate_cases(trial.floor, trial.first, trial.count, trial.inexact_m)
+    out = [_judge_case(site, trial.floor, number, case) for number, case in enumerate(cases, trial.first)]
     return TrialResult([{name: getattr(j, name) for name in JudgedCase.__slots__} for j in out])
 
 
@@ -104,7 +105,8 @@ def _judge_case(site: Site, floor: int, number: int, case: Case) -> JudgedCase:
     lines = np.array(case.milestone.expected, float).reshape(-1, 2, 3)
     evidence = compute_evidence(
         robot, lines, segments.value.segments_px, pose, covariance, case.belief.world_from_robot(robot.world),
-        case.belief.covariance_world(robot.world), check_lines(robot, lines, segments.value.segments_px, pose),
+        case.belief.covariance_world(robot.world), check_lines(
+            robot, lines, segments.value.segments_px, pose, errors=case.milestone.errors),
         check_colors(robot, pose, decode_small_color(case.jpeg), case.milestone.looks),
     )
     sigma_m, sigma_rad = (math.sqrt(float(v)) for v in (np.linalg.eigvalsh(covariance[:2, :2])[-1], covariance[2, 2]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,8 @@ from blackboard.effect import Effect, Post
 from blackboard.level import Level
 from knowledge_sources.camera_knowledge import compute_camera_covariance, compute_camera_px, find_camera
 from knowledge_sources.methods.localization.camera_matching import match_with_camera
-from knowledge_sources.methods.matching import Match, PoseMatch, match_lines, match_on_floor
+from knowledge_sources.methods.matching import FloorMatch, Match, PoseMatch, match_lines, match_on_floor
+from knowledge_sources.methods.pose.displacements import compute_sigmas_px, fit_displacements
 from knowledge_sources.questions import find_belief, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis
@@ -56,7 +58,10 @@ class Matcher(RobotKnowledgeSource):
                                  frozen(np.zeros(0))), (segments, milestone, belief))
             return
         camera = compute_camera_covariance(find_camera(view), self._settings.camera_state)
-        found = self._match(find_robot(view), m, lines_world, data_px, belief.value, camera)
+        if m.modes:
+            found: Match | PoseMatch = self._match_displaced(find_robot(view), m, lines_world, data_px, belief.value)
+        else:
+            found = self._match(find_robot(view), m, lines_world, data_px, belief.value, camera)
         pairs = np.asarray(found.pairs, np.int64).reshape(-1, 2)
         yield Post(
             LineMatch(
@@ -86,3 +91,19 @@ class Matcher(RobotKnowledgeSource):
             belief.world_from_robot(robot.world), belief.covariance_world(robot.world),
             self._settings.matching,
         )
+
+    def _match_displaced(
+        self, robot: RobotModel, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
+    ) -> FloorMatch:
+        """As :meth:`_match`, of a model that is inexact: wider first, then with its lines displaced as one."""
+        s, errors = self._settings, milestone.errors
+        mount, camera = robot.on_floor_of(belief.locale).mount.camera_from_robot, robot.camera
+        prior, covariance = belief.world_from_robot(robot.world), belief.covariance_world(robot.world)
+        wide_px = float(np.median(compute_sigmas_px(lines_world, errors, camera, mount, prior)))
+        wider = replace(
+            s.matching, max_pose_pair_px=s.matching.max_pose_pair_px + s.pose.displaced_gate_sigmas * wide_px,
+            pose_sigma_px=math.hypot(s.matching.pose_sigma_px, wide_px), gate_px=s.matching.gate_px + wide_px)
+        found = match_on_floor(lines_world, data_px, camera, mount, prior, covariance, wider)
+        fit = fit_displacements(
+            lines_world, errors, data_px, camera, mount, found.world_from_robot, covariance, s.pose)
+        return replace(found, pairs=fit.pairs)

@@ -29,7 +29,7 @@ class MedRAndT(RobotKnowledgeSource):
     The mounting of the camera is known (§3.2), so three of the six unknowns of §6.2 are left. Subsets of lines propose
     poses, the median residual of all lines chooses one, and the inliers refine it. How well the camera is known is
     known too: what the lines say of it beside the pose is posted with the pose, and its uncertainty is part of the
-    pose's covariance.
+    pose's covariance. Where the model is inexact, its errors are integrated out, and nothing is learnt of the camera.
     """
 
     level = Level.PLAN
@@ -50,12 +50,12 @@ class MedRAndT(RobotKnowledgeSource):
         prior = s.prior_covariance_factor * belief.value.covariance_world(robot.world)
         prior = prior + np.diag([s.prior_sigma_m**2, s.prior_sigma_m**2, s.prior_sigma_rad**2])
         known = compute_camera_covariance(camera, self._settings.camera_state)
-        learnt = self._learn(robot, match.value, here, prior, known)
+        learnt = None if m.modes else self._learn(robot, match.value, here, prior, known)
         moves = learnt is not None and not has_counted(
             camera, learnt.world_from_robot, self._settings.camera_state)
         if learnt is not None and moves:
             robot = find_robot(view, camera.moved(tuple(learnt.step.tolist()))).on_floor_of(locale)
-        found = self._solve(robot, match.value, here, prior, [m.landmark_of[i] for i in match.value.pairs[:, 0]])
+        found = self._solve(robot, match.value, here, prior, m)
         covariance = found.covariance
         if learnt is not None:
             spread = learnt.covariance if moves else known
@@ -84,7 +84,7 @@ class MedRAndT(RobotKnowledgeSource):
         return found if np.count_nonzero(found.inliers) >= s.min_lines else None
 
     def _solve(
-        self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, landmarks: list[int]
+        self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, milestone: Milestone
     ) -> PlanarEstimate:
         """The pose with a camera that is taken as it is."""
         return planar_from_lines(
@@ -94,7 +94,8 @@ class MedRAndT(RobotKnowledgeSource):
             robot.mount.camera_from_robot,
             here,
             prior_covariance=prior,
-            landmark_ids=landmarks,
+            landmark_ids=[milestone.landmark_of[i] for i in match.pairs[:, 0]],
             sigma_px=self._settings.features.sigma_across_px,
+            errors=milestone.errors.take(match.pairs[:, 0]),
             settings=self._settings.pose,
         )

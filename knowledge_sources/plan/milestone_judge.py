@@ -21,7 +21,7 @@ from knowledge_sources.methods.verification.color_check import ColorCheck, check
 from knowledge_sources.methods.verification.line_check import LineCheck, check_lines
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.methods.verification.pose_evidence import compute_evidence, compute_motion_tolerance_px
-from knowledge_sources.methods.verification.predicted_lines import predict_lines
+from knowledge_sources.methods.verification.predicted_lines import find_errors, predict_lines
 from knowledge_sources.questions import find_belief, find_robot, find_robot_in, has_followed, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Frame
@@ -125,7 +125,9 @@ class MilestoneJudge(RobotKnowledgeSource):
         before = pose if belief is None else belief.value.world_from_robot(robot.world)
         covariance = fix.covariance if belief is None else belief.value.covariance_world(robot.world)
         lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
-        agreed = check_lines(robot, lines, segments.segments_px, pose, s.verification)
+        agreed = check_lines(robot, lines, segments.segments_px, pose, s.verification, milestone.errors, s.pose)
+        plain_px = agreed.projected_px if not milestone.modes else check_lines(
+            robot, lines, segments.segments_px, pose, s.verification).projected_px
         faces = check_colors(robot, pose, decode_small_color(frame.jpeg), milestone.looks, s)
         weight = compute_evidence(
             robot, lines, segments.segments_px, pose, fix.covariance, before, covariance, agreed, faces,
@@ -154,7 +156,7 @@ class MilestoneJudge(RobotKnowledgeSource):
             faces=faces,
             p_false=p_false,
             is_enough=POSE_CONFIDENCE.accepts(p_false, s.plan.p_wrong_in_doubt if in_doubt else p_wrong),
-            shift_px=_median_shift(expected_px, agreed.projected_px),
+            shift_px=_median_shift(expected_px, plain_px),
             tolerance_px=tolerance_px if is_as_put_down else min(tolerance_px, s.plan.max_deviation_px),
             is_weak=in_doubt or not followed,
             camera_chi2=fix.camera_chi2,
@@ -210,8 +212,10 @@ class MilestoneJudge(RobotKnowledgeSource):
         least = self._settings.plan.min_alias_part * weighed.lines.coverage
         for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
             there = other.value.world_from_robot(weighed.robot.world) @ correction
-            lines = predict_lines(weighed.robot, there, s).lines_world
-            if check_lines(weighed.robot, lines, weighed.segments.segments_px, there, s).coverage >= least:
+            lines = predict_lines(weighed.robot, there, s)
+            found = check_lines(weighed.robot, lines.lines_world, weighed.segments.segments_px, there, s,
+                                find_errors(weighed.robot, lines), self._settings.pose)
+            if found.coverage >= least:
                 return other
         return None
 

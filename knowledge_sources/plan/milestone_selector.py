@@ -18,7 +18,7 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.localization.aliasing import precompute_views
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from knowledge_sources.methods.verification.predicted_lines import predict_lines
+from knowledge_sources.methods.verification.predicted_lines import find_errors, predict_lines
 from knowledge_sources.methods.verification.view_quality import ViewQuality, compute_view_quality
 from knowledge_sources.questions import (
     deepest_sketch,
@@ -37,6 +37,7 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.plan import PlanSettings
 from world_models.building.building import Building
+from world_models.building.model_errors import pack_errors
 from world_models.entries.body import Look
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstruction import Obstruction
@@ -256,6 +257,7 @@ def predict_milestone(
     """The milestone with the lines and colours that should be seen from a pose, without those of ``car``."""
     lines = _predict_clear_lines(robot, pose, car, settings)
     marks = sorted({int(i) for i in lines.landmark})
+    errors = find_errors(robot, lines)
     return replace(
         milestone,
         landmarks=tuple(lines.marks[i].name for i in marks),
@@ -263,6 +265,8 @@ def predict_milestone(
         expected_px=_to_tuples(lines.segments_px),
         landmark_of=tuple(marks.index(int(i)) for i in lines.landmark),
         looks=predict_face_colors(robot, pose, settings.verification),
+        modes=errors.modes,
+        shifts=pack_errors(errors),
         status="expected",
     )
 

@@ -107,3 +107,27 @@ class PoseSettings:
         4.0, "1", "A point further than this many standard deviations off is an outlier.", "engineering judgement")
     max_point_rounds: int = setting(
         6, "count", "Rounds in which inliers and pose may still change each other.", "engineering judgement")
+
+    # Lines of a model that is inexact
+    shared_prior_factor: float = setting(
+        3.0, "1", "A prior of the same model is loosened by so many times what the model's errors make uncertain.",
+        "engineering judgement")
+    max_marginal_rounds: int = setting(
+        12, "count", "Rounds in which lines that do not agree are left out.", "engineering judgement")
+    max_marginal_steps: int = setting(8, "count", "Steps of Gauss-Newton in each of them.", "engineering judgement")
+    min_marginal_step: float = setting(1e-7, "m, rad", "Step at which these end.", "convergence")
+    displaced_widths_px: tuple[float, ...] = setting(
+        (12.0, 8.0, 5.0, 3.0, 2.0, 1.5), "px", "Widths of the loss by which displacements of the model are fitted.",
+        "engineering judgement")
+    displaced_steps: int = setting(2, "count", "Steps of that fit at each width.", "engineering judgement")
+    displaced_gate_sigmas: float = setting(
+        2.5, "1", "Deviations of belief and model within which a segment may belong to a line.",
+        "engineering judgement")
+    displaced_gate_px: float = setting(
+        3.0, "px", "And the segment's own error across its line.", "engineering judgement")
+    displaced_gate_rad: float = setting(
+        0.15, "rad", "And the segment's own error in direction.", "engineering judgement")
+    displaced_pair_px: float = setting(
+        2.5, "px", "Largest distance of a segment from its line, once that is displaced.", "engineering judgement")
+    displaced_unit_px: float = setting(
+        20.0, "px", "A segment of this length weighs like one measurement.", "engineering judgement")

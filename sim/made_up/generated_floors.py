@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sim.differences.inexact import TrueInexact, displace
 from sim.made_up.floor_plan import FloorPlan
 from sim.made_up.generated_floors_text import as_toml
 from world_models.building.world import World
@@ -59,6 +60,12 @@ class Floor:
                     locale["things"] = [thing for thing in locale["things"] if chance.random() >= missing]
         details = Source.parse(self.details, f"floor-{self.seed}-details")
         return read_world(Source.parse(as_toml(data), f"floor-{self.seed}"), [details])
+
+    def displaced(self, truth: TrueInexact) -> World:
+        """The building, with its details, as inexactly as the model describes it."""
+        details = Source.parse(self.details, f"floor-{self.seed}-details")
+        return read_world(Source.parse(self.text, f"floor-{self.seed}"), [details],
+                          altered=lambda spec: displace(spec, truth).spec)
 
     def write(self, folder: Path) -> tuple[Path, Path]:
         """Write the files of the model and of the details, for scenarios."""

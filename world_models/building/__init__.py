@@ -10,6 +10,7 @@ In reading order:
 * :mod:`.passages`: passage graphs at every level of the hierarchy, and routes.
 * :mod:`.changes`: what is believed otherwise than the world file says: a door found shut, a thing gone.
 * :mod:`.building`: the queries, one locale at a time; :mod:`.world`: the whole, as files and the simulator have it.
+* :mod:`.model_errors`: how well the model knows where things are, and which errors are shared.
 * :mod:`.checks`: faults of a world.
 * :mod:`.plan_view`: a floor plan as a drawing.
 """

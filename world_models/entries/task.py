@@ -8,6 +8,7 @@ from typing import Literal
 
 from blackboard.kinds import inference, observation
 from world_models import words
+from world_models.building.model_errors import LineErrors, unpack_errors
 from world_models.entries.location import Covariance, Place
 
 GoalStatus = Literal["active", "reached", "abandoned"]
@@ -221,6 +222,8 @@ class Milestone:
         landmark_of: for each line, its index in ``landmarks``.
         looks: the faces that should be seen, each as its colour (red, green, blue; 0..1) and points of it [m, world].
         tried: headings from which it was looked for before, and could not be told [rad, world].
+        modes: what of the model may be displaced as one: walls, doors, things; none where it is exact.
+        shifts: by how much a standard deviation of a mode displaces a line: (mode, line, x, y, z [m, world]).
         status: turning (not yet looking there), expected, verified, refuted, not testable, or withdrawn (what is
             known of the building has changed, and it rested on that).
     """
@@ -235,11 +238,18 @@ class Milestone:
     landmark_of: tuple[int, ...] = ()
     looks: tuple[tuple[tuple[float, ...], tuple[tuple[float, ...], ...]], ...] = ()
     tried: tuple[float, ...] = ()
+    modes: tuple[str, ...] = ()
+    shifts: tuple[tuple[float, ...], ...] = ()
     status: MilestoneStatus = "turning"
 
     @property
     def is_open(self) -> bool:
         return self.status in ("turning", "expected")
+
+    @property
+    def errors(self) -> LineErrors:
+        """How well the model knows its lines."""
+        return unpack_errors(self.modes, self.shifts, len(self.expected))
 
     def name(self) -> str:
         """``M1 of the route``, or ``check of the belief``; without the reason for a check."""

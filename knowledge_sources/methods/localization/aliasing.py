@@ -20,9 +20,11 @@ from knowledge_sources.methods.localization.pose_candidates import are_distinct,
 from knowledge_sources.methods.localization.refinement import refine_pose
 from knowledge_sources.methods.localization.repetition import find_repetitions
 from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.methods.pose.displacements import fit_displacements
 from knowledge_sources.methods.verification.agreement import compute_coverage
-from knowledge_sources.methods.verification.predicted_lines import predict_lines
+from knowledge_sources.methods.verification.predicted_lines import find_errors, predict_lines
 from knowledge_sources.settings import DEFAULT, Settings
+from world_models.building.model_errors import LineErrors
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 
@@ -47,7 +49,7 @@ def find_strongest_alias(
               *(find_fitting_poses(robot, segments_px, room, pose, settings) if search else ())]
     if not others:
         return None
-    views = predict_views_on_grid(robot, (pose, *others), settings)
+    views = predict_views_on_grid(robot, (pose, *others), settings, segments_px)
     own, *there = (score_view(lines_px, segments_px, settings) for lines_px in views)
     margins = [compute_margin(own, other, settings) for other in there]
     smallest = int(np.argmin(margins))
@@ -77,9 +79,15 @@ def precompute_views(robot: RobotModel, room: str, pose: Pose2, settings: Settin
     predict_views_on_grid(robot, (pose, *find_repeated_poses(robot, room, pose, settings)), settings)
 
 
-def predict_views_on_grid(robot: RobotModel, poses: Sequence[Pose2], settings: Settings = DEFAULT) -> list[Floats]:
-    """Predict the view (n, 2, 2) [px] from each pose: the lines visible from the nearest pose of the grid."""
-    lines = [robot.camera_from_world(pose).apply(_find_visible_on_grid(robot, pose, settings)) for pose in poses]
+def predict_views_on_grid(
+    robot: RobotModel, poses: Sequence[Pose2], settings: Settings = DEFAULT, segments_px: Floats | None = None
+) -> list[Floats]:
+    """Predict the view (n, 2, 2) [px] from each pose: the lines visible from the nearest pose of the grid.
+
+    Lines of a model that is inexact are displaced as they fit segments (k, 2, 2) best, where these are given.
+    """
+    lines = [robot.camera_from_world(pose).apply(_find_displaced_on_grid(robot, pose, segments_px, settings))
+             for pose in poses]
     seen, inside = robot.camera.project_segments(np.concatenate(lines).reshape(-1, 2, 3), Pose.identity())
     ends = np.cumsum([len(some) for some in lines])[:-1]
     return [some[here] for some, here in zip(np.split(seen, ends), np.split(inside, ends), strict=True)]
@@ -105,15 +113,33 @@ def compute_margin(one: ScoredView, other: ScoredView, settings: Settings = DEFA
     return _sum_own(one, other, settings) - _sum_own(other, one, settings)
 
 
-def _find_visible_on_grid(robot: RobotModel, pose: Pose2, settings: Settings) -> Floats:
-    """(n, 2, 3) the lines [m, world] that are visible from the pose of the grid nearest to a pose. Kept."""
+def _find_displaced_on_grid(
+    robot: RobotModel, pose: Pose2, segments_px: Floats | None, settings: Settings
+) -> Floats:
+    """(n, 2, 3) the lines [m, world] of the grid's nearest pose, displaced as far as the model is inexact."""
+    lines, errors = _find_visible_on_grid(robot, pose, settings)
+    if segments_px is None or errors.is_exact:
+        return lines
+    return fit_displacements(lines, errors, segments_px, robot.camera, robot.mount.camera_from_robot, pose,
+                             settings=settings.pose).lines_world
+
+
+def _find_visible_on_grid(robot: RobotModel, pose: Pose2, settings: Settings) -> tuple[Floats, LineErrors]:
+    """The lines (n, 2, 3) [m, world] that are visible from the pose of the grid nearest to a pose, and their errors.
+
+    Kept.
+    """
     grid_m, grid_rad = settings.localization.view_grid_m, settings.localization.view_grid_rad
     turned = round(pose.heading_rad / grid_rad) % round(math.tau / grid_rad)
     nearest = (round(pose.x_m / grid_m), round(pose.y_m / grid_m), turned)
     of_grid = Pose2(nearest[0] * grid_m, nearest[1] * grid_m, nearest[2] * grid_rad)
     key = robot.camera, robot.mount.height_m, nearest, grid_m, grid_rad, settings.verification
-    return robot.world.cached("views on a grid", settings.localization.cached_views, key,
-                              lambda: predict_lines(robot, of_grid, settings.verification).lines_world)
+
+    def predict() -> tuple[Floats, LineErrors]:
+        lines = predict_lines(robot, of_grid, settings.verification)
+        return lines.lines_world, find_errors(robot, lines)
+
+    return robot.world.cached("views on a grid", settings.localization.cached_views, key, predict)
 
 
 def _sum_own(view: ScoredView, other: ScoredView, settings: Settings) -> float:

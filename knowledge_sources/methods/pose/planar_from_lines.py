@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
-from knowledge_sources.methods.pose.estimate import BEHIND, PlanarEstimate
+from knowledge_sources.methods.pose.displacements import compute_sigmas_px
+from knowledge_sources.methods.pose.estimate import BEHIND, DISTANCE, PlanarEstimate
 from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, build_line_set, group_by_landmark
+from knowledge_sources.methods.pose.marginal_likelihood import maximise_marginal
 from knowledge_sources.methods.pose.numerics import kernels
 from knowledge_sources.methods.pose.numerics.discrepancy_principle import compute_max_chi2, solve_near_prior
 from knowledge_sources.methods.pose.numerics.finish import find_rejections
@@ -29,6 +31,7 @@ from knowledge_sources.methods.pose.planar import (
 )
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.pose import PoseSettings
+from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 
@@ -47,6 +50,7 @@ def planar_from_lines(
     landmark_ids: LandmarkIds = None,
     sigma_px: Any = 1.0,
     robust: bool = True,
+    errors: LineErrors | None = None,
     settings: PoseSettings = DEFAULT.pose,
 ) -> PlanarEstimate:
     """Robot pose on the floor of maximum likelihood, robust beyond 50 % of wrong lines.
@@ -64,10 +68,15 @@ def planar_from_lines(
         landmark_ids: n names; pairs within one landmark are not tried as candidates.
         sigma_px: of the segment ends across the line, one number or (n,).
         robust: False takes every line as right.
+        errors: of the model's lines, one row a pair; they are integrated out (:mod:`.marginal_likelihood`), and
+            ``sigma_px`` is one number. ``None``: the model is exact.
 
     Raises:
         ValueError: as :func:`build_line_set`; ids that are not one a line; a covariance of another shape.
     """
+    if errors is not None and not errors.is_exact:
+        return _solve_inexact(model_lines_world, segments_px, camera, camera_from_robot, prior, prior_covariance,
+                              landmark_ids, float(sigma_px), robust, errors, settings)
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     groups = group_by_landmark(landmark_ids, len(lines))
     floor = _Floor(lines, build_planar_prior(prior, prior_covariance, settings), camera_from_robot, settings)
@@ -84,6 +93,32 @@ def planar_from_lines(
     best = int(np.argmin(floor.compute_costs(finalists, bound)))
     state, near = _alternate(floor, finalists[best], bound)
     return _finish(floor, near, state, bound)
+
+
+def _solve_inexact(
+    model_lines_world: Any, segments_px: Any, camera: Camera, camera_from_robot: Pose, prior: Pose2,
+    prior_covariance: Any, landmark_ids: LandmarkIds, sigma_px: float, robust: bool, errors: LineErrors,
+    settings: PoseSettings,
+) -> PlanarEstimate:
+    """From lines whose model is inexact: robustly with each line's own error first, then with those that they share."""
+    wide_px = np.hypot(sigma_px, compute_sigmas_px(
+        np.asarray(model_lines_world, float).reshape(-1, 2, 3), errors, camera, camera_from_robot, prior))
+    first = planar_from_lines(
+        model_lines_world, segments_px, camera, camera_from_robot, prior, prior_covariance=prior_covariance,
+        landmark_ids=landmark_ids, sigma_px=wide_px, robust=robust, settings=settings)
+    if first.reason is not None:
+        return first
+    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
+    belief = build_planar_prior(prior, prior_covariance, settings)
+    if not belief.given:
+        belief = replace(belief, information=np.zeros((3, 3)))
+    pose = first.world_from_robot
+    found = maximise_marginal(
+        lines, errors.shifts, sigma_px, camera_from_robot, belief, np.array([pose.x_m, pose.y_m, pose.heading_rad]),
+        first.inliers, settings)
+    rejected = tuple(None if near else reason or DISTANCE
+                     for near, reason in zip(found.near, first.rejected, strict=True))
+    return PlanarEstimate(to_pose2(found.state), found.covariance, found.near, found.residuals_px, rejected, found.cost)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

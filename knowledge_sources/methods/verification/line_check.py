@@ -7,12 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.pose.planar import compute_camera_poses
+from knowledge_sources.methods.pose.displacements import fit_displacements
+from knowledge_sources.methods.pose.planar import compute_camera_poses, to_pose2
 from knowledge_sources.methods.verification.agreement import Agreement, compute_agreement
 from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.pose import PoseSettings
 from knowledge_sources.settings.verification import VerificationSettings
+from world_models.building.model_errors import LineErrors
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
+
+_FEW = np.array([4 * k + k % 4 for k in range(8)])
+"""Of the wrong poses, those at which a displaced model is fitted: each direction and distance, with one turn."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,12 +38,23 @@ class LineCheck:
 
 def check_lines(
     robot: RobotModel, lines_world: Floats, segments_px: Floats, world_from_robot: Pose2,
-    settings: VerificationSettings = DEFAULT.verification,
+    settings: VerificationSettings = DEFAULT.verification, errors: LineErrors | None = None,
+    pose_settings: PoseSettings = DEFAULT.pose,
 ) -> LineCheck:
-    """Compare model lines (m, 2, 3) [m, world], visible from a pose, with segments (k, 2, 2) of the picture."""
+    """Compare model lines (m, 2, 3) [m, world], visible from a pose, with segments (k, 2, 2) of the picture.
+
+    Where the model is inexact, by ``errors``, its lines are displaced as they fit best: at this pose, and as freely at
+    the wrong ones at which chance is counted.
+    """
     state = np.array([world_from_robot.x_m, world_from_robot.y_m, world_from_robot.heading_rad])
     states = np.concatenate([state[None], _displace(state, settings.displacement_m, settings.displacement_rad)])
-    here, displaced = np.split(_project(robot, lines_world, states), [1])
+    if errors is None or errors.is_exact:
+        projected = _project(robot, lines_world, states)
+    else:
+        few = np.concatenate([states[:1], states[1:][_FEW]])
+        projected = np.concatenate([
+            _project_displaced(robot, lines_world, errors, segments_px, s, pose_settings) for s in few])
+    here, displaced = np.split(projected, [1])
     agreement = compute_agreement(here[0], segments_px, displaced, settings)
     lengths = np.linalg.norm(here[0, :, 1] - here[0, :, 0], axis=1)
     return LineCheck(agreement, agreement.covered_length(lengths), here[0])
@@ -49,6 +66,17 @@ def _project(robot: RobotModel, lines_world: Floats, states: Floats) -> Floats:
     lines_camera = lines_world.reshape(1, -1, 3) @ np.swapaxes(turns, 1, 2) + shifts[:, None]
     seen, _ = robot.camera.project_segments(lines_camera.reshape(-1, 2, 3), Pose.identity())
     return seen.reshape(len(states), -1, 2, 2)
+
+
+def _project_displaced(
+    robot: RobotModel, lines_world: Floats, errors: LineErrors, segments_px: Floats, state: Floats,
+    settings: PoseSettings,
+) -> Floats:
+    """(1, m, 2, 2) the lines as seen from a state (3,), displaced as they fit the segments best [px]."""
+    fit = fit_displacements(
+        lines_world, errors, segments_px, robot.camera, robot.mount.camera_from_robot, to_pose2(state),
+        settings=settings)
+    return _project(robot, fit.lines_world, state[None])
 
 
 def _displace(state: Floats, shift_m: float, turn_rad: float) -> Floats:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from world_models.building.geometry.outlines import is_simple
 from world_models.building.geometry.regions import Finish
+from world_models.building.model_errors import SIGMA
 from world_models.files.construction.specs import LocaleSpec, RoomFinishes
 from world_models.files.toml.shared_parts import SharedParts
 from world_models.files.toml.source import Node
@@ -20,8 +21,9 @@ from world_models.frames import Pose
 RECTANGLE_WALLS = ("south", "east", "north", "west")
 FINISH_KEYS = ("walls", "floor", "ceiling", "baseboard", "moulding", "frame", "leaf", "threshold")
 LOCALE_KEYS = ("kind", "in", "at", "turn", "size", "outline", "height", "wall_heights", "sky", "like", "things",
-               "properties", "survey", *FINISH_KEYS[:5])
+               "properties", "survey", "sigma_cm", *FINISH_KEYS[:5])
 DEFAULT_KEYS = (*FINISH_KEYS, "kind", "in", "height", "door_width", "door_height")
+MAX_SIGMA_CM = 100.0
 GREY_WALL, GREY_FLOOR, WHITE_CEILING = Finish((0.8, 0.8, 0.76)), Finish((0.5, 0.5, 0.5)), Finish((0.9, 0.9, 0.9))
 
 
@@ -55,6 +57,8 @@ class LocaleReader:
         if "sky" in node and node["sky"].flag():
             finishes = replace(finishes, ceiling=None, moulding=None)
             properties["sky"] = True
+        if "sigma_cm" in node:
+            properties[SIGMA] = read_sigma(node)
         survey_m, survey_rad = self._read_survey(node.get("survey"))
         return LocaleSpec(
             name, kind.text(), self._read_container(name, node, world_name), self.read_pose(node), outline, walls,
@@ -153,6 +157,11 @@ def pose_at(at: tuple[float, float, float], turn_deg: float, unit_m: float = 1.0
     turn = math.radians(turn_deg)
     c, s = (round(value, 15) for value in (math.cos(turn), math.sin(turn)))
     return Pose(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.array(at) * unit_m)
+
+
+def read_sigma(node: Node) -> float:
+    """How well a table's part of the building is known: a standard deviation [m]."""
+    return 0.01 * node["sigma_cm"].number(0.0, MAX_SIGMA_CM)
 
 
 def read_properties(node: Node | None) -> dict[str, Any]:

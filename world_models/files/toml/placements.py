@@ -15,8 +15,8 @@ from world_models.files.toml.source import Node
 
 MAX_PLACES = 1000
 """Largest number of places from one step."""
-THING_KEYS = ("part", "boxes", "finish", "name", "wall", "along", "up", "at", "turn")
-ROW_KEYS = ("finish", "up", "turn")
+THING_KEYS = ("part", "boxes", "finish", "name", "wall", "along", "up", "at", "turn", "sigma_cm")
+ROW_KEYS = ("finish", "up", "turn", "sigma_cm")
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +31,7 @@ class Placement:
         x_m, y_m: its position on the floor, or along the wall (x only).
         turn_deg: its direction on the floor, counter-clockwise.
         up_m: its height on a wall.
+        sigma_m: how well its place is known, where the file says so of it.
     """
 
     kind: str
@@ -42,6 +43,7 @@ class Placement:
     y_m: float = 0.0
     turn_deg: float = 0.0
     up_m: float = 0.0
+    sigma_m: float | None = None
 
 
 def read_placements(node: Node, shared: SharedParts) -> list[Placement]:
@@ -73,7 +75,7 @@ def _read_steps(node: Node, shared: SharedParts) -> list[float]:
 def _read_table(node: Node, shared: SharedParts) -> Placement:
     against = "wall" in node.table((), THING_KEYS)
     place = ("wall", "along") if against else ("at",)
-    node.table(place, ("part", "boxes", "finish", "name", *(("up",) if against else ("turn",))))
+    node.table(place, ("part", "boxes", "finish", "name", "sigma_cm", *(("up",) if against else ("turn",))))
     if ("part" in node) == ("boxes" in node):
         raise node.fail("either a part or boxes", "both" if "part" in node else "neither")
     thing = _read_thing(node, node.get("part"), node, shared)
@@ -93,6 +95,7 @@ def _read_thing(place: Node, part: Node | None, options: Node, shared: SharedPar
         part.text() if part else "detail", boxes, place, None, options.get("name"), 0.0,
         turn_deg=options["turn"].number(-360.0, 360.0) if "turn" in options else 0.0,
         up_m=shared.coordinate(options["up"]) if "up" in options else 0.0,
+        sigma_m=0.01 * options["sigma_cm"].number(0.0, 100.0) if "sigma_cm" in options else None,
     )
 
 

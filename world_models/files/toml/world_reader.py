@@ -8,15 +8,16 @@ from itertools import combinations, count
 from pathlib import Path
 
 from world_models.building.geometry.regions import Finish
+from world_models.building.model_errors import SIGMA, SIGMAS
 from world_models.files.construction.specs import DoorSpec, LinkSpec, LocaleSpec, ThingSpec, WorldSpec
 from world_models.files.toml.includes import find_named_file, read_included
-from world_models.files.toml.locale_reader import LOCALE_KEYS, LocaleReader, pose_at, read_properties
+from world_models.files.toml.locale_reader import LOCALE_KEYS, LocaleReader, pose_at, read_properties, read_sigma
 from world_models.files.toml.placements import Placement, read_coordinates, read_placements
 from world_models.files.toml.source import Node, Source
 from world_models.files.toml.subtrees import COPY_KEYS, extract_subtree, rename_locales
 
 SHARED_KEYS = ("include", "finishes", "parts", "defaults")
-DOOR_KEYS = ("width", "height", "open", "frame", "leaf", "threshold", "panel")
+DOOR_KEYS = ("width", "height", "open", "frame", "leaf", "threshold", "panel", "sigma_cm")
 DOOR_FINISH = Finish((0.45, 0.33, 0.22))
 
 
@@ -38,18 +39,29 @@ class WorldReader:
     doors: list[DoorSpec] = field(default_factory=list)
     things: list[ThingSpec] = field(default_factory=list)
     links: list[LinkSpec] = field(default_factory=list)
+    _sigma_m: float | None = None
+    _sigmas_m: dict[str, dict[str, float]] = field(default_factory=dict)
     _thing_names: dict[str, set[str]] = field(default_factory=dict)
 
     def spec(self) -> WorldSpec:
         """All that has been read."""
-        return WorldSpec(self.name, f"{self.base.name}:1", self.locales, tuple(self.doors), tuple(self.things),
+        locales = {name: self._with_sigmas(spec) for name, spec in self.locales.items()}
+        return WorldSpec(self.name, f"{self.base.name}:1", locales, tuple(self.doors), tuple(self.things),
                          tuple(self.links))
+
+    def _with_sigmas(self, spec: LocaleSpec) -> LocaleSpec:
+        """A locale with what the file says of how well it, its doors and its things are known."""
+        stated = {} if self._sigma_m is None else {SIGMA: self._sigma_m}
+        own = self._sigmas_m.get(spec.name)
+        more = {SIGMAS: {**spec.properties.get(SIGMAS, {}), **own}} if own else {}
+        return replace(spec, properties={**stated, **spec.properties, **more}) if stated or more else spec
 
     # -- files -----------------------------------------------------------------------------------------------------
 
     def read_base(self) -> None:
         """Read the world file itself. Raises WorldError."""
-        root = self.base.root.table(("name", "units", "locales"), (*SHARED_KEYS, "doors", "links"))
+        root = self.base.root.table(("name", "units", "locales"), (*SHARED_KEYS, "doors", "links", "sigma_cm"))
+        self._sigma_m = read_sigma(root) if "sigma_cm" in root else None
         self.name = root["name"].text()
         self._read_shared(root)
         nodes = root["locales"]
@@ -164,6 +176,9 @@ class WorldReader:
         is_open = node["open"].flag() if "open" in node else False
         if len(between) > 2 or len(set(between)) != len(between) or (is_open and len(between) < 2):
             raise node["between"].fail("two different locales" if is_open else "one or two different locales")
+        if "sigma_cm" in node:
+            for room in between:
+                self._sigmas_m.setdefault(room, {}).update(dict.fromkeys((name, f"{room}/{name}"), read_sigma(node)))
         casing, leaf, threshold = (self.reader.finish(node, key, DOOR_FINISH) for key in ("frame", "leaf", "threshold"))
         return DoorSpec(
             name, between, self._read_wall(node["wall"], between[0]), along_m,
@@ -213,7 +228,11 @@ class WorldReader:
         if self.locales[locale].outline is None:
             raise things.fail("things only in a locale with walls", f"things in {locale}")
         for item in things.items():
-            self.things += [self._build_thing(locale, place) for place in read_placements(item, self.reader.shared)]
+            for place in read_placements(item, self.reader.shared):
+                self.things.append(self._build_thing(locale, place))
+                if place.sigma_m is not None:
+                    name = f"{locale}/{self.things[-1].name}"
+                    self._sigmas_m.setdefault(locale, {})[name] = place.sigma_m
 
     def _build_thing(self, locale: str, place: Placement) -> ThingSpec:
         name = self._name_thing(locale, place)

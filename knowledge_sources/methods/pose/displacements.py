@@ -1,0 +1,179 @@
+"""Model lines that are displaced by errors of the model, fitted to segments together with the robot's pose.
+
+The model's errors are modes (:class:`world_models.building.model_errors.LineErrors`): a wall with all that is on it, a
+door, a thing. To first order in the image, the distance of a segment's end from its model line is r + J dx + A a, with
+the pose's change dx and the modes' amplitudes a in standard deviations, of which a prior is known: N(0, I).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from knowledge_sources.methods.arrays import Floats, Indices, Mask
+from knowledge_sources.methods.pose.line_set import LineSet, build_line_set
+from knowledge_sources.methods.pose.numerics.image_error import compute_distance_slopes
+from knowledge_sources.methods.pose.numerics.levenberg_marquardt import cross
+from knowledge_sources.methods.pose.planar import compute_camera_poses, compute_line_jacobian
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.pose import PoseSettings
+from world_models.building.model_errors import LineErrors
+from world_models.camera import Camera
+from world_models.frames import Pose, Pose2, wrap_angle
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DisplacedFit:
+    """Model lines displaced so that segments lie on them.
+
+    Attributes:
+        state: (3,) x [m], y [m], heading [rad] of ``world_from_robot``.
+        amplitudes: (k,) of the modes, in standard deviations.
+        lines_world: (n, 2, 3) the displaced model lines [m].
+        pairs: (p, 2) line and segment that lie on each other, sorted.
+    """
+
+    state: Floats
+    amplitudes: Floats
+    lines_world: Floats
+    pairs: Indices
+
+
+def compute_displaced_jacobian(
+    lines: LineSet, shifts: Floats, state: Floats, camera_from_robot: Pose
+) -> tuple[Floats, Floats, Floats]:
+    """Distances (n, 2) [px], derivatives (n, 2, 3) by (x, y, heading) and (n, 2, k) by the amplitudes of the modes.
+
+    Args:
+        shifts: (k, n, 3) as in :class:`LineErrors`, one row a line.
+    """
+    points = lines.points[:, 0]
+    distances, by_pose = compute_line_jacobian(points, lines.directions, lines, state, camera_from_robot)
+    rotation, translation = compute_camera_poses(state, camera_from_robot)
+    along = lines.directions @ rotation.T
+    planes = cross(points @ rotation.T + translation, along)
+    _, slopes = compute_distance_slopes(lines, planes)
+    moved = cross(shifts @ rotation.T, along[None])
+    return distances, by_pose, np.einsum("ned,knd->nek", slopes, moved)
+
+
+def compute_sigmas_px(
+    lines_world: Floats, errors: LineErrors, camera: Camera, camera_from_robot: Pose, pose: Pose2
+) -> Floats:
+    """(n,) by how much the model's errors displace each line in the image, across it: a standard deviation [px].
+
+    The larger of a line's two ends; 0 where it is not in view.
+    """
+    rotation, translation = compute_camera_poses(_to_state(pose), camera_from_robot)
+    projected, _ = camera.project_segments(np.array(lines_world, float), Pose(rotation, translation))
+    sigmas = np.zeros(len(lines_world))
+    seen = np.flatnonzero(np.isfinite(projected).all(axis=(1, 2)))
+    if len(seen) and len(errors.modes):
+        lines = build_line_set(lines_world[seen], projected[seen], camera, 1.0)
+        _, _, by_mode = compute_displaced_jacobian(lines, errors.shifts[:, seen], _to_state(pose), camera_from_robot)
+        sigmas[seen] = np.sqrt(np.sum(by_mode**2, axis=2)).max(axis=1)
+    return sigmas
+
+
+def fit_displacements(
+    lines_world: Any,
+    errors: LineErrors,
+    segments_px: Any,
+    camera: Camera,
+    camera_from_robot: Pose,
+    pose: Pose2,
+    covariance: Floats | None = None,
+    settings: PoseSettings = DEFAULT.pose,
+) -> DisplacedFit:
+    """Displace model lines by their modes, and move the pose, until segments lie on them: least robust squares.
+
+    The loss is Welsch's, of a width that becomes smaller, so that lines which are displaced together find the segments
+    that are displaced alike, though each of them has others nearby.
+
+    Args:
+        lines_world: (n, 2, 3) [m]. segments_px: (s, 2, 2) found in the picture.
+        pose: ``world_from_robot``. covariance: (3, 3) of it; ``None``: the pose stays.
+    """
+    lines, segments = np.asarray(lines_world, float), np.asarray(segments_px, float).reshape(-1, 2, 2)
+    state, start = _to_state(pose), _to_state(pose)
+    which, data = _find_candidates(lines, errors, segments, camera, camera_from_robot, state, covariance, settings)
+    amplitudes = np.zeros(len(errors.modes))
+    if not len(which):
+        return DisplacedFit(state, amplitudes, lines, np.zeros((0, 2), np.int64))
+    observed = build_line_set(lines[which], segments[data], camera, 1.0)
+    shifts, free = errors.shifts[:, which], 0 if covariance is None else 3
+    information = np.eye(free + len(amplitudes))
+    if covariance is not None:
+        information[:3, :3] = np.linalg.inv(covariance)
+    weight = np.minimum(1.0, observed.lengths_px / settings.displaced_unit_px)
+    for width in settings.displaced_widths_px:
+        for _ in range(settings.displaced_steps):
+            moved = _displace(observed, shifts, amplitudes)
+            distances, by_pose, by_mode = compute_displaced_jacobian(moved, shifts, state, camera_from_robot)
+            slopes = by_mode if covariance is None else np.concatenate([by_pose, by_mode], axis=2)
+            w = weight * np.exp(-0.5 * np.mean(distances**2, axis=1) / width**2) / width**2
+            away = np.concatenate([_subtract(state, start)[:free], amplitudes])
+            step = _solve(slopes, distances, w, information, away)
+            state, amplitudes = state + np.pad(step[:free], (0, 3 - free)), amplitudes + step[free:]
+    moved = _displace(observed, shifts, amplitudes)
+    distances, _, _ = compute_displaced_jacobian(moved, shifts, state, camera_from_robot)
+    near = np.abs(distances).max(axis=1) <= settings.displaced_pair_px
+    return DisplacedFit(state, amplitudes, errors.displace(lines, amplitudes), np.column_stack([which, data])[near])
+
+
+def _solve(slopes: Floats, distances: Floats, weights: Floats, information: Floats, away: Floats) -> Floats:
+    """The step of weighted least squares with the prior's share."""
+    flat = slopes.reshape(-1, slopes.shape[2])
+    weighted = flat * np.repeat(weights, 2)[:, None]
+    return np.asarray(-np.linalg.solve(
+        flat.T @ weighted + information, weighted.T @ distances.reshape(-1) + information @ away))
+
+
+def _displace(lines: LineSet, shifts: Floats, amplitudes: Floats) -> LineSet:
+    by_m = np.tensordot(amplitudes, shifts, axes=1)
+    points = lines.points + by_m[:, None]
+    return LineSet(points, lines.directions, np.cross(points[:, 0], lines.directions), lines.rays, lines.normals,
+                   lines.lengths_px, lines.sigma_px, lines.focal_px)
+
+
+def _find_candidates(
+    lines: Floats, errors: LineErrors, segments: Floats, camera: Camera, mount: Pose, state: Floats,
+    covariance: Floats | None, settings: PoseSettings,
+) -> tuple[Indices, Indices]:
+    """Lines and segments (p,) that may belong together, by what belief and model may be wrong."""
+    rotation, translation = compute_camera_poses(state, mount)
+    projected, _ = camera.project_segments(lines, Pose(rotation, translation))
+    along, lengths = _measure(projected)
+    data_along, _ = _measure(segments)
+    turned = np.abs(along[:, None, 0] * data_along[None, :, 1] - along[:, None, 1] * data_along[None, :, 0])
+    which, data = np.nonzero(turned <= np.sin(settings.displaced_gate_rad))
+    if not len(which):
+        return which, data
+    observed = build_line_set(lines[which], segments[data], camera, 1.0)
+    distances, by_pose, by_mode = compute_displaced_jacobian(observed, errors.shifts[:, which], state, mount)
+    variances = np.sum(by_mode**2, axis=2)
+    if covariance is not None:
+        variances = variances + np.einsum("nei,ij,nej->ne", by_pose, covariance, by_pose)
+    reach = settings.displaced_gate_sigmas * np.sqrt(variances) + settings.displaced_gate_px
+    at = np.einsum("ni,nei->ne", along[which], segments[data] - projected[which, :1])
+    beside = reach.max(axis=1) + settings.max_beside_px
+    overlaps = (at.max(axis=1) >= -beside) & (at.min(axis=1) <= lengths[which] + beside)
+    near: Mask = np.all(np.abs(distances) <= reach, axis=1) & overlaps
+    return which[near], data[near]
+
+
+def _measure(segments_px: Floats) -> tuple[Floats, Floats]:
+    """Unit directions (n, 2), NaN where there is none, and lengths (n,)."""
+    by = segments_px[:, 1] - segments_px[:, 0]
+    lengths = np.linalg.norm(by, axis=1)
+    return by / np.where(lengths > 0.0, lengths, np.nan)[:, None], lengths
+
+
+def _to_state(pose: Pose2) -> Floats:
+    return np.array([pose.x_m, pose.y_m, pose.heading_rad])
+
+
+def _subtract(state: Floats, start: Floats) -> Floats:
+    return np.array([state[0] - start[0], state[1] - start[1], wrap_angle(float(state[2] - start[2]))])

@@ -1,0 +1,148 @@
+"""How well the model knows where things are: the errors of its lines, and which of them are shared.
+
+A world file may state a standard deviation (``sigma_cm``) for all of it, a locale, a door or a thing. What is built
+together is wrong together, so the errors are not one a line but one a *mode*: a wall is displaced along its normal with
+all that is on it; a door along its wall; a thing along and up its wall, or on the floor in both directions. The modes
+are independent and normal. Without a stated deviation the model counts as exact, and there are none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.building.building import Building
+from world_models.building.geometry.landmarks import Landmark
+
+Floats = NDArray[np.float64]
+
+SIGMA, SIGMAS = "sigma_m", "sigmas_m"
+"""Properties of a locale: the deviation of all that is in it [m], and by name those of its doors and things."""
+WALL_DEPTH_M = 0.15
+"""What lies no further than this from the plane of a wall is on it [m]."""
+MIN_LIFT_M = 0.3
+"""Things on a wall that begin lower stand on the floor: their height is known [m]."""
+MAX_MARKS = 4096
+"""Landmarks whose modes are kept."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LineErrors:
+    """The errors of n model lines.
+
+    Attributes:
+        modes: k names, of walls, doors and things.
+        shifts: (k, n, 3) by how much one standard deviation of each mode displaces each line [m, world].
+    """
+
+    modes: tuple[str, ...]
+    shifts: Floats
+
+    @property
+    def is_exact(self) -> bool:
+        return not self.modes
+
+    def take(self, lines: Sequence[int] | NDArray[np.int64]) -> LineErrors:
+        """Those of some of the lines, which may be repeated."""
+        return LineErrors(self.modes, self.shifts[:, np.asarray(lines, np.int64)])
+
+    def displace(self, lines_world: Floats, amplitudes: Floats) -> Floats:
+        """The lines (n, 2, 3) displaced by the modes with amplitudes (k,), in standard deviations."""
+        return np.asarray(lines_world + np.tensordot(amplitudes, self.shifts, axes=1)[:, None])
+
+
+def exact(count: int) -> LineErrors:
+    """Of lines that are where the model says."""
+    return LineErrors((), np.zeros((0, count, 3)))
+
+
+def pack_errors(errors: LineErrors) -> tuple[tuple[float, ...], ...]:
+    """The shifts that are not zero, as (mode, line, x, y, z)."""
+    return tuple((float(k), float(i), *errors.shifts[k, i].tolist())
+                 for k, i in np.argwhere(np.any(errors.shifts != 0.0, axis=2)).tolist())
+
+
+def unpack_errors(modes: tuple[str, ...], packed: Sequence[Sequence[float]], count: int) -> LineErrors:
+    """The inverse of :func:`pack_errors`, for ``count`` lines."""
+    shifts = np.zeros((len(modes), count, 3))
+    for k, i, *by_m in packed:
+        shifts[int(k), int(i)] = by_m
+    return LineErrors(modes, shifts)
+
+
+def find_line_errors(building: Building, marks: Sequence[Landmark], line: Sequence[int]) -> LineErrors:
+    """The errors of n model lines, as far as the world file states them.
+
+    Args:
+        marks: the landmark of each line. line: its number in the landmark.
+    """
+    rows: dict[str, Floats] = {}
+    for i, (mark, number) in enumerate(zip(marks, line, strict=True)):
+        for name, shifts in _find_modes(building, mark).items():
+            if np.any(shifts[number]):
+                rows.setdefault(name, np.zeros((len(marks), 3)))[i] = shifts[number]
+    return LineErrors(tuple(rows), np.array(list(rows.values()), float).reshape(len(rows), len(marks), 3))
+
+
+def find_sigma_m(building: Building, locale: str, name: str = "") -> float:
+    """The stated deviation of a door or thing of a locale, or else of what is in it; 0 where nothing is stated."""
+    properties = building.locale(locale).properties
+    sigmas: Mapping[str, float] = properties.get(SIGMAS, {})
+    return float(sigmas.get(name, properties.get(SIGMA, 0.0)))
+
+
+def _find_modes(building: Building, mark: Landmark) -> Mapping[str, Floats]:
+    """For each mode of a landmark, by name, the displacement (lines, 3) of its lines [m, world]."""
+    if not find_sigma_m(building, mark.locale, mark.name) and not find_sigma_m(building, mark.locale):
+        return {}
+    return building.cached("model errors", MAX_MARKS, mark.name, lambda: _compute_modes(building, mark))
+
+
+def _compute_modes(building: Building, mark: Landmark) -> dict[str, Floats]:
+    own_m, walls_m = find_sigma_m(building, mark.locale, mark.name), find_sigma_m(building, mark.locale)
+    names, origins, inward = _list_walls(building, mark.locale)
+    lines = mark.lines_world
+    flat = lines[..., :2]
+    off_m = np.einsum("nei,wi->wne", flat, inward) - np.sum(origins * inward, axis=1)[:, None, None]
+    if mark.kind == "wall":
+        near = np.abs(off_m).max(axis=2) <= WALL_DEPTH_M
+        return {names[w]: walls_m * near[w][:, None] * _level(inward[w]) for w in np.flatnonzero(near.any(axis=1))}
+    thing = next((t for t in building.things_of(mark.locale) if t.name == mark.name), None)
+    if thing is not None and thing.protrusion_m is None:
+        return {f"{mark.name} {axis}": own_m * _same(lines, direction)
+                for axis, direction in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)))}
+    wall = int(np.argmin(np.abs(off_m).mean(axis=(1, 2)) + 10.0 * _miss_wall(flat, origins, inward)))
+    along = (inward[wall, 1], -inward[wall, 0], 0.0)
+    found = {names[wall]: walls_m * _same(lines, tuple(_level(inward[wall]))),
+             f"{mark.name} along": own_m * _same(lines, along)}
+    if thing is not None and thing.low_m >= MIN_LIFT_M:
+        found[f"{mark.name} up"] = own_m * _same(lines, (0.0, 0.0, 1.0))
+    return found
+
+
+def _list_walls(building: Building, locale: str) -> tuple[list[str], Floats, Floats]:
+    """Names, starts (w, 2) and unit normals into the room (w, 2) of the walls of a room [m, world]."""
+    outline = building.outline(locale)
+    along = np.roll(outline, -1, axis=0) - outline
+    normals = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
+    return [f"{locale} wall {i}" for i in range(len(outline))], outline, normals
+
+
+def _miss_wall(points: Floats, origins: Floats, inward: Floats) -> Floats:
+    """(w,) how far the middle of points (..., 2) lies beyond the ends of each wall [m]."""
+    along = np.column_stack([inward[:, 1], -inward[:, 0]])
+    lengths = np.linalg.norm(np.roll(origins, -1, axis=0) - origins, axis=1)
+    at = np.sum((points.reshape(-1, 2).mean(axis=0) - origins) * along, axis=1)
+    return np.asarray(np.maximum(0.0, np.maximum(-at, at - lengths)))
+
+
+def _level(direction: Floats) -> Floats:
+    return np.array([direction[0], direction[1], 0.0])
+
+
+def _same(lines: Floats, direction: tuple[float, ...]) -> Floats:
+    """(n, 3) one displacement for all lines."""
+    return np.tile(np.array(direction, float), (len(lines), 1))
