@@ -26,6 +26,7 @@ from knowledge_sources.action.obstacle_finder import ObstacleFinder
 from knowledge_sources.action.path_follower import PathFollower
 from knowledge_sources.action.range_watcher import RangeWatcher
 from knowledge_sources.action.withdrawer import Withdrawer
+from knowledge_sources.action.yaw_calibrator import YawCalibrator
 from knowledge_sources.goal.interpreter import Interpreter
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.goal.relocalizer import Relocalizer
@@ -61,6 +62,7 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     MedRAndT,
     MilestoneJudge,
     CameraCalibrator,
+    YawCalibrator,
     PlanAdjuster,
     Escalator,
     Relocalizer,

@@ -13,25 +13,31 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.camera_knowledge import compute_camera_covariance, find_camera
 from knowledge_sources.questions import find_belief, find_contact, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
+from world_models.camera import YAW
 from world_models.entries.body import BodyFault, Course, Look, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot import Drift
+from world_models.entries.travel import Travel, begin_travel
 from world_models.frames import Pose2
+
+UNSEEN = ("command", "relocalization")
+"""What a belief rests on that no way is measured from."""
 
 
 class DeadReckoner(RobotKnowledgeSource):
     """Moves the belief by the odometry's report, corrected for drift, and asks for a picture to check it.
 
     Of a motion that was broken off, the unreported rest may have been driven in part or whole: it is added to the
-    covariance.
+    covariance; and so is that the camera may look aside of where the robot heads by its picture.
     """
 
     level = Level.ACTION
     watches = (Watch(MotionReport, (Posted,)),)
-    writes = (Hypothesis, Drift, Look, Discrepancy)
+    writes = (Hypothesis, Drift, Travel, Look, Discrepancy)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         belief = find_belief(view)
@@ -51,6 +57,9 @@ class DeadReckoner(RobotKnowledgeSource):
         pose, covariance = (actuator.propagate_course if on_the_move else actuator.propagate_move)(
             before, belief.value.covariance_world(world), report.turn_rad, report.move_m, drift.curvature_per_m
         )
+        camera = find_camera(view)
+        yaw_variance = float(compute_camera_covariance(camera, self._settings.camera_state)[YAW, YAW])
+        covariance = covariance + _compute_aside_covariance(before, pose, yaw_variance)
         there = world.locale_at([*pose.position, world.floor_m(belief.value.locale)])
         locale = there if there and world.is_room(there) else belief.value.locale  # in a doorway: still the old room
         fault = None if request is None else view.latest(BodyFault, lambda f: f.request == request.id)
@@ -62,6 +71,14 @@ class DeadReckoner(RobotKnowledgeSource):
         yield step
         rolled = drift.after_motion(actuator, report.turn_rad, report.move_m, on_the_spot=not on_the_move)
         yield Post(rolled, (trigger.entry,)) if known is None else Revise(known, rolled, (trigger.entry, known))
+        travel = view.latest(Travel)
+        if travel is None or belief.value.basis in UNSEEN:
+            way = begin_travel(before, belief.value.covariance_world(world), camera.mount.yaw_rad, yaw_variance)
+        else:
+            way = travel.value
+        slip_m = actuator.skitter_m * min(1.0, abs(report.turn_rad) / (math.pi / 2.0))
+        way = way.after_motion(before, pose, slip_m)
+        yield Post(way, (trigger.entry,)) if travel is None else Revise(travel, way, (trigger.entry, travel))
         if not on_the_move or fault is not None:  # on the move a picture was taken
             yield Post(Look("track"), (step,))
         if request is None or fault is not None:
@@ -74,6 +91,13 @@ class DeadReckoner(RobotKnowledgeSource):
             bound_px = self._settings.plan.max_deviation_px
             stopped = Discrepancy(Level.ACTION, what, math.inf, (bound_px, bound_px), "px")
             yield Post(stopped, (trigger.entry,) if contact is None else (trigger.entry, contact))
+
+
+def _compute_aside_covariance(before: Pose2, after: Pose2, yaw_variance: float) -> NDArray[np.float64]:
+    """(3, 3) of where the robot came to, as its heading is the camera's less a yaw that is not exactly known."""
+    ahead = after.position - before.position
+    aside = np.array([-ahead[1], ahead[0], 0.0])
+    return np.asarray(np.outer(aside, aside) * yaw_variance)
 
 
 def _compute_missing_motion(

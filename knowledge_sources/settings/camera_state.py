@@ -35,6 +35,16 @@ class CameraStateSettings:
     match_sigma_px: float = setting(2.5, "px", "Standard deviation of a data end across its model line then.", _JUDGED)
     sharp_px: float = setting(1.0, "px", "A line is covered sharply by segments within this distance.", _JUDGED)
 
+    # The yaw, from where the robot comes to
+    min_travel_m: float = setting(1.0, "m", "Shortest way by which the yaw is learnt.", _JUDGED)
+    max_travel_m: float = setting(15.0, "m", "A longer way is not measured: what the wheels slip adds up.", _JUDGED)
+    min_straightness: float = setting(
+        0.9, "1", "Part of the way's length that its ends are apart; of a more bent one nothing is learnt.", _JUDGED)
+    heading_sigma_rad: float = setting(
+        math.radians(0.2), "rad", "Standard deviation of the headings on a way of one metre; they average.",
+        "missions with cameras up to 3 degrees off, seeds below 20")
+    min_learnt: float = setting(0.05, "1", "The yaw is revised when its variance shrinks by this part.", _JUDGED)
+
     # What is learnt
     min_lines: int = setting(10, "count", "Fewest lines by which the camera is learnt.", _JUDGED)
     max_chi2: float = setting(

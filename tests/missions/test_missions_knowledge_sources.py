@@ -42,7 +42,8 @@ OF_TRUTH = Truth | SimulatedBody | Stage | TrueBuilding | Lasting | TrueCamera |
 NAMES = [source.__module__.rpartition(".")[2] for source in KNOWLEDGE_SOURCES]
 NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "fault_handler", "path_follower",
               "elevator_rider", "obstruction_finder", "model_reviser", "withdrawer", "obstacle_finder", "door_watcher",
-              "door_doubter", "range_watcher", "floor_watcher", "camera_calibrator"}
+              "door_doubter", "range_watcher", "floor_watcher", "camera_calibrator",
+              "yaw_calibrator"}
 """Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
 the move, ride in elevators, find what is before the camera or in the way, take up what somebody tells, or learn of the
 camera."""
@@ -134,7 +135,8 @@ def test_nothing_of_a_truth_that_differs_is_on_the_board() -> None:
     assert not [text for text in texts if "extra-0" in text or text == "bin"]
     told, *learnt = [entry for entry in entries if isinstance(entry.value, CameraState)]
     assert told.value.lens.fx == stage.scenario.camera.camera.fx and told.author == "robot"
-    assert {entry.author for entry in learnt} == {"camera_calibrator"}
+    assert {entry.author for entry in learnt} == {"camera_calibrator",
+              "yaw_calibrator"}
 
 
 def _reachable(root: Any) -> Iterable[Any]:

@@ -5,5 +5,6 @@ the robot knows of its camera, wheels and footprint. ``body``: requests to the r
 contacts and ranges. ``task``: command, goal, plan sketch, leg, milestone, certificate, outcome. ``percepts``: tracks,
 segments, matches, pose fixes. ``told``: what somebody says of the building. ``location``: pose hypotheses.
 ``obstruction``: what stands before the camera. ``obstacle``: what stands in the way. ``floor``: free
-floor, and what floors look like. ``door_state``: which doors are seen open or shut. ``kinds``: all of them.
+floor, and what floors look like. ``door_state``: which doors are seen open or shut. ``travel``: the way since a known
+place. ``kinds``: all of them.
 """

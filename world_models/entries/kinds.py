@@ -14,7 +14,8 @@ from world_models.entries import (
     task,
     told,
     touch,
+    travel,
 )
 
 KINDS = kinds_in(locale_frame, told, robot, body, touch, task, percepts, location, obstacle, obstruction, floor,
-                 door_state)
+                 door_state, travel)

@@ -1,0 +1,123 @@
+"""Yaw calibrator (§3.2): learns how far the camera looks aside of where the robot drives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change, Revised, Watch
+from blackboard.effect import Effect, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from knowledge_sources.camera_knowledge import compute_camera_covariance, find_camera, to_tuples
+from knowledge_sources.questions import find_belief, find_building, is_standing
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.camera import CAMERA_UNKNOWNS, YAW
+from world_models.entries.location import Hypothesis
+from world_models.entries.robot import CameraState, Drift
+from world_models.entries.travel import Travel, begin_travel, turn_about_camera
+from world_models.frames import Pose2, wrap_angle
+
+
+class Measured(NamedTuple):
+    """The yaw after a way: by how much it is otherwise than believed, and its variance."""
+
+    step_rad: float
+    variance: float
+
+
+class YawCalibrator(RobotKnowledgeSource):
+    """Learns the camera's yaw on the robot from the direction in which the robot came from one milestone to another.
+
+    No single picture can tell it from the robot's heading. Where the heading is wrong by the yaw, the robot comes to a
+    place beside the one that the wheels and the headings say. With the yaw the believed heading turns, as the camera's
+    own direction is what is known.
+    """
+
+    level = Level.ACTION
+    watches = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),)
+    writes = (CameraState, Hypothesis, Drift, Travel)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        travel, belief = view.latest(Travel), find_belief(view)
+        if travel is None or belief is None or not is_standing(view):
+            return None
+        if self._is_spent(travel.value):
+            return 1.0
+        measured = self._measure(view, travel.value, belief.value)
+        if measured is None:
+            return None
+        known = compute_camera_covariance(find_camera(view), self._settings.camera_state)[YAW, YAW]
+        return 1.0 if measured.variance < (1.0 - self._settings.camera_state.min_learnt) * known else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        travel, belief, camera = view.latest(Travel), find_belief(view), view.latest(CameraState)
+        if travel is None or belief is None or camera is None:
+            return
+        measured, pose = self._measure(view, travel.value, belief.value), _find_pose(view, belief.value)
+        step_rad, way = 0.0, travel.value
+        if measured is not None:
+            step_rad = measured.step_rad
+            covariance = compute_camera_covariance(camera.value, self._settings.camera_state)
+            covariance[YAW, :] = covariance[:, YAW] = 0.0
+            covariance[YAW, YAW] = max(measured.variance, self._settings.camera_state.floor_rad**2)
+            step = [0.0] * len(CAMERA_UNKNOWNS)
+            step[YAW] = step_rad
+            learnt = replace(camera.value.moved(step), covariance=to_tuples(covariance))
+            yield Revise(camera, learnt, (travel, belief, camera))
+            yield from self._turn(view, belief, camera.value, -step_rad, pose)
+            way = way.turned(-step_rad, camera.value.mount.forward_m)
+        if self._is_spent(way):
+            here = turn_about_camera(pose, -step_rad, camera.value.mount.forward_m)
+            variance = float(compute_camera_covariance(camera.value, self._settings.camera_state)[YAW, YAW])
+            way = begin_travel(here, belief.value.covariance_world(find_building(view)),
+                               camera.value.mount.yaw_rad + step_rad,
+                               variance if measured is None else measured.variance)
+        yield Revise(travel, way, (travel, belief))
+
+    def _is_spent(self, travel: Travel) -> bool:
+        """Whether a way is too long or too bent to measure more by it."""
+        s = self._settings.camera_state
+        return travel.gone_m > s.max_travel_m or (
+            travel.gone_m > s.min_travel_m and travel.net_m < s.min_straightness * travel.gone_m)
+
+    def _measure(self, view: View, travel: Travel, belief: Hypothesis) -> Measured | None:
+        """The yaw by the whole way, from what was known when it began; None where the way tells too little."""
+        s, pose = self._settings.camera_state, _find_pose(view, belief)
+        way = travel.seen(pose.heading_rad)
+        came = pose.position - travel.began.position
+        net_m = way.net_m
+        if net_m < s.min_travel_m or net_m < s.min_straightness * way.gone_m:
+            return None
+        off_rad = wrap_angle(math.atan2(came[1], came[0]) - math.atan2(way.y_m, way.x_m))
+        aside = np.array([-way.y_m, way.x_m]) / net_m
+        ends = np.array(travel.covariance)[:2, :2] + belief.covariance_world(find_building(view))[:2, :2]
+        noise = (float(aside @ ends @ aside) + way.slip_m2) / net_m**2 + travel.covariance[2][2]
+        noise += s.heading_sigma_rad**2 / net_m
+        gain = travel.yaw_variance / (travel.yaw_variance + noise)
+        # The heading is too large by as much as the yaw is too small: the robot came to the right of it.
+        believed = find_camera(view).mount.yaw_rad
+        yaw = travel.yaw_rad + gain * (believed - off_rad - travel.yaw_rad)
+        return Measured(yaw - believed, (1.0 - gain) * travel.yaw_variance)
+
+    def _turn(
+        self, view: View, belief: Entry[Hypothesis], camera: CameraState, turn_rad: float, pose: Pose2
+    ) -> Iterable[Effect]:
+        """Turn the believed heading, and the one that the drift is measured from."""
+        b, building = belief.value, find_building(view)
+        here = turn_about_camera(pose, turn_rad, camera.mount.forward_m)
+        turned = Hypothesis.of_world(building, b.locale, here, b.covariance_world(building), b.basis, motion=b.motion)
+        yield Revise(belief, turned, (belief,))
+        drift = view.latest(Drift)
+        if drift is not None:
+            yield Revise(drift, replace(drift.value, heading_rad=drift.value.heading_rad + turn_rad), (drift,))
+
+
+def _find_pose(view: View, belief: Hypothesis) -> Pose2:
+    """The believed pose [world]."""
+    return belief.world_from_robot(find_building(view))
