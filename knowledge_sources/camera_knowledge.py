@@ -10,7 +10,8 @@ import numpy as np
 from blackboard.board import View
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.settings.camera_state import CameraStateSettings
-from world_models.camera import Camera
+from knowledge_sources.settings.plan import PlanSettings
+from world_models.camera import YAW, Camera
 from world_models.entries.robot import CameraState
 from world_models.frames import Pose2, wrap_angle
 
@@ -43,6 +44,19 @@ def compute_knocked_covariance(camera: CameraState, settings: CameraStateSetting
     covariance = compute_camera_covariance(camera, settings)
     opened = np.square((s.sigma_tilt_rad, s.sigma_roll_rad, s.sigma_yaw_rad, 0.0, 0.0, 0.0, 0.0))
     return np.asarray(covariance + np.diag(opened))
+
+
+def loosen(covariance: Floats, settings: PlanSettings) -> Floats:
+    """A belief's covariance (3, 3), world, as the prior of a pose that lines tell."""
+    s = settings
+    return np.asarray(s.prior_covariance_factor * covariance
+                      + np.diag([s.prior_sigma_m**2, s.prior_sigma_m**2, s.prior_sigma_rad**2]))
+
+
+def add_yaw(pose_covariance: Floats, camera_covariance: Floats, known: Floats) -> Floats:
+    """A pose's covariance (3, 3) where the camera's yaw may have become another: the heading follows the camera."""
+    extra = max(float(camera_covariance[YAW, YAW] - known[YAW, YAW]), 0.0)
+    return pose_covariance + np.diag([0.0, 0.0, extra])
 
 
 def compute_camera_px(camera: Camera, covariance: Floats, distance_m: float) -> float:

@@ -10,22 +10,25 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Revise
 from blackboard.level import Level
-from knowledge_sources.camera_knowledge import learn
+from knowledge_sources.camera_knowledge import compute_camera_covariance, learn
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.camera import YAW
 from world_models.entries.percepts import PoseFix
 from world_models.entries.robot import CameraState
 from world_models.entries.task import Certificate
+from world_models.entries.travel import Travel, begin_travel
 
 
 class CameraCalibrator(RobotKnowledgeSource):
     """Takes over what the lines of a verified milestone say of the camera: tilt, roll, height, lens.
 
-    The pose was solved for with the same camera, so it acts before the plan adjuster takes the pose over.
+    The pose was solved for with the same camera, so it acts before the plan adjuster takes the pose over. After a knock
+    the yaw is open again, and the way by which it was learnt ends.
     """
 
     level = Level.PLAN
     watches = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
-    writes = (CameraState,)
+    writes = (CameraState, Travel)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         fix = view.get(trigger.entry.value.fix)
@@ -38,4 +41,10 @@ class CameraCalibrator(RobotKnowledgeSource):
         f: PoseFix = fix.value
         state = learn(camera.value, f.camera_step, np.array(f.camera_covariance), f.world_from_robot,
                       self._settings.camera_state)
-        yield Revise(camera, state, (trigger.entry, fix, camera))
+        learnt = Revise(camera, state, (trigger.entry, fix, camera))
+        yield learnt
+        before = compute_camera_covariance(camera.value, self._settings.camera_state)[YAW, YAW]
+        travel, variance = view.latest(Travel), state.covariance[YAW][YAW]
+        if travel is not None and variance > before:
+            way = begin_travel(f.world_from_robot, f.covariance, state.mount.yaw_rad, variance)
+            yield Revise(travel, way, (learnt,))

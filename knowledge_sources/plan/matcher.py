@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +12,16 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
-from knowledge_sources.camera_knowledge import compute_camera_covariance, compute_camera_px, find_camera
-from knowledge_sources.methods.localization.camera_matching import match_with_camera
-from knowledge_sources.methods.matching import FloorMatch, Match, PoseMatch, match_lines, match_on_floor
-from knowledge_sources.methods.pose.displacements import compute_sigmas_px, fit_displacements
+from knowledge_sources.camera_knowledge import (
+    add_yaw,
+    compute_camera_covariance,
+    compute_camera_px,
+    compute_knocked_covariance,
+    find_camera,
+    loosen,
+)
+from knowledge_sources.methods.localization.camera_matching import match_with_camera, rate_match
+from knowledge_sources.methods.matching import Match, PoseMatch, match_lines, match_on_floor
 from knowledge_sources.questions import find_belief, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis
@@ -57,53 +62,44 @@ class Matcher(RobotKnowledgeSource):
             yield Post(LineMatch(milestone.id, segments.id, none, frozen(lines_world), frozen(data_px[:0]), 0.0,
                                  frozen(np.zeros(0))), (segments, milestone, belief))
             return
-        camera = compute_camera_covariance(find_camera(view), self._settings.camera_state)
-        if m.modes:
-            found: Match | PoseMatch = self._match_displaced(find_robot(view), m, lines_world, data_px, belief.value)
-        else:
-            found = self._match(find_robot(view), m, lines_world, data_px, belief.value, camera)
+        found, is_open = self._match(view, m, lines_world, data_px, belief.value)
         pairs = np.asarray(found.pairs, np.int64).reshape(-1, 2)
         yield Post(
             LineMatch(
                 milestone.id, segments.id, pairs, frozen(lines_world[pairs[:, 0]]), frozen(data_px[pairs[:, 1]]),
-                float(found.e_match), frozen(found.coverage),
+                float(found.e_match), frozen(found.coverage), is_open,
             ),
             (segments, milestone, belief),
         )
 
     def _match(
-        self, robot: RobotModel, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis,
-        camera_covariance: Floats,
+        self, view: View, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
+    ) -> tuple[Match | PoseMatch, bool]:
+        """The match, and whether it takes the camera for knocked: much more agrees with the picture then."""
+        robot, camera, s = find_robot(view).on_floor_of(belief.locale), find_camera(view), self._settings.camera_state
+        known = compute_camera_covariance(camera, s)
+        prior = belief.world_from_robot(robot.world), belief.covariance_world(robot.world)
+        given = lines_world, data_px, robot.camera, robot.mount
+        is_known = compute_camera_px(robot.camera, known, self._settings.plan.rigid_distance_m) <= s.max_known_px
+        if not is_known:
+            return match_with_camera(*given, *prior, known, self._settings).match, False
+        found = rate_match(self._match_with_known_camera(robot, milestone, lines_world, data_px, belief), *given,
+                           prior[0], loosen(prior[1], self._settings.plan), known, self._settings)
+        if found.sharp_part >= s.min_sharp_part and found.prior_chi2 <= s.max_chi2:
+            return found.match, False
+        opened = compute_knocked_covariance(camera, s)
+        knocked = match_with_camera(*given, prior[0], add_yaw(prior[1], opened, known), opened, self._settings)
+        is_knocked = knocked.sharp_part >= found.sharp_part + s.min_knock_gain
+        return (knocked if is_knocked else found).match, is_knocked
+
+    def _match_with_known_camera(
+        self, robot: RobotModel, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
     ) -> Match | PoseMatch:
         s = self._settings.plan
-        there = robot.on_floor_of(belief.locale)
-        if (compute_camera_px(robot.camera, camera_covariance, s.rigid_distance_m)
-                > self._settings.camera_state.max_known_px):
-            return match_with_camera(
-                lines_world, data_px, robot.camera, there.mount, belief.world_from_robot(robot.world),
-                belief.covariance_world(robot.world), camera_covariance, self._settings)
         sigma_px = robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / s.rigid_distance_m)
         if sigma_px <= s.max_rigid_sigma_px:
             model_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
             return match_lines(model_px, data_px, self._settings.matching)
         return match_on_floor(
-            lines_world, data_px, robot.camera, there.mount.camera_from_robot,
-            belief.world_from_robot(robot.world), belief.covariance_world(robot.world),
-            self._settings.matching,
-        )
-
-    def _match_displaced(
-        self, robot: RobotModel, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
-    ) -> FloorMatch:
-        """As :meth:`_match`, of a model that is inexact: wider first, then with its lines displaced as one."""
-        s, errors = self._settings, milestone.errors
-        mount, camera = robot.on_floor_of(belief.locale).mount.camera_from_robot, robot.camera
-        prior, covariance = belief.world_from_robot(robot.world), belief.covariance_world(robot.world)
-        wide_px = float(np.median(compute_sigmas_px(lines_world, errors, camera, mount, prior)))
-        wider = replace(
-            s.matching, max_pose_pair_px=s.matching.max_pose_pair_px + s.pose.displaced_gate_sigmas * wide_px,
-            pose_sigma_px=math.hypot(s.matching.pose_sigma_px, wide_px), gate_px=s.matching.gate_px + wide_px)
-        found = match_on_floor(lines_world, data_px, camera, mount, prior, covariance, wider)
-        fit = fit_displacements(
-            lines_world, errors, data_px, camera, mount, found.world_from_robot, covariance, s.pose)
-        return replace(found, pairs=fit.pairs)
+            lines_world, data_px, robot.camera, robot.mount.camera_from_robot,
+            belief.world_from_robot(robot.world), belief.covariance_world(robot.world), self._settings.matching)

@@ -10,7 +10,15 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
-from knowledge_sources.camera_knowledge import compute_camera_covariance, find_camera, has_counted, to_tuples
+from knowledge_sources.camera_knowledge import (
+    add_yaw,
+    compute_camera_covariance,
+    compute_knocked_covariance,
+    find_camera,
+    has_counted,
+    loosen,
+    to_tuples,
+)
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.methods.pose.estimate import PlanarEstimate
@@ -44,15 +52,16 @@ class MedRAndT(RobotKnowledgeSource):
         if belief is None or milestone is None:
             return
         m: Milestone = milestone.value
-        s, locale = self._settings.plan, belief.value.locale
+        s, own, locale = self._settings.plan, self._settings.camera_state, belief.value.locale
         robot, camera = find_robot(view).on_floor_of(locale), find_camera(view)
         here = belief.value.world_from_robot(robot.world)
-        prior = s.prior_covariance_factor * belief.value.covariance_world(robot.world)
-        prior = prior + np.diag([s.prior_sigma_m**2, s.prior_sigma_m**2, s.prior_sigma_rad**2])
-        known = compute_camera_covariance(camera, self._settings.camera_state)
+        prior, known = loosen(belief.value.covariance_world(robot.world), s), compute_camera_covariance(camera, own)
+        if match.value.is_camera_open:
+            opened = compute_knocked_covariance(camera, own)
+            prior, known = add_yaw(prior, opened, known), opened
         learnt = None if m.modes else self._learn(robot, match.value, here, prior, known)
-        moves = learnt is not None and not has_counted(
-            camera, learnt.world_from_robot, self._settings.camera_state)
+        moves = learnt is not None and (
+            match.value.is_camera_open or not has_counted(camera, learnt.world_from_robot, own))
         if learnt is not None and moves:
             robot = find_robot(view, camera.moved(tuple(learnt.step.tolist()))).on_floor_of(locale)
         found = self._solve(robot, match.value, here, prior, m)

@@ -15,7 +15,7 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.camera_knowledge import find_camera
+from knowledge_sources.camera_knowledge import add_yaw, compute_camera_covariance, find_camera
 from knowledge_sources.methods.localization.aliasing import find_strongest_alias
 from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors, decode_small_color
 from knowledge_sources.methods.verification.line_check import LineCheck, check_lines
@@ -124,6 +124,9 @@ class MilestoneJudge(RobotKnowledgeSource):
         robot = find_robot(view, camera) if belief is None else find_robot_in(view, belief.value.locale, camera)
         before = pose if belief is None else belief.value.world_from_robot(robot.world)
         covariance = fix.covariance if belief is None else belief.value.covariance_world(robot.world)
+        if fix.camera_step:
+            known = compute_camera_covariance(find_camera(view), s.camera_state)
+            covariance = add_yaw(covariance, np.array(fix.camera_covariance), known)
         lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
         agreed = check_lines(robot, lines, segments.segments_px, pose, s.verification, milestone.errors, s.pose)
         plain_px = agreed.projected_px if not milestone.modes else check_lines(

@@ -35,6 +35,12 @@ class CameraStateSettings:
     match_sigma_px: float = setting(2.5, "px", "Standard deviation of a data end across its model line then.", _JUDGED)
     sharp_px: float = setting(1.0, "px", "A line is covered sharply by segments within this distance.", _JUDGED)
 
+    # A camera that was knocked
+    min_sharp_part: float = setting(
+        0.6, "1", "Where less of the lines' length is covered sharply, the camera may have been knocked.", _JUDGED)
+    min_knock_gain: float = setting(
+        0.15, "1", "By so much more must be covered sharply with a camera that was knocked.", _JUDGED)
+
     # The yaw, from where the robot comes to
     min_travel_m: float = setting(1.0, "m", "Shortest way by which the yaw is learnt.", _JUDGED)
     max_travel_m: float = setting(15.0, "m", "A longer way is not measured: what the wheels slip adds up.", _JUDGED)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from blackboard.journal import Decision
 from harvey.simulation.run import run_mission
+from sim.faults.camera_faults import CameraKnocked
 from sim.scenario import load_scenario, with_settings
 from sim.stage import build_stage
-from world_models.camera import CAMERA_UNKNOWNS, subtract_cameras
+from world_models.camera import CAMERA_UNKNOWNS, YAW, subtract_cameras
 from world_models.entries.robot import CameraState
 
 WRONG = {"truth.camera.tilt_deg": "-2", "truth.camera.roll_deg": "1.5", "truth.camera.height_m": "0.06",
@@ -38,3 +40,22 @@ def test_the_camera_is_learnt_on_the_way(settings: dict[str, str]) -> None:
         assert np.all(np.abs(off) < 4.0 * np.sqrt(np.diag(np.array(state.covariance)))[seen])
     tilt, roll, _, height, *_ = subtract_cameras(states[-1].lens, states[-1].mount, *truth)
     assert max(abs(tilt), abs(roll)) < math.radians(0.05) and abs(height) < 0.005
+
+
+def test_a_knock_in_mid_mission_is_noticed_and_survived() -> None:
+    """The robot is not taken for carried off: the camera is believed otherwise, and the mission is reached."""
+    knock = CameraKnocked(after_m=4.0, tilt_rad=math.radians(2.0), roll_rad=math.radians(-1.0),
+                          yaw_rad=math.radians(-2.0))
+    scenario = replace(load_scenario("forty-foot-hallway"), faults=(knock,))
+    states: list[CameraState] = []
+
+    def listen(decision: Decision) -> None:
+        states.extend(c.entry.value for c in decision.made if isinstance(c.entry.value, CameraState))
+
+    result = run_mission(build_stage(scenario), 1, sinks=[listen])
+    assert result.outcome == "reached" and result.relocalizations == 0 and result.milestones["false_accepts"] == 0
+    before, after = scenario.camera.mount, states[-1].mount
+    assert after.tilt_rad - before.tilt_rad == pytest.approx(knock.tilt_rad, abs=math.radians(0.05))
+    assert after.roll_rad - before.roll_rad == pytest.approx(knock.roll_rad, abs=math.radians(0.05))
+    sigma_rad = math.sqrt(states[-1].covariance[YAW][YAW])
+    assert abs(after.yaw_rad - before.yaw_rad - knock.yaw_rad) < 3.0 * sigma_rad < math.radians(1.5)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.arrays import Floats, Indices
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.matching.image_matching import Match
 from knowledge_sources.methods.matching.pose_matching import PoseMatch, match_in_space
 from knowledge_sources.methods.pose.with_camera import CameraEstimate, estimate_camera_and_pose
 from knowledge_sources.methods.verification.agreement import compute_coverage
@@ -22,10 +23,25 @@ MOUNTING = 4
 FOCAL = CAMERA_UNKNOWNS.index("focal")
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraMatch:
+    """Pairs, and what they are worth with the pose and the camera that fit them best.
+
+    Attributes:
+        match: the pairs.
+        sharp_part: of the model lines' length in view, what segments cover sharply; 0 with too few pairs.
+        prior_chi2: squared distance of the camera from what was believed of it.
+    """
+
+    match: Match | PoseMatch
+    sharp_part: float
+    prior_chi2: float
+
+
 def match_with_camera(
     model_lines_world: Any, data_px: Any, camera: Camera, mount: CameraMount, prior: Pose2, prior_covariance: Floats,
     camera_covariance: Floats, settings: Settings = DEFAULT,
-) -> PoseMatch:
+) -> CameraMatch:
     """Match model lines to data lines within what the priors of pose and camera allow.
 
     The mounting and the pose on the floor move the camera in six unknowns; of several focal lengths the one is taken
@@ -42,21 +58,30 @@ def match_with_camera(
     lines, data = np.asarray(model_lines_world, float), np.asarray(data_px, float)
     spread = compute_space_covariance(mount, prior, prior_covariance, camera_covariance)
     expected = mount.camera_from_robot @ prior.lifted().inverse()
-    found: list[tuple[float, PoseMatch]] = []
+    found: list[CameraMatch] = []
     for sigmas in s.focal_starts:
         factor = 1.0 + sigmas * float(np.sqrt(camera_covariance[FOCAL, FOCAL]))
         zoomed = replace(camera, fx=factor * camera.fx, fy=factor * camera.fy)
         match = match_in_space(lines, data, zoomed, expected, spread, settings.matching,
                                pair_px=s.pair_px, sigma_px=s.match_sigma_px)
-        pairs: Indices = match.pairs
-        if len(pairs) >= s.min_lines:
-            estimate = estimate_camera_and_pose(
-                lines[pairs[:, 0]], data[pairs[:, 1]], camera, mount, prior, prior_covariance, camera_covariance,
-                sigma_px=s.line_sigma_px, settings=s)
-            found.append((compute_sharp_part(lines, data, camera, mount, estimate, settings), match))
-        else:
-            found.append((0.0, match))
-    return max(found, key=lambda tried: tried[0])[1]
+        found.append(rate_match(
+            match, lines, data, camera, mount, prior, prior_covariance, camera_covariance, settings))
+    return max(found, key=lambda tried: tried.sharp_part)
+
+
+def rate_match(
+    match: Match | PoseMatch, lines_world: Floats, data_px: Floats, camera: Camera, mount: CameraMount, prior: Pose2,
+    prior_covariance: Floats, camera_covariance: Floats, settings: Settings = DEFAULT,
+) -> CameraMatch:
+    """What a match is worth; arguments as for :func:`match_with_camera`."""
+    s, pairs = settings.camera_state, np.asarray(match.pairs, np.intp).reshape(-1, 2)
+    if len(pairs) < s.min_lines:
+        return CameraMatch(match, 0.0, 0.0)
+    estimate = estimate_camera_and_pose(
+        lines_world[pairs[:, 0]], data_px[pairs[:, 1]], camera, mount, prior, prior_covariance, camera_covariance,
+        sigma_px=s.line_sigma_px, settings=s)
+    sharp = compute_sharp_part(lines_world, data_px, camera, mount, estimate, settings)
+    return CameraMatch(match, sharp, estimate.prior_chi2)
 
 
 def compute_sharp_part(
