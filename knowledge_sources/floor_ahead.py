@@ -21,12 +21,14 @@ from knowledge_sources.methods.floor.seen_floor import (
     measure_free_m,
     sample_sweep,
 )
+from knowledge_sources.methods.motion.footprints import build_free_floor, build_polygon
 from knowledge_sources.questions import active_goal, deepest_sketch, find_robot
 from knowledge_sources.settings.action import ActionSettings
 from world_models.building.things import EXTRA_KIND
 from world_models.entries.body import Frame, MotionReport, RideReport
 from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis
+from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Goal, Leg, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
@@ -38,7 +40,7 @@ class Caution(NamedTuple):
     """How the next move is limited by what is not seen.
 
     Attributes:
-        move_m: at most so far [m, true].
+        move_m: at most so far [m, true]; 0 where something may stand in what is not seen.
         creeps: whether that leads into floor that was not seen to be free.
     """
 
@@ -60,6 +62,7 @@ class FloorAhead:
         found = [shapely.Polygon(thing.footprint_world) for name in self._locales
                  for thing in self._robot.world.things_of(name) if thing.kind == EXTRA_KIND]
         self._asked = shapely.buffer(shapely.union_all([self._floor, *found]), -settings.near_model_m)
+        self._suspected = _list_what_may_stand(view)
         self.scans = _find_scans(view, belief, settings)
         self._seen = SeenFloor(
             tuple(entry.value for entry in self.scans), self._list_discs(view),
@@ -69,18 +72,22 @@ class FloorAhead:
         """How far, of a move to the leg's end, the robot may go at once; a move of any other kind is no longer."""
         unseen = self._find_unseen(self._sweep(self._way, move_m))
         caution = limit_move(unseen, move_m, self._settings)
-        short_m = max(self._settings.min_creep_m, self._measure_to_things_m())
-        return caution._replace(move_m=min(caution.move_m, short_m)) if caution.creeps else caution
+        if not caution.creeps:
+            return caution
+        return caution._replace(move_m=min(caution.move_m, self._measure_to_things_m(move_m)))
 
-    def _measure_to_things_m(self) -> float:
-        """How far the robot can go towards the leg's end before it meets what the newest pictures have there."""
-        way = shapely.LineString(self._way)
-        around_m = self._robot.radius_m + self._settings.seen_margin_m
-        newest = self.scans[-self._settings.newest_scans:]
-        things = [shapely.Polygon(thing.footprint).buffer(around_m) for entry in newest
-                  for thing in entry.value.things if thing.p_thing >= 0.5]
-        met = shapely.intersection(way, shapely.union_all(things))
-        return math.inf if met.is_empty else float(met.distance(shapely.Point(self._here.position)))
+    def _measure_to_things_m(self, most_m: float) -> float:
+        """How far the robot can go towards the leg's end before it comes nearer to what may stand there; 0..most."""
+        way, step_m = shapely.LineString(self._way), self._settings.min_creep_m
+        along = np.arange(0.0, most_m + step_m, step_m)
+        points = shapely.line_interpolate_point(way, along)
+        free_m = most_m
+        for polygon in self._suspected:
+            gaps = shapely.distance(points, polygon)
+            met = np.flatnonzero((gaps[1:] < self._robot.radius_m) & (gaps[1:] < gaps[:-1] - 1e-9))
+            if len(met):
+                free_m = min(free_m, float(along[met[0]]))
+        return free_m
 
     def measure_free_m(self, most_m: float) -> float:
         """How far towards the leg's end the floor is seen to be free."""
@@ -129,29 +136,53 @@ class FloorAhead:
         return asked.only(~self._seen.find_free(asked.points))
 
     def _list_discs(self, view: View) -> Floats:
-        """Floor that is free without being seen: under the robot, where it has driven, and where it was put down."""
-        radius_m = self._robot.radius_m
-        step_m = 0.3 * radius_m  # so near to one another they leave no gap at the sides
-        discs = [(self._here.x_m, self._here.y_m, radius_m + self._settings.seen_margin_m)]
-        for a, b in pairwise([e.value for e in self.scans if e.value.sense == "camera"]):
-            gap_m = math.dist((a.x_m, a.y_m), (b.x_m, b.y_m))
-            if step_m < gap_m <= self._settings.max_driven_gap_m:
-                parts = np.linspace(0.0, 1.0, math.ceil(gap_m / step_m) + 1)
-                discs += [(a.x_m + part * (b.x_m - a.x_m), a.y_m + part * (b.y_m - a.y_m), radius_m) for part in parts]
-        goal = active_goal(view)
-        if goal is not None and goal.id == f"{Goal.__name__}-1" and view.latest(RideReport) is None:
-            start = self._find_start(view, goal.value)
-            discs.append((*start, self._settings.put_down_free_m))
-        return np.array(discs)
+        return list_free_discs(view, self._robot, self._here, self.scans, self._settings)
 
-    def _find_start(self, view: View, goal: Goal) -> Point:
-        """Where the robot was put down: by the first picture, if it is still on the board, else by what was said."""
-        first = view.get(f"{FreeFloor.__name__}-1")
-        start = goal.origin.in_world(self._robot.world)
-        most_m = self._settings.max_driven_gap_m
-        if first is None or math.dist((first.value.x_m, first.value.y_m), start.position) > most_m:
-            return start.x_m, start.y_m
-        return first.value.x_m, first.value.y_m
+
+def _list_what_may_stand(view: View) -> list[shapely.Polygon]:
+    """What the robot does not creep into: all that what is suspected may take; of what is there what was seen of it,
+    as the sketcher leads through the rest only where nothing else is left.
+    """
+    found = [entry.value for entry in view.where(Obstacle, lambda o: o.status != "gone")]
+    return [build_polygon(o.core if o.is_there and o.core else o.footprint) for o in found]
+
+
+def find_known_free(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> shapely.Geometry:
+    """The floor of the locales here that was seen to be free, or driven over, or told to be free [m, world]."""
+    robot, scans = find_robot(view), _find_scans(view, belief, settings)
+    discs = list_free_discs(view, robot, belief.value.world_from_robot(robot.world), scans, settings)
+    seen = [build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
+            for f in (entry.value for entry in scans)]
+    return shapely.union_all([*seen, *shapely.buffer(shapely.points(discs[:, :2]), discs[:, 2])])
+
+
+def list_free_discs(
+    view: View, robot: RobotModel, here: Pose2, scans: Sequence[Entry[FreeFloor]], settings: ActionSettings
+) -> Floats:
+    """(k, 3) centres and radii of floor that is free without being seen: under the robot, where it has driven, and
+    where it was put down.
+    """
+    radius_m = robot.radius_m
+    step_m = 0.3 * radius_m  # so near to one another they leave no gap at the sides
+    discs = [(here.x_m, here.y_m, radius_m + settings.seen_margin_m)]
+    for a, b in pairwise([e.value for e in scans if e.value.sense == "camera"]):
+        gap_m = math.dist((a.x_m, a.y_m), (b.x_m, b.y_m))
+        if step_m < gap_m <= settings.max_driven_gap_m:
+            parts = np.linspace(0.0, 1.0, math.ceil(gap_m / step_m) + 1)
+            discs += [(a.x_m + part * (b.x_m - a.x_m), a.y_m + part * (b.y_m - a.y_m), radius_m) for part in parts]
+    goal = active_goal(view)
+    if goal is not None and goal.id == f"{Goal.__name__}-1" and view.latest(RideReport) is None:
+        discs.append((*_find_start(view, robot, goal.value, settings), settings.put_down_free_m))
+    return np.array(discs)
+
+
+def _find_start(view: View, robot: RobotModel, goal: Goal, settings: ActionSettings) -> Point:
+    """Where the robot was put down: by the first picture, if it is still on the board, else by what was said."""
+    first = view.get(f"{FreeFloor.__name__}-1")
+    start = goal.origin.in_world(robot.world)
+    if first is None or math.dist((first.value.x_m, first.value.y_m), start.position) > settings.max_driven_gap_m:
+        return start.x_m, start.y_m
+    return first.value.x_m, first.value.y_m
 
 
 def limit_move(unseen: Sweep, move_m: float, settings: ActionSettings) -> Caution:

@@ -51,6 +51,7 @@ class Motor(RobotKnowledgeSource):
     It stands still while a command is being carried out or the body is at fault. While anything above the action level
     is in doubt it does not drive, and turns only for the look that is to end the doubt. It moves only as far as the
     floor is seen to be free; it looks at the floor behind a corner before it is there, and creeps where it cannot see.
+    It does not creep to where something may stand: there it halts the leg.
     """
 
     level = Level.ACTION
@@ -123,6 +124,9 @@ class Motor(RobotKnowledgeSource):
             command = self._plan_increment(robot.actuator, seen, here, curvature_per_m)
             if command is not None and command.move_m > 0.0 and self._settings.action.keeps_to_seen_floor:
                 seen, command, scans = self._keep_to_seen_floor(view, seen, belief, command)
+                if command is None:
+                    yield Revise(leg, replace(seen, status="halted"), (leg, belief, *scans))
+                    return
         discrepancy = open_discrepancy(view, Level.ACTION)
         corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
         yield from corrected
@@ -143,10 +147,11 @@ class Motor(RobotKnowledgeSource):
 
     def _keep_to_seen_floor(
         self, view: View, leg: Leg, belief: Entry[Hypothesis], command: MotorCommand
-    ) -> tuple[Leg, MotorCommand, tuple[Entry[FreeFloor], ...]]:
+    ) -> tuple[Leg, MotorCommand | None, tuple[Entry[FreeFloor], ...]]:
         """A move only as far as the floor is seen to be free; before it a look at what will be needed behind the leg.
 
-        Returns the leg, the command, and the newest scan that it rests on.
+        Returns the leg, the command, and the newest scan that it rests on. The command is None where something may
+        stand in floor that is not seen, right before the robot.
         """
         s, actuator = self._settings.action, find_robot(view).actuator
         floor = FloorAhead(view, leg, belief, s)
@@ -158,7 +163,10 @@ class Motor(RobotKnowledgeSource):
             turned = self._go_on_looking(looking, here, actuator)
             if turned is not None:
                 return looking, turned, because
-        caution = floor.limit_move(actuator.reach * command.move_m)
+        wanted_m = actuator.reach * command.move_m
+        caution = floor.limit_move(wanted_m)
+        if caution.creeps and caution.move_m < min(s.min_creep_m, wanted_m):
+            return leg, None, because
         move_m = min(command.move_m, actuator.compute_command_m(caution.move_m))
         slowly = s.creep_speed_m_per_s if caution.creeps else None
         return leg, MotorCommand(command.turn_rad, move_m, slowly), because

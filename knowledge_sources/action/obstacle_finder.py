@@ -17,6 +17,7 @@ from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
+from knowledge_sources.floor_ahead import find_known_free
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.motion.footprints import (
     Corners,
@@ -33,6 +34,7 @@ from knowledge_sources.methods.motion.footprints import (
 )
 from knowledge_sources.methods.motion.routes import find_nearest
 from knowledge_sources.questions import (
+    current_leg,
     find_belief,
     find_building,
     find_contact,
@@ -50,6 +52,7 @@ from world_models.entries.floor import FloorThing, FreeFloor
 from world_models.entries.locale_frame import FrameChange, LocaleFrame
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
+from world_models.entries.task import Leg
 from world_models.entries.touch import Contact
 
 
@@ -71,14 +74,16 @@ class ObstacleFinder(RobotKnowledgeSource):
     the thing is a touch does not tell: it is taken to be ``obstacle_width_m`` wide and deep.
 
     What is seen on the floor is joined with what is known there already. It is there when it is certain enough, by one
-    sure picture or two unsure ones; and gone when most of its footprint is seen to be free floor. The frame is revised
-    only when the footprint has changed so much that plans may change.
+    sure picture or two unsure ones, or by one where it is next on the way; and gone when most of its footprint is seen
+    to be free floor. Where its feet were not seen, it may reach to the robot's rim. The frame is revised only when the
+    footprint has changed so much that plans may change.
     """
 
     level = Level.ACTION
     watches = (
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),
         Watch(FreeFloor, (Posted,)),
+        Watch(Leg, (Revised,), lambda leg: leg.status == "halted"),
     )
     writes = (Obstacle, LocaleFrame)
 
@@ -87,12 +92,16 @@ class ObstacleFinder(RobotKnowledgeSource):
             if find_belief(view) is None or is_in_doubt(view):
                 return None
             return 0.95 if trigger.entry.value.things or view.latest(Obstacle, _may_be_there) else None
+        if isinstance(trigger.entry.value, Leg):
+            return 0.95 if any(True for _ in self._find_halting(view, trigger.entry)) else None
         contact, most_rad = _find_new_contact(view), self._settings.action.max_touch_sigma_rad
         return 0.95 if contact is not None and contact.value.sigma_rad <= most_rad else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         if isinstance(trigger.entry.value, FreeFloor):
             drafts = list(self._weigh_floor(view, trigger.entry))
+        elif isinstance(trigger.entry.value, Leg):
+            drafts = list(self._find_halting(view, trigger.entry))
         else:
             contact = _find_new_contact(view)
             drafts = [] if contact is None else list(self._weigh_contact(view, contact, trigger.entry))
@@ -130,8 +139,9 @@ class ObstacleFinder(RobotKnowledgeSource):
         s = self._settings.action
         corner = build_polygon(_build_footprint(touched, out, across, 0.5 * s.obstacle_depth_m))
         joined = shapely.convex_hull(shapely.union_all([build_polygon(known.footprint), corner]))
-        new = replace(known, footprint=list_corners(joined), certainty=s.max_obstacle_certainty, seen_s=when_s,
-                      looked_s=when_s, touched_s=when_s, status="there")
+        core = list_corners(shapely.union(build_polygon(known.core), corner)) if known.core else ()
+        new = replace(known, footprint=list_corners(joined), core=core, certainty=s.max_obstacle_certainty,
+                      seen_s=when_s, looked_s=when_s, touched_s=when_s, status="there")
         return _place(world, new, joined)
 
     # -- floor ---------------------------------------------------------------------------------------------------------
@@ -147,6 +157,9 @@ class ObstacleFinder(RobotKnowledgeSource):
             if thing.p_thing < s.min_thing_certainty or thing.sigma_m > s.max_obstacle_sigma_m:
                 continue
             shape = deepen(thing.footprint, (f.x_m, f.y_m), s.obstacle_depth_m)
+            core = shape
+            if thing.is_cut:
+                shape = self._reach_to_rim(view, shape, f)
             rest, whole = [e for e in known.values() if e.id not in drafts], s.max_hull_part
             if f.sense == "ranges":  # an echo tells how far a thing is, not where in its cone: any in it may be heard
                 rest, whole = [e for e in rest if _may_be_there(e.value)], math.inf
@@ -154,7 +167,7 @@ class ObstacleFinder(RobotKnowledgeSource):
             if entry is not None:
                 new = self._see_again(view, entry, thing, shape, free, scan)
                 if new is not None:
-                    drafts[entry.id] = _Draft(entry, new, [scan])
+                    drafts[entry.id] = _Draft(entry, _with_core(new, core), [scan])
                 continue
             again = [build_polygon(draft.new.footprint) for draft in drafts.values()]
             if any(shapely.intersection(polygon, shape).area > 0.5 * shape.area for polygon in again):
@@ -162,8 +175,12 @@ class ObstacleFinder(RobotKnowledgeSource):
             found = self._see_first(view, thing, shape, scan, fresh)
             if found is not None:
                 fresh += 1
-                drafts[f"new {fresh}"] = _Draft(None, found, [scan])
-        yield from drafts.values()
+                drafts[f"new {fresh}"] = _Draft(None, _with_core(found, core), [scan])
+        driving = current_leg(view)
+        ahead = shapely.Polygon() if driving is None else self._find_way_ahead(view, driving[0].value)
+        for draft in drafts.values():
+            is_next = draft.new.status == "suspected" and build_polygon(draft.new.footprint).intersects(ahead)
+            yield replace(draft, new=replace(draft.new, status="there")) if is_next else draft
         seen = [build_polygon(thing.footprint).buffer(2.0 * thing.sigma_m) for thing in f.things]
         for entry in known.values():
             if entry.id in drafts or not _may_be_there(entry.value):
@@ -173,6 +190,36 @@ class ObstacleFinder(RobotKnowledgeSource):
                 gone = self._miss(find_building(view), entry.value, free, f.seen_s)
                 if gone is not None:
                     yield _Draft(entry, gone, [scan, entry])
+
+    def _find_halting(self, view: View, leg: Entry[Leg]) -> Iterator[_Draft]:
+        """What is suspected right before a leg that was halted for it: it is held to be there."""
+        ahead = self._find_way_ahead(view, leg.value)
+        for entry in view.where(Obstacle, lambda o: o.status == "suspected"):
+            if build_polygon(entry.value.footprint).intersects(ahead):
+                yield _Draft(entry, replace(entry.value, status="there"), [entry, leg])
+
+    def _find_way_ahead(self, view: View, leg: Leg) -> shapely.Geometry:
+        """What the robot will sweep next on its leg."""
+        belief, s = find_belief(view), self._settings.action
+        if belief is None:
+            return shapely.Polygon()
+        robot = find_robot(view)
+        here = shapely.Point(belief.value.world_from_robot(robot.world).position)
+        way = shapely.LineString([here, (leg.x1_m, leg.y1_m)])
+        around_m = robot.radius_m + s.seen_margin_m
+        return shapely.intersection(way, here.buffer(s.act_within_m)).buffer(around_m)
+
+    def _reach_to_rim(self, view: View, shape: shapely.Polygon, scan: FreeFloor) -> shapely.Polygon:
+        """What a thing whose feet are not seen may take: from the robot's rim on, but for floor that is known free."""
+        belief, s = find_belief(view), self._settings.action
+        if belief is None:
+            return shape
+        eye, rim_m = np.array([scan.x_m, scan.y_m]), find_robot(view).radius_m + s.seen_margin_m
+        away = shapely.get_coordinates(shape)[:-1] - eye
+        rim = eye + rim_m * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+        whole = build_polygon(np.concatenate([shapely.get_coordinates(shape), rim]))
+        unseen = shapely.difference(whole, find_known_free(view, belief, s))
+        return build_polygon(shapely.get_coordinates(shapely.union(shape, _largest_part(unseen))))
 
     def _see_first(
         self, view: View, thing: FloorThing, shape: shapely.Polygon, scan: Entry[FreeFloor], before: int
@@ -310,6 +357,18 @@ def _measure_common_directions(known: shapely.Geometry, seen: shapely.Geometry, 
         ends.append((float(aside.min()), float(aside.max())))
     (a, b), (low, high) = ends
     return max(0.0, min(b, high) - max(a, low)) / max(high - low, 1e-6)
+
+
+def _with_core(obstacle: Obstacle, seen: shapely.Geometry) -> Obstacle:
+    """An obstacle with what was seen of its footprint last, where that is clearly less than the footprint."""
+    footprint = build_polygon(obstacle.footprint)
+    core = shapely.intersection(footprint, seen)
+    is_less = 0.0 < core.area < 0.9 * footprint.area
+    return replace(obstacle, core=list_corners(core) if is_less else ())
+
+
+def _largest_part(shape: shapely.Geometry) -> shapely.Geometry:
+    return max(shapely.get_parts(shape), key=lambda part: part.area, default=shapely.Polygon())
 
 
 def _may_be_there(obstacle: Obstacle) -> bool:

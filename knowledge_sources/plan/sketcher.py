@@ -30,7 +30,7 @@ class Sketcher(RobotKnowledgeSource):
     watches = (
         Watch(Goal, (Posted,), lambda goal: goal.is_active),
         Watch(Milestone, (Revised,), lambda m: m.status == "verified" and m.sketch != ""),
-        Watch(Leg, (Revised,), lambda leg: leg.status == "arrived"),
+        Watch(Leg, (Revised,), lambda leg: leg.status != "moving"),
         Watch(PlanSketch, (Revised,), lambda sketch: sketch.status == "done"),
         Watch(PlanSketch, (Revised,), lambda sketch: sketch.status == "superseded" and not sketch.path),
     )
@@ -56,7 +56,9 @@ class Sketcher(RobotKnowledgeSource):
             yield from self._close(view, trigger.entry)
         else:
             sketch = self._sketch_of(view, value)
-            if sketch is not None and isinstance(value, Leg):
+            if sketch is not None and isinstance(value, Leg) and value.status == "halted":
+                yield from self._go_otherwise(view, trigger.entry, sketch)
+            elif sketch is not None and isinstance(value, Leg):
                 yield Revise(sketch, sketch.value.advanced(), (trigger.entry,))
             elif sketch is not None:
                 yield from self._continue(view, trigger.entry, sketch)
@@ -71,29 +73,34 @@ class Sketcher(RobotKnowledgeSource):
         return entry
 
     def _begin(
-        self, view: View, goal: Entry[Goal], withdrawn: Entry[PlanSketch] | None = None
+        self, view: View, goal: Entry[Goal], withdrawn: Entry[PlanSketch] | None = None, halts: int = 0
     ) -> Iterable[Effect]:
-        """The first level: from locale to locale; sketches for earlier goals are superseded (§2)."""
+        """The first level: from locale to locale; sketches for earlier goals are superseded (§2).
+
+        ``halts``: how often in a row a leg was halted, and the sketch drawn anew for it.
+        """
         for old in view.where(PlanSketch, lambda s: s.is_active):
             yield Revise(old, replace(old.value, status="superseded"), (goal,))
         belief = find_belief(view)
         if belief is None:
             return
         because = (goal, belief) if withdrawn is None else (goal, belief, withdrawn)
-        here, planner = _place_of(belief.value), self._planner(view)
-        unfit = planner.explain_unfit(goal.value.destination)
+        here, planners = _place_of(belief.value), self._list_planners(view)
+        unfit = planners[-1].explain_unfit(goal.value.destination)
         if unfit:
             near = _find_obstacles(view, (goal.value.destination.locale,))
             named = [entry for entry in near if entry.value.name in unfit]
             reason = f"the goal {goal.value.destination} {unfit}{_name_obstacles(named)}"
             yield Post(Outcome("blocked", reason), (*because, *named))
             return
-        subgoals = planner.plan_between_locales(here, goal.value.destination, self._settings.plan.goal_tolerance_m)
+        subgoals = _find_first(planner.plan_between_locales(
+            here, goal.value.destination, self._settings.plan.goal_tolerance_m) for planner in planners)
         if subgoals is None:
             why = self._explain_no_way(view, here.locale, goal.value.destination.locale)
             yield Post(Outcome("blocked", why), (*because, *_find_obstacles(view)))
         else:
-            yield Post(PlanSketch(goal.id, (), "", subgoals), (*because, *find_frames(view, _list_locales(subgoals))))
+            drawn = PlanSketch(goal.id, (), "", subgoals, halts=halts)
+            yield Post(drawn, (*because, *find_frames(view, _list_locales(subgoals))))
 
     def _continue(self, view: View, milestone: Entry[Milestone], sketch: Entry[PlanSketch]) -> Iterable[Effect]:
         """Go on after a verified milestone: adjust, finish, or begin the next subgoal, refined if not primitive."""
@@ -141,12 +148,14 @@ class Sketcher(RobotKnowledgeSource):
         self, view: View, sketch: Entry[PlanSketch], subgoal: Subgoal, belief: Entry[Hypothesis], go: Revise
     ) -> Iterable[Effect]:
         """Draw a more detailed sketch for the current subgoal, only now that its locale is entered."""
-        s, planner = sketch.value, self._planner(view)
+        s, planners = sketch.value, self._list_planners(view)
         locale = find_building(view).common(subgoal.origin.locale, subgoal.destination.locale)
         if subgoal.origin.locale == subgoal.destination.locale:
-            parts = planner.plan_across(subgoal, belief.value)
+            parts = _find_first(planner.plan_across(subgoal, belief.value) for planner in planners)
         else:
-            parts = planner.plan_between_locales(_place_of(belief.value), subgoal.destination, subgoal.tolerance_m)
+            here = _place_of(belief.value)
+            parts = _find_first(planner.plan_between_locales(here, subgoal.destination, subgoal.tolerance_m)
+                                for planner in planners)
         if parts is None:
             obstacles, goal = _find_obstacles(view, (locale,)) or _find_obstacles(view), view.get(s.goal)
             if obstacles and goal is not None and self._leads_otherwise(view, goal.value, belief.value):
@@ -163,8 +172,9 @@ class Sketcher(RobotKnowledgeSource):
     def _leads_otherwise(self, view: View, goal: Goal, belief: Hypothesis) -> bool:
         """Whether a way leads to the goal by other passages than those of the sketch that is being carried out."""
         drawn = view.latest(PlanSketch, lambda s: s.is_active and not s.path)
-        parts = self._planner(view).plan_between_locales(
+        parts = _find_first(planner.plan_between_locales(
             _place_of(belief), goal.destination, self._settings.plan.goal_tolerance_m)
+            for planner in self._list_planners(view))
         if parts is None:
             return False
         left = () if drawn is None else drawn.value.subgoals[drawn.value.at:]
@@ -180,8 +190,32 @@ class Sketcher(RobotKnowledgeSource):
         goal = view.get(done.value.goal)
         if goal is not None and goal.value.is_active:
             yield Revise(goal, replace(goal.value, status="reached"), (done,))
-    def _planner(self, view: View) -> SubgoalPlanner:
-        return SubgoalPlanner(find_robot(view), self._settings.plan, [e.value for e in _find_obstacles(view)])
+
+    def _go_otherwise(self, view: View, leg: Entry[Leg], sketch: Entry[PlanSketch]) -> Iterable[Effect]:
+        """A leg was halted before what may stand in floor that is not seen: another way, or none is left."""
+        belief, goal = find_belief(view), view.get(sketch.value.goal)
+        if belief is None or goal is None:
+            return
+        here, there = _place_of(belief.value), goal.value.destination
+        planner, drawn = self._list_planners(view)[0], view.latest(PlanSketch, lambda s: s.is_active and not s.path)
+        halts = 1 if drawn is None else drawn.value.halts + 1
+        leads_there = planner.plan_between_locales(here, there, self._settings.plan.goal_tolerance_m) is not None
+        if leads_there and halts <= self._settings.plan.max_adjustments:
+            yield from self._begin(view, goal, halts=halts)
+            return
+        obstacles = _find_obstacles(view)
+        reason = f"something may stand in floor that is not seen, before {here.words()}{_name_obstacles(obstacles)}"
+        yield Post(Outcome("blocked", reason), (leg, belief, *obstacles))
+
+    def _list_planners(self, view: View) -> list[SubgoalPlanner]:
+        """Planners in the order in which they are asked: round all that obstacles may take, then what is seen of them.
+
+        Where the feet of an obstacle were not seen, the floor round it may be free: the robot drives as if it were, and
+        only into what it then sees to be free.
+        """
+        robot, obstacles = find_robot(view), [entry.value for entry in _find_obstacles(view)]
+        ways = [False, *([True] if any(obstacle.core for obstacle in obstacles) else [])]
+        return [SubgoalPlanner(robot, self._settings.plan, obstacles, by_cores=by_cores) for by_cores in ways]
 
     def _explain_no_way(self, view: View, here: str, there: str) -> str:
         """Why no sketch leads from one locale to another."""
@@ -195,6 +229,11 @@ class Sketcher(RobotKnowledgeSource):
         by_stairs = building.is_walkable(here, there, self._settings.plan.max_walked_rooms)
         stairs = "; people can walk there, by stairs" * by_stairs
         return f"no passage for wheels leads from {here} to {there}{shut}{stairs}"
+
+
+def _find_first(plans: Iterable[tuple[Subgoal, ...] | None]) -> tuple[Subgoal, ...] | None:
+    """The first plan that leads anywhere."""
+    return next((plan for plan in plans if plan is not None), None)
 
 
 def _find_obstacles(view: View, locales: Collection[str] | None = None) -> tuple[Entry[Obstacle], ...]:

@@ -57,9 +57,6 @@ class ActionSettings:
         0.09, "m/s", "Speed into floor that was not seen to be free.", "engineering judgement")
     max_driven_gap_m: float = setting(
         0.8, "m", "Between two pictures that are no further apart the robot drove straight.", "engineering judgement")
-    newest_scans: int = setting(
-        3, "count", "The robot creeps only up to what the newest so many sights of the floor have in the way.",
-        "engineering judgement")
     max_look_error_rad: float = setting(
         math.radians(6.0), "rad", "The robot looks where the floor is to be seen when it faces there to within this.",
         "engineering judgement")
@@ -70,8 +67,7 @@ class ActionSettings:
         0.6, "1", "A sight without feet tells nothing new where this part of its directions is that of what is known.",
         "engineering judgement")
     min_creep_m: float = setting(
-        0.05, "m", "Shortest move into floor that was not seen to be free, before what may stand there.",
-        "engineering judgement")
+        0.05, "m", "Shortest move into floor that was not seen to be free.", "engineering judgement")
     max_creep_m: float = setting(
         0.6, "m", "Longest move at that speed before the next picture.", "engineering judgement")
     look_ahead_m: float = setting(
@@ -165,6 +161,9 @@ class ActionSettings:
     min_obstacle_certainty: float = setting(
         0.9, "1", "With this certainty an obstacle is there: by one sure picture, or by two unsure ones.",
         "engineering judgement")
+    act_within_m: float = setting(
+        0.7, "m", "What may stand in the next so much of the way is held to be there: nearer it is not seen at all.",
+        "the picture's lower border shows floor 1.3 m ahead")
     max_obstacle_certainty: float = setting(
         0.99, "1", "No obstacle is more certain than this, so that what is gone is soon forgotten.",
         "engineering judgement")

@@ -30,6 +30,7 @@ class FloorThing:
         p_thing: probability that it is solid and higher than what the robot rolls over.
         box_px: (left, top, right, bottom) of it in the rectified picture; of ranges (0, 0, 0, 0).
         evidence: what tells that it is there, in words.
+        is_cut: whether the picture's lower border cuts its feet off: it may reach from there to the robot's rim.
     """
 
     footprint: tuple[Point, ...]
@@ -39,6 +40,7 @@ class FloorThing:
     p_thing: float
     box_px: tuple[float, float, float, float]
     evidence: str
+    is_cut: bool = False
 
 
 @inference(keep=LAST_FLOORS)

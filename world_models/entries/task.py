@@ -113,6 +113,7 @@ class PlanSketch:
         at: the subgoal that is next or under way; n at the end.
         verified: whether milestone ``at`` holds.
         status: active, done or superseded.
+        halts: so often in a row a leg was halted and the sketch drawn anew for it.
         adjustments: how often plan-level servoing changed it.
     """
 
@@ -123,6 +124,7 @@ class PlanSketch:
     at: int = 0
     verified: bool = False
     status: SketchStatus = "active"
+    halts: int = 0
     adjustments: int = 0
 
     @property

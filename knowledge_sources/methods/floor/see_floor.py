@@ -227,7 +227,7 @@ def _build_thing(
     return FloorThing(
         footprint=tuple((round(x, 3), round(y, 3)) for x, y in world), sigma_m=round(math.hypot(spread, own), 4),
         height_m=round(height_m, 3), sigma_height_m=round(sigma_height_m, 3), p_thing=round(odds / (1.0 + odds), 4),
-        box_px=(float(left), float(top), float(right), float(bottom)), evidence=how)
+        box_px=(float(left), float(top), float(right), float(bottom)), evidence=how, is_cut=region.is_cut)
 
 
 def _learn(

@@ -5,8 +5,9 @@ All coordinates are on the floor, in one frame, in metres.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
+from types import MappingProxyType
 from typing import Any
 
 import networkx as nx
@@ -16,6 +17,8 @@ from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats
 from world_models.building.building import Building
+
+Footprint = tuple[tuple[float, float], ...]
 
 SLACK_M = 1e-6
 """Distance below which two places are the same: rounding of shapely's geometry."""
@@ -28,11 +31,23 @@ MAX_FREE_SPACES = 64
 
 
 def find_free_space(
-    building: Building, locale: str, clearance_m: float, *, is_round: bool = False
+    building: Building, locale: str, clearance_m: float, *, is_round: bool = False,
+    instead: Mapping[str, Footprint] = MappingProxyType({}),
 ) -> shapely.Geometry:
-    """Where the robot's centre may be in a locale, ``clearance_m`` from walls and things; cached."""
-    return building.cached("free spaces", MAX_FREE_SPACES, (locale, clearance_m, is_round), lambda: compute_free_space(
-        building.outline(locale), building.obstacles(locale), clearance_m, is_round=is_round))
+    """Where the robot's centre may be in a locale, ``clearance_m`` from walls and things; cached.
+
+    ``instead``: footprints (k, 2) by the names of things that are taken to stand otherwise.
+    """
+    key = (locale, clearance_m, is_round, tuple(sorted(instead.items())))
+    return building.cached("free spaces", MAX_FREE_SPACES, key, lambda: compute_free_space(
+        building.outline(locale), [corners for _, corners in _list_footprints(building, locale, instead)], clearance_m,
+        is_round=is_round))
+
+
+def _list_footprints(building: Building, locale: str, instead: Mapping[str, Footprint]) -> list[tuple[str, Floats]]:
+    """The names and the corners (k, 2) of what the robot could hit in a locale."""
+    return [(thing.name, np.asarray(instead[thing.name], float) if thing.name in instead else thing.footprint_world)
+            for thing in building.things_of(locale) if thing.is_obstacle]
 
 
 def compute_free_space(
@@ -112,12 +127,17 @@ def measure_thing_distance_m(footprint: Any, point: Any) -> float:
     return float(shapely.Polygon(np.asarray(footprint, float)).distance(shapely.Point(point)))
 
 
-def find_nearest(building: Building, locale: str, point: Any) -> tuple[float, str]:
-    """Distance [m] of a point (2,) [world] from the nearest wall or obstacle of a locale, and which of them it is."""
+def find_nearest(
+    building: Building, locale: str, point: Any, instead: Mapping[str, Footprint] = MappingProxyType({})
+) -> tuple[float, str]:
+    """Distance [m] of a point (2,) [world] from the nearest wall or obstacle of a locale, and which of them it is.
+
+    ``instead``: footprints by the names of things that are taken to stand otherwise.
+    """
     openings = [np.concatenate(doorway.thresholds_world) for doorway in building.doorways_of(locale)]
     near = [(measure_wall_distance_m(building.outline(locale), openings, point), "a wall")]
-    near += [(measure_thing_distance_m(thing.footprint_world, point), thing.name)
-             for thing in building.things_of(locale) if thing.is_obstacle]
+    near += [(measure_thing_distance_m(corners, point), name)
+             for name, corners in _list_footprints(building, locale, instead)]
     return min(near)
 
 

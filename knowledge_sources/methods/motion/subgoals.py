@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -32,10 +33,19 @@ MAX_ROUTES = 24
 class SubgoalPlanner:
     """Plans the subgoals of a sketch, for one robot in the building as it is known now."""
 
-    def __init__(self, robot: RobotModel, settings: PlanSettings, obstacles: Sequence[Obstacle] = ()) -> None:
-        """``obstacles``: what stands somewhere and is not in the file; ways are sought round it, and by other doors."""
+    def __init__(
+        self, robot: RobotModel, settings: PlanSettings, obstacles: Sequence[Obstacle] = (), *, by_cores: bool = False
+    ) -> None:
+        """Prepare to plan.
+
+        Args:
+            obstacles: what stands somewhere and is not in the file; ways are sought round it, and by other doors.
+            by_cores: whether obstacles take only what was seen of them: their feet were not, and may be elsewhere.
+        """
         self._robot, self._building, self._settings = robot, robot.world, settings
-        self._obstacles = tuple(obstacle for obstacle in obstacles if obstacle.is_there)
+        there = tuple(obstacle for obstacle in obstacles if obstacle.is_there)
+        self._cores = {o.name: o.core for o in there if o.core} if by_cores else {}
+        self._obstacles = tuple(replace(o, footprint=o.core) if o.name in self._cores else o for o in there)
         self._cluttered = frozenset(obstacle.locale for obstacle in self._obstacles)
 
     def explain_unfit(self, there: Place) -> str:
@@ -43,7 +53,7 @@ class SubgoalPlanner:
         building, name = self._building, there.locale
         if not building.locale(name).contains((there.x_m, there.y_m)):
             return f"is not within {name}"
-        distance_m, what = find_nearest(building, name, there.in_world(building).position)
+        distance_m, what = find_nearest(building, name, there.in_world(building).position, self._cores)
         radius_m, margin_m = self._robot.radius_m, self._settings.clearances_m[-1]
         if distance_m >= radius_m + margin_m:
             return ""
@@ -183,7 +193,8 @@ class SubgoalPlanner:
 
     def _free_space(self, locale: str, margin_m: float, *, is_round: bool = False) -> Geometry:
         """Where the robot's centre may be with a margin round the robot; cached."""
-        return find_free_space(self._building, locale, self._robot.radius_m + margin_m, is_round=is_round)
+        return find_free_space(
+            self._building, locale, self._robot.radius_m + margin_m, is_round=is_round, instead=self._cores)
 
 
 def _divide(route: list[Floats], max_leg_m: float) -> list[Floats]:
