@@ -94,7 +94,10 @@ def _reflected(
     reflected = np.zeros_like(first)
     for _ in range(lighting.bounces):
         leaving = np.vstack([albedo * (first + reflected), np.zeros(3)])  # hit -1 is the last row: nothing
-        reflected = sum(leaving[hits[:, k]] for k in range(hits.shape[1])) / hits.shape[1]
+        reflected = np.zeros_like(first)
+        for k in range(hits.shape[1]):  # ray by ray: all at once would take gigabytes
+            reflected += leaving[hits[:, k]]
+        reflected /= hits.shape[1]
     return _smooth(np.asarray(reflected), places)
 
 
