@@ -30,6 +30,10 @@ class DoorSettings:
 
     # What a leaf looks like
     min_grey: float = setting(6.0, "grey levels", "Least median brightness of an opening that is judged.", _JUDGED)
+    max_grey: float = setting(
+        250.0, "grey levels", "A sample is overexposed where one of its colors is brighter.", _JUDGED)
+    min_exposed_share: float = setting(
+        0.8, "1", "Least share of an opening's samples that are not overexposed, where it is judged.", _JUDGED)
     dark_offset: float = setting(
         4.0, "1", "Grey levels added before a ratio of colors is taken, against noise in the dark.", _JUDGED)
     min_compared: int = setting(

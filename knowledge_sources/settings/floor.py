@@ -46,6 +46,21 @@ class FloorSettings:
     max_unlike: float = setting(
         5.0, "1", "Pixels further than so many standard deviations from the floor's looks do not look like it.",
         "engineering judgement")
+    max_shade_step: float = setting(
+        2.5, "1", "From floor in light to floor in shade, neighbouring pixels differ by at most so many standard "
+        "deviations of the floor's looks.", "engineering judgement")
+    max_shade_chroma: float = setting(
+        0.06, "1", "Largest difference of the parts of red and blue between floor in light and in shade.",
+        "engineering judgement")
+    min_floor_share: float = setting(
+        0.3, "1", "Share of what should be floor that must agree with its known looks; else the picture may be tinted.",
+        "engineering judgement")
+    min_tinted_share: float = setting(
+        0.6, "1", "Share of what should be floor that must look alike, to be the floor in a tinted picture.",
+        "engineering judgement")
+    max_tint: float = setting(
+        0.12, "1", "Largest difference from the floor's colour, in its parts of red and blue, in a tinted picture.",
+        "engineering judgement")
     max_samples: float = setting(
         2000.0, "count", "Past pixels of a floor weigh at most as much as this many.", "engineering judgement")
 

@@ -80,7 +80,9 @@ def decode_half(jpeg: bytes) -> Image:
 def measure_opening(
     robot: RobotModel, opening: Opening, image: Image, settings: DoorSettings = DEFAULT.doors
 ) -> LeafEvidence | None:
-    """Measure an opening in a picture (h, w, 3), as the lens made it, maybe reduced; None where it is too dark."""
+    """Measure an opening in a picture (h, w, 3), as the lens made it, maybe reduced; None where it is too dark or too
+    bright: all that is overexposed has one color.
+    """
     lens = robot.lens
     pixels = np.concatenate([opening.pixels, opening.frame_pixels])
     at = pixels if lens == robot.camera else lens.project(robot.camera.rays(pixels))
@@ -88,7 +90,8 @@ def measure_opening(
     part = (at + 0.5) / (lens.width, lens.height) * (width, height)
     column, row = np.clip(part.astype(np.int64), 0, (width - 1, height - 1)).T
     seen, around = np.split(cv2.blur(image, (3, 3))[row, column].astype(np.float64), [len(opening.pixels)])
-    if np.median(seen) < settings.min_grey:
+    is_exposed = seen.max(axis=1) <= settings.max_grey
+    if np.median(seen) < settings.min_grey or is_exposed.mean() < settings.min_exposed_share:
         return None
     colors = np.log(seen + settings.dark_offset)
     compared = opening.is_whole & ~np.isnan(opening.colors[:, 0])

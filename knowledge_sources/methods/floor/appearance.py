@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,7 +35,7 @@ def default_covariance(settings: FloorSettings) -> Floats:
 
 
 def fit_looks(
-    looks: Floats, expected: Floats, is_learnt: bool, settings: FloorSettings
+    looks: Floats, expected: Floats, is_learnt: bool, settings: FloorSettings, max_chroma_error: float | None = None
 ) -> tuple[Floats, Floats] | None:
     """Mean (3,) and covariance (3, 3) of the looks (n, 3) of a floor in one picture; None where it is not to be seen.
 
@@ -44,8 +45,10 @@ def fit_looks(
     Args:
         expected: (3,) looks by the model, or as learnt.
         is_learnt: whether the brightness of ``expected`` tells anything.
+        max_chroma_error: in place of that of the settings.
     """
-    is_alike = np.all(np.abs(looks[:, 1:] - expected[1:]) <= settings.max_chroma_error, axis=1)
+    limit = settings.max_chroma_error if max_chroma_error is None else max_chroma_error
+    is_alike = np.all(np.abs(looks[:, 1:] - expected[1:]) <= limit, axis=1)
     near = looks[is_alike]
     if len(near) < settings.min_floor_pixels:
         return None
@@ -64,6 +67,31 @@ def measure_unlike(looks: Floats, mean: Floats, covariance: Floats) -> Floats:
     """Squared Mahalanobis distance (...) of looks (..., 3) from the floor's."""
     off = looks - mean
     return np.asarray(np.einsum("...i,ij,...j->...", off, np.linalg.inv(covariance), off))
+
+
+def find_floor_in_shade(
+    looks: Floats, here: NDArray[np.bool_], mean: Floats, covariance: Floats, settings: FloorSettings
+) -> NDArray[np.bool_]:
+    """Which pixels (rows, columns) of ``here`` look like the floor, or like it in other light.
+
+    Light changes the brightness, and the hue a little, as walls reflect it; and mostly little by little. What has about
+    the floor's hue is floor too where a way leads to floor on which the looks change nowhere at once. At the foot of a
+    thing they do.
+
+    Args:
+        looks: (rows, columns, 3); mean, covariance: the floor's.
+    """
+    alike = np.zeros(here.shape, bool)
+    alike[here] = measure_unlike(looks[here], mean, covariance) <= settings.max_unlike**2
+    may_be = here & np.all(np.abs(looks[..., 1:] - mean[1:]) <= settings.max_shade_chroma, axis=-1)
+    around, sigmas = np.ones((3, 3), np.uint8), np.sqrt(np.diag(covariance))
+    for part, sigma in zip(np.moveaxis(looks.astype(np.float32), -1, 0), sigmas, strict=True):
+        may_be &= cv2.dilate(part, around) - cv2.erode(part, around) <= settings.max_shade_step * sigma
+    _, parts = cv2.connectedComponents(((here & alike) | may_be).astype(np.uint8), connectivity=4)
+    reached = np.zeros(int(parts.max()) + 1, bool)
+    reached[parts[alike]] = True
+    reached[0] = False
+    return np.asarray(reached[parts])
 
 
 def learn_appearance(

@@ -1,4 +1,6 @@
-"""Does a region stand up from the floor, or lie flat on it? Its top in two pictures with known motion between them."""
+"""Does a region stand up from the floor, lie flat on it, or is it reflected in it? Its top in two pictures with known
+motion between them.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +22,9 @@ COLUMNS = 8
 PLACES = (0.5, 0.75, 1.0, 1.25)
 """Where its top may be between the floor behind it (0) and right above its foot (1): what is deep has its upper border
 further back than its foot, and the foot of what is cut off is nearer than it is taken to be."""
+DEPTHS = tuple(1.25 * 1.18**step for step in range(10))
+"""Where a mirror image is: so many times as far away as the floor. That of a thing of height h, with the camera at
+height c above the floor, is 1 + h / c times as far."""
 MIN_DEVIATION = 4.0
 """A patch with less contrast than this [grey levels] tells nothing."""
 
@@ -28,10 +33,11 @@ def compute_parallax_odds(
     region: Region, grid: FloorGrid, picture: NDArray[np.float32], earlier: NDArray[np.float32],
     earlier_from_now: Pose2, camera: Camera, mount: CameraMount, settings: FloorSettings,
 ) -> float:
-    """The odds that a region is solid against flat, by an earlier picture; 1 where nothing tells.
+    """The odds that a region is solid against flat or reflected, by an earlier picture; 1 where nothing tells.
 
-    Points of the upper border are on the floor if the region is flat, and above its foot if it is solid. Where they
-    were in the earlier picture then differs; the patch round each tells which of the two it is.
+    Points of the upper border are on the floor if the region is flat, above its foot if it is solid, and below the
+    floor if a shiny floor mirrors what is elsewhere. Where they were in the earlier picture then differs; the patch
+    round each tells which of these it is.
 
     Args:
         picture, earlier: (h, w) grey, reduced by STEP_PX.
@@ -53,19 +59,29 @@ def compute_parallax_odds(
         at = 1.0 - share * (1.0 - part)
         solid = np.column_stack([eye + (points - eye) * at[:, None], grid.camera_height_m * (1.0 - at)])
         then_solid.append(_project(solid, earlier_from_now, camera, mount, grid))
-    apart = np.array([np.linalg.norm(then_flat - there, axis=1) * STEP_PX for there in then_solid])
+    then_mirrored = [_project(_below(points, eye, depth, grid), earlier_from_now, camera, mount, grid)
+                     for depth in DEPTHS]
     votes = 0
-    for i in np.flatnonzero((apart >= settings.min_parallax_px).any(axis=0)):
+    for i in range(len(points)):
         patch = _cut(picture, grid.top + int(rows[i]), int(columns[i]))
         as_flat = _correlate(earlier, patch, then_flat[i])
-        as_solid = max(_correlate(earlier, patch, there[i]) for there, away in zip(then_solid, apart, strict=True)
-                       if away[i] >= settings.min_parallax_px)
-        is_found = max(as_flat, as_solid) >= settings.min_parallax_correlation
-        if is_found and abs(as_solid - as_flat) >= settings.min_parallax_margin:
-            votes += 1 if as_solid > as_flat else -1
+        as_solid, as_mirrored = (
+            _correlate_best(earlier, patch, then_flat[i], [there[i] for there in then], settings.min_parallax_px)
+            for then in (then_solid, then_mirrored))
+        as_solid = as_flat if as_solid is None else as_solid  # too near to each other to tell them apart
+        lying = as_flat if as_mirrored is None else max(as_flat, as_mirrored)
+        is_found = max(lying, as_solid) >= settings.min_parallax_correlation
+        if is_found and abs(as_solid - lying) >= settings.min_parallax_margin:
+            votes += 1 if as_solid > lying else -1
     if votes == 0:
         return 1.0
     return float(settings.parallax_odds ** np.clip(votes / 2.0, -1.0, 1.0))
+
+
+def _below(points: Floats, eye: Floats, depth: float, grid: FloorGrid) -> Floats:
+    """(n, 3) points on the rays to floor points (n, 2), so many times as far away."""
+    height = np.full(len(points), grid.camera_height_m * (1.0 - depth))
+    return np.column_stack([eye + (points - eye) * depth, height])
 
 
 def _find_upper_border(region: Region) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -105,3 +121,11 @@ def _correlate(earlier: NDArray[np.float32], patch: NDArray[np.float32], there: 
     if patch.std() < MIN_DEVIATION or window.std() < MIN_DEVIATION:
         return -1.0
     return float(cv2.matchTemplate(window, patch, cv2.TM_CCOEFF_NORMED).max())
+
+
+def _correlate_best(
+    earlier: NDArray[np.float32], patch: NDArray[np.float32], flat: Floats, places: list[Floats], min_parallax_px: float
+) -> float | None:
+    """The largest correlation at those places that differ enough from where a flat region was; None where none does."""
+    apart = [there for there in places if np.linalg.norm(there - flat) * STEP_PX >= min_parallax_px]
+    return max((_correlate(earlier, patch, there) for there in apart), default=None)

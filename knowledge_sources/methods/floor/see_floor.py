@@ -18,9 +18,9 @@ from knowledge_sources.methods.features.rectification import get_rectifier
 from knowledge_sources.methods.floor.appearance import (
     compute_looks,
     default_covariance,
+    find_floor_in_shade,
     fit_looks,
     learn_appearance,
-    measure_unlike,
 )
 from knowledge_sources.methods.floor.floor_grid import STEP_PX, FloorGrid, build_floor_grid
 from knowledge_sources.methods.floor.model_floor import ModelFloor, predict_model_floor
@@ -125,29 +125,48 @@ def find_unlike(
     """
     looks = compute_looks(cv2.GaussianBlur(np.asarray(picture), (3, 3), 0.6).astype(np.float32))
     unlike, tells = np.zeros(model.kinds.shape, bool), np.zeros(model.kinds.shape, bool)
-    exposure: float | None = None
+    shift: Floats | None = None  # of this picture's looks from the model's: its exposure, and a tint where it has one
     kinds, counts = np.unique(model.kinds[model.is_plain], return_counts=True)
     for kind in kinds[np.argsort(-counts, kind="stable")]:
         if np.isnan(model.colours[kind]).any():
             continue
         here = model.is_plain & (model.kinds == kind)
         by_model = compute_looks(255.0 * model.colours[kind])
-        expected, is_learnt = by_model, exposure is not None
-        if exposure is not None:
-            expected = by_model + np.array([exposure, 0.0, 0.0])
-        fitted = None
-        if exposure is None and known is not None and known.samples > 0.0:
-            fitted = fit_looks(looks[here], compute_looks(np.array(known.mean)), True, settings)
-        if fitted is None:
-            fitted = fit_looks(looks[here], expected, is_learnt, settings)
-        if fitted is None and exposure is None:
-            continue
-        mean, covariance = fitted if fitted is not None else (expected, 4.0 * default_covariance(settings))
-        if exposure is None:
-            exposure = float(mean[0] - by_model[0])
-        unlike[here] = measure_unlike(looks[here], mean, covariance) > settings.max_unlike**2
+        if shift is None:
+            guesses = [(compute_looks(np.array(known.mean)), True)] if known and known.samples > 0.0 else []
+            fitted = _fit_most(looks, here, [*guesses, (by_model, False)], settings)
+            if fitted is None:
+                continue
+            mean, covariance = fitted
+            shift = mean - by_model
+            if np.abs(shift[1:]).max() <= settings.max_chroma_error:
+                shift[1:] = 0.0
+        else:
+            expected = by_model + shift
+            mean, covariance = fit_looks(looks[here], expected, True, settings) or (
+                expected, 4.0 * default_covariance(settings))
+        unlike |= here & ~find_floor_in_shade(looks, here, mean, covariance, settings)
         tells |= here
     return unlike, tells
+
+
+def _fit_most(
+    looks: Floats, here: NDArray[np.bool_], guesses: Sequence[tuple[Floats, bool]], settings: FloorSettings
+) -> tuple[Floats, Floats] | None:
+    """Mean and covariance of the looks of the floor ``here``, by the first of the guesses (as ``expected`` and
+    ``is_learnt`` of :func:`fit_looks`) that some of it agrees with; None where its looks are not known.
+
+    Where hardly any of it agrees, the camera's white balance may be another than it was: what most of it looks like
+    then is the floor, if it has about the floor's hue.
+    """
+    found = [fit_looks(looks[here], expected, is_learnt, settings) for expected, is_learnt in guesses]
+    fits = [(fit, settings.min_floor_share) for fit in found]
+    fits += [(fit_looks(looks[here], expected, False, settings, settings.max_tint), settings.min_tinted_share)
+             for expected, _ in guesses]
+    for fit, share in fits:
+        if fit is not None and find_floor_in_shade(looks, here, *fit, settings).sum() >= share * here.sum():
+            return fit
+    return next((fit for fit in found if fit is not None), None)
 
 
 class _Scan(NamedTuple):

@@ -185,3 +185,10 @@ def test_a_state_says_what_is_seen() -> None:
     state = look([(4.5, 0.0), (4.5, 1.0)])[-1]
     assert state is not None and not state.is_passable
     assert state.sentence() == "d is shut: its opening shows something; 99.3% by 2 pictures, the last at 1.0 s"
+
+
+@pytest.mark.parametrize("state", ["open", "shut"])
+def test_an_overexposed_opening_says_nothing(
+    robot: RobotModel, doorway: Doorway, buildings: dict[str, Building], state: str
+) -> None:
+    assert weigh(robot, doorway, buildings[state], before_door(doorway, 2.0, 0.0), gain=9.0) is None
