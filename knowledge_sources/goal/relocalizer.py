@@ -19,8 +19,10 @@ from knowledge_sources.methods.localization.global_localization import (
     LocalizationResult,
     LocalizationStatus,
     localize,
+    make_alias_test,
 )
 from knowledge_sources.methods.localization.obstructions import update_obstruction
+from knowledge_sources.methods.localization.place_odds import ToldPlace, compute_prior, weigh_told
 from knowledge_sources.methods.localization.views import CameraView, propagate_pose
 from knowledge_sources.questions import (
     active_goal,
@@ -35,10 +37,10 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
 from world_models.entries.body import Look, MotionReport, MotorCommand
-from world_models.entries.location import Hypothesis, HypothesisStatus, Place, covariance_tuple
+from world_models.entries.location import Hypothesis, HypothesisStatus, Place, PlaceOdds, covariance_tuple
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import Glimpse, Panorama, Segments
-from world_models.entries.task import Goal, PlanSketch
+from world_models.entries.task import Certificate, Goal, PlanSketch
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 
@@ -47,9 +49,10 @@ class Relocalizer(RobotKnowledgeSource):
     """Keeps every place of the floor that agrees with its pictures, and takes more until one place is left.
 
     The next picture is taken after the turn or short safe move by which the candidates' views are expected to differ
-    most. Once the place is known, a new top-level goal leads from there to the old destination (§2). Where the building
-    looks the same at several places, the robot stays lost and the candidates stay on the board: it never guesses. What
-    is at the same place in its pictures while it turns is an obstruction, and is ignored.
+    most. Once the place is known, a new top-level goal leads from there to the old destination (§2). Of places that
+    look alike, the one where it was told to be, or was tracked to, is believed if it is likely enough by these odds
+    and by the pictures. Otherwise the robot stays lost and the candidates stay on the board: it never guesses. What is
+    at the same place in its pictures while it turns is an obstruction, and is ignored.
     """
 
     level = Level.GOAL
@@ -59,7 +62,7 @@ class Relocalizer(RobotKnowledgeSource):
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "odometry"),
         Watch(Segments, (Posted,), lambda s: s.milestone == ""),
     )
-    writes = (Look, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama, Obstruction)
+    writes = (Look, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama, Obstruction, PlaceOdds)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         lost = open_discrepancy(view, Level.GOAL)
@@ -104,17 +107,29 @@ class Relocalizer(RobotKnowledgeSource):
             because = (segments, lost, hidden if change is None else change)
         building, rooms = find_building(view), self._list_rooms(view, belief.value)
         looking = robot.with_obstruction(obstruction).on_floor_of(belief.value.locale)
-        result = localize(looking, looks, rooms, self._settings)
+        here = belief.value.world_from_robot(building)
+        told = ToldPlace(here, belief.value.covariance_world(building),
+                         compute_prior(len(view.where(PlaceOdds, lambda _: True)), tuning))
+        seen_result = localize(looking, looks, rooms, self._settings, (belief.value.locale, here))
         is_last = len(glimpses) >= self._settings.goal.max_probes
+        if is_last:
+            seen_result = replace(seen_result, next_action=None)
+        look_alike = make_alias_test(looking, [g.now_from_then for g in glimpses], self._settings)
+        result = weigh_told(seen_result, told, look_alike, len(looks), tuning)
+        odds = _odds_used(view, seen_result, result, told)
         if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
             result = _prefer_reachable(building, result, belief.value.locale)
         for old in view.where(Hypothesis, lambda h: h.status == "candidate"):
             yield Retract(old, (segments,))
-        panorama = Panorama(glimpses, _describe(result))
+        panorama = Panorama(glimpses, _describe(result) if odds is None else odds.sentence())
         seen = Post(panorama, because) if before is None else Revise(before, panorama, (*because, before))
         yield seen
         if result.status is LocalizationStatus.FOUND:
-            yield from self._adopt(view, (segments, seen), lost, belief, result.candidates[0])
+            why: tuple[Effect, ...] = (seen,)
+            if odds is not None:
+                why = (seen, Post(odds, (seen, belief)))
+                yield why[1]
+            yield from self._adopt(view, (segments, *why), lost, belief, result.candidates[0])
             return
         for c in result.candidates:
             yield Post(_to_hypothesis(building, c, belief.value, "candidate", c.weight), (segments, seen, belief))
@@ -142,8 +157,8 @@ class Relocalizer(RobotKnowledgeSource):
         return [name for name in rooms if abs(building.floor_m(name) - level_m) < same_m]
 
     def _adopt(
-        self, view: View, seen: tuple[Entry[Segments], Effect], lost: Entry[Discrepancy], belief: Entry[Hypothesis],
-        candidate: Candidate,
+        self, view: View, seen: tuple[Entry[Segments] | Effect, ...], lost: Entry[Discrepancy],
+        belief: Entry[Hypothesis], candidate: Candidate,
     ) -> Iterable[Effect]:
         """The belief is corrected, and a new top-level goal takes the place of the old one (§2)."""
         building = find_building(view)
@@ -162,6 +177,17 @@ class Relocalizer(RobotKnowledgeSource):
         pose = candidate.world_from_robot
         origin = Place.of_world(building, candidate.room, pose.x_m, pose.y_m)
         yield Post(Goal(origin, goal.value.destination), (here, abandon))
+
+
+def _odds_used(
+    view: View, by_pictures: LocalizationResult, result: LocalizationResult, told: ToldPlace
+) -> PlaceOdds | None:
+    """The odds by which a place was found that the pictures alone had not found; None where they had."""
+    if result.status is not LocalizationStatus.FOUND or by_pictures.status is LocalizationStatus.FOUND:
+        return None
+    found, count = result.candidates[0], len(by_pictures.candidates)
+    tracked = view.latest(Certificate, lambda c: c.verdict == "verified")
+    return PlaceOdds(found.room, count, "told" if tracked is None else "tracked", told.p_told, found.weight)
 
 
 def _prefer_reachable(building: Building, result: LocalizationResult, locale: str) -> LocalizationResult:

@@ -155,6 +155,27 @@ class LocalizationSettings:
         math.radians(2.0), "rad", "Grid of headings on which visible lines are computed and kept.", _JUDGED)
     cached_views: int = setting(64, "count", "Predicted views on the grid that are kept.", _JUDGED)
 
+    # Odds of the place where the robot was told to be, or was tracked to
+    p_told: float = setting(
+        0.98, "1", "Probability that the robot is where it was told to be at the start.", _JUDGED)
+    lost_again_odds: float = setting(
+        0.2, "1", "Factor on the odds of that for every time that it was believed by them, and the robot got lost.",
+        _JUDGED)
+    told_sigma_m: float = setting(
+        0.1, "m", "Standard deviation that a tracked position has beyond its covariance: it may have slipped.", _JUDGED)
+    told_sigma_rad: float = setting(
+        math.radians(3.0), "rad", "Standard deviation that a tracked heading has beyond its covariance.", _JUDGED)
+    max_told_chi2: float = setting(
+        21.1, "1", "Largest squared distance of a place from where it was told or tracked to be that is still that"
+        " place, in deviations; three unknowns, 99.99 %.", _JUDGED)
+    max_alike_log_ratio: float = setting(
+        3.0, "1", "Largest log likelihood ratio of the pictures between places that look alike by the model: more is"
+        " chance.", _JUDGED)
+    min_p_believed: float = setting(
+        0.97, "1", "Smallest probability of a place that is believed where no look within reach tells more.", _JUDGED)
+    min_p_sure: float = setting(
+        0.999, "1", "Smallest probability of a place that is believed although another look could tell more.", _JUDGED)
+
     # Obstructions before the camera
     min_turn_between_views_rad: float = setting(
         math.radians(10.0), "rad", "Turn from which nothing of the building stays where it is in the picture.", _JUDGED)

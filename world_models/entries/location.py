@@ -143,6 +143,31 @@ class Hypothesis:
                 f" {words.degrees(pose.heading_rad)}{likely}; {sure}, by {self.basis}{evidence}")
 
 
+@inference()
+@dataclass(frozen=True, slots=True)
+class PlaceOdds:
+    """What the robot was told or had tracked, as evidence of where it is among places that look alike.
+
+    Attributes:
+        locale: where it is believed to be.
+        alike: number of the places between which the pictures did not tell, this one included.
+        source: ``told`` at the start, or ``tracked`` by milestones since.
+        p_prior: probability that it is there, before any picture since it was lost.
+        probability: with the pictures.
+    """
+
+    locale: str
+    alike: int
+    source: Literal["told", "tracked"]
+    p_prior: float
+    probability: float
+
+    def sentence(self) -> str:
+        how = "this one was told at the start" if self.source == "told" else "to this one it was tracked"
+        return (f"{words.count(self.alike, 'place')} look alike from here; {how} ({self.p_prior:.0%} before any"
+                f" picture): {self.locale}, {self.probability:.1%}")
+
+
 def _turn(angle_rad: float) -> NDArray[np.float64]:
     c, s = math.cos(angle_rad), math.sin(angle_rad)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

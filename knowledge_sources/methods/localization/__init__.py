@@ -18,6 +18,7 @@ Which of these poses is it, and what to look at next?
 * :mod:`hypotheses`: weights of poses, and whether predicted views can be told apart.
 * :mod:`next_view`: the turn or move whose view separates the hypotheses best (active localization).
 * :mod:`global_localization`: all of the above: found, look again, or ambiguous.
+* :mod:`place_odds`: where it was told to be, or was tracked to, as prior odds.
 
 Could a known pose be another one that looks the same?
 

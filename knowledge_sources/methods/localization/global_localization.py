@@ -96,29 +96,39 @@ class RefinedPose(NamedTuple):
 
 
 def localize(
-    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT
+    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT,
+    guess: tuple[str, Pose2] | None = None,
 ) -> LocalizationResult:
-    """Find the robot in these rooms by its views, the last of which was taken from where it is now."""
+    """Find the robot in these rooms by its views, the last of which was taken from where it is now.
+
+    Args:
+        guess: a room and a pose that are always tried: of many places that look alike only some are.
+    """
     aligned = align_headings(views, robot.camera, robot.mount.camera_from_robot, settings)
-    candidates = find_candidates(robot, aligned, rooms, settings)
+    candidates = find_candidates(robot, aligned, rooms, settings, guess)
     return decide(robot, candidates, [view.now_from_then for view in aligned], settings)
 
 
 def find_candidates(
-    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT
+    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT,
+    guess: tuple[str, Pose2] | None = None,
 ) -> tuple[Candidate, ...]:
     """Find the places in these rooms that explain all views (with aligned headings), the likeliest first.
 
-    If one accepted place is left, its aliases on the whole floor are weighed too.
+    A place to which ``guess`` leads is tried first, and kept if it is not refuted. If one accepted place is left, its
+    aliases on the whole floor are weighed too.
     """
     look_alike = make_alias_test(robot, [view.now_from_then for view in views], settings)
-    found = [_build_candidate(robot, views, pose, settings) for pose in _find_refined(robot, views, rooms, settings)]
-    kept = rank_candidates(found, look_alike, settings)
+    refined = [] if guess is None else [RefinedPose(guess[0], *refine_pose(robot, views, guess[1], settings))]
+    refined += [pose for pose in _find_refined(robot, views, rooms, settings) if all(
+        are_distinct(pose.world_from_robot, other.world_from_robot, settings.localization) for other in refined)]
+    found = [_build_candidate(robot, views, pose, settings) for pose in refined]
+    kept = rank_candidates(found, look_alike, settings, found[0] if guess is not None else None)
     if len(kept) != 1 or not kept[0].is_accepted:
         return kept
     aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, settings)
     beside = [_build_candidate(robot, views, pose, settings) for pose in aliases]
-    return rank_candidates([*kept, *beside], look_alike, settings)
+    return rank_candidates([*kept, *beside], look_alike, settings, kept[0])
 
 
 def find_aliases(
@@ -156,19 +166,22 @@ def make_alias_test(robot: RobotModel, looked: Sequence[Pose2], settings: Settin
 
 
 def rank_candidates(
-    found: Sequence[Candidate], look_alike: LookAlike, settings: Settings = DEFAULT
+    found: Sequence[Candidate], look_alike: LookAlike, settings: Settings = DEFAULT, first: Candidate | None = None
 ) -> tuple[Candidate, ...]:
     """Keep the likely candidates that the likeliest does not refute, with their weights, the likeliest first.
 
     The likeliest refutes a candidate by the log likelihood ratio (Bayes factor), but never one that would look the
-    same: chance may have made it much less likely.
+    same: chance may have made it much less likely. Where too many are left, ``first`` is none that is left out.
     """
     tuning = settings.localization
     order = sorted((c for c in found if c.likelihood.log_likelihood >= tuning.min_log_likelihood),
                    key=lambda c: -c.likelihood.log_likelihood)
     kept = [c for c in order
             if c.likelihood.log_likelihood >= order[0].likelihood.log_likelihood - tuning.refuting_log_ratio
-            or look_alike(order[0].world_from_robot, c.world_from_robot)][: tuning.max_hypotheses]
+            or look_alike(order[0].world_from_robot, c.world_from_robot)]
+    if first in kept[tuning.max_hypotheses:]:
+        kept[tuning.max_hypotheses - 1] = first
+    kept = kept[:tuning.max_hypotheses]
     weights = normalize_log_likelihoods([c.likelihood.log_likelihood for c in kept])
     return tuple(replace(c, weight=weight) for c, weight in zip(kept, weights, strict=True))
 

@@ -1,0 +1,119 @@
+"""The odds of the place where the robot was told to be, or was tracked to: prior odds times the pictures' ratio.
+
+The alternative is that it stands in another place just so as it was told for the first: so neither the distance from
+where it was told, nor how rarely a robot would stand just there by chance, speaks for the place that was told. What
+speaks for it is the probability ``p_told`` alone; and it is excluded where it is farther away than it can have moved.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.localization.global_localization import (
+    Candidate,
+    LocalizationResult,
+    LocalizationStatus,
+    LookAlike,
+)
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.localization import LocalizationSettings
+from world_models.frames import Pose2, wrap_angle
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ToldPlace:
+    """Where the robot was told to be, or was tracked to, before it was lost.
+
+    Attributes:
+        world_from_robot, covariance: the pose, and (3, 3) over (x, y, heading), world.
+        p_told: probability that it is there, before any picture.
+    """
+
+    world_from_robot: Pose2
+    covariance: Floats
+    p_told: float
+
+    def includes(self, candidate: Candidate, settings: LocalizationSettings = DEFAULT.localization) -> bool:
+        """Whether a candidate is this place."""
+        return is_within_reach(candidate.world_from_robot, candidate.covariance, self.world_from_robot,
+                               self.covariance, settings)
+
+
+def weigh_told(
+    result: LocalizationResult, told: ToldPlace, look_alike: LookAlike, looks: int,
+    settings: LocalizationSettings = DEFAULT.localization,
+) -> LocalizationResult:
+    """Weigh the candidates by what was told and by the pictures, the likeliest first.
+
+    Found is the told place if it is accepted and so likely that it is believed: ``min_p_sure``, or ``min_p_believed``
+    where no look within reach tells more, after ``min_views`` of ``looks``. Where the pictures alone have found a place, or none of the candidates is
+    the told place, nothing is changed.
+    """
+    is_told = [told.includes(c, settings) for c in result.candidates]
+    if result.status is LocalizationStatus.FOUND or not any(is_told):
+        return result
+    best = next(c for c, here in zip(result.candidates, is_told, strict=True) if here)
+    alike = [look_alike(best.world_from_robot, c.world_from_robot) for c in result.candidates]
+    odds = compute_place_odds([c.likelihood.log_likelihood for c in result.candidates], is_told, alike, told.p_told,
+                              settings)
+    weighed = tuple(sorted((replace(c, weight=p) for c, p in zip(result.candidates, odds, strict=True)),
+                           key=lambda c: -c.weight))
+    likeliest = weighed[0]
+    is_tied = result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None
+    enough = settings.min_p_believed if is_tied else settings.min_p_sure
+    is_settled = looks >= settings.min_views and likeliest.is_accepted and likeliest.weight >= enough
+    if is_settled and told.includes(likeliest, settings):
+        return LocalizationResult(LocalizationStatus.FOUND, (likeliest,))
+    return replace(result, candidates=weighed)
+
+
+def compute_place_odds(
+    log_likelihoods: Sequence[float], is_told: Sequence[bool], is_alike: Sequence[bool], p_told: float,
+    settings: LocalizationSettings = DEFAULT.localization,
+) -> tuple[float, ...]:
+    """Compute the posterior probabilities of places, which sum to one.
+
+    Bayes' rule: places that were told share the prior probability ``p_told``, all others what is left. Where none was
+    told, or nothing else is left, the prior says nothing.
+
+    Args:
+        log_likelihoods: of the pictures, of each place.
+        is_told: whether the robot was told to be there, or was tracked there.
+        is_alike: whether the place looks like the likeliest that was told, by the model. Between such places a ratio
+            of the pictures that is larger than ``max_alike_log_ratio`` is chance, and counts as that.
+    """
+    told = [i for i, here in enumerate(is_told) if here]
+    if not log_likelihoods:
+        return ()
+    logs = list(log_likelihoods)
+    if told:
+        most, best = settings.max_alike_log_ratio, max(log_likelihoods[i] for i in told)
+        logs = [best + min(most, max(-most, value - best)) if alike and not here else value
+                for value, here, alike in zip(logs, is_told, is_alike, strict=True)]
+        others = len(logs) - len(told)
+        if others:
+            shares = (math.log((1.0 - p_told) / others), math.log(p_told / len(told)))
+            logs = [value + shares[here] for value, here in zip(logs, is_told, strict=True)]
+    weights = np.exp(np.array(logs) - max(logs))
+    return tuple(float(w) for w in weights / np.sum(weights))
+
+
+def compute_prior(times_lost: int, settings: LocalizationSettings = DEFAULT.localization) -> float:
+    """Compute the prior probability of the told place after it was believed so often by it, and the robot got lost."""
+    odds = settings.p_told / (1.0 - settings.p_told) * settings.lost_again_odds**times_lost
+    return odds / (1.0 + odds)
+
+
+def is_within_reach(
+    pose: Pose2, covariance: Floats, told: Pose2, told_covariance: Floats,
+    settings: LocalizationSettings = DEFAULT.localization,
+) -> bool:
+    """Whether a pose may be where the robot was told to be, or was tracked to, by both covariances (3, 3)."""
+    off = np.array([pose.x_m - told.x_m, pose.y_m - told.y_m, wrap_angle(pose.heading_rad - told.heading_rad)])
+    beyond = np.diag(np.square([settings.told_sigma_m, settings.told_sigma_m, settings.told_sigma_rad]))
+    return float(off @ np.linalg.solve(covariance + told_covariance + beyond, off)) <= settings.max_told_chi2
