@@ -13,6 +13,7 @@ from sim.body.building import Building
 from sim.body.elevator import Elevators
 from sim.body.simulated_body import SimulatedBody
 from sim.differences.changing_faces import ChangingFaces, State
+from sim.differences.table import AS_TOLD
 from sim.render.light.lamps import Room
 from sim.render.light.lights import Lights
 from sim.scenario import Scenario
@@ -41,6 +42,7 @@ class Stage:
         world: the building with its details; not what the robot believes.
         building: the same for the simulated body.
         start_world, goal_world: intended poses at start and goal, in the world frame.
+        put_down_world: where it is put down, before the errors of putting it down: at the start, as a rule.
         goal_floor_m: height of the goal's floor [m].
     """
 
@@ -49,6 +51,7 @@ class Stage:
     building: Building
     start_world: Pose2
     goal_world: Pose2
+    put_down_world: Pose2
     goal_floor_m: float = 0.0
 
     def body(self, seed: int) -> SimulatedBody:
@@ -56,7 +59,7 @@ class Stage:
         s = self.scenario
         camera, mount = _true_camera(s)
         return SimulatedBody(
-            self.building, self.start_world, camera, mount,
+            self.building, self.put_down_world, camera, mount,
             seed=seed, actuator=s.actuator, sensor=s.sensor, bumper=s.bumper, ranges=s.ranges,
             faults=s.faults, lighting=s.light,
             put_down_sigma_m=s.start.put_down_sigma_m, put_down_sigma_rad=s.start.put_down_sigma_rad,
@@ -80,7 +83,8 @@ def build_stage(scenario: Scenario) -> Stage:
     _true_camera(scenario)
     check_names(scenario, world)
     start, goal = _ends(scenario, world)
-    named = (*find_named_locales(scenario), *find_changed_locales(scenario, world))
+    down = _put_down(scenario, world, start)
+    named = (down.locale, *find_named_locales(scenario), *find_changed_locales(scenario, world))
     around = _around(world, (start.locale, goal.locale, *named))
     faces = move_scenario_things(scenario, world, world.faces_within(around))
     changes = find_changes(scenario, world, around, faces)
@@ -89,11 +93,11 @@ def build_stage(scenario: Scenario) -> Stage:
     elevators = Elevators.of_links(_links_in(world, around), world, scenario.rides)
     on_floor = _storeys(world, around, changing, elevators)
     building = on_floor(world.floor_m(start.locale))
-    check_room(scenario, world, start, building, on_floor)
+    check_room(scenario, world, down, building, on_floor)
     heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
     start_world = replace(start, heading_rad=scenario.start.heading_rad).in_world(world)
     goal_world = replace(goal, heading_rad=heading).in_world(world)
-    return Stage(scenario, world, building, start_world, goal_world, world.floor_m(goal.locale))
+    return Stage(scenario, world, building, start_world, goal_world, down.in_world(world), world.floor_m(goal.locale))
 
 
 def _world(scenario: Scenario) -> World:
@@ -119,6 +123,16 @@ def _ends(scenario: Scenario, world: World) -> tuple[Place, Place]:
         return parse_command(scenario.goal, world)
     except ValueError as error:
         raise scenario.refused(("goal",), str(error)) from None
+
+
+def _put_down(scenario: Scenario, world: World, start: Place) -> Place:
+    """Where the robot is put down. Raises ScenarioError where the world has no such place."""
+    true = scenario.truth.start
+    if true == AS_TOLD:
+        return replace(start, heading_rad=scenario.start.heading_rad)
+    if true.locale not in world.locales:
+        raise scenario.refused(("truth", "start", "locale"), f"expected a room of the world, got {true.locale!r}")
+    return Place(true.locale, true.x_m, true.y_m, true.heading_rad)
 
 
 def _around(world: World, locales: Sequence[str]) -> str:

@@ -172,6 +172,26 @@ AS_BELIEVED = TrueCamera()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TrueStart:
+    """Where the robot is put down, where that is not the place that it is told: ``[truth.start]``.
+
+    Attributes:
+        locale: the room; x_m, y_m, heading_rad: the pose in its frame, before the errors of putting it down.
+    """
+
+    locale: str = ""
+    x_m: float = 0.0
+    y_m: float = 0.0
+    heading_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_bounds(self, {"x_m": COORDINATE, "y_m": COORDINATE, "heading_rad": TURN})
+
+
+AS_TOLD = TrueStart()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TruthTable:
     """All that is otherwise; of several entries about the same door, thing or wall, the last one that is due holds."""
 
@@ -180,6 +200,7 @@ class TruthTable:
     walls: tuple[TrueWall, ...] = ()
     extra: tuple[ExtraThing, ...] = ()
     camera: TrueCamera = AS_BELIEVED
+    start: TrueStart = AS_TOLD
     inexact: TrueInexact = EXACT
 
 
@@ -188,11 +209,12 @@ NO_DIFFERENCES = TruthTable()
 
 def read_truth(node: Node) -> TruthTable:
     """The table of a file. Raises WorldError."""
-    node.table((), ("doors", "things", "walls", "extra", "camera", "inexact"))
+    node.table((), ("doors", "things", "walls", "extra", "camera", "start", "inexact"))
     return TruthTable(
         doors=_read_all(node, "doors", TrueDoor), things=_read_all(node, "things", TrueThing),
         walls=_read_all(node, "walls", TrueWall), extra=_read_all(node, "extra", ExtraThing),
         camera=read_settings(node["camera"], TrueCamera) if "camera" in node else AS_BELIEVED,
+        start=read_settings(node["start"], TrueStart) if "start" in node else AS_TOLD,
         inexact=read_settings(node["inexact"], TrueInexact) if "inexact" in node else EXACT,
     )
 

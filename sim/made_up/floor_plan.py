@@ -20,6 +20,8 @@ DETAILS = Path(__file__).parents[1] / "buildings" / "research_center_details.tom
 MAX_ROOMS_PER_SIDE = 7
 """Rooms on one side of a corridor."""
 WALL_FT = 0.5
+DEPTH_FT = 14.0
+"""Depth of identical rooms."""
 DOOR_FT, DOOR_MARGIN_FT = 3.3, 2.1
 """Width of a doorway, and the distance from its middle that is kept free."""
 INWARD: Mapping[str, tuple[float, float, float]] = {
@@ -87,6 +89,7 @@ class FloorPlan:
     repeated: bool
     open_share: float
     joined: bool = False
+    identical: bool = False
     corridors: dict[str, Table] = field(default_factory=dict)
     rooms: dict[str, Table] = field(default_factory=dict)
     doors: dict[str, Table] = field(default_factory=dict)
@@ -110,6 +113,30 @@ class FloorPlan:
             self._add_gallery(y)
         for name in (*self.corridors, *self.rooms):
             self._furnish(name)
+        if self.identical:
+            self._copy_first_room()
+
+    def _copy_first_room(self) -> None:
+        """Make all rooms on the north sides copies of the first one, and all others the same turned by 180 degrees."""
+        first, model = next(iter(self.rooms.items()))
+        for name, room in self.rooms.items():
+            turned = room["of"][1] != model["of"][1]
+            room.update({"floor": model["floor"], "walls": {
+                ACROSS[wall] if turned else wall: finish for wall, finish in model["walls"].items()}})
+            room["things"] = [self._turn_thing(thing, model["size"]) if turned else dict(thing)
+                              for thing in model["things"]]
+            for wall in INWARD:
+                length = model["size"][0 if wall in ("south", "north") else 1]
+                free = self.sides[first, wall].free
+                side = ACROSS[wall] if turned else wall
+                self.sides[name, side] = WallSide([(length - b, length - a) for a, b in free][::-1] if turned else free)
+
+    def _turn_thing(self, thing: Table, size: Sequence[float]) -> Table:
+        """A thing of a room, where it is if the room is turned by 180 degrees."""
+        if "at" in thing:
+            return {**thing, "at": [round(s - v, 1) for s, v in zip(size, thing["at"], strict=True)]}
+        length = size[0 if thing["wall"] in ("south", "north") else 1]
+        return {**thing, "wall": ACROSS[thing["wall"]], "along": round(length - thing["along"], 1)}
 
     def _add_corridor(self, number: int, rooms: int, y: float) -> float:
         """Add a corridor with its rooms from y on; returns where the next one may begin."""
@@ -121,6 +148,8 @@ class FloorPlan:
             length = round(spans[0][-1][1] + spans[0][0][0], 1)
             spans[1] = [(round(length - b, 1), round(length - a, 1)) for a, b in spans[0]][::-1][: per_side[1]]
         depths = [[round(float(self.rng.uniform(10.0, 18.0)), 1) for _ in s] for s in spans]
+        if self.identical:
+            depths = [[DEPTH_FT] * len(s) for s in spans]
         bottom = y + max(depths[1], default=0.0) + WALL_FT
         self.corridors[name] = {"kind": "hallway", "at": [0.0, round(bottom, 1)], "size": [length, width],
                                 "floor": str(self.rng.choice(["linoleum", "carpet"])), **self._draw_walls(name)}

@@ -77,7 +77,7 @@ class Floor:
 
 def generated_floor(
     seed: int, rooms: int = 12, *, symmetric: bool = False, repeated: bool = False, open_share: float = 0.5,
-    clutter: float = 1.0, joined: bool = False,
+    clutter: float = 1.0, joined: bool = False, identical: bool = False,
 ) -> Floor:
     """Generate a floor, the same for the same arguments.
 
@@ -87,6 +87,7 @@ def generated_floor(
         repeated: all doors are alike and at the same distance from each other.
         open_share: share of the doors that is open.
         clutter: amount of things that the model lacks; 1 is about as in the Research Center.
+        identical: all rooms are alike, also in what stands in them; implies ``repeated``.
         joined: doors join neighbouring rooms too, so that there is more than one way.
 
     Raises:
@@ -95,6 +96,7 @@ def generated_floor(
     if rooms < 2 or not 0.0 <= open_share <= 1.0 or clutter < 0.0:
         raise ValueError(f"expected at least 2 rooms, 0 <= open_share <= 1 and clutter >= 0, "
                          f"got {rooms}, {open_share} and {clutter}")
-    plan = FloorPlan(np.random.default_rng(seed), symmetric, repeated, 0.0 if symmetric else open_share, joined)
+    plan = FloorPlan(np.random.default_rng(seed), symmetric, repeated or identical, 0.0 if symmetric else open_share,
+                     joined, identical)
     plan.lay_out(rooms)
     return Floor(seed, plan.format_world(seed), plan.format_details(clutter), tuple(plan.corridors), tuple(plan.rooms))

@@ -51,8 +51,8 @@ def weigh_told(
     """Weigh the candidates by what was told and by the pictures, the likeliest first.
 
     Found is the told place if it is accepted and so likely that it is believed: ``min_p_sure``, or ``min_p_believed``
-    where no look within reach tells more, after ``min_views`` of ``looks``. Where the pictures alone have found a place, or none of the candidates is
-    the told place, nothing is changed.
+    where no look within reach tells more, after ``min_views`` of ``looks``. Where the pictures alone have found a
+    place, or none of the candidates is the told place, nothing is changed.
     """
     is_told = [told.includes(c, settings) for c in result.candidates]
     if result.status is LocalizationStatus.FOUND or not any(is_told):
