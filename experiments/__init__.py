@@ -44,7 +44,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "kidnap": "Kidnaps to anywhere on generated floors of 40 rooms",
         "light": "1,000 missions under lamps, sun and reflections",
         "malformed-worlds": "World and building files with errors put in",
-        "miscalibrated": "1,000 missions with a camera otherwise than told, or knocked on the way",
+        "miscalibrated": "1,000 missions with a camera mounted otherwise",
         "missions": "1,000 missions without trouble and 1,000 with",
         "obstacles": "1,000 missions among things that the model lacks",
         "serial-chaos": "Drivers of bases over serial lines with errors",

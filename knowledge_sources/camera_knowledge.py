@@ -9,11 +9,13 @@ import numpy as np
 
 from blackboard.board import View
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.settings import Settings
 from knowledge_sources.settings.camera_state import CameraStateSettings
 from knowledge_sources.settings.plan import PlanSettings
 from world_models.camera import YAW, Camera
 from world_models.entries.robot import CameraState
 from world_models.frames import Pose2, wrap_angle
+from world_models.robot import RobotModel
 
 
 def find_camera(view: View) -> CameraState:
@@ -64,6 +66,12 @@ def compute_camera_px(camera: Camera, covariance: Floats, distance_m: float) -> 
     tilt, roll, _, height, focal, _, _ = np.sqrt(np.diag(covariance))
     aside_px = 0.25 * math.hypot(camera.width, camera.height)
     return math.hypot(camera.fy * tilt, aside_px * roll, camera.fy * height / distance_m, aside_px * focal)
+
+
+def is_camera_known(robot: RobotModel, covariance: Floats, settings: Settings) -> bool:
+    """Whether a covariance (7, 7) moves what is seen by no more than lines are looked for where they are predicted."""
+    px = compute_camera_px(robot.camera, covariance, settings.plan.rigid_distance_m)
+    return px <= settings.camera_state.max_known_px
 
 
 def has_counted(camera: CameraState, pose: Pose2, settings: CameraStateSettings) -> bool:

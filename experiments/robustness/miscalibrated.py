@@ -23,9 +23,10 @@ FIRST_SEED, SEEDS_APART = 100_000, 10_000
 PARTS: Mapping[CameraCase, float] = {"as told": 0.2, "miscalibrated": 0.5, "knocked": 0.3}
 INCH_M = 0.0254
 MIN_REACHED: Mapping[CameraCase, float] = {"as told": 0.99, "miscalibrated": 0.99, "knocked": 0.97}
-MAX_TURN_RAD, MAX_HEIGHT_M = math.radians(0.05), 0.005
-WITHIN = (0.93, 0.97)
-"""Share of what was learnt that is within two standard deviations; the upper end where so many trials can tell."""
+MIN_FOUND, MAX_TILT_RAD, MAX_YAW_RAD, MAX_HEIGHT_M = 0.95, math.radians(0.05), math.radians(0.5), 0.005
+"""How well the camera is to be known, and in which part of the missions; the yaw is the hardest."""
+MIN_WITHIN = 0.93
+"""Least part of what was learnt that is within two standard deviations."""
 TILT, YAW, HEIGHT = (CAMERA_UNKNOWNS.index(name) for name in ("tilt_rad", "yaw_rad", "height_m"))
 WORST_SHOWN = 6
 COLUMNS = ("camera", "paper", "peer", "missions", "within an inch", "proves at least", "false accepts", "tilt off deg",
@@ -98,13 +99,14 @@ def _claims(found: Mapping[CameraCase, Sequence[CameraResult]]) -> Iterator[tupl
         yield (f"{case}: at least {MIN_REACHED[case]:.0%} reach within an inch: {right} of {len(ends)}, so at least"
                f" {at_least(right, len(ends)):.1%}", right >= MIN_REACHED[case] * len(ends))
     wrong = [e for e in found["miscalibrated"] if e.is_learnt]
-    for what, unknown, limit, unit in (("tilt", TILT, MAX_TURN_RAD, "0.05 degrees"), ("yaw", YAW, MAX_TURN_RAD,
-                                       "0.05 degrees"), ("height", HEIGHT, MAX_HEIGHT_M, "5 mm")):
+    for what, unknown, limit, unit in (
+            ("tilt", TILT, MAX_TILT_RAD, "0.05 degrees"), ("yaw", YAW, MAX_YAW_RAD, "half a degree"),
+            ("height", HEIGHT, MAX_HEIGHT_M, "5 mm")):
         near = sum(abs(e.found[unknown]) <= limit for e in wrong)
-        yield (f"miscalibrated: {what} is found to {unit} within 10 m, as a rule: in {near} of {len(wrong)} missions",
-               2 * near > len(wrong) or not wrong)
-    share, low = _share_within(everywhere), WITHIN[0]
-    yield f"what was learnt is within 2 sigma in at least {low:.0%}: in {share:.1%}", share >= low
+        yield (f"miscalibrated: {what} is found to {unit} within 10 m in at least {MIN_FOUND:.0%}: in {near} of"
+               f" {len(wrong)} missions", near >= MIN_FOUND * len(wrong))
+    share = _share_within(everywhere)
+    yield f"what was learnt is within 2 sigma in at least {MIN_WITHIN:.0%}: in {share:.1%}", share >= MIN_WITHIN
 
 
 def _worst(case: str, ends: Sequence[CameraResult]) -> list[str]:

@@ -15,9 +15,9 @@ from blackboard.level import Level
 from knowledge_sources.camera_knowledge import (
     add_yaw,
     compute_camera_covariance,
-    compute_camera_px,
     compute_knocked_covariance,
     find_camera,
+    is_camera_known,
     loosen,
 )
 from knowledge_sources.methods.localization.camera_matching import match_with_camera, rate_match
@@ -80,8 +80,7 @@ class Matcher(RobotKnowledgeSource):
         known = compute_camera_covariance(camera, s)
         prior = belief.world_from_robot(robot.world), belief.covariance_world(robot.world)
         given = lines_world, data_px, robot.camera, robot.mount
-        is_known = compute_camera_px(robot.camera, known, self._settings.plan.rigid_distance_m) <= s.max_known_px
-        if not is_known:
+        if not is_camera_known(robot, known, self._settings):
             return match_with_camera(*given, *prior, known, self._settings).match, False
         found = rate_match(self._match_with_known_camera(robot, milestone, lines_world, data_px, belief), *given,
                            prior[0], loosen(prior[1], self._settings.plan), known, self._settings)

@@ -15,7 +15,7 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.camera_knowledge import add_yaw, compute_camera_covariance, find_camera
+from knowledge_sources.camera_knowledge import add_yaw, compute_camera_covariance, find_camera, is_camera_known
 from knowledge_sources.methods.localization.aliasing import find_strongest_alias
 from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors, decode_small_color
 from knowledge_sources.methods.verification.line_check import LineCheck, check_lines
@@ -51,6 +51,7 @@ class Weighed:
         tolerance_px: the largest that may be.
         is_weak: whether what was believed before adds little: it is in doubt, or no landmarks were followed.
         camera_chi2: squared distance of the camera, as solved for, from what was believed of it.
+        is_camera_known: whether the camera's mounting is known well enough for the picture to be predicted.
     """
 
     robot: RobotModel
@@ -67,6 +68,7 @@ class Weighed:
     tolerance_px: float
     is_weak: bool
     camera_chi2: float
+    is_camera_known: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,8 +126,8 @@ class MilestoneJudge(RobotKnowledgeSource):
         robot = find_robot(view, camera) if belief is None else find_robot_in(view, belief.value.locale, camera)
         before = pose if belief is None else belief.value.world_from_robot(robot.world)
         covariance = fix.covariance if belief is None else belief.value.covariance_world(robot.world)
+        known = compute_camera_covariance(find_camera(view), s.camera_state)
         if fix.camera_step:
-            known = compute_camera_covariance(find_camera(view), s.camera_state)
             covariance = add_yaw(covariance, np.array(fix.camera_covariance), known)
         lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
         agreed = check_lines(robot, lines, segments.segments_px, pose, s.verification, milestone.errors, s.pose)
@@ -163,6 +165,7 @@ class MilestoneJudge(RobotKnowledgeSource):
             tolerance_px=tolerance_px if is_as_put_down else min(tolerance_px, s.plan.max_deviation_px),
             is_weak=in_doubt or not followed,
             camera_chi2=fix.camera_chi2,
+            is_camera_known=is_camera_known(robot, known, s),
         )
 
     def _decide(self, view: View, weighed: Weighed) -> Verdict:
@@ -184,6 +187,8 @@ class MilestoneJudge(RobotKnowledgeSource):
         colours = f" and {round(faces.agreeing * faces.count)} of {faces.count} faces' colours" * faces.is_testable
         found = f"{a.matched} of {a.visible} lines, {w.lines.coverage:.0%} of their length,{colours} accounted for"
         if w.p_false >= POSE_CONFIDENCE.refute:
+            if not w.is_camera_known:  # a place where the camera's own error hides what agrees
+                return "not testable", f"{found}: the camera is not known well enough to tell"
             return "refuted", f"{found}; at a wrong place {a.chance:.0%} are by chance"
         where = f"{found}, {w.shift_px:.1f} px from where expected"
         if w.camera_chi2 > self._settings.camera_state.max_chi2:

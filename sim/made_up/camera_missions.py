@@ -1,4 +1,4 @@
-"""Missions on generated floors with a camera that is not mounted as the robot is told, or that is knocked on the way."""
+"""Missions on generated floors with a camera that is not mounted as told, or that is knocked on the way."""
 
 from __future__ import annotations
 

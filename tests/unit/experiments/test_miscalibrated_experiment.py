@@ -1,0 +1,75 @@
+"""Missions with a camera mounted otherwise: what is written, what is claimed, and the small version."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments import trials
+from experiments.robustness import miscalibrated
+from experiments.robustness.miscalibrated_trial import CameraResult, CameraTrial, run_camera_mission
+from sim.made_up.camera_missions import CASES, MAX_TURN_RAD, write_camera_mission
+from sim.scenario import load_scenario
+from sim.stage import build_stage
+
+
+def end(trial: CameraTrial, **other: Any) -> CameraResult:
+    """A flawless end, or one with flaws."""
+    values: dict[str, Any] = {
+        "outcome": "reached", "reason": "there", "error_m": 0.01, "false_accepts": 0, "relocations": 0,
+        "told": [0.02] * 7, "found": [1e-4] * 7, "sigmas": [1e-4] * 7, "is_learnt": True, "is_knocked": False,
+        "gone_m": 12.0, "robot_s": 60.0, "wall_s": 4.0}
+    return CameraResult(trial.case, trial.floor, **(values | other))
+
+
+def report(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, work: Callable[[CameraTrial], CameraResult], **how: Any
+) -> Any:
+    def here(_: Any, jobs: Sequence[CameraTrial], *__: Any) -> list[CameraResult]:
+        return [work(job) for job in jobs]
+
+    monkeypatch.setattr(trials, "RUNS", tmp_path)
+    monkeypatch.setattr(miscalibrated, "run_trials", here)
+    return miscalibrated.run(seed=0, **how)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_mission_is_written_the_same_again_and_can_be_staged(tmp_path: Path, case: Any) -> None:
+    path = write_camera_mission(tmp_path, 3, case)
+    text = path.read_text("utf-8")
+    assert write_camera_mission(tmp_path, 3, case).read_text("utf-8") == text
+    scenario = load_scenario(path)
+    camera = scenario.truth.camera
+    assert bool(scenario.faults) == (case == "knocked") and bool(camera.tilt_rad) == (case == "miscalibrated")
+    assert max(abs(camera.tilt_rad), abs(camera.roll_rad), abs(camera.yaw_rad)) <= MAX_TURN_RAD
+    build_stage(scenario)
+
+
+def test_flawless_missions_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    found = report(monkeypatch, tmp_path, end, quick=False)
+    assert found.failing == ()
+    assert sum(row[3] for row in found.rows) == 1_000
+
+
+@pytest.mark.parametrize(("flaw", "told"), [
+    ({"outcome": "lost"}, "knocked: at least"),
+    ({"error_m": 0.03}, "miscalibrated: at least"),
+    ({"found": [0.02] * 7}, "tilt is found"),
+    ({"found": [0.0, 0.0, 0.02, 0.0, 0.0, 0.0, 0.0]}, "yaw is found"),
+    ({"sigmas": [1e-5] * 7}, "within 2 sigma"),
+    ({"false_accepts": 1}, "no milestone"),
+])
+def test_a_flaw_fails_its_claim(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, flaw: dict[str, Any], told: str
+) -> None:
+    found = report(monkeypatch, tmp_path, lambda trial: end(trial, **flaw), quick=False, missions=30)
+    assert any(told in claim for claim in found.failing)
+
+
+def test_the_small_version_drives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    found = report(monkeypatch, tmp_path, run_camera_mission, quick=True)
+    assert found.holds, found.text()
+    assert {row[0] for row in found.rows} == set(CASES)
