@@ -23,6 +23,10 @@ class PlanSettings:
     doorway_distances_m: tuple[float, ...] = setting(
         (0.65, 0.55, 0.47, 0.40), "m",
         "Distances from a doorway at which it is approached straight, tried in this order.", "engineering judgement")
+    doorway_offsets_m: tuple[float, ...] = setting(
+        (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6), "m",
+        "Distances from its middle, to either side, at which it is approached aslant, past what stands before it.",
+        "engineering judgement")
     max_leg_m: float = setting(
         3.6, "m", "Longest leg without a milestone in between.", "engineering judgement")
     way_tolerance_m: float = setting(

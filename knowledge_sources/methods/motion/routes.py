@@ -40,8 +40,14 @@ def find_free_space(
     """
     key = (locale, clearance_m, is_round, tuple(sorted(instead.items())))
     return building.cached("free spaces", MAX_FREE_SPACES, key, lambda: compute_free_space(
-        building.outline(locale), [corners for _, corners in _list_footprints(building, locale, instead)], clearance_m,
-        is_round=is_round))
+        building.outline(locale), list_obstacles(building, locale, instead), clearance_m, is_round=is_round))
+
+
+def list_obstacles(
+    building: Building, locale: str, instead: Mapping[str, Footprint] = MappingProxyType({})
+) -> list[Floats]:
+    """The corners (k, 2) of what the robot could hit in a locale; ``instead`` as in :func:`find_free_space`."""
+    return [corners for _, corners in _list_footprints(building, locale, instead)]
 
 
 def _list_footprints(building: Building, locale: str, instead: Mapping[str, Footprint]) -> list[tuple[str, Floats]]:

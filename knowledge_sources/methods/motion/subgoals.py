@@ -6,20 +6,23 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from shapely import Geometry, LineString, Point
 
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.motion.doorways import compute_free_passage, find_line_through
 from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.methods.motion.routes import (
     find_free_space,
     find_nearest,
     find_shortest_route,
     is_clear,
+    list_obstacles,
 )
 from knowledge_sources.settings.plan import PlanSettings
-from world_models.building.locales import Link, Passage
+from world_models.building.locales import Doorway, Link, Passage
 from world_models.building.passages import Route
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle
@@ -28,6 +31,18 @@ from world_models.robot import RobotModel
 
 MAX_ROUTES = 24
 """So many routes are tried for one that obstacles leave free."""
+
+
+MAX_FREE_PASSAGES = 32
+"""Size of the cache of what is free in and beside doorways."""
+
+
+class _Ends(NamedTuple):
+    """The places before and behind a passage, between which it is passed straight, and the tolerance at the first."""
+
+    before: Place
+    behind: Place
+    tolerance_m: float
 
 
 class SubgoalPlanner:
@@ -63,7 +78,17 @@ class SubgoalPlanner:
     def plan_between_locales(self, here: Place, destination: Place, tolerance_m: float) -> tuple[Subgoal, ...] | None:
         """Subgoals through each passage to the destination, at the highest level where they differ (Figure 9).
 
-        Where what the model lacks leaves no way through a room or to a passage, other passages are tried.
+        Where what the model lacks leaves no way through a room or to a passage, other passages are tried; and where
+        none is left, passing one aslant.
+        """
+        straight = self._plan_by_any(here, destination, tolerance_m, aslant=False)
+        return straight if straight or not self._cluttered else self._plan_by_any(
+            here, destination, tolerance_m, aslant=True)
+
+    def _plan_by_any(
+        self, here: Place, destination: Place, tolerance_m: float, *, aslant: bool
+    ) -> tuple[Subgoal, ...] | None:
+        """Subgoals by the first route that obstacles leave free; ``aslant``: its passages need not be passed straight.
         """
         tried: set[frozenset[str]] = set()
         todo: list[tuple[Passage, ...]] = [()]
@@ -76,23 +101,22 @@ class SubgoalPlanner:
             route = self._building.route(here.locale, destination.locale, avoided)
             if route is None:
                 continue
-            blocked = self._find_blocked(route, here, destination)
+            blocked = self._find_blocked(route, here, destination, aslant)
             if not blocked:
-                return self._plan_route(route, here, destination, tolerance_m)
+                return self._plan_route(route, here, destination, tolerance_m, aslant)
             todo += [(*avoided, passage) for passage in blocked]
         return None
 
-    def _find_blocked(self, route: Route, here: Place, destination: Place) -> list[Passage]:
+    def _find_blocked(self, route: Route, here: Place, destination: Place, aslant: bool) -> list[Passage]:
         """The passages at the ends of the first part of a route on which obstacles leave no way, if any."""
         came: Passage | None = None
         for step in route.steps:
-            ends = [self._find_place_before(step.passage, side) for side in (step.origin, step.destination)]
-            if None in ends:
+            ends = self._find_ends(step.passage, step.origin, step.destination, aslant)
+            if ends is None:
                 return [step.passage]
-            if ends[0] is not None and not self._has_way(here, ends[0]):
+            if not self._has_way(here, ends.before):
                 return [step.passage, *([] if came is None else [came])]
-            assert ends[1] is not None
-            here, came = ends[1], step.passage
+            here, came = ends.behind, step.passage
         return [came] if came is not None and not self._has_way(here, destination) else []
 
     def _has_way(self, here: Place, there: Place) -> bool:
@@ -103,20 +127,48 @@ class SubgoalPlanner:
         return self._find_way(here.locale, start.position, end.position) is not None
 
     def _plan_route(
-        self, route: Route, here: Place, destination: Place, tolerance_m: float
+        self, route: Route, here: Place, destination: Place, tolerance_m: float, aslant: bool
     ) -> tuple[Subgoal, ...] | None:
         subgoals: list[Subgoal] = []
         for step in route.steps:
-            before = self._find_place_before(step.passage, step.origin)
-            behind = self._find_place_before(step.passage, step.destination)
-            if before is None or behind is None:
+            ends = self._find_ends(step.passage, step.origin, step.destination, aslant)
+            if ends is None:
                 return None
-            subgoals.append(self._build_subgoal(here, before, self._way_tolerance_m(step.passage)))
+            subgoals.append(self._build_subgoal(here, ends.before, ends.tolerance_m))
             on_wheels = not isinstance(step.passage, Link)  # else it is a ride: there is nothing to drive
-            subgoals.append(Subgoal(before, behind, on_wheels, step.passage.name, self._settings.way_tolerance_m))
-            here = behind
+            subgoals.append(
+                Subgoal(ends.before, ends.behind, on_wheels, step.passage.name, self._settings.way_tolerance_m))
+            here = ends.behind
         subgoals.append(self._build_subgoal(here, destination, tolerance_m))
         return tuple(subgoals)
+
+    def _find_ends(self, passage: Passage, origin: str, destination: str, aslant: bool) -> _Ends | None:
+        """The places before and behind a passage: straight before it, or past what stands there, aslant."""
+        before, behind = (self._find_place_before(passage, side) for side in (origin, destination))
+        if before is not None and behind is not None:
+            return _Ends(before, behind, self._way_tolerance_m(passage))
+        if not aslant or isinstance(passage, Link) or not self._cluttered & {origin, destination}:
+            return None
+        middles = [passage.threshold_of(side).mean(axis=0) for side in (origin, destination)]
+        for clearance_m in self._settings.clearances_m:
+            free = self._find_free_passage(passage, (origin, destination), clearance_m)
+            line = find_line_through(free, middles, passage.outward_from(origin), self._settings.doorway_distances_m,
+                                     self._settings.doorway_offsets_m)
+            if line is not None:
+                before, behind = (Place.of_world(self._building, side, float(x), float(y))
+                                  for side, (x, y) in zip((origin, destination), line, strict=True))
+                return _Ends(before, behind, min(clearance_m, self._way_tolerance_m(passage)))
+        return None
+
+    def _find_free_passage(self, passage: Doorway, rooms: tuple[str, str], margin_m: float) -> Geometry:
+        """Where the robot's centre may be in two rooms and the doorway between them, with a margin round the robot."""
+        building, cores = self._building, self._cores
+        found = tuple(obstacle.footprint for obstacle in self._obstacles if obstacle.locale in rooms)
+        key = (passage.name, rooms, margin_m, tuple(sorted(cores.items())), found)
+        return building.cached("free passages", MAX_FREE_PASSAGES, key, lambda: compute_free_passage(
+            [building.outline(room) for room in rooms], np.concatenate(passage.thresholds_world),
+            [*found, *(corners for room in rooms for corners in list_obstacles(building, room, cores))],
+            self._robot.radius_m + margin_m))
 
     def _way_tolerance_m(self, passage: Passage) -> float:
         """Tolerance at the place before a passage, so that the robot passes it straight without contact."""
