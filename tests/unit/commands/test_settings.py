@@ -147,12 +147,13 @@ EXCEPTIONS = {
         "pose/numerics/finish.py: MIN_LENGTH_PX",
         "pose/numerics/kernels.py: MIN_IMAGE_PART", "pose/numerics/kernels.py: MIN_POINT_STEP",
         "pose/numerics/kernels.py: MIN_RELATIVE_GAIN", "pose/numerics/kernels.py: MIN_STEP",
-        "pose/numerics/kernels.py: TINY", "pose/numerics/levenberg_marquardt.py: MIN_RELATIVE_GAIN",
+        "motion/doorways.py: JOINT_M", "pose/numerics/kernels.py: TINY", "pose/numerics/levenberg_marquardt.py: MIN_RELATIVE_GAIN",
         "pose/numerics/levenberg_marquardt.py: MIN_STEP", "pose/planar_from_lines.py: NO_BOUND",
         "verification/view_quality.py: EPSILON_INFORMATION",
     ),
     "the size of a cache, on which no result depends": (
         "localization/visibility_map.py: MAX_MAPS", "motion/routes.py: MAX_FREE_SPACES",
+        "motion/subgoals.py: MAX_FREE_PASSAGES",
         "tracking/template_tracking.py: MAX_TEMPLATES", "verification/predicted_colors.py: MAX_PACKETS",
     ),
     "of methods that are new: those of them that somebody may want to tune become settings": (
