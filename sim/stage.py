@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 
@@ -29,6 +31,8 @@ from world_models.entries.location import Place
 from world_models.files.world_files import WorldError
 from world_models.frames import Pose2
 
+PATH_TRACED = Path("runs") / "path-traced"
+"""Where path-traced pictures are kept: one of the same building, light and pose is traced once."""
 MAX_FLOOR_STEP_M = 0.5
 """Rooms whose floors differ by less are on one storey [m]."""
 
@@ -88,7 +92,7 @@ def build_stage(scenario: Scenario) -> Stage:
     around = _around(world, (start.locale, goal.locale, *named))
     faces = move_scenario_things(scenario, world, world.faces_within(around))
     changes = find_changes(scenario, world, around, faces)
-    lights = Lights(scenario.light, _lit_rooms(world, around)) if scenario.light else None
+    lights = _lights(scenario, world, around)
     changing = ChangingFaces(faces, changes, scenario.render.samples, lights)
     elevators = Elevators.of_links(_links_in(world, around), world, scenario.rides)
     on_floor = _storeys(world, around, changing, elevators)
@@ -169,6 +173,15 @@ def _storeys(
         return at_time(floor_m, 0.0)
 
     return on_floor
+
+
+def _lights(scenario: Scenario, world: World, around: str) -> Lights | None:
+    """What lights the building; None without ``[light]``. Raises ScenarioError where it needs what is not installed."""
+    if scenario.light is None:
+        return None
+    if scenario.light.traced_paths and find_spec("mitsuba") is None:
+        raise scenario.refused(("light", "traced_paths"), "expected Mitsuba to be installed, as by 'harvey[photo]'")
+    return Lights(scenario.light, _lit_rooms(world, around), PATH_TRACED)
 
 
 def _lit_rooms(world: World, around: str) -> tuple[Room, ...]:

@@ -17,6 +17,7 @@ BOUNDS: Mapping[str, Bounds] = {
     "sun_elevation_rad": Bounds(0.0, math.pi / 2.0), "floor_gloss": SHARE, "glass": SHARE, "wall_colours": SHARE,
     "bounces": Bounds(0, 10), "rays": Bounds(1, 4096), "cell_m": Bounds(0.05, 10.0), "seed": Bounds(0, 10**9),
     "exposure_lag_s": Bounds(0.0, 100.0), "white_balance_lag_s": Bounds(0.0, 100.0), "vignetting": SHARE,
+    "traced_paths": Bounds(0, 65536),
 }
 MAX_LAMP_COLOUR = 4.0
 
@@ -47,6 +48,7 @@ class Lighting:
         exposure_lag_s: time constant of auto exposure; 0: the exposure is fixed.
         white_balance_lag_s: time constant of auto white balance; 0: it is fixed.
         vignetting: how much darker the corners of the picture are, as a share of the light.
+        traced_paths: paths per pixel of the reference, a path tracer (extra ``photo``); 0: the fast renderer.
     """
 
     flat: float = 0.0
@@ -68,6 +70,7 @@ class Lighting:
     exposure_lag_s: float = 0.4
     white_balance_lag_s: float = 0.0
     vignetting: float = 0.0
+    traced_paths: int = 0
 
     def __post_init__(self) -> None:
         check_bounds(self, BOUNDS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import colorsys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import shapely
@@ -17,6 +18,7 @@ from sim.render.light.lighting import GAMMA, Lighting
 from sim.render.light.lit_renderer import BakedLight, LitRenderer
 from sim.render.light.lit_shading import NO_MIRROR
 from sim.render.light.panes import find_panes
+from sim.render.light.path_traced import PathTracedRenderer
 from sim.render.light.sun_patches import SunPatch, find_sun_patches
 from sim.render.mesh import FaceLike, Mesh, build_mesh, join_meshes, plane_of
 from sim.render.noise_table import build_noise_table
@@ -38,10 +40,12 @@ class Lights:
     Attributes:
         lighting: the light.
         rooms: where lamps hang, and which floors there are.
+        folder: where path-traced pictures are kept.
     """
 
     lighting: Lighting
     rooms: tuple[Room, ...] = ()
+    folder: Path | None = None
 
     def renderer(self, faces: Iterable[FaceLike], samples: int = 8) -> LitRenderer:
         """The renderer of these faces under this light. Raises ValueError for a bad region or number of samples."""
@@ -64,6 +68,10 @@ class Lights:
         planes, mirror_of, gloss = self._find_mirrors(solid, panes)
         seen_light = (light ** (1.0 / GAMMA)).astype(np.float32)
         baked = BakedLight(places, seen_light, planes, mirror_of[base], gloss[base])
+        if self.lighting.traced_paths:
+            return PathTracedRenderer(
+                mesh, mesh.colours, build_noise_table(), samples, baked=baked, solid=solid, panes=panes, lamps=lamps,
+                lighting=self.lighting, rays=self.lighting.traced_paths, folder=self.folder)
         return LitRenderer(mesh, mesh.colours, build_noise_table(), samples, baked=baked)
 
     def _paint(self, mesh: Mesh, panes: NDArray[np.bool_]) -> Floats:
