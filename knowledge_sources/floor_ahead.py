@@ -23,6 +23,7 @@ from knowledge_sources.methods.floor.seen_floor import (
 )
 from knowledge_sources.methods.motion.footprints import build_free_floor, build_polygon
 from knowledge_sources.questions import active_goal, deepest_sketch, find_robot
+from knowledge_sources.settings import Settings
 from knowledge_sources.settings.action import ActionSettings
 from world_models.building.things import EXTRA_KIND
 from world_models.entries.body import Frame, MotionReport, RideReport
@@ -51,8 +52,9 @@ class Caution(NamedTuple):
 class FloorAhead:
     """What the board tells of the floor along the way of one leg."""
 
-    def __init__(self, view: View, leg: Leg, belief: Entry[Hypothesis], settings: ActionSettings) -> None:
-        self._settings, self._leg = settings, leg
+    def __init__(self, view: View, leg: Leg, belief: Entry[Hypothesis], whole: Settings) -> None:
+        settings = whole.action
+        self._settings, self._leg, self._max_hidden_m = settings, leg, whole.floor.max_hidden_m
         self._robot = find_robot(view)
         self._here = belief.value.world_from_robot(self._robot.world)
         self._way: list[Point] = [(self._here.x_m, self._here.y_m), (leg.x1_m, leg.y1_m)]
@@ -105,7 +107,8 @@ class FloorAhead:
         actuator = self._robot.actuator
         costs = Costs(s.look_turn_rad_per_s, s.look_picture_s, actuator.turn_increment_rad,
                       1.0 / s.creep_speed_m_per_s - 1.0 / actuator.speed_m_per_s)
-        look = choose_look(self._robot, self._floor, self._here, self._list_poses_ahead(to_go_m), unseen, costs)
+        look = choose_look(self._robot, self._floor, self._here, self._list_poses_ahead(to_go_m), unseen, costs,
+                           self._max_hidden_m)
         if look is None or self._was_tried(look.heading_rad):
             return None
         return look

@@ -129,6 +129,12 @@ class Pose2:
             wrap_angle(self.heading_rad + other.heading_rad),
         )
 
+    def apply(self, points: Any) -> NDArray[np.float64]:
+        """Transform points (..., 2) [m] from the robot's frame into the target frame."""
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        turned: NDArray[np.float64] = np.asarray(points, float) @ np.array([[c, s], [-s, c]])
+        return turned + self.position
+
     def inverse(self) -> Pose2:
         c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
         return Pose2(-c * self.x_m - s * self.y_m, s * self.x_m - c * self.y_m, wrap_angle(-self.heading_rad))

@@ -154,7 +154,7 @@ class Motor(RobotKnowledgeSource):
         stand in floor that is not seen, right before the robot.
         """
         s, actuator = self._settings.action, find_robot(view).actuator
-        floor = FloorAhead(view, leg, belief, s)
+        floor = FloorAhead(view, leg, belief, self._settings)
         because, here = floor.scans[-1:], belief.value.world_from_robot(find_building(view))
         look = floor.choose_look()
         if look is not None:

@@ -107,7 +107,7 @@ class PathFollower(RobotKnowledgeSource):
         most_m = actuator.stopping_distance_m() + self._settings.action.min_rolling_leg_m
         if not self._settings.action.keeps_to_seen_floor:
             return most_m
-        return FloorAhead(view, leg, belief, self._settings.action).measure_free_m(most_m)
+        return FloorAhead(view, leg, belief, self._settings).measure_free_m(most_m)
 
     def _is_floor_ahead(self, view: View, leg: Leg, belief: Entry[Hypothesis], actuator: ActuatorModel) -> bool:
         """Whether enough floor ahead is seen to be free to roll on."""

@@ -11,7 +11,6 @@ import shapely
 
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.floor.seen_floor import Sweep, measure_blind_m
-from knowledge_sources.settings import DEFAULT
 from world_models.building.building import Building
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
@@ -39,18 +38,23 @@ def _compute_floor(building: Building, names: Sequence[str]) -> shapely.Geometry
     return shapely.difference(floor, shapely.union_all(things)) if things else floor
 
 
-def sees(robot: RobotModel, floor: shapely.Geometry, pose: Pose2, points: Floats) -> Mask:
-    """Which points (n, 2) of the floor the camera sees from a pose, as far as the model tells."""
-    seen = _is_in_picture(robot, pose, points)
+def sees(
+    robot: RobotModel, floor: shapely.Geometry, pose: Pose2, points: Floats, max_hidden_m: float
+) -> Mask:
+    """Which points (n, 2) of the floor the camera sees from a pose, as far as the model tells.
+
+    ``max_hidden_m``: height up to which what stands on a point has to be in the picture too.
+    """
+    seen = _is_in_picture(robot, pose, points, max_hidden_m)
     rest = np.flatnonzero(seen)
     if len(rest):
         seen[rest] = _is_in_sight(robot, floor, pose, points[rest])
     return seen
 
 
-def _is_in_picture(robot: RobotModel, pose: Pose2, points: Floats) -> Mask:
+def _is_in_picture(robot: RobotModel, pose: Pose2, points: Floats, max_hidden_m: float) -> Mask:
     """Which points are before the camera; the robot stands on the floor that they are on."""
-    lifted = np.column_stack([_turn_back(pose, points), np.full(len(points), DEFAULT.floor.max_hidden_m)])
+    lifted = np.column_stack([pose.inverse().apply(points), np.full(len(points), max_hidden_m)])
     there = robot.mount.camera_from_robot.apply(lifted)
     inside = there[:, 2] > MIN_DEPTH_M
     inside[inside] = robot.camera.inside(robot.camera.project(there[inside]), BORDER_PX)
@@ -64,13 +68,6 @@ def _is_in_sight(robot: RobotModel, floor: shapely.Geometry, pose: Pose2, points
     lines = shapely.linestrings(np.stack([np.broadcast_to(eye, points.shape), points], axis=1))
     shapely.prepare(floor)
     return np.asarray(shapely.covers(floor, lines))
-
-
-def _turn_back(pose: Pose2, points: Floats) -> Floats:
-    """Points (n, 2) of the world in the robot's frame."""
-    c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    out = points - np.array(pose.position)
-    return np.column_stack([c * out[:, 0] + s * out[:, 1], -s * out[:, 0] + c * out[:, 1]])
 
 
 class Costs(NamedTuple):
@@ -106,30 +103,33 @@ class Look(NamedTuple):
 
 
 def choose_look(
-    robot: RobotModel, floor: shapely.Geometry, here: Pose2, ahead: Sequence[Pose2], unseen: Sweep, costs: Costs
+    robot: RobotModel, floor: shapely.Geometry, here: Pose2, ahead: Sequence[Pose2], unseen: Sweep, costs: Costs,
+    max_hidden_m: float,
 ) -> Look | None:
     """The look from here that is worth its time; None where there is none, or a better one from a place ahead.
 
     Args:
         ahead: poses on the way at which pictures will be taken anyway.
         unseen: what the robot is going to sweep and was not seen yet.
+        max_hidden_m: as of :func:`sees`.
     """
     rest = unseen
     for pose in (here, *ahead):  # these pictures cost nothing
         if len(rest.points):
-            rest = rest.only(~sees(robot, floor, pose, rest.points))
+            rest = rest.only(~sees(robot, floor, pose, rest.points, max_hidden_m))
     blind_m = measure_blind_m(rest)
     if blind_m * costs.creep_s_per_m <= 0.0:
         return None
-    best = _find_best(robot, floor, here, rest, blind_m, costs)
+    best = _find_best(robot, floor, here, rest, blind_m, costs, max_hidden_m)
     if best is None:
         return None
-    better = (_find_best(robot, floor, pose, rest, blind_m, costs) for pose in ahead)
+    better = (_find_best(robot, floor, pose, rest, blind_m, costs, max_hidden_m) for pose in ahead)
     return None if any(look is not None and look.gain_s > best.gain_s for look in better) else best
 
 
 def _find_best(
-    robot: RobotModel, floor: shapely.Geometry, pose: Pose2, unseen: Sweep, blind_m: float, costs: Costs
+    robot: RobotModel, floor: shapely.Geometry, pose: Pose2, unseen: Sweep, blind_m: float, costs: Costs,
+    max_hidden_m: float,
 ) -> Look | None:
     """The look from a pose that saves the most time."""
     best: Look | None = None
@@ -138,7 +138,7 @@ def _find_best(
         cost_s = costs.look_s(wrap_angle(heading - pose.heading_rad))
         if blind_m * costs.creep_s_per_m <= cost_s + (0.0 if best is None else best.gain_s):
             continue
-        seen = sees(robot, floor, Pose2(pose.x_m, pose.y_m, heading), unseen.points)
+        seen = sees(robot, floor, Pose2(pose.x_m, pose.y_m, heading), unseen.points, max_hidden_m)
         if not seen.any():
             continue
         gain_s = (blind_m - measure_blind_m(unseen.only(~seen))) * costs.creep_s_per_m - cost_s

@@ -96,8 +96,7 @@ def _find_upper_border(region: Region) -> tuple[NDArray[np.intp], NDArray[np.int
 def _project(points_robot: Floats, earlier_from_now: Pose2, camera: Camera, mount: CameraMount, grid: FloorGrid
              ) -> Floats:
     """Where points (n, 3) of the robot's frame now were in the earlier picture, reduced [px]; NaN behind it."""
-    c, s = np.cos(earlier_from_now.heading_rad), np.sin(earlier_from_now.heading_rad)
-    flat = points_robot[:, :2] @ np.array([[c, s], [-s, c]]) + np.array(earlier_from_now.position)
+    flat = earlier_from_now.apply(points_robot[:, :2])
     height = mount.height_m - grid.camera_height_m  # of the floor above the plan on which poses are
     there = mount.camera_from_robot.apply(np.column_stack([flat, points_robot[:, 2] + height]))
     ahead = there[:, 2] > NEAR_PLANE_M

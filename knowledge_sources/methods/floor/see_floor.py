@@ -91,7 +91,7 @@ def see_free_floor(
     regions = find_regions(unlike, tells, grid, s) if s.use_appearance else ()
     built = [(region, _build_thing(region, grid, robot, pose, covariance, picture, earlier, s)) for region in regions]
     things = [(region, thing) for region, thing in built if thing is not None]
-    scan = _scan(grid, model, tells, things, s)
+    scan = _scan(grid, model, tells, things, robot.camera.fy, s)
     learnt = _learn(robot, locale, pose, earlier, known, floor_m, settings)
     return FreeFloor(
         sense="camera", locale=locale, x_m=round(eye.x_m, 4), y_m=round(eye.y_m, 4),
@@ -179,7 +179,7 @@ class _Scan(NamedTuple):
 
 def _scan(
     grid: FloorGrid, model: ModelFloor, tells: NDArray[np.bool_], things: Sequence[tuple[Region, FloorThing]],
-    settings: FloorSettings,
+    fy: float, settings: FloorSettings,
 ) -> _Scan:
     """From the lower border up: as far as the model has floor, its looks are known, and no thing is in the way."""
     rows, columns = grid.shape
@@ -207,7 +207,7 @@ def _scan(
         near.append(round(near_m, 3))
         far.append(round(min(range_m, settings.sight_m), 3))
         ends.append(end)
-        sigmas.append(round(0.01 + STEP_PX * range_m**2 / (grid.camera_height_m * 400.0), 3))
+        sigmas.append(round(0.01 + STEP_PX * range_m**2 / (grid.camera_height_m * fy), 3))
     return _Scan(tuple(bearings), tuple(near), tuple(far), tuple(ends), tuple(sigmas))
 
 
@@ -237,14 +237,15 @@ def _build_thing(
     elif not settings.use_parallax:
         odds = 1e6
     corners = find_footprint(region, grid, settings)
-    world = [(pose @ Pose2(float(x), float(y), 0.0)).position for x, y in corners]
+    world = pose.apply(corners)
     foot_m = float(np.linalg.norm(corners, axis=1).min())
     spread = math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0) + foot_m**2 * float(covariance[2, 2]))
     at, left_right = np.flatnonzero(region.mask.any(axis=1)), np.flatnonzero(region.mask.any(axis=0))
     (left, top), (right, bottom) = grid.pixels[at[0], left_right[0]], grid.pixels[at[-1], left_right[-1]]
     own = CUT_SIGMA_M if region.is_cut else STEP_PX * foot_m**2 / (grid.camera_height_m * robot.camera.fy)
     return FloorThing(
-        footprint=tuple((round(x, 3), round(y, 3)) for x, y in world), sigma_m=round(math.hypot(spread, own), 4),
+        footprint=tuple((round(float(x), 3), round(float(y), 3)) for x, y in world),
+        sigma_m=round(math.hypot(spread, own), 4),
         height_m=round(height_m, 3), sigma_height_m=round(sigma_height_m, 3), p_thing=round(odds / (1.0 + odds), 4),
         box_px=(float(left), float(top), float(right), float(bottom)), evidence=how, is_cut=region.is_cut)
 
@@ -266,8 +267,7 @@ def _learn(
     ahead, aside = (grid.points_robot @ np.array(axis) / away for axis in (now.position, (-now.y_m, now.x_m)))
     driven = (ahead > 0.0) & (ahead < away) & (np.abs(aside) < DRIVEN_HALF_WIDTH_M)
     if driven.any():  # of this locale only: the next one may have another floor
-        c, sine = math.cos(then.pose.heading_rad), math.sin(then.pose.heading_rad)
-        there = grid.points_robot[driven] @ np.array([[c, sine], [-sine, c]]) + np.array(then.pose.position)
+        there = then.pose.apply(grid.points_robot[driven])
         driven[driven] = shapely.contains_xy(shapely.Polygon(robot.world.outline(locale)), there)
     if not driven.any():
         return ()
