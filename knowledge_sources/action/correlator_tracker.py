@@ -30,6 +30,7 @@ from knowledge_sources.methods.tracking.template_tracking import (
     follow_landmarks,
     select_landmarks,
 )
+from knowledge_sources.methods.verification.predicted_lines import find_errors
 from knowledge_sources.questions import (
     find_belief,
     find_building,
@@ -196,8 +197,10 @@ class CorrelatorTracker(RobotKnowledgeSource):
             world, robot.camera, robot.camera_from_world(pose), min_length_px=s.min_edge_length_px,
             min_contrast=s.min_edge_contrast, max_distance_m=s.max_edge_distance_m,
         )
-        found = align_to_edges(robot, image, lines.lines_world, pose, belief.covariance_world(world),
-                               self._settings.tracking)
+        found = None
+        if find_errors(robot, lines).is_exact:  # else the edges are not where the model has them
+            found = align_to_edges(robot, image, lines.lines_world, pose, belief.covariance_world(world),
+                                   self._settings.tracking)
         if found is not None:
             pose = found.world_from_robot
             belief = Hypothesis.of_world(world, belief.locale, pose, found.covariance, "tracks", motion=belief.motion)

@@ -49,6 +49,7 @@ class Weighed:
         is_enough: whether that is little enough to accept the pose.
         shift_px: median distance of the lines from where they were expected.
         tolerance_px: the largest that may be.
+        is_inexact: whether the model's lines may be displaced.
         is_weak: whether what was believed before adds little: it is in doubt, or no landmarks were followed.
         camera_chi2: squared distance of the camera, as solved for, from what was believed of it.
         is_camera_known: whether the camera's mounting is known well enough for the picture to be predicted.
@@ -67,6 +68,7 @@ class Weighed:
     shift_px: float
     tolerance_px: float
     is_weak: bool
+    is_inexact: bool
     camera_chi2: float
     is_camera_known: bool
 
@@ -150,6 +152,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         if is_sure or in_doubt:
             tolerance_px = max(s.plan.max_deviation_px, tolerance_px * is_as_put_down)
         p_wrong = s.plan.p_wrong_followed if followed else s.plan.p_wrong_unfollowed
+        p_wrong = _update(s.plan.p_wrong_in_doubt if in_doubt else p_wrong, milestone.told)
         return Weighed(
             robot=robot,
             room="" if belief is None else belief.value.locale,
@@ -160,10 +163,11 @@ class MilestoneJudge(RobotKnowledgeSource):
             lines=agreed,
             faces=faces,
             p_false=p_false,
-            is_enough=POSE_CONFIDENCE.accepts(p_false, s.plan.p_wrong_in_doubt if in_doubt else p_wrong),
+            is_enough=POSE_CONFIDENCE.accepts(p_false, p_wrong),
             shift_px=_median_shift(expected_px, plain_px),
             tolerance_px=tolerance_px if is_as_put_down else min(tolerance_px, s.plan.max_deviation_px),
             is_weak=in_doubt or not followed,
+            is_inexact=bool(milestone.modes),
             camera_chi2=fix.camera_chi2,
             is_camera_known=is_camera_known(robot, known, s),
         )
@@ -189,7 +193,8 @@ class MilestoneJudge(RobotKnowledgeSource):
         if w.p_false >= POSE_CONFIDENCE.refute:
             if not w.is_camera_known:  # a place where the camera's own error hides what agrees
                 return "not testable", f"{found}: the camera is not known well enough to tell"
-            return "refuted", f"{found}; at a wrong place {a.chance:.0%} are by chance"
+            kind: MilestoneVerdict = "not testable" if w.is_inexact else "refuted"
+            return kind, f"{found}; at a wrong place {a.chance:.0%} are by chance"
         where = f"{found}, {w.shift_px:.1f} px from where expected"
         if w.camera_chi2 > self._settings.camera_state.max_chi2:
             return "refuted", f"{where}: only with a camera that is mounted otherwise than it can be"
@@ -229,7 +234,9 @@ class MilestoneJudge(RobotKnowledgeSource):
 
     def _may_look_again(self, verdict: Verdict, milestone: Milestone) -> bool:
         """Whether another view may tell what this one could not."""
-        return verdict.kind == "not testable" and len(milestone.tried) + 1 < self._settings.plan.max_looks
+        s = self._settings.plan
+        most = s.max_inexact_looks if milestone.modes or milestone.told else s.max_looks
+        return verdict.kind == "not testable" and len(milestone.tried) + 1 < most
 
 
 def _milestone_of(view: View, fix: PoseFix) -> Entry[Milestone] | None:
@@ -261,6 +268,14 @@ def _to_certificate(
         faces=weighed.faces.count,
         faces_alike=weighed.faces.agreeing,
     )
+
+
+def _update(p_wrong: float, log_odds: float) -> float:
+    """The probability of a wrong place after evidence, by Bayes' rule."""
+    if not log_odds:
+        return p_wrong
+    odds = p_wrong / (1.0 - p_wrong) * math.exp(log_odds)
+    return odds / (1.0 + odds)
 
 
 def _median_shift(before_px: Floats, after_px: Floats) -> float:

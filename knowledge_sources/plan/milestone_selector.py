@@ -41,7 +41,7 @@ from world_models.building.model_errors import pack_errors
 from world_models.entries.body import Look
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstruction import Obstruction
-from world_models.entries.task import Milestone, PlanSketch
+from world_models.entries.task import Certificate, Milestone, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import VisibleLines
@@ -117,7 +117,8 @@ class MilestoneSelector(RobotKnowledgeSource):
         robot, pose = _find_robot_and_pose(view, belief.value)
         headings = self._find_untried(self._turned_headings(pose), tried) or [pose.heading_rad]
         heading = choose_heading(robot, pose, headings, self._settings.plan.check_tolerance_m, settings=self._settings)
-        yield Post(replace(check, look_heading_rad=heading), (doubt, belief))
+        turned = replace(check, look_heading_rad=heading)
+        yield Post(replace(turned, told=self._sum_told(view, turned)), (doubt, belief))
 
     def _expect_again(
         self, view: View, hidden: Entry[Obstruction], belief: Entry[Hypothesis]
@@ -138,6 +139,7 @@ class MilestoneSelector(RobotKnowledgeSource):
         tried = _tried_headings(view, lambda m: (m.value.sketch, m.value.index) == (sketch.id, s.at))
         heading = self._choose_direction(robot, s, pose, tried)
         milestone = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}", heading, tried=tried)
+        milestone = replace(milestone, told=self._sum_told(view, milestone))
         if self._faces(view, belief.value, milestone):
             yield from self._look_for(view, None, milestone, sketch, belief, _car_of(sketch, s.at))
         else:
@@ -157,6 +159,23 @@ class MilestoneSelector(RobotKnowledgeSource):
         wish = Post(expected, because) if old is None else Revise(old, expected, because)
         yield wish
         yield Post(Look("milestone"), (wish,))
+
+    def _sum_told(self, view: View, milestone: Milestone) -> float:
+        """The log odds of a wrong place by the looks for a milestone in other directions, of an inexact model.
+
+        A look counts less the nearer its direction is to another's: what both show is no evidence twice.
+        """
+        last, s = view.latest(Milestone), self._settings.plan
+        certificate = view.latest(Certificate)
+        if not milestone.tried or last is None or certificate is None or certificate.value.milestone != last.id:
+            return 0.0
+        c = certificate.value
+        if not last.value.modes or c.matched < self._settings.verification.min_matched_lines:
+            return last.value.told
+        p = min(max(c.p_false, 1e-9), 1.0 - 1e-9)
+        apart = min(abs(wrap_angle(milestone.look_heading_rad - heading)) for heading in milestone.tried)
+        said = min(max(math.log(p / (1.0 - p)), -s.max_told), s.max_told)
+        return last.value.told + min(1.0, apart / s.independent_look_rad) * said
 
     def _choose_direction(self, robot: RobotModel, sketch: PlanSketch, pose: Pose2, tried: Sequence[float]) -> float:
         before = sketch.subgoals[sketch.at - 1] if sketch.at else None

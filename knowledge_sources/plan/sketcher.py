@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
@@ -107,7 +108,7 @@ class Sketcher(RobotKnowledgeSource):
         s, belief = sketch.value, find_belief(view)
         if belief is None:
             return
-        if s.at > 0 and self._is_off(view, belief.value, s.subgoals[s.at - 1]):
+        if s.at > 0 and self._is_off(view, belief.value, s.subgoals[s.at - 1], bool(milestone.value.modes)):
             yield from self._adjust(view, milestone, sketch, belief)
         elif s.at_end:
             yield Revise(sketch, replace(s, status="done", verified=True), (milestone, belief))
@@ -119,13 +120,15 @@ class Sketcher(RobotKnowledgeSource):
             else:
                 yield from self._refine(view, sketch, current, belief, go)
 
-    def _is_off(self, view: View, belief: Hypothesis, subgoal: Subgoal) -> bool:
+    def _is_off(self, view: View, belief: Hypothesis, subgoal: Subgoal, is_inexact: bool) -> bool:
+        """Whether the end of a subgoal is further than its tolerance, which a model that is inexact makes wider."""
         building = find_building(view)
         here, there = belief.world_from_robot(building), subgoal.destination.in_world(building)
         heading = subgoal.destination.heading_rad
         error = 0.0 if heading is None else wrap_angle(here.heading_rad - there.heading_rad)
         turned = abs(error) > self._settings.plan.goal_heading_tolerance_rad
-        return here.distance_to(there) > subgoal.tolerance_m or turned
+        wider_m = self._settings.plan.inexact_tolerance_sigmas * belief.sigma_m if is_inexact else 0.0
+        return here.distance_to(there) > math.hypot(subgoal.tolerance_m, wider_m) or turned
 
     def _adjust(
         self, view: View, milestone: Entry[Milestone], sketch: Entry[PlanSketch], belief: Entry[Hypothesis]

@@ -122,6 +122,17 @@ class PlanSettings:
     max_looks: int = setting(
         3, "count", "A milestone is looked for from so many directions before it counts as a discrepancy.",
         "engineering judgement")
+    inexact_tolerance_sigmas: float = setting(
+        2.0, "1", "Deviations of the belief that are added to the tolerance of a goal where the model is inexact.",
+        "engineering judgement")
+    max_inexact_looks: int = setting(
+        5, "count", "The same where the model is inexact: each look tells less.", "engineering judgement")
+    independent_look_rad: float = setting(
+        math.radians(65.0), "rad", "Looks that differ by so much show nothing twice; nearer ones count less.",
+        "the field of view")
+    max_told: float = setting(
+        3.0, "1", "Most that one look counts for or against a place, in log odds, with those in other directions.",
+        "engineering judgement")
     min_alias_part: float = setting(
         0.8, "1", "Another place at which this part of the agreement is seen is not ruled out.",
         "engineering judgement")

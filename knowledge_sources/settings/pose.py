@@ -112,6 +112,9 @@ class PoseSettings:
     shared_prior_factor: float = setting(
         3.0, "1", "A prior of the same model is loosened by so many times what the model's errors make uncertain.",
         "engineering judgement")
+    marginal_spread: float = setting(
+        1.4, "1", "Factor on the standard deviations of such a pose, for segments matched to a wrong line nearby.",
+        "ellipsoids of 150 poses on generated floors 1003 to 1006")
     max_marginal_rounds: int = setting(
         12, "count", "Rounds in which lines that do not agree are left out.", "engineering judgement")
     max_marginal_steps: int = setting(8, "count", "Steps of Gauss-Newton in each of them.", "engineering judgement")
@@ -119,6 +122,8 @@ class PoseSettings:
     displaced_widths_px: tuple[float, ...] = setting(
         (12.0, 8.0, 5.0, 3.0, 2.0, 1.5), "px", "Widths of the loss by which displacements of the model are fitted.",
         "engineering judgement")
+    displaced_width_sigmas: float = setting(
+        2.0, "1", "Widest of these, in standard deviations of the lines in the picture.", "engineering judgement")
     displaced_steps: int = setting(2, "count", "Steps of that fit at each width.", "engineering judgement")
     displaced_gate_sigmas: float = setting(
         2.5, "1", "Deviations of belief and model within which a segment may belong to a line.",

@@ -226,6 +226,7 @@ class Milestone:
         tried: headings from which it was looked for before, and could not be told [rad, world].
         modes: what of the model may be displaced as one: walls, doors, things; none where it is exact.
         shifts: by how much a standard deviation of a mode displaces a line: (mode, line, x, y, z [m, world]).
+        told: log odds of a wrong place by the looks in other directions, where the model is inexact.
         status: turning (not yet looking there), expected, verified, refuted, not testable, or withdrawn (what is
             known of the building has changed, and it rested on that).
     """
@@ -242,6 +243,7 @@ class Milestone:
     tried: tuple[float, ...] = ()
     modes: tuple[str, ...] = ()
     shifts: tuple[tuple[float, ...], ...] = ()
+    told: float = 0.0
     status: MilestoneStatus = "turning"
 
     @property

@@ -108,7 +108,7 @@ def fit_displacements(
     if covariance is not None:
         information[:3, :3] = np.linalg.inv(covariance)
     weight = np.minimum(1.0, observed.lengths_px / settings.displaced_unit_px)
-    for width in settings.displaced_widths_px:
+    for width in _choose_widths(lines, errors, camera, camera_from_robot, pose, settings):
         for _ in range(settings.displaced_steps):
             moved = _displace(observed, shifts, amplitudes)
             distances, by_pose, by_mode = compute_displaced_jacobian(moved, shifts, state, camera_from_robot)
@@ -121,6 +121,14 @@ def fit_displacements(
     distances, _, _ = compute_displaced_jacobian(moved, shifts, state, camera_from_robot)
     near = np.abs(distances).max(axis=1) <= settings.displaced_pair_px
     return DisplacedFit(state, amplitudes, errors.displace(lines, amplitudes), np.column_stack([which, data])[near])
+
+
+def _choose_widths(
+    lines: Floats, errors: LineErrors, camera: Camera, mount: Pose, pose: Pose2, settings: PoseSettings
+) -> tuple[float, ...]:
+    """The widths that are not much wider than the model is inexact: a wider loss draws to other lines."""
+    most_px = settings.displaced_width_sigmas * float(np.median(compute_sigmas_px(lines, errors, camera, mount, pose)))
+    return tuple(w for w in settings.displaced_widths_px if w <= max(most_px, settings.displaced_gate_px))
 
 
 def _solve(slopes: Floats, distances: Floats, weights: Floats, information: Floats, away: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from knowledge_sources.methods.pose.displacements import (
     fit_displacements,
 )
 from knowledge_sources.methods.pose.line_set import build_line_set
+from knowledge_sources.settings import DEFAULT
 from world_models.building.model_errors import LineErrors, exact
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle
@@ -23,6 +25,8 @@ from world_models.frames import Pose2, wrap_angle
 CAMERA = Camera.from_field_of_view(np.radians(65.0))
 MOUNT = CameraMount(1.0, 0.1, 0.05).camera_from_robot
 SIGMA_PX = 0.3
+ALONE = replace(DEFAULT.pose, marginal_spread=1.0, shared_prior_factor=0.0)
+"""Every segment is of its line, and the prior is independent."""
 PRIOR = np.diag([0.2, 0.2, 0.05]) ** 2
 TRUTH = Pose2(0.0, 0.0, 0.0)
 STATE = np.zeros(3)
@@ -65,7 +69,7 @@ def solve(seed: int, sigma_m: float = 0.05) -> tuple[Array, Array]:
     away = rng.multivariate_normal(np.zeros(3), PRIOR)
     found = planar_from_lines(
         model[visible], segments[visible], CAMERA, MOUNT, Pose2(*away), prior_covariance=PRIOR, sigma_px=SIGMA_PX,
-        errors=errors.take(np.flatnonzero(visible)))
+        errors=errors.take(np.flatnonzero(visible)), settings=ALONE)
     pose = found.world_from_robot
     return np.array([pose.x_m, pose.y_m, wrap_angle(pose.heading_rad)]), found.covariance
 
