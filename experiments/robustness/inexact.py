@@ -1,6 +1,6 @@
 """Missions on floors that their model describes by centimetres wrongly: are they reached, are covariances honest?
 
-Each wall, door and thing is displaced on its own, by a standard deviation that the world file states; of the things 30 %
+Each wall, door and thing is displaced on its own, by a standard deviation that the world file states; 30 % of the things
 are missing, and 10 % more are there. Wheels three times worse than believed are driven on exact floors.
 """
 

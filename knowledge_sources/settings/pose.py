@@ -118,7 +118,7 @@ class PoseSettings:
     max_marginal_rounds: int = setting(
         12, "count", "Rounds in which lines that do not agree are left out.", "engineering judgement")
     max_marginal_steps: int = setting(8, "count", "Steps of Gauss-Newton in each of them.", "engineering judgement")
-    min_marginal_step: float = setting(1e-7, "m, rad", "Step at which these end.", "convergence")
+    min_marginal_step: float = setting(1e-7, "1", "Step [m, rad] at which these end.", "convergence")
     displaced_widths_px: tuple[float, ...] = setting(
         (12.0, 8.0, 5.0, 3.0, 2.0, 1.5), "px", "Widths of the loss by which displacements of the model are fitted.",
         "engineering judgement")

@@ -17,10 +17,6 @@ from world_models.building.model_errors import LineErrors
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 
-_FEW = np.array([4 * k + k % 4 for k in range(8)])
-"""Of the wrong poses, those at which a displaced model is fitted: each direction and distance, with one turn."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class LineCheck:
     """What the segments of a picture say of the lines predicted at a pose.
@@ -51,7 +47,7 @@ def check_lines(
     if errors is None or errors.is_exact:
         projected = _project(robot, lines_world, states)
     else:
-        few = np.concatenate([states[:1], states[1:][_FEW]])
+        few = np.concatenate([states[:1], _take_few(states[1:])])
         projected = np.concatenate([
             _project_displaced(robot, lines_world, errors, segments_px, s, pose_settings) for s in few])
     here, displaced = np.split(projected, [1])
@@ -77,6 +73,11 @@ def _project_displaced(
         lines_world, errors, segments_px, robot.camera, robot.mount.camera_from_robot, to_pose2(state),
         settings=settings)
     return _project(robot, fit.lines_world, state[None])
+
+
+def _take_few(states: Floats) -> Floats:
+    """(8, 3) of the wrong states (32, 3): each direction and distance, with one of the turns."""
+    return states[[4 * k + k % 4 for k in range(8)]]
 
 
 def _displace(state: Floats, shift_m: float, turn_rad: float) -> Floats:
