@@ -10,6 +10,7 @@ from knowledge_sources.settings.setting import setting
 _JUDGED = "engineering judgement"
 _KIDNAP = "engineering judgement, checked with harvey experiment kidnap"
 _MILESTONES = "engineering judgement, checked with harvey experiment milestones"
+_REPEATS = "engineering judgement, checked with harvey experiment repeats"
 _CORRIDOR = "engineering judgement, checked with harvey experiment corridor"
 
 
@@ -223,3 +224,30 @@ class LocalizationSettings:
         3.0, "1", "Standard deviations of a verified pose that fit into the tolerance.", _CORRIDOR)
     camera_max_restarts: int = setting(
         3, "count", "Most times that a pose is replaced by a better one found from it.", _CORRIDOR)
+
+    # Rivals of a pose: others within the prior that explain as much
+    rival_reach_sigmas: float = setting(
+        5.0, "1", "Distance from the prior, in its deviations, up to which a rival is looked for.", _JUDGED)
+    rival_max_voting_lines: int = setting(
+        150, "count", "Most model lines, the longest, that vote for motions onto one another.", _JUDGED)
+    rival_max_motions: int = setting(
+        60, "count", "Most translations that are tried, those with most votes; each as a turn too.", _REPEATS)
+    rival_max_refined: int = setting(10, "count", "Most rivals that are refined, the likeliest.", _REPEATS)
+    rival_parallel_rad: float = setting(
+        0.05, "rad", "Largest angle of model lines that vote for a motion onto one another.", _JUDGED)
+    rival_vote_px: float = setting(
+        6.0, "px", "Cell of the votes, as seen at the lines' median distance.", _REPEATS)
+    rival_min_depth_m: float = setting(0.3, "m", "Least median distance of lines that is counted with.", _JUDGED)
+    rival_same_px: float = setting(
+        6.0, "px", "Distance up to which a moved model line appears on another one.", _REPEATS)
+    rival_same_rad: float = setting(
+        0.08, "rad", "Angle up to which a moved model line appears on another one.", _JUDGED)
+    rival_min_self_similarity: float = setting(
+        0.3, "1", "Part of the model's length that a motion takes onto the model, from which the motion is tried.",
+        _REPEATS)
+    rival_widths_px: tuple[float, ...] = setting(
+        (12.0, 8.0, 5.0, 3.0, 2.0, 2.0), "px", "Widths of the loss by which a rival is refined.", _REPEATS)
+    rival_min_lead: float = setting(
+        5.0, "1", "Log likelihood ratio by which a verified pose leads every rival.", _REPEATS)
+    rival_distinct_tolerances: float = setting(
+        2.0, "1", "Distance of a rival, in tolerances of the pose: nearer ones are the same pose.", _JUDGED)

@@ -9,6 +9,8 @@ from knowledge_sources.settings.setting import setting
 _JUDGED = "engineering judgement"
 _MILESTONES = "engineering judgement, checked with harvey experiment milestones"
 
+_REPEATS = "engineering judgement, checked with harvey experiment repeats"
+
 
 @dataclass(frozen=True, slots=True)
 class VerificationSettings:
@@ -95,6 +97,23 @@ class VerificationSettings:
         1e-12, "1", "Probability of chance agreement that counts as certainty.", _JUDGED)
     fit_ridge: float = setting(
         0.02, "1", "Ridge penalty of the fit of evidence weights.", _JUDGED)
+
+    # Log likelihood of a pose, by which rivals are compared.
+    detection_rate: float = setting(
+        0.85, "1", "Probability that a predicted line is found at the right pose.", _REPEATS)
+    line_independence: float = setting(
+        0.7, "1", "Weight of a line: lines of one thing are seen or missed together (tempered likelihood).", _REPEATS)
+    min_score_chance: float = setting(
+        0.05, "1", "Lower bound of the probability of a line at a wrong pose.", _JUDGED)
+    max_score_chance: float = setting(
+        0.5, "1", "Upper bound of the probability of a line at a wrong pose: one that is found speaks for a pose.",
+        _JUDGED)
+    full_line_px: float = setting(
+        30.0, "px", "Length from which a line counts fully: shorter ones are covered by chance.", _JUDGED)
+    same_line_px: float = setting(
+        5.0, "px", "Distance up to which lines of the picture are one observation.", _REPEATS)
+    same_line_rad: float = setting(
+        0.03, "rad", "Angle up to which lines of the picture are one observation.", _REPEATS)
 
     # Preview of milestones before a mission.
     alias_min_coverage: float = setting(

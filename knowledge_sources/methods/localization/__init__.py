@@ -27,5 +27,7 @@ Could a known pose be another one that looks the same?
 
 Where exactly is a camera, near a prior?
 
+* :mod:`self_motions`: motions of the camera under which the model looks like itself.
+* :mod:`rivals`: other poses within the prior that explain a picture comparably well.
 * :mod:`locate_camera`: match, solve, and judge with six unknowns; used on photographs.
 """

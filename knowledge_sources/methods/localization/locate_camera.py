@@ -17,12 +17,16 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices
 from knowledge_sources.methods.features.lines import LineSegments, find_lines, remove_duplicates
+from knowledge_sources.methods.localization.rivals import Rival, find_rivals
 from knowledge_sources.methods.matching import match_in_space
+from knowledge_sources.methods.matching.pose_parameters import CameraParameters, build_camera_parameters
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml, trunc_r_and_t
-from knowledge_sources.methods.verification.agreement import Agreement, compute_agreement
+from knowledge_sources.methods.verification.agreement import Agreement, compute_agreement, compute_p_false
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import Camera
 from world_models.frames import Pose
+
+RESTLESS = "each pose that is found leads to a better one"
 
 
 class PoseVerdict(Enum):
@@ -43,8 +47,11 @@ class CameraFix:
         segments_px: (k, 2, 2) found around the projected model.
         evidence: which of the model lines are matched, and how many would be by chance.
         coverage: covered part of their length in view, 0..1.
-        verdict: refuted if the agreement may well be by chance; verified only if most of the model is covered and the
-            covariance, scaled by the residuals, fits into the tolerance.
+        verdict: refuted if the agreement may well be by chance, where so many lines would tell; verified only if most
+            of the model is covered, the covariance, scaled by the residuals, fits into the tolerance, and no other
+            pose within the prior explains comparably much.
+        rival: the pose that explains most besides, where one was looked for and found.
+        reason: why it is not verified, in words; "" where it is.
     """
 
     estimate: PoseEstimate
@@ -53,6 +60,8 @@ class CameraFix:
     evidence: Agreement
     coverage: float
     verdict: PoseVerdict
+    rival: Rival | None = None
+    reason: str = ""
 
     @property
     def camera_from_world(self) -> Pose:
@@ -81,7 +90,7 @@ def locate_camera(
 
     Args:
         model_lines_world: (m, 2, 3) [m].
-        image: (h, w) grey levels.
+        image: (h, w) grey levels; None where the segments are all that is known of it.
         prior, prior_covariance: ``camera_from_world`` and (6, 6) of its left perturbation.
         tolerance_m, tolerance_rad: how precise a verified pose must be.
         rng: draws subsets of lines.
@@ -89,25 +98,25 @@ def locate_camera(
     """
     if segments is None:
         segments = find_lines(image, settings=settings.features)
+    parameters = build_camera_parameters(prior, prior_covariance)
     search = _Search(
-        np.asarray(model_lines_world, float), image, camera, np.asarray(prior_covariance, float), segments.segments_px,
-        tolerance_m, tolerance_rad, rng, settings)
-    best = search.locate(prior)
+        parameters, np.asarray(model_lines_world, float), image, camera, np.asarray(prior_covariance, float),
+        segments.segments_px, tolerance_m, tolerance_rad, rng, settings)
+    best = search.locate(prior, search.covariance)
     for _ in range(settings.localization.camera_max_restarts):
-        other = None if best is None else search.locate(best.camera_from_world)
-        if best is None or other is None or other.coverage <= best.coverage:
+        best, is_better = search.look_elsewhere(best)
+        if best is None or not is_better:
             return best
-        if search.is_same(other.camera_from_world, best.camera_from_world):
-            return other
-        best = other
-    is_restless = best is not None and best.verdict is PoseVerdict.VERIFIED
-    return replace(best, verdict=PoseVerdict.NOT_TESTABLE) if best is not None and is_restless else best
+    if best is not None and best.verdict is PoseVerdict.VERIFIED:
+        return replace(best, verdict=PoseVerdict.NOT_TESTABLE, reason=RESTLESS)
+    return best
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Search:
-    """One picture, one model and one prior covariance; see :func:`locate_camera`."""
+    """One picture, one model and one prior; see :func:`locate_camera`."""
 
+    prior: CameraParameters
     model: Floats
     image: Any
     camera: Camera
@@ -118,17 +127,53 @@ class _Search:
     rng: np.random.Generator
     settings: Settings
 
-    def locate(self, prior: Pose) -> CameraFix | None:
-        """The pose that the picture shows within the prior's covariance, with its own verdict."""
+    def look_elsewhere(self, best: CameraFix | None) -> tuple[CameraFix | None, bool]:
+        """A better pose, from here or where the model repeats itself; else the same, held against its rivals."""
+        if best is None:
+            return None, False
+        pose = best.camera_from_world
+        other = self.locate(pose, self.covariance)
+        if other is not None and other.coverage > best.coverage:
+            if not self.is_same(other.camera_from_world, pose):
+                return other, True
+            best, pose = other, other.camera_from_world
+        rivals = self._find_rivals(best)
+        for rival in rivals:
+            if rival.lead < 0.0:
+                near = self.settings.localization.camera_second_prior**2 * self.covariance
+                there = self.locate(rival.camera_from_world, near)
+                if there is not None and not self.is_same(there.camera_from_world, pose):
+                    return there, True
+        return self._hold_against(best, rivals), False
+
+    def _find_rivals(self, fix: CameraFix) -> list[Rival]:
+        """Poses within the prior that explain the picture too, the likeliest first."""
+        apart = self.settings.localization.rival_distinct_tolerances
+        return find_rivals(
+            lambda _: self.model, self.segments_px, self.camera, self.prior, fix.camera_from_world,
+            fix.evidence.chance, same_m=apart * self.tolerance_m, same_rad=apart * self.tolerance_rad,
+            settings=self.settings)
+
+    def _hold_against(self, fix: CameraFix, rivals: list[Rival]) -> CameraFix:
+        """The verdict, now that the rivals are known."""
+        if not rivals:
+            return fix
+        strongest = rivals[0]
+        if fix.verdict is PoseVerdict.VERIFIED and strongest.lead < self.settings.localization.rival_min_lead:
+            return replace(fix, verdict=PoseVerdict.NOT_TESTABLE, rival=strongest, reason=strongest.sentence())
+        return replace(fix, rival=strongest)
+
+    def locate(self, prior: Pose, covariance: Floats) -> CameraFix | None:
+        """The pose that the picture shows within a prior, with its own verdict."""
         tuning = self.settings.localization
         coarse = tuning.camera_coarse_pair_px, tuning.camera_coarse_sigma_px
         fine = tuning.camera_fine_pair_px, tuning.camera_fine_sigma_px
-        rough = self._solve(self.segments_px, prior, self.covariance, coarse, trunc_r_and_t)
+        rough = self._solve(self.segments_px, prior, covariance, coarse, trunc_r_and_t)
         if rough is None:
             return None
         pose = rough[0].camera_from_world
         near = self._find_near(pose)
-        solved = self._solve(near, pose, tuning.camera_second_prior**2 * self.covariance, fine, med_r_and_t)
+        solved = self._solve(near, pose, tuning.camera_second_prior**2 * covariance, fine, med_r_and_t)
         return None if solved is None else self._judge(self._state_as_seen(*solved, near), solved[1], near)
 
     def is_same(self, pose: Pose, other: Pose) -> bool:
@@ -147,6 +192,8 @@ class _Search:
         """(k, 2, 2) edges in bands around the model lines as seen from a pose."""
         shown = self.camera.project_segments(self.model[self._find_visible(pose)], pose)[0]
         band_px, features = self.settings.localization.camera_band_px, self.settings.features
+        if self.image is None:
+            return self.segments_px
         found = find_lines(self.image, shown, band_px=band_px, settings=features)
         return remove_duplicates(found, features).segments_px
 
@@ -183,13 +230,26 @@ class _Search:
         here[~(np.nan_to_num(lengths) >= tuning.camera_min_line_length_px)] = np.nan
         agreement = compute_agreement(here, self.segments_px, displaced, self.settings.verification)
         coverage = agreement.covered_length(lengths)
+        verdict, reason = self._decide(estimate, agreement, coverage)
+        return CameraFix(estimate, pairs, near, agreement, coverage, verdict, reason=reason)
+
+    def _decide(self, estimate: PoseEstimate, agreement: Agreement, coverage: float) -> tuple[PoseVerdict, str]:
+        """The verdict by this pose alone, and why it is not verified."""
+        tuning = self.settings.localization
+        best_possible = compute_p_false(
+            agreement.visible, agreement.visible, agreement.chance, self.settings.verification)
+        if agreement.visible < tuning.camera_min_matched_lines or best_possible > tuning.camera_max_p_false:
+            return PoseVerdict.NOT_TESTABLE, f"{agreement.visible} lines in view: too few to tell the place by"
         if agreement.matched < tuning.camera_min_matched_lines or agreement.p_false > tuning.camera_max_p_false:
-            verdict = PoseVerdict.REFUTED
-        elif estimate.ok and coverage >= tuning.camera_min_coverage and self._is_precise(estimate.covariance):
-            verdict = PoseVerdict.VERIFIED
-        else:
-            verdict = PoseVerdict.NOT_TESTABLE
-        return CameraFix(estimate, pairs, near, agreement, coverage, verdict)
+            found = f"{agreement.matched} of {agreement.visible} lines are found"
+            return PoseVerdict.REFUTED, f"{found}; at a wrong place {agreement.chance:.0%} are"
+        if not estimate.ok:
+            return PoseVerdict.NOT_TESTABLE, estimate.reason or ""
+        if coverage < tuning.camera_min_coverage:
+            return PoseVerdict.NOT_TESTABLE, f"{coverage:.0%} of the lines' length is found"
+        if not self._is_precise(estimate.covariance):
+            return PoseVerdict.NOT_TESTABLE, "not precise enough"
+        return PoseVerdict.VERIFIED, ""
 
     def _state_as_seen(self, estimate: PoseEstimate, pairs: Indices, near: Floats) -> PoseEstimate:
         """The estimate with the covariance that the noise of its own residuals gives, and the shared error."""

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Indices
-from knowledge_sources.methods.matching.pose_pairs import LineScene, PosePairs, linearise_pairs
-from knowledge_sources.methods.matching.pose_parameters import Widths
+from knowledge_sources.methods.matching.pose_pairs import (
+    LineScene,
+    PosePairs,
+    build_scene,
+    find_pairs_near,
+    linearise_pairs,
+)
+from knowledge_sources.methods.matching.pose_parameters import PoseParameters, Widths
 from knowledge_sources.settings.matching import MatchingSettings
+from world_models.camera import Camera
 from world_models.frames import Pose
 
 compiled = njit(cache=True, error_model="numpy")
@@ -42,6 +51,27 @@ def find_start_poses(scene: LineScene, wide: PosePairs, settings: MatchingSettin
     scores = np.array([score for _, score in exact])
     best = _select_distinct(reached, scores, settings.max_pose_starts, scene, settings)
     return [_refine_pose(scene, wide, exact[i][0], [groups[-1][-2:]], settings)[0] for i in best]
+
+
+def refine_pose(
+    model_lines_world: Any, segments_px: Any, camera: Camera, parameters: PoseParameters, pose: Pose, widths: Widths,
+    settings: MatchingSettings,
+) -> Pose:
+    """The pose near ``pose`` at which model lines (m, 2, 3) [m] fit data lines (k, 2, 2) [px], the prior as one term.
+
+    Args:
+        parameters: the prior and its unknowns.
+        widths: of the loss, narrowing; data further than the first [px] from their lines are left out.
+    """
+    scene = build_scene(model_lines_world, segments_px, camera, parameters)
+    for width in widths:
+        pairs = find_pairs_near(scene, pose, width, settings.max_pose_pair_rad)
+        if not len(pairs.model):
+            break
+        still, offset = np.zeros((1, len(parameters.root))), parameters.compute_step(pose)
+        steps, _ = _refine_steps(pairs, still, parameters.information, offset, (width, width), settings)
+        pose = parameters.move(pose, steps[0])
+    return pose
 
 
 def _refine_pose(

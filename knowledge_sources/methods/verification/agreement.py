@@ -64,8 +64,15 @@ def compute_agreement(
     seen = visible_there > 0
     rate = float(np.mean(matched_there[seen] / visible_there[seen])) if np.any(seen) else 1.0
     chance = min(settings.max_chance, max(settings.min_chance, rate))
-    p = settings.test_count * float(binom.sf(matched - 1, visible, chance)) if visible else 1.0
-    return Agreement(coverage, int(visible), int(matched), chance, min(1.0, p))
+    p_false = compute_p_false(int(matched), int(visible), chance, settings)
+    return Agreement(coverage, int(visible), int(matched), chance, p_false)
+
+
+def compute_p_false(
+    matched: int, visible: int, chance: float, settings: VerificationSettings = DEFAULT.verification
+) -> float:
+    """Compute the probability that so many of the visible lines are matched at a wrong pose (binomial tail)."""
+    return min(1.0, settings.test_count * float(binom.sf(matched - 1, visible, chance))) if visible else 1.0
 
 
 def compute_coverage(
