@@ -1,7 +1,7 @@
-"""Missions on floors that their model describes by centimetres wrongly: are they reached, are covariances honest?
+"""Missions on floors that their model describes by centimetres wrongly: is a goal reached, is a covariance honest?
 
-Each wall, door and thing is displaced on its own, by a standard deviation that the world file states; 30 % of the things
-are missing, and 10 % more are there. Wheels three times worse than believed are driven on exact floors.
+Each wall, door and thing is displaced on its own, by a standard deviation that the world file states; 30 % of the
+things are missing, and 10 % more are there. Wheels three times worse than believed are driven on exact floors.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ from world_models.building.model_errors import LineErrors
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LineCheck:
     """What the segments of a picture say of the lines predicted at a pose.
