@@ -74,6 +74,8 @@ VALUES = (
     _value(_MOUNT, "forward_m", "forward_m", Bounds(-2.0, 2.0), "m", "Optical centre ahead of the turning axis."),
     _value(_MOUNT, "tilt_rad", "tilt_rad", Bounds(-math.pi / 2.0, math.pi / 2.0), "rad",
            "Downward tilt of the optical axis."),
+    _value(_MOUNT, "roll_rad", "roll_rad", Bounds(-0.8, 0.8), "rad", "Roll about it, its right side low.", 0.0),
+    _value(_MOUNT, "yaw_rad", "yaw_rad", Bounds(-0.8, 0.8), "rad", "Turn from the robot's heading to the left.", 0.0),
     _value(_LENS, "fx_px", "fx", _FOCAL, "px", "Focal length along a row of the picture."),
     _value(_LENS, "fy_px", "fy", _FOCAL, "px", "Focal length along a column of the picture."),
     _value(_LENS, "cx_px", "cx", _CENTRE, "px", "Column of the principal point."),

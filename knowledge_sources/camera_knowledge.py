@@ -34,8 +34,9 @@ def compute_camera_covariance(camera: CameraState, settings: CameraStateSettings
 def compute_first_covariance(camera: CameraState, settings: CameraStateSettings) -> Floats:
     """(7, 7) before anything is learnt: what was stated, and the settings where nothing was."""
     s = settings
-    sigmas = (camera.sigma_tilt_rad or s.sigma_tilt_rad, s.sigma_roll_rad, s.sigma_yaw_rad,
-              camera.sigma_height_m or s.sigma_height_m, camera.sigma_focal or s.sigma_focal,
+    sigmas = (camera.sigma_tilt_rad or s.sigma_tilt_rad, camera.sigma_roll_rad or s.sigma_roll_rad,
+              camera.sigma_yaw_rad or s.sigma_yaw_rad, camera.sigma_height_m or s.sigma_height_m,
+              camera.sigma_focal or s.sigma_focal,
               s.sigma_centre_px, s.sigma_centre_px)
     return np.asarray(np.diag(np.square(sigmas)))
 

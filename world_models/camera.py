@@ -259,12 +259,15 @@ class CameraDeviation:
     Attributes:
         tilt_rad, height_m, forward_m: of the mounting.
         focal: of the focal length, as a part of it.
+        roll_rad, yaw_rad: of the mounting.
     """
 
     tilt_rad: float = 0.0
     height_m: float = 0.0
     forward_m: float = 0.0
     focal: float = 0.0
+    roll_rad: float = 0.0
+    yaw_rad: float = 0.0
 
 
 NOT_STATED = CameraDeviation()

@@ -49,7 +49,8 @@ class RobotModel:
     def entries(self) -> tuple[CameraState, Wheels, Footprint]:
         """What the robot knows of itself, as it lies on the board."""
         d = self.deviation
-        camera = CameraState(self.lens, self.mount, d.tilt_rad, d.height_m, d.forward_m, d.focal)
+        camera = CameraState(self.lens, self.mount, d.tilt_rad, d.height_m, d.forward_m, d.focal,
+                             sigma_roll_rad=d.roll_rad, sigma_yaw_rad=d.yaw_rad)
         return camera, Wheels(self.actuator, self.continuous), Footprint(self.radius_m)
 
     def in_building(self, building: Building) -> RobotModel:

@@ -42,6 +42,7 @@ def format_result(r: MissionResult, out: Path | None) -> str:
         f" {count(r.relocalizations, 'relocalization')}",
         f"  collisions    {r.collisions}{_places(r)}",
         *(f"  {point.kind:<12}  cycle {point.cycle}: {point.text}" for point in r.turning_points),
+        *(f"  camera        {lesson.text()}" for lesson in r.camera),
         *(f"  amiss         {text}" for text in r.amiss),
         f"  way           {r.path_length_m:.1f} m in {r.sim_time_s:.0f} s of the robot's time",
         f"  took          {r.wall_time_s:.1f} s for {count(r.cycles, 'cycle')} and {count(r.frames, 'picture')}, with"

@@ -123,6 +123,7 @@ def summary(result: MissionResult, out: Path) -> str:
     m = result.milestones
     return (f"{result.outcome}: {result.reason}\n"
             f"  milestones    {m['verified']} verified, {m['refuted']} refuted, {m['not_testable']} not testable\n"
+            f"{''.join(f'  camera        {lesson.text()}{chr(10)}' for lesson in result.camera)}"
             f"  way           {result.path_length_m:.1f} m, as the wheels claim, in {result.sim_time_s:.0f} s\n"
             f"  recording     {out / 'recording.rrd'}\n\n"
             f"open it with    harvey view {out}\nask it with     harvey why {out}")

@@ -141,7 +141,7 @@ def find_mounting(
     forward = board.camera_ahead_m or 0.0
     if board.board_ahead_m is not None:
         forward = board.board_ahead_m - found.to_board_m
-    return found, CameraMount(found.height_m, forward, found.tilt_rad)
+    return found, CameraMount(found.height_m, forward, found.tilt_rad, found.roll_rad)
 
 
 def find_deviation(calibration: Calibration, found: Mounting | None, board: Mounted | None) -> CameraDeviation:
@@ -149,9 +149,9 @@ def find_deviation(calibration: Calibration, found: Mounting | None, board: Moun
     focal = float(calibration.deviations[0]) / calibration.camera.fx
     if found is None:
         return CameraDeviation(focal=focal)
-    height_m, tilt_rad, _, to_board_m, _ = (float(sigma) for sigma in found.deviations)
+    height_m, tilt_rad, roll_rad, to_board_m, _ = (float(sigma) for sigma in found.deviations)
     by_board = board is not None and board.board_ahead_m is not None
-    return CameraDeviation(tilt_rad, height_m, to_board_m if by_board else 0.0, focal)
+    return CameraDeviation(tilt_rad, height_m, to_board_m if by_board else 0.0, focal, roll_rad)
 
 
 def report(

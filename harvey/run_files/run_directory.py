@@ -21,7 +21,7 @@ from harvey.errors import BadInput
 RUNS = Path("runs")
 """Where runs are kept unless ``--out`` says otherwise."""
 
-FILES = ("run.json", "journal.jsonl", "camera.mjpeg", "recording.rrd", "result.json")
+FILES = ("run.json", "journal.jsonl", "camera.mjpeg", "recording.rrd", "result.json", "camera.toml")
 
 RESULT: Mapping[str, tuple[Any, str]] = {
     "scenario": (str, "a text"),
@@ -73,6 +73,10 @@ class RunDirectory:
             if key in data and not isinstance(data[key], kind):
                 raise BadInput(f"{self.result}: {key}: expected {named}, got {json.dumps(data[key])}")
         return data
+
+    def write_camera(self, text: str) -> None:
+        """Write ``camera.toml``: the camera as it was known at the end. Raises OSError."""
+        (self.path / "camera.toml").write_text(text, encoding="utf-8")
 
     def write_result(self, record: Mapping[str, Any]) -> None:
         """Write ``result.json``; an older one stays as it is until the new one is whole. Raises OSError."""

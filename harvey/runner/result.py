@@ -9,11 +9,15 @@ from typing import Any
 
 from blackboard.journal import Decision
 from logs.turning_points import TurningPoint, TurningPointFinder
+from world_models.camera_lessons import CameraLesson, find_camera_lessons
 from world_models.entries.body import Frame, MotionReport
 from world_models.entries.locale_frame import FrameRequest
 from world_models.entries.location import Hypothesis
+from world_models.entries.robot import CameraState
 from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch
 
+PARTS = ("contacts", "turning_points", "camera")
+"""What of a result is a list of parts with names."""
 UNFINISHED = "unfinished"
 """The outcome in ``result.json`` of a run that has none yet."""
 
@@ -50,6 +54,7 @@ class MissionResult:
         max_cross_track_m: how far the robot truly strayed from the line of the leg it was driving.
         contacts: each of the collisions.
         turning_points: what changed the course of the run, as the robot itself knew it.
+        camera: what has turned out to be otherwise about the camera than the robot was told.
         amiss: which of the scenario's faults did not happen, or not as they were asked for, in words.
     """
 
@@ -75,6 +80,7 @@ class MissionResult:
     contacts: Sequence[Contact] = ()
     turning_points: Sequence[TurningPoint] = ()
     waits: int = 0
+    camera: Sequence[CameraLesson] = ()
 
     @property
     def cycles(self) -> int:
@@ -94,14 +100,16 @@ class MissionResult:
     def record(self) -> dict[str, Any]:
         """As JSON types."""
         record = {name: getattr(self, name) for name in self.__slots__}
-        return record | {name: [asdict(one) for one in record[name]] for name in ("contacts", "turning_points")}
+        return record | {name: [asdict(one) for one in record[name]] for name in PARTS}
 
     @staticmethod
     def of_record(record: Mapping[str, Any]) -> MissionResult:
         """From JSON types. Raises TypeError where they are not those of a result."""
         contacts = tuple(Contact(**one) for one in record.get("contacts", ()))
         turning_points = tuple(TurningPoint(**one) for one in record.get("turning_points", ()))
-        return MissionResult(**{**record, "contacts": contacts, "turning_points": turning_points})
+        camera = tuple(CameraLesson(**one) for one in record.get("camera", ()))
+        return MissionResult(
+            **{**record, "contacts": contacts, "turning_points": turning_points, "camera": camera})
 
 
 class RunCounts:
@@ -112,6 +120,8 @@ class RunCounts:
         self.milestones = {"verified": 0, "refuted": 0, "not_testable": 0}
         self.path_m = self.time_s = 0.0
         self.turning_points: list[TurningPoint] = []
+        self.told_camera: CameraState | None = None
+        self.camera: CameraState | None = None
         self._finder = TurningPointFinder()
 
     def __call__(self, decision: Decision) -> None:
@@ -124,8 +134,12 @@ class RunCounts:
                 self.path_m += value.move_m
                 self.time_s = value.sim_time_s
             self.frames += isinstance(value, Frame)
+            if isinstance(value, CameraState):
+                self.told_camera = self.camera = value
         for change in decision.made:
             value, revision = change.entry.value, change.entry.revision
+            if isinstance(value, CameraState):
+                self.camera = value
             if isinstance(value, Milestone) and value.status.replace(" ", "_") in self.milestones:
                 self.milestones[value.status.replace(" ", "_")] += 1
             elif isinstance(value, PlanSketch):
@@ -136,6 +150,12 @@ class RunCounts:
             elif isinstance(value, Hypothesis) and value.is_held:
                 self.relocalizations += value.basis == "relocalization"
 
+    def camera_lessons(self) -> tuple[CameraLesson, ...]:
+        """What has turned out to be otherwise about the camera than told."""
+        if self.told_camera is None or self.camera is None:
+            return ()
+        return find_camera_lessons(self.told_camera, self.camera)
+
     def result(self, name: str, seed: int, goal: str, outcome: Outcome, wall_time_s: float) -> MissionResult:
         """How it went, without the truth."""
         return MissionResult(
@@ -144,5 +164,5 @@ class RunCounts:
             wall_time_s=wall_time_s, frames=self.frames, decisions=self.decisions,
             milestones={**self.milestones, "false_accepts": None}, replans=self.replans,
             relocalizations=self.relocalizations, sketches=self.sketches, collisions=None, max_cross_track_m=None,
-            turning_points=tuple(self.turning_points), waits=self.waits,
+            turning_points=tuple(self.turning_points), waits=self.waits, camera=self.camera_lessons(),
         )

@@ -15,6 +15,7 @@ from blackboard.journal import Decision, Sink
 from blackboard.scheduler import RAISED, Scheduler
 from harvey.agent import Agent
 from harvey.errors import BadInput
+from harvey.run_files.learnt_camera import build_camera_text
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
 from harvey.run_files.run_recorder import RunRecorder
@@ -25,6 +26,7 @@ from harvey.runner.world_port import WorldPort, tell_robot
 from logs.disk import CannotWriteError
 from logs.errors import RecordingError
 from world_models.entries.location import Hypothesis
+from world_models.entries.robot import CameraState
 from world_models.entries.task import Goal, Outcome
 from world_models.files.toml.mission import Limits, Telling
 
@@ -140,6 +142,8 @@ class Run:
         if files is not None:
             with suppress(OSError):  # where the disk is full, the outcome that is there, unfinished, is true as well
                 files.write_result(result.record())
+                if (learnt := self.scheduler.view.latest(CameraState)) is not None and learnt.value.covariance:
+                    files.write_camera(build_camera_text(learnt.value, self.head.name))
         return result
 
     def _close(self) -> str:

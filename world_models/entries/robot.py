@@ -23,7 +23,7 @@ class CameraState:
         lens: the physical camera, with its distortion.
         mount: where it is on the robot.
         sigma_tilt_rad, sigma_height_m, sigma_forward_m, sigma_focal: standard deviations of the mounting and, as a part
-            of it, of the focal length; 0 where nobody has stated any.
+            of it, of the focal length; 0 where nobody has stated any. sigma_roll_rad, sigma_yaw_rad: the same.
         covariance: (7, 7) over :data:`~world_models.camera.CAMERA_UNKNOWNS`, once it is learnt from milestones, or ().
         counted: the poses (x [m], y [m], heading [rad], world) of the pictures by which it was learnt, the newest last.
     """
@@ -34,6 +34,8 @@ class CameraState:
     sigma_height_m: float = 0.0
     sigma_forward_m: float = 0.0
     sigma_focal: float = 0.0
+    sigma_roll_rad: float = 0.0
+    sigma_yaw_rad: float = 0.0
     covariance: tuple[tuple[float, ...], ...] = ()
     counted: tuple[tuple[float, ...], ...] = ()
 

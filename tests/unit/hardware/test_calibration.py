@@ -150,7 +150,7 @@ def test_a_camera_file_says_how_well_it_is_known(tmp_path: Path) -> None:
         (("distortion = [", "distortion = [0.0, 0.0, "), "expected an array of 4 or 5 numbers"),
         (("height_m = 0.2", "height_m = 'tall'"), "height_m: expected a number"),
         (("[mount]", "[deviation]\nheight_m = -1.0\n[mount]"), "deviation.height_m: expected a number from 0 to 1"),
-        (("[mount]", "[deviation]\nroll_deg = 1.0\n[mount]"), "roll_deg"),
+        (("[mount]", "[deviation]\nlean_deg = 1.0\n[mount]"), "lean_deg"),
     ],
 )
 def test_a_camera_file_that_is_wrong_is_pointed_at(tmp_path: Path, change: tuple[str, str], message: str) -> None:

@@ -61,9 +61,12 @@ def camera_text(
         lines += ["", "[mount]", f"height_m = {float(mount.height_m)!r}  # optical centre above the floor",
                   f"forward_m = {float(mount.forward_m)!r}  # ahead of the axis that the robot turns about",
                   f"tilt_deg = {math.degrees(mount.tilt_rad)!r}  # downward"]
+        turned = (("roll_deg", mount.roll_rad, "its right side low"), ("yaw_deg", mount.yaw_rad, "to the left"))
+        lines += [f"{key} = {math.degrees(angle)!r}  # {what}" for key, angle, what in turned if angle]
     if deviation is not None and deviation != NOT_STATED:
         stated = {"focal_px": deviation.focal * camera.fx, "height_m": deviation.height_m,
-                  "forward_m": deviation.forward_m, "tilt_deg": math.degrees(deviation.tilt_rad)}
+                  "forward_m": deviation.forward_m, "tilt_deg": math.degrees(deviation.tilt_rad),
+                  "roll_deg": math.degrees(deviation.roll_rad), "yaw_deg": math.degrees(deviation.yaw_rad)}
         lines += ["", "[deviation]  # standard deviations",
                   *(f"{key} = {float(value)!r}" for key, value in stated.items() if value > 0.0)]
     return "\n".join(lines).lstrip("\n") + "\n"
@@ -80,18 +83,22 @@ def _read_camera(node: Node) -> Camera:
 
 
 def _read_mount(node: Node) -> CameraMount:
-    node.table(("height_m",), ("forward_m", "tilt_deg"))
+    node.table(("height_m",), ("forward_m", "tilt_deg", "roll_deg", "yaw_deg"))
     forward = node["forward_m"].number(-10.0, 10.0) if "forward_m" in node else 0.0
     tilt = node["tilt_deg"].number(-89.0, 89.0) if "tilt_deg" in node else 0.0
-    return CameraMount(node["height_m"].number(0.01, 10.0), forward, math.radians(tilt))
+    roll, yaw = (node[key].number(-89.0, 89.0) if key in node else 0.0 for key in ("roll_deg", "yaw_deg"))
+    return CameraMount(node["height_m"].number(0.01, 10.0), forward, math.radians(tilt), math.radians(roll),
+                       math.radians(yaw))
 
 
 def _read_deviation(node: Node, camera: Camera) -> CameraDeviation:
-    known = {"focal_px": camera.fx, "height_m": 1.0, "forward_m": 1.0, "tilt_deg": 30.0}
+    known = {"focal_px": camera.fx, "height_m": 1.0, "forward_m": 1.0,
+             **dict.fromkeys(("tilt_deg", "roll_deg", "yaw_deg"), 30.0)}
     node.table((), tuple(known))
     stated = {key: node[key].number(0.0, most) if key in node else 0.0 for key, most in known.items()}
     return CameraDeviation(math.radians(stated["tilt_deg"]), stated["height_m"], stated["forward_m"],
-                           stated["focal_px"] / camera.fx)
+                           stated["focal_px"] / camera.fx, math.radians(stated["roll_deg"]),
+                           math.radians(stated["yaw_deg"]))
 
 
 def _read_pixels(node: Node) -> int:
