@@ -6,11 +6,14 @@ import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
+import shapely
+
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
+from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
 from knowledge_sources.questions import ACTIVE_SKETCH, find_belief, find_building, find_frames, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -80,8 +83,8 @@ class Sketcher(RobotKnowledgeSource):
 
         ``halts``: how often in a row a leg was halted, and the sketch drawn anew for it.
         """
-        for old in view.where(PlanSketch, lambda s: s.is_active):
-            yield Revise(old, replace(old.value, status="superseded"), (goal,))
+        looks = _count_looks(view, goal, withdrawn)
+        yield from _supersede(view, goal)
         belief = find_belief(view)
         if belief is None:
             return
@@ -92,16 +95,41 @@ class Sketcher(RobotKnowledgeSource):
             near = _find_obstacles(view, (goal.value.destination.locale,))
             named = [entry for entry in near if entry.value.name in unfit]
             reason = f"the goal {goal.value.destination} {unfit}{_name_obstacles(named)}"
-            yield Post(Outcome("blocked", reason), (*because, *named))
+            yield self._look_again(view, goal, named, looks) or Post(Outcome("blocked", reason), (*because, *named))
             return
         subgoals = _find_first(planner.plan_between_locales(
             here, goal.value.destination, self._settings.plan.goal_tolerance_m) for planner in planners)
         if subgoals is None:
+            obstacles = _find_obstacles(view)
             why = self._explain_no_way(view, here.locale, goal.value.destination.locale)
-            yield Post(Outcome("blocked", why), (*because, *_find_obstacles(view)))
+            again = self._look_again(view, goal, obstacles, looks)
+            yield again or Post(Outcome("blocked", why), (*because, *obstacles))
         else:
-            drawn = PlanSketch(goal.id, (), "", subgoals, halts=halts)
+            drawn = PlanSketch(goal.id, (), "", subgoals, halts=halts, looks=looks)
             yield Post(drawn, (*because, *find_frames(view, _list_locales(subgoals))))
+
+    def _look_again(
+        self, view: View, goal: Entry[Goal], obstacles: Sequence[Entry[Obstacle]], looks: int
+    ) -> Post | None:
+        """A sketch that leads to where one of the obstacles can be looked at from elsewhere, the nearest first.
+
+        What was seen of it, from one place or when it was too near, may be wrong. None where it was looked at often
+        enough, or no place is left.
+        """
+        belief = find_belief(view)
+        if belief is None or not obstacles or looks >= self._settings.plan.max_lookouts:
+            return None
+        here = shapely.Point(belief.value.world_from_robot(find_building(view)).position)
+        nearest = sorted(obstacles, key=lambda o: (build_polygon(o.value.footprint).distance(here), o.value.name))
+        first = looks % len(nearest)
+        planner = self._list_planners(view)[0]
+        for obstacle in (*nearest[first:], *nearest[:first]):
+            subgoal = planner.plan_look(belief.value, obstacle.value)
+            if subgoal is not None:
+                frames = find_frames(view, {belief.value.locale})
+                drawn = PlanSketch(goal.id, (), "", (subgoal,), looks=looks + 1, is_look=True)
+                return Post(drawn, (goal, belief, obstacle, *frames))
+        return None
 
     def _continue(self, view: View, milestone: Entry[Milestone], sketch: Entry[PlanSketch]) -> Iterable[Effect]:
         """Go on after a verified milestone: adjust, finish, or begin the next subgoal, refined if not primitive."""
@@ -164,6 +192,11 @@ class Sketcher(RobotKnowledgeSource):
             if obstacles and goal is not None and self._leads_otherwise(view, goal.value, belief.value):
                 yield from self._begin(view, goal)
                 return
+            again = None if goal is None else self._look_again(view, goal, obstacles, _count_looks(view, goal))
+            if goal is not None and again is not None:
+                yield from _supersede(view, goal)
+                yield again
+                return
             yield go
             reason = f"no way through {locale} to {subgoal.destination}{_name_obstacles(obstacles)}"
             yield Post(Outcome("blocked", reason), (go, *obstacles))
@@ -191,7 +224,9 @@ class Sketcher(RobotKnowledgeSource):
                 yield Revise(parent, parent.value.advanced(), (done,))
             return
         goal = view.get(done.value.goal)
-        if goal is not None and goal.value.is_active:
+        if goal is not None and done.value.is_look:
+            yield from self._begin(view, goal, done)
+        elif goal is not None and goal.value.is_active:
             yield Revise(goal, replace(goal.value, status="reached"), (done,))
 
     def _go_otherwise(self, view: View, leg: Entry[Leg], sketch: Entry[PlanSketch]) -> Iterable[Effect]:
@@ -207,6 +242,11 @@ class Sketcher(RobotKnowledgeSource):
             yield from self._begin(view, goal, halts=halts)
             return
         obstacles = _find_obstacles(view)
+        again = self._look_again(view, goal, obstacles, _count_looks(view, goal))
+        if again is not None:
+            yield from _supersede(view, goal)
+            yield again
+            return
         reason = f"something may stand in floor that is not seen, before {here.words()}{_name_obstacles(obstacles)}"
         yield Post(Outcome("blocked", reason), (leg, belief, *obstacles))
 
@@ -232,6 +272,19 @@ class Sketcher(RobotKnowledgeSource):
         by_stairs = building.is_walkable(here, there, self._settings.plan.max_walked_rooms)
         stairs = "; people can walk there, by stairs" * by_stairs
         return f"no passage for wheels leads from {here} to {there}{shut}{stairs}"
+
+
+def _supersede(view: View, goal: Entry[Goal]) -> Iterable[Effect]:
+    """All active sketches are superseded, before another one is drawn for a goal."""
+    for old in view.where(PlanSketch, lambda s: s.is_active):
+        yield Revise(old, replace(old.value, status="superseded"), (goal,))
+
+
+def _count_looks(view: View, goal: Entry[Goal], before: Entry[PlanSketch] | None = None) -> int:
+    """How often the robot went to look again at what left no way to a goal; ``before``: its last sketch, if it ended.
+    """
+    last = before or view.latest(PlanSketch, lambda s: s.is_active and not s.path and s.goal == goal.id)
+    return 0 if last is None else last.value.looks
 
 
 def _find_first(plans: Iterable[tuple[Subgoal, ...] | None]) -> tuple[Subgoal, ...] | None:

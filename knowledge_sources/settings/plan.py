@@ -27,6 +27,19 @@ class PlanSettings:
         (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6), "m",
         "Distances from its middle, to either side, at which it is approached aslant, past what stands before it.",
         "engineering judgement")
+    max_lookouts: int = setting(
+        3, "count", "So often the robot looks again, from elsewhere, at what leaves no way; then it is blocked.",
+        "engineering judgement")
+    lookout_distances_m: tuple[float, ...] = setting(
+        (1.8, 2.4, 3.0), "m", "Distances from which it does so: the floor before it is in the picture.",
+        "engineering judgement")
+    lookout_directions: int = setting(
+        24, "count", "Directions round it from which that is tried.", "engineering judgement")
+    lookout_short_m: float = setting(
+        0.4, "m", "So near before it something else may be in the line of sight: it may be a part of it.",
+        "engineering judgement")
+    min_lookout_change_m: float = setting(
+        0.4, "m", "A place nearer than this to where the robot stands shows nothing new.", "engineering judgement")
     max_leg_m: float = setting(
         3.6, "m", "Longest leg without a milestone in between.", "engineering judgement")
     way_tolerance_m: float = setting(

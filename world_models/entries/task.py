@@ -113,6 +113,8 @@ class PlanSketch:
         at: the subgoal that is next or under way; n at the end.
         verified: whether milestone ``at`` holds.
         status: active, done or superseded.
+        looks: so often the robot went somewhere to look again at what left no way.
+        is_look: whether it leads there, and not to the goal.
         halts: so often in a row a leg was halted and the sketch drawn anew for it.
         adjustments: how often plan-level servoing changed it.
     """
@@ -126,6 +128,8 @@ class PlanSketch:
     status: SketchStatus = "active"
     halts: int = 0
     adjustments: int = 0
+    looks: int = 0
+    is_look: bool = False
 
     @property
     def is_active(self) -> bool:

@@ -12,8 +12,10 @@ import numpy as np
 from shapely import Geometry, LineString, Point
 
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor.lookout import find_floor
 from knowledge_sources.methods.motion.doorways import compute_free_passage, find_line_through
 from knowledge_sources.methods.motion.footprints import build_polygon
+from knowledge_sources.methods.motion.lookouts import list_lookouts
 from knowledge_sources.methods.motion.routes import (
     find_free_space,
     find_nearest,
@@ -222,6 +224,27 @@ class SubgoalPlanner:
             Subgoal(a, b, True, tolerance_m=subgoal.tolerance_m if i == last else self._settings.way_tolerance_m)
             for i, (a, b) in enumerate(pairwise(places))
         )
+
+    def plan_look(self, belief: Hypothesis, obstacle: Obstacle) -> Subgoal | None:
+        """The nearest place in the robot's room to look at an obstacle again, from elsewhere; None where none is left.
+
+        It is so far away that the floor before the obstacle is in the picture.
+        """
+        s, locale, here = self._settings, belief.locale, belief.world_from_robot(self._building)
+        poses = list_lookouts(
+            self._free_space(locale, s.clearances_m[0], is_round=True),
+            find_floor(self._building, {locale, obstacle.locale}), obstacle.footprint, s.lookout_distances_m,
+            s.lookout_directions, s.lookout_short_m)
+        away = np.linalg.norm(poses[:, :2] - here.position, axis=1)
+        for k in np.argsort(away, kind="stable"):
+            if away[k] < s.min_lookout_change_m:
+                continue
+            if self._find_way(locale, here.position, poses[k, :2]) is not None:
+                x, y, heading = (float(v) for v in poses[k])
+                return self._build_subgoal(
+                    Place.of_world(self._building, locale, here.x_m, here.y_m),
+                    Place.of_world(self._building, locale, x, y, heading), s.way_tolerance_m)
+        return None
 
     def _find_way(self, locale: str, start: Floats, end: Floats) -> list[Floats] | None:
         """The shortest way across a locale, with the largest margin that leaves one; None where none does."""
