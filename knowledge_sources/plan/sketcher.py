@@ -13,7 +13,7 @@ from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.methods.motion.footprints import build_polygon
+from knowledge_sources.methods.motion.footprints import MIN_SIDE_M, build_polygon, list_corners
 from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
 from knowledge_sources.questions import ACTIVE_SKETCH, find_belief, find_building, find_frames, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -111,17 +111,19 @@ class Sketcher(RobotKnowledgeSource):
     def _look_again(
         self, view: View, goal: Entry[Goal], obstacles: Sequence[Entry[Obstacle]], looks: int
     ) -> Post | None:
-        """A sketch that leads to where one of the obstacles can be looked at from elsewhere, the nearest first.
+        """A sketch that leads to where one of the obstacles can be looked at from elsewhere.
 
-        What was seen of it, from one place or when it was too near, may be wrong. None where it was looked at often
-        enough, or no place is left.
+        First those without which there is a way, the nearest of them first. What was seen of it, from one place or when
+        it was too near, may be wrong. None where it was looked at often enough, or no place is left.
         """
         belief = find_belief(view)
         if belief is None or not obstacles or looks >= self._settings.plan.max_lookouts:
             return None
         here = shapely.Point(belief.value.world_from_robot(find_building(view)).position)
         nearest = sorted(obstacles, key=lambda o: (build_polygon(o.value.footprint).distance(here), o.value.name))
-        first = looks % len(nearest)
+        alone = [o for o in nearest if self._leads_without(view, goal.value, belief.value, o)]
+        first = looks % len(alone or nearest)
+        nearest = [*alone, *(o for o in nearest if o not in alone)]
         planner = self._list_planners(view)[0]
         for obstacle in (*nearest[first:], *nearest[:first]):
             subgoal = planner.plan_look(belief.value, obstacle.value)
@@ -130,6 +132,16 @@ class Sketcher(RobotKnowledgeSource):
                 drawn = PlanSketch(goal.id, (), "", (subgoal,), looks=looks + 1, is_look=True)
                 return Post(drawn, (goal, belief, obstacle, *frames))
         return None
+
+    def _leads_without(self, view: View, goal: Goal, belief: Hypothesis, without: Entry[Obstacle]) -> bool:
+        """Whether a way would lead to the goal if one obstacle were next to nothing."""
+        middle = build_polygon(without.value.footprint).centroid
+        least = list_corners(middle.buffer(MIN_SIDE_M))
+        obstacles = [replace(o.value, core=least if o.id == without.id else ()) for o in _find_obstacles(view)]
+        planner = SubgoalPlanner(find_robot(view), self._settings.plan, obstacles, by_cores=True)
+        tolerance_m = self._settings.plan.goal_tolerance_m
+        return not planner.explain_unfit(goal.destination) and planner.plan_between_locales(
+            _place_of(belief), goal.destination, tolerance_m) is not None
 
     def _continue(self, view: View, milestone: Entry[Milestone], sketch: Entry[PlanSketch]) -> Iterable[Effect]:
         """Go on after a verified milestone: adjust, finish, or begin the next subgoal, refined if not primitive."""

@@ -38,6 +38,9 @@ class PlanSettings:
     lookout_short_m: float = setting(
         0.4, "m", "So near before it something else may be in the line of sight: it may be a part of it.",
         "engineering judgement")
+    lookout_same_side_m: float = setting(
+        3.0, "m", "So much farther another side of it may be than the one from which it was seen last.",
+        "engineering judgement")
     min_lookout_change_m: float = setting(
         0.4, "m", "A place nearer than this to where the robot stands shows nothing new.", "engineering judgement")
     max_leg_m: float = setting(

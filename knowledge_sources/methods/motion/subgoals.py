@@ -226,9 +226,9 @@ class SubgoalPlanner:
         )
 
     def plan_look(self, belief: Hypothesis, obstacle: Obstacle) -> Subgoal | None:
-        """The nearest place in the robot's room to look at an obstacle again, from elsewhere; None where none is left.
+        """A place in the robot's room to look at an obstacle again, from elsewhere; None where none is left.
 
-        It is so far away that the floor before the obstacle is in the picture.
+        It is so far away that the floor before the obstacle is in the picture; near, but rather on another side.
         """
         s, locale, here = self._settings, belief.locale, belief.world_from_robot(self._building)
         poses = list_lookouts(
@@ -236,7 +236,10 @@ class SubgoalPlanner:
             find_floor(self._building, {locale, obstacle.locale}), obstacle.footprint, s.lookout_distances_m,
             s.lookout_directions, s.lookout_short_m)
         away = np.linalg.norm(poses[:, :2] - here.position, axis=1)
-        for k in np.argsort(away, kind="stable"):
+        middle = np.mean(build_polygon(obstacle.footprint).exterior.coords[:-1], axis=0)
+        side_rad = math.atan2(*(middle - here.position)[::-1])
+        same_side = np.maximum(0.0, np.cos(poses[:, 2] - side_rad))
+        for k in np.argsort(away + s.lookout_same_side_m * same_side, kind="stable"):
             if away[k] < s.min_lookout_change_m:
                 continue
             if self._find_way(locale, here.position, poses[k, :2]) is not None:
