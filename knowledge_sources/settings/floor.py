@@ -89,6 +89,17 @@ class FloorSettings:
         0.15, "1", "Smallest difference of the correlations of the two hypotheses that tells anything.",
         "engineering judgement")
 
+    foot_part_step: float = setting(
+        0.05, "1", "Distances at which a lower border may hang over the floor are tried in steps of this part.",
+        "engineering judgement")
+    min_foot_part: float = setting(
+        0.4, "1", "Least part of its seeming distance at which a lower border is looked for.", "engineering judgement")
+    min_foot_margin: float = setting(
+        0.07, "1", "Smallest difference of the mean correlations of a lower border over the floor and on it that tells "
+        "anything.", "engineering judgement")
+    min_foot_columns: int = setting(
+        6, "count", "With fewer patches of a lower border its height is not told.", "engineering judgement")
+
     # Ranges
     max_belief_sigma_m: float = setting(
         0.15, "m", "A less certain place tells of no free floor.", "engineering judgement")

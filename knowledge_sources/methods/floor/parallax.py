@@ -78,6 +78,41 @@ def compute_parallax_odds(
     return float(settings.parallax_odds ** np.clip(votes / 2.0, -1.0, 1.0))
 
 
+def measure_foot_part(
+    region: Region, grid: FloorGrid, picture: NDArray[np.float32], earlier: NDArray[np.float32],
+    earlier_from_now: Pose2, camera: Camera, mount: CameraMount, settings: FloorSettings,
+) -> float:
+    """How far a region's lower border is, as a part of the distance at which it would stand on the floor; 1: it does.
+
+    The lower border of what hangs over the floor, as a shelf on legs, hides floor that is further away: it moves
+    otherwise between two pictures than floor does. All of the border is taken to be at one height.
+
+    Args:
+        picture, earlier: (h, w) grey, reduced by STEP_PX.
+        earlier_from_now: the robot's pose now in its frame then.
+    """
+    feet = region.feet[region.feet[:, 0] < grid.shape[0] - 2]
+    if not len(feet):
+        return 1.0
+    feet = feet[np.unique(np.linspace(0, len(feet) - 1, min(COLUMNS, len(feet))).astype(int))]
+    points = grid.points_robot[feet[:, 0], feet[:, 1]]
+    parts = np.arange(1.0, settings.min_foot_part - 1e-9, -settings.foot_part_step)
+    eye = np.array([mount.forward_m, 0.0])
+    then = np.stack([_project(_below(points, eye, part, grid), earlier_from_now, camera, mount, grid)
+                     for part in parts])
+    patches = [_cut(picture, grid.top + row, column) for row, column in feet]
+    alike = np.array([[_correlate(earlier, patch, at) for patch, at in zip(patches, there, strict=True)]
+                      for there in then])
+    shown = alike[0] > -1.0
+    if np.count_nonzero(shown) < settings.min_foot_columns:
+        return 1.0
+    mean = alike[:, shown].mean(axis=1)
+    apart = np.linalg.norm(then - then[0], axis=2)[:, shown].mean(axis=1) * STEP_PX
+    best = int(np.argmax(mean))
+    tells = mean[best] >= settings.min_parallax_correlation and apart[best] >= settings.min_parallax_px
+    return float(parts[best]) if tells and mean[best] - mean[0] >= settings.min_foot_margin else 1.0
+
+
 def _below(points: Floats, eye: Floats, depth: float, grid: FloorGrid) -> Floats:
     """(n, 3) points on the rays to floor points (n, 2), so many times as far away."""
     height = np.full(len(points), grid.camera_height_m * (1.0 - depth))

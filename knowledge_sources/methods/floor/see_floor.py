@@ -24,7 +24,7 @@ from knowledge_sources.methods.floor.appearance import (
 )
 from knowledge_sources.methods.floor.floor_grid import STEP_PX, FloorGrid, build_floor_grid
 from knowledge_sources.methods.floor.model_floor import ModelFloor, predict_model_floor
-from knowledge_sources.methods.floor.parallax import compute_parallax_odds
+from knowledge_sources.methods.floor.parallax import compute_parallax_odds, measure_foot_part
 from knowledge_sources.methods.floor.things import Region, find_footprint, find_regions, measure_height
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.floor import FloorSettings
@@ -90,14 +90,14 @@ def see_free_floor(
     unlike, tells = find_unlike(picture[grid.top:], model, known, s)
     regions = find_regions(unlike, tells, grid, s) if s.use_appearance else ()
     built = [(region, _build_thing(region, grid, robot, pose, covariance, picture, earlier, s)) for region in regions]
-    things = [(region, thing) for region, thing in built if thing is not None]
+    things = [(region, *thing) for region, thing in built if thing is not None]
     scan = _scan(grid, model, tells, things, robot.camera.fy, s)
     learnt = _learn(robot, locale, pose, earlier, known, floor_m, settings)
     return FreeFloor(
         sense="camera", locale=locale, x_m=round(eye.x_m, 4), y_m=round(eye.y_m, 4),
         bearings_rad=tuple(round(math.remainder(pose.heading_rad + b, math.tau), 5) for b in scan.bearings_rad),
         near_m=scan.near_m, far_m=scan.far_m, ends=scan.ends, sigma_m=scan.sigma_m,
-        things=tuple(thing for _, thing in things), seen_s=seen_s), learnt
+        things=tuple(thing for _, thing, _ in things), seen_s=seen_s), learnt
 
 
 @lru_cache(maxsize=16)
@@ -178,15 +178,17 @@ class _Scan(NamedTuple):
 
 
 def _scan(
-    grid: FloorGrid, model: ModelFloor, tells: NDArray[np.bool_], things: Sequence[tuple[Region, FloorThing]],
+    grid: FloorGrid, model: ModelFloor, tells: NDArray[np.bool_], things: Sequence[tuple[Region, FloorThing, float]],
     fy: float, settings: FloorSettings,
 ) -> _Scan:
     """From the lower border up: as far as the model has floor, its looks are known, and no thing is in the way."""
     rows, columns = grid.shape
     blocked = np.zeros(grid.shape, bool)
-    for region, thing in things:
+    parts = np.ones(columns)  # how far what ends the floor is, of the distance at which it seems to stand
+    for region, thing, part in things:
         if thing.p_thing >= 0.5:
             blocked |= region.mask
+            parts[region.mask.any(axis=0)] = np.minimum(parts[region.mask.any(axis=0)], part)
     is_floor = model.kinds >= 0
     up = np.arange(rows)[::-1]
     first_thing, first_model = _first(blocked[up]), _first(~is_floor[up])
@@ -200,6 +202,8 @@ def _scan(
         stop = min(at_thing, at_model)
         told = tells[up][:max(stop, 1), group].any()
         range_m = settings.sight_m if stop >= rows else float(grid.ranges_m[rows - 1 - stop, group].min())
+        if at_thing <= at_model and stop < rows:
+            range_m *= float(parts[group].min())
         end: FloorEnd = "sight" if range_m >= settings.sight_m else "thing" if at_thing <= at_model else "model"
         if stop == 0 or not told:  # nothing of the floor is seen, or its looks are not known
             range_m = 0.0
@@ -219,8 +223,11 @@ def _first(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
 def _build_thing(
     region: Region, grid: FloorGrid, robot: RobotModel, pose: Pose2, covariance: Floats,
     picture: NDArray[np.uint8], earlier: Sequence[Seen], settings: FloorSettings,
-) -> FloorThing | None:
-    """What stands where a region is; None where it is lower than what is rolled over."""
+) -> tuple[FloorThing, float] | None:
+    """What stands where a region is, and the part of its seeming distance; None where it is lower than what is rolled
+    over.
+    """
+    part = 1.0
     height_m, sigma_height_m = measure_height(region, grid)
     if height_m < settings.max_rolled_over_m and math.isfinite(sigma_height_m):
         return None
@@ -233,21 +240,29 @@ def _build_thing(
         grey = picture.astype(np.float32) @ GREY
         told = compute_parallax_odds(region, grid, grey, before, earlier_from_now, robot.camera, robot.mount, settings)
         odds *= told
+        if not region.is_cut and told >= 1.0:
+            part = measure_foot_part(
+                region, grid, grey, before, earlier_from_now, robot.camera, robot.mount, settings)
+        if part < 1.0:
+            height_m, sigma_height_m = measure_height(region, grid, part)
         how += "" if told == 1.0 else " and stands up from it" if told > 1.0 else ", but lies flat on it"
     elif not settings.use_parallax:
         odds = 1e6
-    corners = find_footprint(region, grid, settings)
+    corners = find_footprint(region, grid, settings, part)
     world = pose.apply(corners)
     foot_m = float(np.linalg.norm(corners, axis=1).min())
     spread = math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0) + foot_m**2 * float(covariance[2, 2]))
     at, left_right = np.flatnonzero(region.mask.any(axis=1)), np.flatnonzero(region.mask.any(axis=0))
     (left, top), (right, bottom) = grid.pixels[at[0], left_right[0]], grid.pixels[at[-1], left_right[-1]]
     own = CUT_SIGMA_M if region.is_cut else STEP_PX * foot_m**2 / (grid.camera_height_m * robot.camera.fy)
+    if part < 1.0:
+        own = math.hypot(own, settings.foot_part_step * foot_m / part)
+        how += f", and hangs {grid.camera_height_m * (1.0 - part):.2f} m over it"
     return FloorThing(
         footprint=tuple((round(float(x), 3), round(float(y), 3)) for x, y in world),
         sigma_m=round(math.hypot(spread, own), 4),
         height_m=round(height_m, 3), sigma_height_m=round(sigma_height_m, 3), p_thing=round(odds / (1.0 + odds), 4),
-        box_px=(float(left), float(top), float(right), float(bottom)), evidence=how, is_cut=region.is_cut)
+        box_px=(float(left), float(top), float(right), float(bottom)), evidence=how, is_cut=region.is_cut), part
 
 
 def _learn(

@@ -121,14 +121,15 @@ def _drop_slivers(seen: NDArray[np.bool_], tells: NDArray[np.bool_]) -> NDArray[
     return np.asarray(seen & ((thick > 0) | ~above))
 
 
-def find_footprint(region: Region, grid: FloorGrid, settings: FloorSettings) -> Floats:
+def find_footprint(region: Region, grid: FloorGrid, settings: FloorSettings, part: float = 1.0) -> Floats:
     """(k, 2) corners, counter-clockwise, robot's frame, of what a region takes of the floor [m].
 
-    It is the hull of its feet, and of the same points further off by the depth that is assumed.
+    It is the hull of its feet, and of the same points further off by the depth that is assumed. What hangs over the
+    floor is at a ``part`` of the distances at which its feet seem to be.
     """
-    points = grid.points_robot[region.feet[:, 0], region.feet[:, 1]]
     eye = grid.eye_robot
-    away = points - eye
+    away = part * (grid.points_robot[region.feet[:, 0], region.feet[:, 1]] - eye)
+    points = eye + away
     lengths = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
     cut = region.feet[:, 0] >= grid.shape[0] - 2
     near = np.where(cut[:, None], eye + away * CUT_PART, points)
@@ -142,11 +143,11 @@ def find_footprint(region: Region, grid: FloorGrid, settings: FloorSettings) -> 
     return np.asarray(orient(slim if isinstance(slim, shapely.Polygon) else hull).exterior.coords)[:-1, :2]
 
 
-def measure_height(region: Region, grid: FloorGrid) -> tuple[float, float]:
+def measure_height(region: Region, grid: FloorGrid, part: float = 1.0) -> tuple[float, float]:
     """Height of a region's top [m] if it stands up from its feet, and its standard deviation; infinite if unknown."""
     row, column = region.top
     ranges = grid.ranges_m[region.feet[:, 0], region.feet[:, 1]]
-    foot_m = float(ranges.min()) if not region.is_cut else float(ranges.min()) * CUT_PART
+    foot_m = float(ranges.min()) * (CUT_PART if region.is_cut else part)
     top_m = float(grid.ranges_m[row, column])
     height = grid.camera_height_m * (1.0 - min(1.0, foot_m / top_m)) if np.isfinite(top_m) else grid.camera_height_m
     if region.is_clipped or region.is_cut:

@@ -1,0 +1,68 @@
+"""Laws of a lower border's height: a board that is drawn ray by ray, on the floor or over it, and seen twice."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor.floor_grid import STEP_PX, build_floor_grid
+from knowledge_sources.methods.floor.parallax import measure_foot_part
+from knowledge_sources.methods.floor.things import find_footprint, find_regions
+from knowledge_sources.settings.floor import FloorSettings
+from world_models.camera import Camera, CameraMount
+from world_models.frames import Pose2
+
+S = FloorSettings()
+CAMERA = Camera.from_field_of_view(math.radians(65.0))
+MOUNT = CameraMount(1.0, 0.1)
+BUILT = build_floor_grid(CAMERA, MOUNT, MOUNT.height_m, 9.0)
+assert BUILT is not None
+GRID = BUILT
+
+
+def draw(texture: Floats, at_m: float, low_m: float, moved_m: float) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Grey and which pixels show the board: it stands across the way, ``at_m`` ahead of the robot before it moved."""
+    u = (np.arange(CAMERA.width // STEP_PX) + 0.5) * STEP_PX - 0.5
+    rays = CAMERA.rays(np.stack(np.meshgrid(u, u), axis=-1)) @ MOUNT.camera_from_robot.rotation
+    away = at_m - moved_m - MOUNT.forward_m
+    with np.errstate(divide="ignore", invalid="ignore"):
+        y, z = rays[..., 1] * away / rays[..., 0], MOUNT.height_m + rays[..., 2] * away / rays[..., 0]
+    on = (np.abs(y) < 0.4) & (z > low_m) & (z < low_m + 0.35) & (rays[..., 0] > 0.0)
+    rows, columns = (np.clip(200.0 * part, 0, texture.shape[0] - 1).astype(np.float32) for part in (z - low_m, y + 0.4))
+    shown = cv2.remap(texture.astype(np.float32), columns, rows, cv2.INTER_LINEAR)
+    return np.where(on, shown, 120.0).astype(np.float32), on
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(2.2, 3.0), st.sampled_from([0.0, 0.0, 0.15, 0.2, 0.3]), st.floats(0.4, 0.6))
+def test_a_border_is_on_the_floor_or_as_far_as_its_height_makes_it(
+    seed: int, at_m: float, low_m: float, moved_m: float
+) -> None:
+    noise = np.random.default_rng(seed).uniform(0.0, 255.0, (40, 40))
+    texture = cv2.resize(noise, (200, 200), interpolation=cv2.INTER_LINEAR)
+    earlier, _ = draw(texture, at_m, low_m, 0.0)
+    now, board = draw(texture, at_m, low_m, moved_m)
+    (region,) = find_regions(board[GRID.top:], np.ones(GRID.shape, bool), GRID, S)
+    part = measure_foot_part(region, GRID, now, earlier, Pose2(moved_m, 0.0, 0.0), CAMERA, MOUNT, S)
+    true_part = 1.0 - low_m / MOUNT.height_m
+    assert part == pytest.approx(true_part, abs=2.0 * S.foot_part_step)
+    if low_m == 0.0:
+        assert part == 1.0
+    near_m = float(find_footprint(region, GRID, S, part)[:, 0].min())
+    assert near_m == pytest.approx(at_m - moved_m, abs=2.0 * S.foot_part_step * (at_m - moved_m) / true_part)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(2.2, 3.0))
+def test_without_motion_nothing_is_told(seed: int, at_m: float) -> None:
+    noise = np.random.default_rng(seed).uniform(0.0, 255.0, (40, 40))
+    picture, board = draw(cv2.resize(noise, (200, 200)), at_m, 0.2, 0.0)
+    (region,) = find_regions(board[GRID.top:], np.ones(GRID.shape, bool), GRID, S)
+    assert measure_foot_part(region, GRID, picture, picture, Pose2(0.0, 0.0, 0.0), CAMERA, MOUNT, S) == 1.0
