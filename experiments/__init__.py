@@ -34,6 +34,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "matcher": "2D matching of growing problems: success and time",
         "milestones": "Milestones at right and wrong places: error rates",
         "milestones-calibrate": "Fits the weights of the evidence for milestones",
+        "repeats": "Stairs, shelves, doors: a pose one repetition off",
         "visibility": "Visibility by the model against the renderer",
     },
     "robustness": {

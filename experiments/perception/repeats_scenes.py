@@ -21,6 +21,8 @@ CAMERA = Camera.from_field_of_view(math.radians(60.0))
 CAMERA_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Rows: the camera's right, down and forward in a world of x to the right, y ahead and z up, without any turn."""
 NOISE_PX, DETECTION, MAX_CLUTTER = 0.3, 0.92, 120
+LONG_PX, SHORT_PX = 40.0, 6.0
+"""Lines longer than the first may be in pieces; none shorter than the second are found."""
 PRIOR_RAD = math.radians(1.5)
 MAX_PITCHES = 3.0
 """Largest error of a prior along the repetition."""
@@ -151,18 +153,20 @@ def find_segments(lines_px: Array, rng: Rng) -> Array:
     """Segments (k, 2, 2) of lines (n, 2, 2): some missed, in one to three pieces, with noise, among clutter."""
     pieces = []
     for start, end in lines_px[rng.uniform(size=len(lines_px)) < DETECTION]:
-        cuts = np.concatenate([[0.0], np.sort(rng.uniform(0.1, 0.9, rng.integers(0, 3))), [1.0]])
-        gaps = rng.uniform(0.01, 0.06, (len(cuts) - 1, 2)) * [1.0, -1.0]
+        length = max(float(np.linalg.norm(end - start)), 1.0)
+        pieces_here = int(rng.integers(0, 3)) if length > LONG_PX else 0
+        cuts = np.concatenate([[0.0], np.sort(rng.uniform(0.1, 0.9, pieces_here)), [1.0]])
+        gaps = rng.uniform(0.5, 2.0, (len(cuts) - 1, 2)) / length * [1.0, -1.0]
         pieces += [np.stack([start + a * (end - start), start + b * (end - start)])
-                   for a, b in np.stack([cuts[:-1], cuts[1:]], axis=1) + gaps if b - a > 0.05]
+                   for a, b in np.stack([cuts[:-1], cuts[1:]], axis=1) + gaps if (b - a) * length > SHORT_PX]
     found = np.array(pieces).reshape(-1, 2, 2)
     along = found[:, 1] - found[:, 0]
     across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
     found = found + rng.normal(0.0, NOISE_PX, (len(found), 2, 1)) * across[:, None]
     clutter = int(rng.integers(0, MAX_CLUTTER))
-    start, angle = rng.uniform(0.0, 511.0, (clutter, 2)), rng.uniform(0.0, math.pi, clutter)
-    length = rng.exponential(20.0, (clutter, 1)) + 8.0
-    return np.concatenate([found, np.stack([start, start + length * np.stack([np.cos(angle), np.sin(angle)], 1)], 1)])
+    first, angle = rng.uniform(0.0, 511.0, (clutter, 2)), rng.uniform(0.0, math.pi, clutter)
+    reach = (rng.exponential(20.0, (clutter, 1)) + 8.0) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.concatenate([found, np.stack([first, first + reach], axis=1)])
 
 
 def _before(lines: Array, pitch: float, rng: Rng) -> Structure:
