@@ -114,7 +114,7 @@ class PoseSettings:
         "engineering judgement")
     marginal_spread: float = setting(
         1.4, "1", "Factor on the standard deviations of such a pose, for segments matched to a wrong line nearby.",
-        "ellipsoids of 150 poses on generated floors 1003 to 1006")
+        "engineering judgement, after a few poses on generated floors")
     max_marginal_rounds: int = setting(
         12, "count", "Rounds in which lines that do not agree are left out.", "engineering judgement")
     max_marginal_steps: int = setting(8, "count", "Steps of Gauss-Newton in each of them.", "engineering judgement")
