@@ -42,7 +42,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "doors": "1,000 missions with doors otherwise than the model says",
         "imported-building": "Missions between the rooms of a house from IFC",
         "imported-floors": "Plans between floors of a university from IndoorGML",
-        "inexact": "1,000 missions each with models that are wrong by 2, 5 and 10 cm",
+        "inexact": "1,000 missions with models wrong by 2, 5 and 10 cm",
         "kidnap": "Kidnaps to anywhere on generated floors of 40 rooms",
         "light": "1,000 missions under lamps, sun and reflections",
         "malformed-worlds": "World and building files with errors put in",

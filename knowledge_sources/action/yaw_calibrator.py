@@ -51,9 +51,9 @@ class YawCalibrator(RobotKnowledgeSource):
         milestone = view.latest(Milestone)
         if milestone is not None and milestone.value.modes:  # an inexact model bends the way more than the yaw does
             return None
-        if self._is_spent(travel.value):
+        if self._is_spent(travel.value, belief.id):
             return 1.0
-        measured = self._measure(view, travel.value, belief.value)
+        measured = self._measure(view, travel.value, belief)
         if measured is None:
             return None
         known = compute_camera_covariance(find_camera(view), self._settings.camera_state)[YAW, YAW]
@@ -63,7 +63,7 @@ class YawCalibrator(RobotKnowledgeSource):
         travel, belief, camera = view.latest(Travel), find_belief(view), view.latest(CameraState)
         if travel is None or belief is None or camera is None:
             return
-        measured, pose = self._measure(view, travel.value, belief.value), _find_pose(view, belief.value)
+        measured, pose = self._measure(view, travel.value, belief), _find_pose(view, belief.value)
         step_rad, way = 0.0, travel.value
         if measured is not None:
             step_rad = measured.step_rad
@@ -76,23 +76,29 @@ class YawCalibrator(RobotKnowledgeSource):
             yield Revise(camera, learnt, (travel, belief, camera))
             yield from self._turn(view, belief, camera.value, -step_rad, pose)
             way = way.turned(-step_rad, camera.value.mount.forward_m)
-        if self._is_spent(way):
+        if self._is_spent(way, belief.id):
             here = turn_about_camera(pose, -step_rad, camera.value.mount.forward_m)
             variance = float(compute_camera_covariance(camera.value, self._settings.camera_state)[YAW, YAW])
             way = begin_travel(here, belief.value.covariance_world(find_building(view)),
                                camera.value.mount.yaw_rad + step_rad,
-                               variance if measured is None else measured.variance)
+                               variance if measured is None else measured.variance, belief.id)
         yield Revise(travel, way, (travel, belief))
 
-    def _is_spent(self, travel: Travel) -> bool:
-        """Whether a way is too long or too bent to measure more by it."""
+    def _is_spent(self, travel: Travel, belief: str) -> bool:
+        """Whether a way is too long or too bent to measure more by it, or began before the robot was lost."""
         s = self._settings.camera_state
-        return travel.gone_m > s.max_travel_m or (
+        return travel.belief not in ("", belief) or travel.gone_m > s.max_travel_m or (
             travel.gone_m > s.min_travel_m and travel.net_m < s.min_straightness * travel.gone_m)
 
-    def _measure(self, view: View, travel: Travel, belief: Hypothesis) -> Measured | None:
-        """The yaw by the whole way, from what was known when it began; None where the way tells too little."""
-        s, pose = self._settings.camera_state, _find_pose(view, belief)
+    def _measure(self, view: View, travel: Travel, held: Entry[Hypothesis]) -> Measured | None:
+        """The yaw by the whole way, from what was known when it began; None where the way tells too little.
+
+        Nor does a way tell anything that ends where no likely yaw leads: something else has moved the robot.
+        """
+        s, belief = self._settings.camera_state, held.value
+        if travel.belief not in ("", held.id):
+            return None
+        pose = _find_pose(view, belief)
         way = travel.seen(pose.heading_rad)
         came = pose.position - travel.began.position
         net_m = way.net_m
@@ -106,7 +112,10 @@ class YawCalibrator(RobotKnowledgeSource):
         gain = travel.yaw_variance / (travel.yaw_variance + noise)
         # The heading is too large by as much as the yaw is too small: the robot came to the right of it.
         believed = find_camera(view).mount.yaw_rad
-        yaw = travel.yaw_rad + gain * (believed - off_rad - travel.yaw_rad)
+        step_rad = believed - off_rad - travel.yaw_rad
+        if step_rad**2 > s.max_yaw_sigmas**2 * (travel.yaw_variance + noise):
+            return None
+        yaw = travel.yaw_rad + gain * step_rad
         return Measured(yaw - believed, (1.0 - gain) * travel.yaw_variance)
 
     def _turn(

@@ -49,6 +49,8 @@ class CameraStateSettings:
     heading_sigma_rad: float = setting(
         math.radians(0.5), "rad", "Standard deviation of the headings on a way of one metre; they average.",
         "missions with cameras as told, generated floors 3 to 8")
+    max_yaw_sigmas: float = setting(
+        3.0, "1", "A way that ends further aside than this tells nothing of the yaw.", _JUDGED)
     min_learnt: float = setting(0.05, "1", "The yaw is revised when its variance shrinks by this part.", _JUDGED)
 
     # What is learnt
