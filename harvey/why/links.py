@@ -53,12 +53,16 @@ def tracks_of(history: History, belief: EntryRecord) -> EntryRecord | None:
     return here[0] if here else reason(history, belief, "Tracks")
 
 
+YAW_CALIBRATOR = "yaw_calibrator"
+"""It turns a belief after a milestone, and tells nothing of where that is from."""
+
+
 def anchor_of(history: History, belief: EntryRecord) -> EntryRecord | None:
     """The revision with which a belief began that was carried on by wheels and landmarks since."""
     id, _, revision = belief.ref.rpartition(".")
     first = int(revision) if revision.isdecimal() else 0
     for back in range(first, max(-1, first - REVISIONS), -1):
         found = history.entry(f"{id}.{back}")
-        if found is None or found.value["basis"] not in ("tracks", "odometry"):
+        if found is None or (found.value["basis"] not in ("tracks", "odometry") and found.author != YAW_CALIBRATOR):
             return found
     return None

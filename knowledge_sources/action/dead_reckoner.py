@@ -73,7 +73,8 @@ class DeadReckoner(RobotKnowledgeSource):
         yield Post(rolled, (trigger.entry,)) if known is None else Revise(known, rolled, (trigger.entry, known))
         travel = view.latest(Travel)
         if travel is None or belief.value.basis in UNSEEN:
-            way = begin_travel(before, belief.value.covariance_world(world), camera.mount.yaw_rad, yaw_variance, belief.id)
+            known_to = belief.value.covariance_world(world)
+            way = begin_travel(before, known_to, camera.mount.yaw_rad, yaw_variance, belief.id)
         else:
             way = travel.value
         slip_m = actuator.skitter_m * min(1.0, abs(report.turn_rad) / (math.pi / 2.0))

@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.building import Building
-from world_models.building.geometry.landmarks import Landmark
+if TYPE_CHECKING:  # an explanation reads journals, and needs no building
+    from world_models.building.building import Building
+    from world_models.building.geometry.landmarks import Landmark
 
 Floats = NDArray[np.float64]
 
