@@ -41,6 +41,7 @@ from knowledge_sources.plan.milestone_selector import MilestoneSelector
 from knowledge_sources.plan.obstruction_finder import ObstructionFinder
 from knowledge_sources.plan.plan_adjuster import PlanAdjuster
 from knowledge_sources.plan.sketcher import Sketcher
+from knowledge_sources.plan.twin_watcher import TwinWatcher
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.entries.kinds import KINDS
@@ -66,6 +67,7 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     PlanAdjuster,
     Escalator,
     Relocalizer,
+    TwinWatcher,
     FaultHandler,
     ModelReviser,
     FloorWatcher,

@@ -34,10 +34,11 @@ from knowledge_sources.questions import (
     open_discrepancy,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.settings.localization import LocalizationSettings
 from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
 from world_models.entries.body import Look, MotionReport, MotorCommand
-from world_models.entries.location import Hypothesis, HypothesisStatus, Place, PlaceOdds, covariance_tuple
+from world_models.entries.location import Hypothesis, HypothesisStatus, Place, PlaceOdds, TwinOdds, covariance_tuple
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import Glimpse, Panorama, Segments
 from world_models.entries.task import Certificate, Goal, PlanSketch
@@ -109,7 +110,7 @@ class Relocalizer(RobotKnowledgeSource):
         looking = robot.with_obstruction(obstruction).on_floor_of(belief.value.locale)
         here = belief.value.world_from_robot(building)
         told = ToldPlace(here, belief.value.covariance_world(building),
-                         compute_prior(len(view.where(PlaceOdds, lambda _: True)), tuning))
+                         _find_prior(view, tuning))
         seen_result = localize(looking, looks, rooms, self._settings, (belief.value.locale, here))
         is_last = len(glimpses) >= self._settings.goal.max_probes
         if is_last:
@@ -177,6 +178,12 @@ class Relocalizer(RobotKnowledgeSource):
         pose = candidate.world_from_robot
         origin = Place.of_world(building, candidate.room, pose.x_m, pose.y_m)
         yield Post(Goal(origin, goal.value.destination), (here, abandon))
+
+
+def _find_prior(view: View, settings: LocalizationSettings) -> float:
+    """Probability of the believed place: as told, with all that was seen since it was told or found."""
+    known, p_told = view.latest(TwinOdds), compute_prior(len(view.where(PlaceOdds, lambda _: True)), settings)
+    return p_told if known is None else max(settings.min_p_twin, min(known.value.probability, p_told))
 
 
 def _odds_used(

@@ -172,6 +172,12 @@ class LocalizationSettings:
     max_alike_log_ratio: float = setting(
         3.0, "1", "Largest log likelihood ratio of the pictures between places that look alike by the model: more is"
         " chance.", _JUDGED)
+    watches_twins: bool = setting(
+        True, "1", "Whether places that look alike are kept in mind while driving.", _JUDGED)
+    min_p_tracked: float = setting(
+        0.5, "1", "Smallest probability, against all places that look alike, of a place that is not doubted.", _JUDGED)
+    min_p_twin: float = setting(
+        1e-6, "1", "Smallest probability of a place that looks alike and is kept in mind.", _JUDGED)
     min_p_believed: float = setting(
         0.97, "1", "Smallest probability of a place that is believed where no look within reach tells more.", _JUDGED)
     min_p_sure: float = setting(

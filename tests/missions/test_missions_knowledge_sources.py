@@ -43,7 +43,7 @@ NAMES = [source.__module__.rpartition(".")[2] for source in KNOWLEDGE_SOURCES]
 NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "fault_handler", "path_follower",
               "elevator_rider", "obstruction_finder", "model_reviser", "withdrawer", "obstacle_finder", "door_watcher",
               "door_doubter", "range_watcher", "floor_watcher", "camera_calibrator",
-              "yaw_calibrator"}
+              "yaw_calibrator", "twin_watcher"}
 """Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
 the move, ride in elevators, find what is before the camera or in the way, take up what somebody tells, or learn of the
 camera."""
@@ -136,7 +136,7 @@ def test_nothing_of_a_truth_that_differs_is_on_the_board() -> None:
     told, *learnt = [entry for entry in entries if isinstance(entry.value, CameraState)]
     assert told.value.lens.fx == stage.scenario.camera.camera.fx and told.author == "robot"
     assert {entry.author for entry in learnt} == {"camera_calibrator",
-              "yaw_calibrator"}
+              "yaw_calibrator", "twin_watcher"}
 
 
 def _reachable(root: Any) -> Iterable[Any]:

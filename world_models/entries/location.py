@@ -168,6 +168,49 @@ class PlaceOdds:
                 f" picture): {self.locale}, {self.probability:.1%}")
 
 
+@dataclass(frozen=True, slots=True)
+class Twin:
+    """A place that looks like where the robot believes that it is.
+
+    Attributes:
+        locale: the room where it was first.
+        there_from_here: the pose there for a pose where it is believed to be, both in the world frame.
+        log_ratio: log likelihood ratio of the pictures so far, of that place to the believed one.
+    """
+
+    locale: str
+    there_from_here: Pose2
+    log_ratio: float
+
+
+@inference(keep=2)
+@dataclass(frozen=True, slots=True)
+class TwinOdds:
+    """How likely the robot is where it believes, against the places that looked the same since it was sure of it.
+
+    Attributes:
+        p_prior: probability of the believed place before any picture.
+        probability: with the pictures that are counted.
+        twins: the other places that are not refuted yet.
+        counted: certificates of the pictures that are counted, each once.
+        last: the pose, in the world frame, of the last of them.
+    """
+
+    p_prior: float
+    probability: float
+    twins: tuple[Twin, ...]
+    counted: tuple[str, ...]
+    last: Pose2
+
+    def sentence(self) -> str:
+        if not self.twins:
+            return f"no other place looks like where it is, after {words.count(len(self.counted), 'picture')}"
+        best = max(self.twins, key=lambda twin: twin.log_ratio)
+        return (f"{words.count(1 + len(self.twins), 'place')} agree with {words.count(len(self.counted), 'picture')};"
+                f" it is where it believes at {self.probability:.1%}, or else most likely as if it had begun in"
+                f" {best.locale}")
+
+
 def _turn(angle_rad: float) -> NDArray[np.float64]:
     c, s = math.cos(angle_rad), math.sin(angle_rad)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -103,6 +103,19 @@ def compute_place_odds(
     return tuple(float(w) for w in weights / np.sum(weights))
 
 
+def compute_twin_odds(log_ratios: Sequence[float], p_prior: float) -> tuple[float, ...]:
+    """Compute the probabilities of the believed place, first, and of each twin; they sum to one.
+
+    Args:
+        log_ratios: of the pictures, of each twin to the believed place.
+        p_prior: of the believed place; the twins share what is left.
+    """
+    if not log_ratios:
+        return (1.0,)
+    return compute_place_odds([0.0, *log_ratios], [True, *[False] * len(log_ratios)], [False] * (1 + len(log_ratios)),
+                              p_prior)
+
+
 def compute_prior(times_lost: int, settings: LocalizationSettings = DEFAULT.localization) -> float:
     """Compute the prior probability of the told place after it was believed so often by it, and the robot got lost."""
     odds = settings.p_told / (1.0 - settings.p_told) * settings.lost_again_odds**times_lost

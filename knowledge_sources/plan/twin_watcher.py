@@ -1,0 +1,120 @@
+"""Twin watcher (§4): is the robot where it believes, or in a place that looked the same until now?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.methods.localization.global_localization import make_alias_test
+from knowledge_sources.methods.localization.log_likelihood import compute_pose_likelihood
+from knowledge_sources.methods.localization.place_odds import compute_prior, compute_twin_odds
+from knowledge_sources.methods.localization.repetition import find_repetitions
+from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.questions import find_belief, find_building, find_robot_in, is_over, open_discrepancy
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.location import Hypothesis, PlaceOdds, Twin, TwinOdds
+from world_models.entries.percepts import LineMatch, PoseFix, Segments
+from world_models.entries.task import Certificate
+from world_models.frames import Pose2, wrap_angle
+from world_models.robot import RobotModel
+
+HERE = Pose2(0.0, 0.0, 0.0)
+
+
+class TwinWatcher(RobotKnowledgeSource):
+    """Keeps the odds of the believed place against the places that look like it, by every verified milestone.
+
+    The first milestone is verified in each of many identical rooms. What the robot was told speaks for one of them;
+    the others are kept in mind, and go with it wherever it drives: each as it would be if the robot had begun there.
+    Every further picture, from another view, is weighed at all of them, once. Where another one is likelier, the robot
+    doubts its place at the goal level, and looks round.
+    """
+
+    level = Level.PLAN
+    watches = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
+    writes = (TwinOdds, Discrepancy)
+
+    def rate(self, view: View, trigger: Change) -> float | None:
+        if is_over(view) or open_discrepancy(view, Level.GOAL) is not None or find_belief(view) is None:
+            return None
+        fix = view.get(trigger.entry.value.fix)
+        if fix is None or not self._settings.localization.watches_twins:
+            return None
+        known = _find_odds(view)
+        return 1.0 if known is None or (known.value.twins and self._is_new(known.value, fix.value)) else None
+
+    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        belief, fix = find_belief(view), view.get(trigger.entry.value.fix)
+        match = None if fix is None else view.get(fix.value.match)
+        if belief is None or fix is None or match is None:
+            return
+        looked = _segments_of(view, match)
+        robot, here = find_robot_in(view, belief.value.locale), fix.value.world_from_robot
+        known, s = _find_odds(view), self._settings.localization
+        if known is None:
+            p_prior = compute_prior(len(view.where(PlaceOdds, lambda _: True)), s)
+            twins = self._find_twins(view, robot, belief.value, here)
+        else:
+            p_prior, twins = known.value.p_prior, known.value.twins
+        weighed = self._weigh(robot, looked.value, here, twins)
+        odds = compute_twin_odds([twin.log_ratio for twin in weighed], p_prior)
+        kept = tuple(twin for twin, p in zip(weighed, odds[1:], strict=True) if p >= s.min_p_twin)
+        counted = (*(() if known is None else known.value.counted), trigger.entry.id)
+        found = TwinOdds(p_prior, odds[0], kept, counted, here)
+        because = (trigger.entry, fix, looked, belief)
+        change = Post(found, because) if known is None else Revise(known, found, (*because, known))
+        yield change
+        if odds[0] < s.min_p_tracked:
+            yield Post(Discrepancy(Level.GOAL, f"it may be elsewhere: {found.sentence()}", None, (0.0, 0.0), "px"),
+                       (change,))
+
+    def _is_new(self, known: TwinOdds, fix: PoseFix) -> bool:
+        """Whether a picture shows something else than the last that was counted."""
+        s, pose = self._settings.localization, fix.world_from_robot
+        turn = abs(wrap_angle(pose.heading_rad - known.last.heading_rad))
+        return pose.distance_to(known.last) >= 0.5 * s.move_m or turn >= s.min_new_view_rad
+
+    def _find_twins(self, view: View, robot: RobotModel, belief: Hypothesis, here: Pose2) -> tuple[Twin, ...]:
+        """The places of the floor that look like the believed one by walls and doors."""
+        building = find_building(view)
+        container, level_m = building.locale(belief.locale).parent or belief.locale, building.floor_m(belief.locale)
+        rooms = building.list_rooms_in(container, level_m, self._settings.goal.max_floor_difference_m)
+        building.require(rooms)
+        if belief.locale not in rooms:
+            return ()
+        nearest = [belief.locale, *(room for room in rooms if room != belief.locale)][:self._settings.goal.max_rooms]
+        back = here.inverse()
+        return tuple(Twin(room, there @ back, 0.0) for room, there in find_repetitions(
+            robot.world, belief.locale, here, nearest, self._settings.localization))
+
+    def _weigh(self, robot: RobotModel, looked: Segments, here: Pose2, twins: tuple[Twin, ...]) -> tuple[Twin, ...]:
+        """The twins with what this picture says of them: nothing of those that look the same from here."""
+        seen = [CameraView(looked.segments_px, HERE, np.zeros((3, 3)))]
+        look_alike = make_alias_test(robot, [HERE], self._settings)
+        own = compute_pose_likelihood(robot, seen, here, self._settings).log_likelihood
+        weighed = []
+        for twin in twins:
+            there = twin.there_from_here @ here
+            ratio = compute_pose_likelihood(robot, seen, there, self._settings).log_likelihood - own
+            weighed.append(replace(twin, log_ratio=twin.log_ratio + (0.0 if look_alike(here, there) else ratio)))
+        return tuple(weighed)
+
+
+def _find_odds(view: View) -> Entry[TwinOdds] | None:
+    """The odds since the robot was found last; None where nothing is counted since."""
+    known = view.latest(TwinOdds)
+    found = view.latest(Discrepancy, lambda d: d.level is Level.GOAL)
+    return None if known is None or (found is not None and found.cycle > known.cycle) else known
+
+
+def _segments_of(view: View, match: Entry[LineMatch]) -> Entry[Segments]:
+    entry: Entry[Segments] = view[match.value.segments]
+    return entry
