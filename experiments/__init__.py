@@ -50,6 +50,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "missions": "1,000 missions without trouble and 1,000 with",
         "obstacles": "1,000 missions among things that the model lacks",
         "serial-chaos": "Drivers of bases over serial lines with errors",
+        "twins": "3,000 missions on floors of identical rooms",
         "video-stream": "A mission's frames through VideoCapture, compared",
     },
     "scale": {

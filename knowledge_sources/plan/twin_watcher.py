@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.localization.global_localization import make_alias_test
 from knowledge_sources.methods.localization.log_likelihood import compute_pose_likelihood
 from knowledge_sources.methods.localization.place_odds import compute_prior, compute_twin_odds
+from knowledge_sources.methods.localization.pose_candidates import are_distinct
 from knowledge_sources.methods.localization.repetition import find_repetitions
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.questions import find_belief, find_building, find_robot_in, is_over, open_discrepancy
@@ -92,11 +94,14 @@ class TwinWatcher(RobotKnowledgeSource):
             return ()
         nearest = [belief.locale, *(room for room in rooms if room != belief.locale)][:self._settings.goal.max_rooms]
         back = here.inverse()
-        return tuple(Twin(room, there @ back, 0.0) for room, there in find_repetitions(
-            robot.world, belief.locale, here, nearest, self._settings.localization))
+        found, s = dict[Pose2, str](), self._settings.localization
+        for room, there in find_repetitions(robot.world, belief.locale, here, nearest, s):
+            if all(are_distinct(there, other, s) for other in (here, *found)):
+                found[there] = room
+        return tuple(Twin(room, there @ back, 0.0) for there, room in found.items())
 
     def _weigh(self, robot: RobotModel, looked: Segments, here: Pose2, twins: tuple[Twin, ...]) -> tuple[Twin, ...]:
-        """The twins with what this picture says of them: nothing of those that look the same from here."""
+        """The twins with what this picture says of them: less what is noise for those that look the same from here."""
         seen = [CameraView(looked.segments_px, HERE, np.zeros((3, 3)))]
         look_alike = make_alias_test(robot, [HERE], self._settings)
         own = compute_pose_likelihood(robot, seen, here, self._settings).log_likelihood
@@ -104,7 +109,9 @@ class TwinWatcher(RobotKnowledgeSource):
         for twin in twins:
             there = twin.there_from_here @ here
             ratio = compute_pose_likelihood(robot, seen, there, self._settings).log_likelihood - own
-            weighed.append(replace(twin, log_ratio=twin.log_ratio + (0.0 if look_alike(here, there) else ratio)))
+            if look_alike(here, there):
+                ratio = math.copysign(max(0.0, abs(ratio) - self._settings.localization.alike_log_noise), ratio)
+            weighed.append(replace(twin, log_ratio=twin.log_ratio + ratio))
         return tuple(weighed)
 
 

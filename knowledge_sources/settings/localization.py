@@ -174,8 +174,11 @@ class LocalizationSettings:
         " chance.", _JUDGED)
     watches_twins: bool = setting(
         True, "1", "Whether places that look alike are kept in mind while driving.", _JUDGED)
+    alike_log_noise: float = setting(
+        2.0, "1", "Log likelihood ratio of one picture between places that look alike by the model that is noise.",
+        "generated floors of seeds 0 to 2")
     min_p_tracked: float = setting(
-        0.5, "1", "Smallest probability, against all places that look alike, of a place that is not doubted.", _JUDGED)
+        0.8, "1", "Smallest probability, against all places that look alike, of a place that is not doubted.", _JUDGED)
     min_p_twin: float = setting(
         1e-6, "1", "Smallest probability of a place that looks alike and is kept in mind.", _JUDGED)
     min_p_believed: float = setting(
