@@ -136,7 +136,7 @@ def test_nothing_of_a_truth_that_differs_is_on_the_board() -> None:
     told, *learnt = [entry for entry in entries if isinstance(entry.value, CameraState)]
     assert told.value.lens.fx == stage.scenario.camera.camera.fx and told.author == "robot"
     assert {entry.author for entry in learnt} == {"camera_calibrator",
-              "yaw_calibrator", "twin_watcher"}
+              "yaw_calibrator"}
 
 
 def _reachable(root: Any) -> Iterable[Any]:
