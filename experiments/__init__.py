@@ -1,7 +1,8 @@
-"""Experiments, in four folders by what they ask; each is a module with ``run(quick, seed) -> Report``.
+"""Experiments, in five folders by what they ask; each is a module with ``run(quick, seed) -> Report``.
 
 ``paper``: do the paper's tables and figures come out? ``perception``: how well does it see? ``robustness``: what
-happens when things go wrong? ``scale``: how fast, how large, how long? A new one needs its file and a line here.
+happens when things go wrong? ``differences``: when the truth differs from what is believed? ``scale``: how fast, how
+large, how long? A new one needs its file and a line here.
 """
 
 from __future__ import annotations
@@ -39,19 +40,21 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
     },
     "robustness": {
         "crash": "Missions killed at random moments and resumed",
-        "doors": "1,000 missions with doors otherwise than the model says",
         "imported-building": "Missions between the rooms of a house from IFC",
         "imported-floors": "Plans between floors of a university from IndoorGML",
-        "inexact": "1,000 missions with models wrong by 2, 5 and 10 cm",
         "kidnap": "Kidnaps to anywhere on generated floors of 40 rooms",
-        "light": "1,000 missions under lamps, sun and reflections",
         "malformed-worlds": "World and building files with errors put in",
-        "miscalibrated": "1,000 missions with a camera mounted otherwise",
         "missions": "1,000 missions without trouble and 1,000 with",
-        "obstacles": "1,000 missions among things that the model lacks",
         "serial-chaos": "Drivers of bases over serial lines with errors",
-        "twins": "3,000 missions on floors of identical rooms",
         "video-stream": "A mission's frames through VideoCapture, compared",
+    },
+    "differences": {
+        "doors": "1,000 missions with doors otherwise than the model says",
+        "inexact": "1,000 missions with models wrong by 2, 5 and 10 cm",
+        "light": "1,000 missions under lamps, sun and reflections",
+        "miscalibrated": "1,000 missions with a camera mounted otherwise",
+        "obstacles": "1,000 missions among things that the model lacks",
+        "twins": "3,000 missions on floors of identical rooms",
     },
     "scale": {
         "agenda": "Activations per second with 10 to 100,000 pending",

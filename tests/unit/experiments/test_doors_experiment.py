@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from experiments import trials
-from experiments.robustness import doors
-from experiments.robustness.doors_trial import DoorResult, DoorTrial, run_door_mission
+from experiments.differences import doors
+from experiments.differences.doors_trial import DoorResult, DoorTrial, run_door_mission
 from sim.made_up.door_missions import write_door_mission
 from sim.scenario import load_scenario
 from sim.stage import build_stage

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from experiments import trials
-from experiments.robustness import inexact
-from experiments.robustness.inexact_trial import InexactResult, InexactTrial, run_inexact_mission
+from experiments.differences import inexact
+from experiments.differences.inexact_trial import InexactResult, InexactTrial, run_inexact_mission
 from sim.differences.inexact import TrueInexact
 from sim.made_up.inexact_missions import write_inexact_mission
 from sim.scenario import load_scenario

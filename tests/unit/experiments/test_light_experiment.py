@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from experiments import trials
-from experiments.robustness import light
-from experiments.robustness.light_trial import LightResult, LightTrial, run_light_mission, write_light_mission
+from experiments.differences import light
+from experiments.differences.light_trial import LightResult, LightTrial, run_light_mission, write_light_mission
 from sim.made_up.lights import LIGHT_KINDS, LightKind, draw_light
 from sim.render.light.lighting import Lighting
 from sim.scenario import load_scenario

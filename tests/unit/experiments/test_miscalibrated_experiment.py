@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from experiments import trials
-from experiments.robustness import miscalibrated
-from experiments.robustness.miscalibrated_trial import CameraResult, CameraTrial, run_camera_mission
+from experiments.differences import miscalibrated
+from experiments.differences.miscalibrated_trial import CameraResult, CameraTrial, run_camera_mission
 from sim.made_up.camera_missions import CASES, MAX_TURN_RAD, write_camera_mission
 from sim.scenario import load_scenario
 from sim.stage import build_stage

@@ -10,8 +10,8 @@ import pytest
 
 import experiments
 from experiments import trials
-from experiments.robustness import obstacles
-from experiments.robustness.obstacles_trial import EMPTY, Trial, TrialEnd, make_trials, write_mission
+from experiments.differences import obstacles
+from experiments.differences.obstacles_trial import EMPTY, Trial, TrialEnd, make_trials, write_mission
 from harvey.errors import BadInput
 from sim.scenario import load_scenario
 

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from experiments import trials
-from experiments.robustness import twins
-from experiments.robustness.twins_trial import TwinResult, TwinTrial
+from experiments.differences import twins
+from experiments.differences.twins_trial import TwinResult, TwinTrial
 from sim.made_up.generated_floors import generated_floor
 from sim.made_up.twin_missions import write_twin_mission
 from sim.scenario import load_scenario

@@ -11,7 +11,7 @@ from pathlib import Path
 from blackboard.change import Change
 from blackboard.entry import Ref
 from blackboard.journal import Decision
-from experiments.robustness.obstacles_truth import Lacking, count_stops, find_shortest_m, judge
+from experiments.differences.obstacles_truth import Lacking, count_stops, find_shortest_m, judge
 from harvey.campaign.campaign import Task, run_task
 from sim.made_up.cluttered_missions import write_cluttered_mission
 from world_models.building.world import World

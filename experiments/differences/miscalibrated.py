@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from experiments.bounds import at_least, at_most
+from experiments.differences.miscalibrated_trial import CameraResult, CameraTrial, run_camera_mission
 from experiments.report import Cell, Report
-from experiments.robustness.miscalibrated_trial import CameraResult, CameraTrial, run_camera_mission
 from experiments.trials import RESULTS, campaign_folder, run_trials
 from sim.made_up.camera_missions import CASES, CameraCase
 from world_models.camera import CAMERA_UNKNOWNS

@@ -15,8 +15,8 @@ import numpy as np
 
 from experiments.bounds import at_least, at_most
 from experiments.chart import OURS, PAPER, PEER, chart
+from experiments.differences.obstacles_trial import RING, Pairs, Trial, TrialEnd, make_trials, run_trial
 from experiments.report import Cell, Report
-from experiments.robustness.obstacles_trial import RING, Pairs, Trial, TrialEnd, make_trials, run_trial
 from experiments.trials import RESULTS, campaign_folder, run_trials
 
 MISSIONS, QUICK_MISSIONS = 1_000, 2

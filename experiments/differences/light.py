@@ -10,9 +10,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from experiments.bounds import at_least, at_most
+from experiments.differences.light_picture import draw_sheet
+from experiments.differences.light_trial import LightResult, LightTrial, run_light_mission
 from experiments.report import Cell, Report
-from experiments.robustness.light_picture import draw_sheet
-from experiments.robustness.light_trial import LightResult, LightTrial, run_light_mission
 from experiments.trials import RESULTS, campaign_folder, run_trials
 from sim.made_up.lights import LIGHT_KINDS, LightKind
 

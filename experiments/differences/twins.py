@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from experiments.bounds import at_least, at_most
+from experiments.differences.twins_trial import TwinResult, TwinTrial, run_twin_mission
 from experiments.report import Cell, Report
-from experiments.robustness.twins_trial import TwinResult, TwinTrial, run_twin_mission
 from experiments.trials import RESULTS, campaign_folder, run_trials
 
 MISSIONS, QUICK_MISSIONS = 3_000, 4

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from experiments.bounds import at_least, at_most
 from experiments.chart import OURS, PAPER, chart
+from experiments.differences.inexact_trial import CHI2_95, InexactResult, InexactTrial, run_inexact_mission
 from experiments.report import Cell, Report
-from experiments.robustness.inexact_trial import CHI2_95, InexactResult, InexactTrial, run_inexact_mission
 from experiments.trials import RESULTS, campaign_folder, run_trials
 
 MISSIONS, QUICK_MISSIONS = 1_000, 4

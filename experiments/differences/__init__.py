@@ -1,0 +1,1 @@
+"""What happens when the truth differs from what the robot believes?"""
