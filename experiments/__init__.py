@@ -18,6 +18,14 @@ if TYPE_CHECKING:
     from experiments.report import Report
 
 EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
+    "differences": {
+        "doors": "1,000 missions with doors otherwise than the model says",
+        "inexact": "1,000 missions with models wrong by 2, 5 and 10 cm",
+        "light": "1,000 missions under lamps, sun and reflections",
+        "miscalibrated": "1,000 missions with a camera mounted otherwise",
+        "obstacles": "1,000 missions among things that the model lacks",
+        "twins": "3,000 missions on floors of identical rooms",
+    },
     "paper": {
         "covariance": "Ellipsoids of the pose solvers: do they hold?",
         "figure12": "Trace of the 2D matcher's local search (Figure 12)",
@@ -47,14 +55,6 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "missions": "1,000 missions without trouble and 1,000 with",
         "serial-chaos": "Drivers of bases over serial lines with errors",
         "video-stream": "A mission's frames through VideoCapture, compared",
-    },
-    "differences": {
-        "doors": "1,000 missions with doors otherwise than the model says",
-        "inexact": "1,000 missions with models wrong by 2, 5 and 10 cm",
-        "light": "1,000 missions under lamps, sun and reflections",
-        "miscalibrated": "1,000 missions with a camera mounted otherwise",
-        "obstacles": "1,000 missions among things that the model lacks",
-        "twins": "3,000 missions on floors of identical rooms",
     },
     "scale": {
         "agenda": "Activations per second with 10 to 100,000 pending",

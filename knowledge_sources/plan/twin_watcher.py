@@ -28,8 +28,6 @@ from world_models.entries.task import Certificate
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
-HERE = Pose2(0.0, 0.0, 0.0)
-
 
 class TwinWatcher(RobotKnowledgeSource):
     """Keeps the odds of the believed place against the places that look like it, by every verified milestone.
@@ -102,8 +100,9 @@ class TwinWatcher(RobotKnowledgeSource):
 
     def _weigh(self, robot: RobotModel, looked: Segments, here: Pose2, twins: tuple[Twin, ...]) -> tuple[Twin, ...]:
         """The twins with what this picture says of them: less what is noise for those that look the same from here."""
-        seen = [CameraView(looked.segments_px, HERE, np.zeros((3, 3)))]
-        look_alike = make_alias_test(robot, [HERE], self._settings)
+        here = Pose2(0.0, 0.0, 0.0)
+        seen = [CameraView(looked.segments_px, here, np.zeros((3, 3)))]
+        look_alike = make_alias_test(robot, [here], self._settings)
         own = compute_pose_likelihood(robot, seen, here, self._settings).log_likelihood
         weighed = []
         for twin in twins:
