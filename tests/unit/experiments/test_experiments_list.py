@@ -23,7 +23,7 @@ def test_every_experiment_is_listed_in_its_folder_in_alphabetical_order() -> Non
 
 def test_the_list_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list"]) == 0
-    lines = capsys.readouterr().out.split("experiments: paper")[1].splitlines()
+    lines = capsys.readouterr().out.split("experiments: differences")[1].splitlines()
     summaries = [line for line in lines if line.startswith("  ")]
     assert len(summaries) == len(experiments.list_names()), "one line each"
     assert max(map(len, summaries)) <= 80
