@@ -100,9 +100,9 @@ class TwinWatcher(RobotKnowledgeSource):
 
     def _weigh(self, robot: RobotModel, looked: Segments, here: Pose2, twins: tuple[Twin, ...]) -> tuple[Twin, ...]:
         """The twins with what this picture says of them: less what is noise for those that look the same from here."""
-        here = Pose2(0.0, 0.0, 0.0)
-        seen = [CameraView(looked.segments_px, here, np.zeros((3, 3)))]
-        look_alike = make_alias_test(robot, [here], self._settings)
+        unmoved = Pose2(0.0, 0.0, 0.0)
+        seen = [CameraView(looked.segments_px, unmoved, np.zeros((3, 3)))]
+        look_alike = make_alias_test(robot, [unmoved], self._settings)
         own = compute_pose_likelihood(robot, seen, here, self._settings).log_likelihood
         weighed = []
         for twin in twins:
