@@ -25,8 +25,8 @@ MINIMAL = 'world = "research_center"\ngoal = "(ptrans (hallway (4,4,0)) (hallway
 HAS_MITSUBA = importlib.util.find_spec("mitsuba") is not None
 
 
-@pytest.mark.skipif(HAS_MITSUBA, reason="the path tracer is installed")
-def test_a_scenario_that_needs_the_path_tracer_is_refused_without_it() -> None:
+def test_a_scenario_that_needs_the_path_tracer_is_refused_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sim.stage.find_spec", lambda name: None)
     with pytest.raises(ScenarioError, match=r"traced_paths: expected Mitsuba to be installed"):
         build_stage(parse_scenario(MINIMAL + "[light]\ntraced_paths = 8\n"))
 
