@@ -75,7 +75,7 @@ class RunDirectory:
         return data
 
     def write_camera(self, text: str) -> None:
-        """Write ``camera.toml``: the camera as it was known at the end. Raises OSError."""
+        """Write ``camera.toml``: the camera at the end, where it is otherwise than told. Raises OSError."""
         (self.path / "camera.toml").write_text(text, encoding="utf-8")
 
     def write_result(self, record: Mapping[str, Any]) -> None:

@@ -26,7 +26,6 @@ from harvey.runner.world_port import WorldPort, tell_robot
 from logs.disk import CannotWriteError
 from logs.errors import RecordingError
 from world_models.entries.location import Hypothesis
-from world_models.entries.robot import CameraState
 from world_models.entries.task import Goal, Outcome
 from world_models.files.toml.mission import Limits, Telling
 
@@ -142,8 +141,8 @@ class Run:
         if files is not None:
             with suppress(OSError):  # where the disk is full, the outcome that is there, unfinished, is true as well
                 files.write_result(result.record())
-                if (learnt := self.scheduler.view.latest(CameraState)) is not None and learnt.value.covariance:
-                    files.write_camera(build_camera_text(learnt.value, self.head.name))
+                if (camera := self._counts.camera) is not None and self._counts.camera_lessons():
+                    files.write_camera(build_camera_text(camera, self.head.name))
         return result
 
     def _close(self) -> str:

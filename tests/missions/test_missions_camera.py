@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ WRONG = {"truth.camera.tilt_deg": "-2", "truth.camera.roll_deg": "1.5", "truth.c
 
 
 @pytest.mark.parametrize("settings", [{}, WRONG], ids=["as believed", "otherwise"])
-def test_the_camera_is_learnt_on_the_way(settings: dict[str, str]) -> None:
+def test_the_camera_is_learnt_on_the_way(settings: dict[str, str], tmp_path: Path) -> None:
     scenario = with_settings(load_scenario("forty-foot-hallway"), settings)
     states: list[CameraState] = []
 
@@ -30,7 +31,8 @@ def test_the_camera_is_learnt_on_the_way(settings: dict[str, str]) -> None:
             if isinstance(change.entry.value, CameraState):
                 states.append(change.entry.value)
 
-    result = run_mission(build_stage(scenario), 2, sinks=[listen])
+    result = run_mission(build_stage(scenario), 2, out=tmp_path / "run", sinks=[listen])
+    assert (tmp_path / "run" / "camera.toml").exists() == bool(settings)
     assert result.outcome == "reached" and result.milestones["false_accepts"] == 0
     assert result.final_error_m is not None and result.final_error_m < 0.0254
     truth = scenario.truth.camera.mounted(scenario.camera.camera, scenario.camera.mount)

@@ -58,7 +58,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
 
 def test_a_run_leaves_its_files(run: Path) -> None:
     assert sorted(p.name for p in run.iterdir()) == [
-        "camera.mjpeg", "camera.toml", "journal.jsonl", "recording.rrd", "result.json", "run.json"]
+        "camera.mjpeg", "journal.jsonl", "recording.rrd", "result.json", "run.json"]
     assert json.loads((run / "result.json").read_text())["outcome"] == "failed"
     head = json.loads((run / "run.json").read_text())
     assert (head["kind"], head["name"], head["seed"]) == ("simulator", "lab-to-allens-office", 0)

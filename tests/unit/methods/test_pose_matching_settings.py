@@ -22,8 +22,10 @@ from knowledge_sources.methods.pose import (
     r_then_t,
     trunc_r_and_t,
 )
+from knowledge_sources.methods.pose.displacements import fit_displacements
 from knowledge_sources.settings.matching import PAPER_MATCHING, MatchingSettings
 from knowledge_sources.settings.pose import PoseSettings
+from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
 
@@ -59,6 +61,39 @@ def spoil(segments: Array, part: float, rng: np.random.Generator) -> Array:
     return out
 
 
+def build_errors(lines: Array) -> LineErrors:
+    """Each wall of the hall known to 5 cm across, and each of three groups of its lines to 4 cm along."""
+    sides = [lines[:, 0, 1] * side > 0.0 for side in (-1.0, 1.0)]
+    groups = [(lines[:, 0, 0] > low) & (lines[:, 0, 0] < low + 4.0) for low in (2.0, 6.0, 10.0)]
+    shifts = [np.outer(side, (0.0, 0.05, 0.0)) for side in sides] + [np.outer(g, (0.04, 0.0, 0.0)) for g in groups]
+    return LineErrors(("right", "left", "near", "middle", "far"), np.array(shifts))
+
+
+def solve_inexact(settings: PoseSettings) -> list[Array]:
+    """The results where the model is inexact: poses, and displacements found among clutter."""
+    out: list[Array] = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        lines = build_hall()
+        errors = build_errors(lines)
+        true = errors.displace(lines, rng.normal(size=len(errors.modes)))
+        segments, seen = CAMERA.project_segments(true, MOUNT @ TRUTH.lifted().inverse())
+        segments = segments[seen] + rng.normal(0.0, SIGMA_PX, segments[seen].shape)
+        lines, errors = lines[seen], errors.take(np.flatnonzero(seen))
+        prior = Pose2(TRUTH.x_m + 0.1, TRUTH.y_m - 0.1, TRUTH.heading_rad + 0.02)
+        covariance = np.diag([0.2, 0.2, 0.05]) ** 2
+        for part in (0.0, 0.3):
+            planar = planar_from_lines(lines, spoil(segments, part, rng), CAMERA, MOUNT, prior, sigma_px=SIGMA_PX,
+                                       prior_covariance=covariance, errors=errors, settings=settings)
+            out += [np.array([planar.world_from_robot.x_m]), planar.covariance, planar.inliers]
+        beside = segments + rng.uniform(-6.0, 6.0, (len(segments), 1, 2)) + rng.normal(0.0, 3.0, segments.shape)
+        for stays in (None, covariance):
+            fit = fit_displacements(lines, errors, np.concatenate([segments, beside]), CAMERA, MOUNT, prior, stays,
+                                    settings)
+            out += [fit.amplitudes, fit.pairs]
+    return out
+
+
 def solve_all(settings: PoseSettings) -> bytes:
     """The results of every solver: few and many lines, near and far priors, with and without outliers."""
     out: list[Array] = []
@@ -91,6 +126,7 @@ def solve_all(settings: PoseSettings) -> bytes:
         ends, pixels = lines.reshape(-1, 3), spoil(segments, 0.3, rng).reshape(-1, 2)
         planar = planar_from_points(ends, pixels, CAMERA, MOUNT, prior, sigma_px=SIGMA_PX, settings=settings)
         out += [np.array([planar.world_from_robot.x_m]), planar.covariance, planar.inliers]
+    out += solve_inexact(settings)
     return b"".join(np.ascontiguousarray(array).tobytes() for array in out)
 
 
