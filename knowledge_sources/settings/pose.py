@@ -99,6 +99,9 @@ class PoseSettings:
     min_scatter_freedom: int = setting(
         6, "count", "Degrees of freedom from which a larger scatter of the inliers widens the covariance.",
         "engineering judgement")
+    max_scatter: float = setting(
+        16.0, "1", "Largest ratio of the noise's variance to the stated one that is told from the inliers' scatter.",
+        "engineering judgement: four times the noise; then the cut on inliers hides the rest")
 
     # A robot on the floor, from points
     huber_sigmas: float = setting(

@@ -65,7 +65,7 @@ def maximise_marginal(
     r, slopes, weights = _linearise(lines.take(near), shifts[:, near], sigma_px, mount, state)
     away = _subtract(state, prior.mean)
     chi2 = float(r @ weights @ r)
-    scatter = settings.marginal_spread**2 * compute_scatter(chi2, len(r), settings)
+    scatter = settings.marginal_spread**2 * compute_scatter(chi2, len(r), settings, bound)
     return MarginalFit(
         state, np.asarray(np.linalg.inv(slopes.T @ weights @ slopes + prior.information) * scatter, float), near,
         _explain(lines, shifts, sigma_px, mount, state, near), chi2 + float(away @ prior.information @ away))

@@ -182,7 +182,8 @@ def refine_on_inliers(
     doubtful = find_doubtful(landmark_ids, near)
     covariance = compute_likeliest_covariance(lines, end, near.astype(float), rejected, settings, bound, doubtful)
     estimate = build_estimate(
-        lines, rotation, translation, covariance, rejected, end.normal.cost, end.iterations, reason, settings
+        lines, rotation, translation, covariance, rejected, end.normal.cost, end.iterations, reason, settings,
+        bound
     )
     return check_in_front(lines, prior, estimate, settings, near, known)
 

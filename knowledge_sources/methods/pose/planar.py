@@ -12,6 +12,7 @@ from knowledge_sources.methods.pose.line_set import LineSet
 from knowledge_sources.methods.pose.numerics.image_error import compute_distance_slopes
 from knowledge_sources.methods.pose.numerics.kernels import RigidMotion
 from knowledge_sources.methods.pose.numerics.levenberg_marquardt import cross
+from knowledge_sources.methods.pose.numerics.trimmed_noise import compute_spread
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.pose import PoseSettings
 from world_models.frames import Pose, Pose2, wrap_angle
@@ -61,13 +62,17 @@ def to_pose2(state: Floats) -> Pose2:
     return Pose2(float(state[0]), float(state[1]), wrap_angle(float(state[2])))
 
 
-def compute_scatter(squares: float, count: int, settings: PoseSettings) -> float:
-    """By how much ``count`` inlier residuals scatter more than sigma says: a variance ratio, never below 1.
+def compute_scatter(squares: float, count: int, settings: PoseSettings, bound: float) -> float:
+    """The factor on the covariance of ``count`` inlier residuals that scatter more than sigma says, never below 1.
 
-    ``squares`` is the sum of the squared residuals over their variance.
+    Args:
+        squares: sum of the squared inlier residuals over their stated variance.
+        bound: of a pair's squares; what is beyond was left out, so that the inliers scatter less than the noise does.
     """
     freedom = count - 3
-    return max(1.0, squares / freedom) if freedom >= settings.min_scatter_freedom else 1.0
+    if freedom < settings.min_scatter_freedom:
+        return 1.0
+    return max(1.0, compute_spread(squares / freedom, bound, settings.max_scatter))
 
 
 def compute_camera_poses(states: Floats, camera_from_robot: Pose) -> tuple[Floats, Floats]:

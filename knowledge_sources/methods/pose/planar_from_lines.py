@@ -257,7 +257,7 @@ def _build_estimate(
         hessian = hessian - floor.prior.information
     distances = floor.measure_lines(state)[0]
     squares = float(np.sum((distances[inliers] / kept.lines.sigma_px[:, None]) ** 2))
-    scatter = compute_scatter(squares, 2 * len(kept.lines), floor.settings)
+    scatter = compute_scatter(squares, 2 * len(kept.lines), floor.settings, bound)
     return PlanarEstimate(
         world_from_robot=to_pose2(state),
         covariance=invert_information(hessian) * scatter,

@@ -107,7 +107,8 @@ def _build_estimate(problem: _Problem, state: Floats, near: Mask) -> PlanarEstim
     )
     j = jacobian[near].reshape(-1, 3)
     few = not problem.prior.given and int(np.count_nonzero(near)) < MIN_POINTS
-    scatter = compute_scatter(float(np.sum(residuals[near] ** 2)), residuals[near].size, problem.settings)
+    bound = problem.settings.point_outlier_sigmas**2
+    scatter = compute_scatter(float(np.sum(residuals[near] ** 2)), residuals[near].size, problem.settings, bound)
     sigma = problem.points[2]
     return PlanarEstimate(
         world_from_robot=to_pose2(state),

@@ -15,6 +15,7 @@ from knowledge_sources.methods.pose.numerics import kernels
 from knowledge_sources.methods.pose.numerics.discrepancy_principle import compute_max_chi2
 from knowledge_sources.methods.pose.numerics.image_error import compute_image_jacobian, find_in_front, measure_lines
 from knowledge_sources.methods.pose.numerics.levenberg_marquardt import orthonormalise
+from knowledge_sources.methods.pose.numerics.trimmed_noise import compute_mean_square, compute_spread
 from knowledge_sources.settings.pose import PoseSettings
 from world_models.frames import Pose, frozen
 
@@ -84,6 +85,7 @@ def build_estimate(
     iterations: int,
     reason: str | None,
     settings: PoseSettings,
+    bound: float = math.inf,
 ) -> PoseEstimate:
     """The estimate at a pose, with its residuals; its reason, if there is none yet, is :func:`find_doubt`'s."""
     residuals = measure_lines(lines, rotation, translation)[0]
@@ -95,15 +97,18 @@ def build_estimate(
         rejected=rejected,
         cost=cost,
         iterations=iterations,
-        reason=reason or find_doubt(residuals / lines.sigma_px[:, None], rejected, settings),
+        reason=reason or find_doubt(residuals / lines.sigma_px[:, None], rejected, settings, bound),
     )
 
 
-def find_doubt(whitened: Floats, rejected: tuple[str | None, ...], settings: PoseSettings) -> str | None:
+def find_doubt(
+    whitened: Floats, rejected: tuple[str | None, ...], settings: PoseSettings, bound: float = math.inf
+) -> str | None:
     """Why a pose has not earned to be called decided by its lines, ``None`` if it has.
 
     ``whitened`` (n, 2) are the residuals over their deviations. A few gross outliers among the lines that count make
-    the mean square large, whether the pose is right or not: the solver does not know.
+    the mean square large, whether the pose is right or not: the solver does not know. Lines of a squared distance
+    beyond ``bound`` are left out, and what is kept scatters the less.
     """
     kept = np.array([r is None for r in rejected], bool)
     count = int(np.count_nonzero(kept))
@@ -112,7 +117,7 @@ def find_doubt(whitened: Floats, rejected: tuple[str | None, ...], settings: Pos
     if 2 * count < len(rejected):
         return MINORITY
     freedom = 2.0 * count
-    limit = settings.max_residual_sigmas**2 * compute_max_chi2(freedom, settings)
+    limit = compute_mean_square(settings.max_residual_sigmas**2, bound) * compute_max_chi2(freedom, settings)
     return FAR_LINES if float(np.sum(whitened[kept] ** 2)) > limit else None
 
 
@@ -127,8 +132,10 @@ def compute_covariance(
     allows have more noise. And ``doubtful`` ones (n,) may be wrong by as much as an inlier can be.
     """
     kept = np.array([r is None for r in rejected], bool)
-    noise = 1.0 if bound is None else compute_trimming(bound)
-    noise *= measure_scatter(lines.take(kept), rotation, translation, settings)
+    noise = measure_scatter(lines.take(kept), rotation, translation, settings)
+    if bound is not None:
+        mean = noise if noise > 1.0 else compute_mean_square(1.0, bound)
+        noise = compute_spread(mean, bound, settings.max_scatter)
     arrays = lines.arrays
     if bound is not None and doubtful is not None:
         arrays = (*arrays[:6], lines.sigma_px * np.where(doubtful, math.sqrt(max(0.5 * bound, 1.0)), 1.0), arrays[7])
@@ -161,18 +168,6 @@ def measure_scatter(lines: LineSet, rotation: Floats, translation: Floats, setti
     left = float(np.sum((whitened - basis @ (basis.T @ whitened)) ** 2))
     is_more = freedom >= settings.min_scatter_freedom and left > compute_max_chi2(freedom, settings)
     return left / freedom if is_more else 1.0
-
-
-def compute_trimming(bound: float) -> float:
-    """The factor on the covariance of the kept lines, where those of a squared distance beyond ``bound`` are left out.
-
-    A line has two residuals of the normal law. Of all lines the part F2, chi-squared's law with two degrees of freedom,
-    is kept, and of their squares F4, the same with four. The kept lines' Hessian is F2 times that of all lines; the
-    pose's covariance is 1 / F4 times the inverse of that (Huber: E[psi^2] / E[psi']^2). So it is F2 / F4 times what the
-    kept lines' Hessian says, and their mean square is F4 / F2 of the noise's.
-    """
-    outside = math.exp(-0.5 * bound)
-    return (1.0 - outside) / (1.0 - outside * (1.0 + 0.5 * bound))
 
 
 def build_prior_estimate(

@@ -1,0 +1,47 @@
+"""Whether errors are as large as stated: the normalised error squared (NEES) within its chi-square band.
+
+Source: Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, §5.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from world_models.frames import Pose2, wrap_angle
+
+Array = NDArray[np.float64]
+P_OUTSIDE = 1e-3
+"""Probability that an honest estimator is outside one end of its band."""
+
+
+def compute_error(found: Pose2, truth: Pose2) -> Array:
+    """(3,) error in x [m], y [m], heading [rad]."""
+    return np.array([found.x_m - truth.x_m, found.y_m - truth.y_m, wrap_angle(found.heading_rad - truth.heading_rad)])
+
+
+def compute_nees(error: Any, covariance: Any) -> float:
+    """Squared error (d,) in units of its covariance (d, d)."""
+    e = np.asarray(error, float)
+    return float(e @ np.linalg.solve(np.asarray(covariance, float), e))
+
+
+def assert_consistent(errors: Iterable[float], freedom: int, *, most_surplus: float = 1.0, most: float = 1.0) -> None:
+    """The mean NEES is within the chi-square band of as many independent draws.
+
+    Args:
+        errors: one NEES a draw. freedom: unknowns of a draw.
+        most_surplus: by how much the stated variance may be too large, where the method promises no more than a bound.
+        most: by how much the variance may be too small; 1: not at all.
+    """
+    values = np.array(list(errors))
+    count = freedom * len(values)
+    mean = float(values.mean()) / freedom
+    low, high = (float(chi2.ppf(p, count)) / count for p in (P_OUTSIDE, 1.0 - P_OUTSIDE))
+    assert mean <= most * high, f"overconfident: errors squared are {mean:.2f} times the stated, not {most * high:.2f}"
+    assert mean >= low / most_surplus, (
+        f"underconfident: errors squared are {mean:.2f} times the stated, at least {low / most_surplus:.2f}")

@@ -1,0 +1,214 @@
+"""Laws of how sure poses are: errors are as large as stated, with noise as stated and with more of it.
+
+The normalised error squared over many noise draws is within its chi-square band (`tests/consistency.py`). A robust
+solver leaves out what is too far off, so that what it keeps scatters less than the noise does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import binom
+
+from consistency import assert_consistent, compute_error, compute_nees
+from knowledge_sources.methods.pose import (
+    PoseEstimate,
+    med_r_and_t,
+    planar_from_lines,
+    planar_from_points,
+    r_and_t,
+    r_and_t_ml,
+    r_then_t,
+    trunc_r_and_t,
+)
+from knowledge_sources.methods.pose.numerics.trimmed_noise import compute_mean_square, compute_spread
+from knowledge_sources.methods.pose.with_camera import estimate_camera_and_pose
+from knowledge_sources.settings import DEFAULT
+from world_models.building.model_errors import LineErrors
+from world_models.camera import Camera, CameraMount
+from world_models.frames import Pose2
+
+CAMERA = Camera.from_field_of_view(np.radians(65.0))
+MOUNT = CameraMount(1.0, 0.1, 0.05)
+SIGMA_PX = 0.3
+PRIOR = np.diag([0.2, 0.2, 0.05]) ** 2
+ALONE = replace(DEFAULT.pose, shared_px=0.0, marginal_spread=1.0, shared_prior_factor=0.0)
+"""No error that all lines share, and every segment is of its line."""
+NOISES = (1.0, 1.5, 2.0)
+"""The true noise over the stated one."""
+ESTIMATED = {1.0: 1.0, 1.5: 1.15, 2.0: 1.15}
+"""By how much errors may exceed the stated ones where the noise is estimated from few residuals (Student's law)."""
+Array = NDArray[np.float64]
+
+
+def build_hall() -> Array:
+    """Door posts, lintels and long edges ahead of the robot (n, 2, 3)."""
+    lines = [[[1.5, y, z], [15.0, y, z]] for y in (-1.2, 1.2) for z in (0.0, 2.4)]
+    for x in (3.0, 5.5, 8.0, 11.0):
+        for y in (-1.2, 1.2):
+            far = x + 0.9
+            lines += [[[x, y, 0.0], [x, y, 2.1]], [[far, y, 0.0], [far, y, 2.1]], [[x, y, 2.1], [far, y, 2.1]]]
+    return np.array(lines)
+
+
+class Draw:
+    """A robot anywhere, what it sees of the hall, and what it believed before."""
+
+    def __init__(self, seed: int, noise: float) -> None:
+        self.rng = rng = np.random.default_rng(seed)
+        self.truth = Pose2(4.0, -2.0, rng.uniform(-3.0, 3.0))
+        here = self.truth.lifted()
+        self.camera_from_world = MOUNT.camera_from_robot @ here.inverse()
+        lines = here.apply(build_hall())
+        segments, visible = CAMERA.project_segments(lines, self.camera_from_world)
+        self.lines, self.segments = lines[visible], self.add_noise(segments[visible], noise)
+        self.points = here.apply(rng.uniform((3.0, -1.2, 0.0), (9.0, 1.2, 2.2), (24, 3)))
+        self.pixels = self.add_noise(CAMERA.project(self.camera_from_world.apply(self.points)), noise)
+        off = rng.multivariate_normal(np.zeros(3), PRIOR)
+        self.prior = Pose2(*(np.array([self.truth.x_m, self.truth.y_m, self.truth.heading_rad]) + off))
+
+    def add_noise(self, px: Array, noise: float) -> Array:
+        return px + self.rng.normal(0.0, noise * SIGMA_PX, px.shape)
+
+
+def on_floor_from_lines(d: Draw) -> Any:
+    return planar_from_lines(d.lines, d.segments, CAMERA, MOUNT.camera_from_robot, d.prior, prior_covariance=PRIOR,
+                             sigma_px=SIGMA_PX)
+
+
+def on_floor_from_lines_alone(d: Draw) -> Any:
+    return planar_from_lines(d.lines, d.segments, CAMERA, MOUNT.camera_from_robot, d.prior, sigma_px=SIGMA_PX)
+
+
+def on_floor_from_every_line(d: Draw) -> Any:
+    return planar_from_lines(d.lines, d.segments, CAMERA, MOUNT.camera_from_robot, d.prior, prior_covariance=PRIOR,
+                             sigma_px=SIGMA_PX, robust=False)
+
+
+def on_floor_from_points(d: Draw) -> Any:
+    return planar_from_points(d.points, d.pixels, CAMERA, MOUNT.camera_from_robot, d.prior, PRIOR, sigma_px=SIGMA_PX)
+
+
+@pytest.mark.parametrize("noise", NOISES)
+@pytest.mark.parametrize(
+    "solve", [on_floor_from_lines, on_floor_from_lines_alone, on_floor_from_every_line, on_floor_from_points])
+def test_a_pose_on_the_floor_is_as_far_off_as_it_says(solve: Callable[[Draw], Any], noise: float) -> None:
+    draws = [Draw(seed, noise) for seed in range(80)]
+    found = [solve(d) for d in draws]
+    assert_consistent((compute_nees(compute_error(f.world_from_robot, d.truth), f.covariance)
+                       for f, d in zip(found, draws, strict=True)), 3, most=ESTIMATED[noise])
+
+
+@pytest.mark.parametrize("solve", [on_floor_from_lines, on_floor_from_points])
+def test_with_three_times_the_noise_it_is_hardly_too_sure(solve: Callable[[Draw], Any]) -> None:
+    """A third of the right lines is then left out as wrong, and the cut hides most of the noise."""
+    draws = [Draw(seed, 3.0) for seed in range(80)]
+    found = [solve(d) for d in draws]
+    assert_consistent((compute_nees(compute_error(f.world_from_robot, d.truth), f.covariance)
+                       for f, d in zip(found, draws, strict=True)), 3, most=2.0)
+
+
+@pytest.mark.parametrize("noise", (1.0, 2.0))
+@pytest.mark.parametrize("solve", [r_then_t, r_and_t, r_and_t_ml, med_r_and_t, trunc_r_and_t])
+def test_a_camera_pose_is_as_far_off_as_it_says(solve: Callable[..., PoseEstimate], noise: float) -> None:
+    errors = []
+    for seed in range(50):
+        d = Draw(seed, noise)
+        prior = d.camera_from_world.perturbed(d.rng.normal(0.0, 0.01, 3), d.rng.normal(0.0, 0.1, 3))
+        found = solve(d.lines, d.segments, CAMERA, prior, sigma_px=SIGMA_PX, settings=ALONE)
+        off = found.camera_from_world @ d.camera_from_world.inverse()
+        errors.append(compute_nees(np.concatenate([off.rotation_vector, off.translation]), found.covariance))
+    assert_consistent(errors, 6)
+
+
+@pytest.mark.parametrize("solve", [r_and_t_ml, med_r_and_t])
+def test_with_four_times_the_noise_no_pose_is_called_decided(solve: Callable[..., PoseEstimate]) -> None:
+    ok = []
+    for seed in range(30):
+        d = Draw(seed, 4.0)
+        ok.append(solve(d.lines, d.segments, CAMERA, d.camera_from_world, sigma_px=SIGMA_PX, settings=ALONE).ok)
+    assert np.mean(ok) <= 0.1
+
+
+@pytest.mark.parametrize("noise", NOISES)
+def test_a_pose_in_an_inexact_model_is_as_far_off_as_it_says(noise: float) -> None:
+    """Walls and doors are displaced by what the model says of itself.
+
+    The factor for segments of a wrong line, which none is here, covers noise that is larger than stated.
+    """
+    errors, tuning = [], ALONE if noise == 1.0 else DEFAULT.pose
+    for seed in range(60):
+        d = Draw(seed, noise)
+        shifts = np.zeros((6, len(d.lines), 3))
+        for k in range(6):
+            shifts[k, k::6] = d.rng.normal(0.0, 0.01, 3)
+        model = LineErrors(tuple(str(k) for k in range(6)), shifts)
+        true = model.displace(d.lines, d.rng.normal(size=6))
+        segments = d.add_noise(CAMERA.project_segments(true, d.camera_from_world)[0], noise)
+        found = planar_from_lines(d.lines, segments, CAMERA, MOUNT.camera_from_robot, d.prior, prior_covariance=PRIOR,
+                                  sigma_px=SIGMA_PX, errors=model, settings=tuning)
+        errors.append(compute_nees(compute_error(found.world_from_robot, d.truth), found.covariance))
+    assert_consistent(errors, 3, most_surplus=1.0 if noise == 1.0 else DEFAULT.pose.marginal_spread**2)
+
+
+@pytest.mark.parametrize("noise", NOISES)
+def test_a_pose_with_the_camera_is_as_far_off_as_it_says(noise: float) -> None:
+    errors = []
+    camera_sigma = np.array([0.01, 0.01, 1e-6, 0.01, 0.01, 0.1, 0.1])
+    for seed in range(60):
+        d = Draw(seed, noise)
+        found = estimate_camera_and_pose(d.lines, d.segments, CAMERA, MOUNT, d.prior, PRIOR, np.diag(camera_sigma**2),
+                                         sigma_px=SIGMA_PX)
+        errors.append(compute_nees(compute_error(found.world_from_robot, d.truth), found.pose_covariance))
+    assert_consistent(errors, 3, most_surplus=1.5)
+
+
+@pytest.mark.parametrize("solve", [on_floor_from_lines, on_floor_from_points])
+def test_as_many_right_ones_are_left_out_as_the_bound_says(solve: Callable[[Draw], Any]) -> None:
+    """Of pairs of residuals of the normal law the part exp(-bound / 2) is beyond the bound on their squares."""
+    s = DEFAULT.pose
+    bound = 2.0 * s.outlier_sigmas**2 if solve is on_floor_from_lines else s.point_outlier_sigmas**2
+    for noise in (1.0, 1.5, 2.0):
+        kept = np.concatenate([solve(Draw(seed, noise)).inliers for seed in range(60)])
+        out = int(np.count_nonzero(~kept))
+        part = np.exp(-0.5 * bound / noise**2)
+        low, high = binom.ppf((1e-3, 1.0 - 1e-3), len(kept), part)
+        assert 0.6 * low <= out <= 1.6 * high + 1, f"{out} of {len(kept)} are left out, expected {part:.2%}"
+
+
+@pytest.mark.parametrize(("sigmas", "is_kept"), [(0.95, True), (1.05, False)])
+def test_one_line_just_within_and_just_beyond_the_bound(sigmas: float, is_kept: bool) -> None:
+    """Both ends of one upright moved across by a part of the largest distance; all other lines are exact."""
+    d = Draw(0, 0.0)
+    level = np.ptp(d.segments[..., 0], axis=1) < 1.0
+    one = int(np.flatnonzero(level)[0])
+    each_px = sigmas * DEFAULT.pose.outlier_sigmas * SIGMA_PX
+    d.segments[one, :, 0] += each_px
+    found = planar_from_lines(d.lines, d.segments, CAMERA, MOUNT.camera_from_robot, d.truth,
+                              prior_covariance=np.diag([1e-8] * 3), sigma_px=SIGMA_PX)
+    assert bool(found.inliers[one]) is is_kept and np.count_nonzero(found.inliers) >= len(d.lines) - 1
+
+
+@pytest.mark.parametrize("variance", [1.0, 2.0, 4.0, 9.0])
+def test_trimmed_noise_by_drawing_it(variance: float) -> None:
+    """Mean square of what is kept, and the spread of the mean of kept ones (a place in the plane), by Monte Carlo."""
+    rng, bound, count = np.random.default_rng(1), 18.0, 400
+    kept = rng.normal(0.0, np.sqrt(variance), (200_000, 2))
+    kept = kept[np.sum(kept**2, axis=1) <= bound]
+    mean = compute_mean_square(variance, bound)
+    assert np.mean(kept**2) == pytest.approx(mean, rel=0.01)
+    centres = []
+    for _ in range(400):
+        drawn, at = rng.normal(0.0, np.sqrt(variance), (count, 2)), np.zeros(2)
+        for _ in range(30):
+            near = np.sum((drawn - at) ** 2, axis=1) <= bound
+            at = drawn[near].mean(axis=0)
+        centres.append(at * np.sqrt(np.count_nonzero(near)))
+    if variance <= 4.0:  # at more noise the limit of many residuals is far
+        assert np.mean(np.square(centres)) == pytest.approx(compute_spread(mean, bound, 16.0), rel=0.2)
+    assert compute_spread(mean, bound, 16.0) == pytest.approx(variance**2 / mean, rel=1e-6)
