@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harvey.tables import table
-from world_models.entries.location import Place
 from world_models.units import FOOT_M, INCH_M
-from world_models.words import count, degrees, listed
+from world_models.words import count, degrees
 
 if TYPE_CHECKING:
     from harvey.dry_run import MilestonePreview
@@ -30,8 +29,8 @@ def format_error(error_m: float) -> str:
     return f"{error_m * 1000.0:.1f} mm ({error_m / INCH_M:.2f} inches)"
 
 
-def format_result(r: MissionResult, out: Path | None) -> str:
-    """The summary of one mission."""
+def format_result(r: MissionResult, out: Path | None, story: Sequence[str] = ()) -> str:
+    """The summary of one mission; ``story``: the first lines of its story."""
     m = r.milestones
     lines = [
         f"{r.outcome}: {r.reason}",
@@ -40,8 +39,7 @@ def format_result(r: MissionResult, out: Path | None) -> str:
         f" {m['false_accepts']} accepted wrongly",
         f"  plans         {count(r.sketches, 'sketch', 'sketches')}, {count(r.replans, 'replan')},"
         f" {count(r.relocalizations, 'relocalization')}",
-        f"  collisions    {r.collisions}{_places(r)}",
-        *(f"  {point.kind:<12}  cycle {point.cycle}: {point.text}" for point in r.turning_points),
+        f"  collisions    {r.collisions}",
         *(f"  camera        {lesson.text()}" for lesson in r.camera),
         *(f"  amiss         {text}" for text in r.amiss),
         f"  way           {r.path_length_m:.1f} m in {r.sim_time_s:.0f} s of the robot's time",
@@ -49,20 +47,12 @@ def format_result(r: MissionResult, out: Path | None) -> str:
         f" {count(r.waits, 'more cycle')} to ask for locale frames",
     ]
     if out is not None:
-        lines += [f"  recording     {out / 'recording.rrd'}", "",
-                  f"open it with    harvey view {out}", f"ask it with     harvey why {out}"]
+        lines.append(f"  recording     {out / 'recording.rrd'}")
+    lines += ["", *story] if story else []
+    if out is not None:
+        lines += ["", f"open it with    harvey view {out}", f"have it told    harvey story {out}",
+                  f"ask it with     harvey why {out}"]
     return "\n".join(lines)
-
-
-def _places(r: MissionResult) -> str:
-    """Where the robot truly touched something."""
-    where = listed([f"in cycle {c.cycle} at {Place(c.locale, c.x_m, c.y_m).words()}{_speed(c.speed_m_per_s)}"
-                    for c in r.contacts])
-    return f": {where}" if where else ""
-
-
-def _speed(speed_m_per_s: float | None) -> str:
-    return "" if speed_m_per_s is None else f" at {speed_m_per_s:.2f} m/s"
 
 
 def format_results(results: Sequence[MissionResult]) -> str:

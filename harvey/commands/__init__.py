@@ -17,6 +17,7 @@ from harvey.commands import (
     resume,
     run,
     settings,
+    story,
     view,
     why,
     world,
@@ -24,7 +25,7 @@ from harvey.commands import (
 from harvey.commands.command import Command
 
 COMMANDS: tuple[Command, ...] = (
-    listing.COMMAND, run.COMMAND, view.COMMAND, why.COMMAND, replay.COMMAND, diff.COMMAND, resume.COMMAND,
-    repair.COMMAND, world.COMMAND, settings.COMMAND, experiment.COMMAND, drive.COMMAND, calibrate.COMMAND,
-    emulate.COMMAND,
+    listing.COMMAND, run.COMMAND, view.COMMAND, story.COMMAND, why.COMMAND, replay.COMMAND, diff.COMMAND,
+    resume.COMMAND, repair.COMMAND, world.COMMAND, settings.COMMAND, experiment.COMMAND, drive.COMMAND,
+    calibrate.COMMAND, emulate.COMMAND,
 )

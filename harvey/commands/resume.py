@@ -45,9 +45,10 @@ def _run(args: Namespace) -> int:
         raise BadInput(f"--base and --camera: expected a run on hardware, and {run.path} is one of the simulator")
     _print_start(run, remains, head)
     from harvey.simulation.run import resume_mission
+    from harvey.story.story import first_lines
 
     result = resume_mission(run, remains, live=args.live)
-    print(format_result(result, run.path))
+    print(format_result(result, run.path, first_lines(run.path)))
     return 0 if result.outcome == "reached" else 1
 
 

@@ -81,6 +81,7 @@ def _check(task: Task) -> int:
 def _one(task: Task, args: Namespace) -> int:
     from harvey.campaign.progress import following
     from harvey.campaign.summary import format_result
+    from harvey.story.story import first_lines
     from harvey.why.trace import printing
 
     sinks = (printing(sys.stdout),) if args.trace else ()
@@ -88,7 +89,7 @@ def _one(task: Task, args: Namespace) -> int:
     print(f"{task.label}: setting the stage", file=sys.stderr, flush=True)
     with following(sys.stderr) as follow:
         result = run_task(task, sinks=sinks, follow=None if args.trace else follow, live=args.live)
-    print(format_result(result, task.out))
+    print(format_result(result, task.out, first_lines(task.out)))
     return 0 if result.outcome == "reached" else 1
 
 

@@ -11,11 +11,11 @@ from typing import Any
 from harvey.commands.command import Command, whole
 from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory, open_run
+from harvey.story.story import opening
 from harvey.why.history import History
 from harvey.why.journal import JournalHistory
 from harvey.why.model.element import stories_of
 from harvey.why.model.world_file import WorldFile
-from harvey.why.on_the_way import levels_off, on_the_way
 from harvey.why.questions import answers, is_question
 from harvey.why.story import LEGEND, Story, lines_of
 from harvey.why.trace import cycle_lines
@@ -61,7 +61,7 @@ def _run(args: Namespace) -> int:
         print(json.dumps([_record(one) for one in stories], indent=2))
     else:
         if not asked and args.at is None:
-            print("\n".join([*levels_off(run), *on_the_way(history, run.read_result()), ""]))
+            print("\n".join([*opening(run, history), ""]))
         print("\n".join(_paragraphs(history, args, stories)))
     return 0
 

@@ -2,7 +2,6 @@
 
 In reading order: ``history`` and ``journal`` (entries by name), ``links`` (what rests on what), ``sentences``,
 ``facts`` and ``decisions`` (in words), ``model/`` (frames, and the world's file), ``story``, ``milestone``,
-``questions``,
-``on_the_way`` (what is told), ``walk``, ``trace``, ``reach`` (the whole web), ``why_not``, ``ask``,
+``questions`` (what is told), ``walk``, ``trace``, ``reach`` (the whole web), ``why_not``, ``ask``,
 ``why_not_answers`` (what did not happen).
 """

@@ -19,7 +19,8 @@ MAX_LISTED = 4
 
 def describe_decision(history: History, record: EntryRecord) -> str:
     """By whom, when and against what."""
-    when = f"cycle {record.cycle}" + _time(history, record)
+    time_s = time_at(history, record.cycle)
+    when = f"cycle {record.cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run,")
     if record.author == WHAT_IF:
         return f"It was revised in {when.rstrip(',')} by the question what if."
     if record.observed:
@@ -38,14 +39,14 @@ def describe_candidate(c: Candidate) -> str:
     return f"the {words(c.source)}, rated {c.rating:.2f}"
 
 
-def _time(history: History, record: EntryRecord) -> str:
-    """The newest time that anything from outside told when the entry came about, which need not rest on that."""
+def time_at(history: History, cycle: int) -> float | None:
+    """The newest time that anything from outside had told by a cycle [s]; None where nothing had lately."""
     cycles = history.cycles
-    for cycle in reversed(cycles[: bisect_right(cycles, record.cycle)][-TIMED_WITHIN:]):
-        told = [found for found in map(_time_of, history.decision(cycle).observed) if found is not None]
+    for one in reversed(cycles[: bisect_right(cycles, cycle)][-TIMED_WITHIN:]):
+        told = [found for found in map(_time_of, history.decision(one).observed) if found is not None]
         if told:
-            return f", {max(told):.1f} s into the run,"
-    return ""
+            return max(told)
+    return None
 
 
 def _time_of(record: EntryRecord) -> float | None:

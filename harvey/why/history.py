@@ -58,6 +58,14 @@ class History(ABC):
     def verify(self) -> None:
         """Read every line. Raises BadInput for the first that is no decision."""
 
+    def of_kind(self, *kinds: str, until: int | None = None) -> Iterator[EntryRecord]:
+        """All revisions of some kinds, up to a cycle, in the order in which they came about."""
+        heads = tuple(f"{kind}-" for kind in kinds)
+        for ref in self.refs:
+            record = self.entry(ref) if ref.startswith(heads) else None
+            if record is not None and (until is None or record.cycle <= until):
+                yield record
+
     def decision(self, cycle: int) -> DecisionRecord:
         """Raises BadInput where the run has no such cycle."""
         found = self.cycle_of(cycle)

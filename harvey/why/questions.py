@@ -55,14 +55,6 @@ def answers(history: History, question: str, at: int | None = None) -> Iterator[
     raise BadInput(f"expected a question as {known}, got {question!r}")
 
 
-def _records(history: History, kind: str, at: int | None) -> Iterator[EntryRecord]:
-    """All revisions of a kind up to a cycle, in the order in which they came about."""
-    for ref in history.refs:
-        record = history.entry(ref) if ref.startswith(f"{kind}-") else None
-        if record is not None and (at is None or record.cycle <= at):
-            yield record
-
-
 def _by_id(records: Iterable[EntryRecord]) -> Mapping[str, list[EntryRecord]]:
     found: dict[str, list[EntryRecord]] = {}
     for record in records:
@@ -73,7 +65,7 @@ def _by_id(records: Iterable[EntryRecord]) -> Mapping[str, list[EntryRecord]]:
 def _tell_way(history: History, question: str, at: int | None) -> Iterator[Story]:
     """Each thing in the way, as it was known last, and how it came to be known."""
     del question
-    things = _by_id(_records(history, "Obstacle", at))
+    things = _by_id(history.of_kind("Obstacle", until=at))
     for revisions in things.values():
         last = revisions[-1]
         yield Story(last.ref, headline(last), describe_decision(history, last), (
@@ -98,13 +90,13 @@ def _tell_sights(history: History, revisions: list[EntryRecord]) -> Iterator[Ste
 def _tell_consequences(history: History, name: str, at: int | None) -> Iterator[Step]:
     """Since when the frame of its locale had it, and whether a plan was withdrawn for that."""
     has_it = False
-    for record in _records(history, "LocaleFrame", at):
+    for record in history.of_kind("LocaleFrame", until=at):
         reference = reference_of(record)
         now = any(change.name == name for change in reference.changes)
         if now and not has_it:
             text = f"What is known of {reference.locale} had it from cycle {record.cycle} on."
             yield Step("known", text, (record.ref,))
-            for sketch in _records(history, "PlanSketch", at):
+            for sketch in history.of_kind("PlanSketch", until=at):
                 if record.ref in sketch.because and _is_superseded(sketch):
                     yield Step("plan", f"For that a plan was withdrawn in cycle {sketch.cycle}.", (sketch.ref,))
         has_it |= now
@@ -117,8 +109,8 @@ def _is_superseded(record: EntryRecord) -> bool:
 def _tell_stops(history: History, question: str, at: int | None) -> Iterator[Story]:
     """Each time that a leg was broken off, that the robot crept, or turned to see floor; with ``at`` the last."""
     del question
-    stops = [record for kind in ("Leg", "MotorCommand", "Contact", "Outcome") for record in _records(history, kind, at)
-             if _is_stop(record)]
+    stops = [record for kind in ("Leg", "MotorCommand", "Contact", "Outcome")
+             for record in history.of_kind(kind, until=at) if _is_stop(record)]
     stops.sort(key=lambda record: record.cycle)
     for record in stops if at is None else stops[-1:]:
         yield Story(record.ref, _describe_stop(record), describe_decision(history, record),
@@ -172,7 +164,7 @@ def _tell_pixels(history: History, record: EntryRecord) -> Iterator[Step]:
 def _tell_detours(history: History, question: str, at: int | None) -> Iterator[Story]:
     """Each plan that was withdrawn because the building is otherwise, and what was planned instead."""
     del question
-    sketches = list(_records(history, "PlanSketch", at))
+    sketches = list(history.of_kind("PlanSketch", until=at))
     detours = [one for one in sketches if _is_superseded(one) and any(
         ref.partition("-")[0] in CHANGED for ref in one.because)]
     cycles: dict[int, EntryRecord] = {}
@@ -191,7 +183,7 @@ def _tell_detours(history: History, question: str, at: int | None) -> Iterator[S
 
 def _tell_doors(history: History, question: str, at: int | None) -> Iterator[Story]:
     """Each door that pictures were asked about, or those that the question names."""
-    doors = _by_id(_records(history, "DoorState", at))
+    doors = _by_id(history.of_kind("DoorState", until=at))
     named = {id: revisions for id, revisions in doors.items()
              if value_of(revisions[-1], DoorState).door in question.lower()}
     for revisions in (named or doors).values():
@@ -205,7 +197,8 @@ def _tell_doors(history: History, question: str, at: int | None) -> Iterator[Sto
                     f" {state.state}, certainty {state.certainty:.3f} by {count(state.pictures, 'picture')}.")
             steps.append(Step("evidence", text, (record.ref, *record.because)))
         yield Story(last.ref, headline(last), describe_decision(history, last), tuple(steps))
-    told = [r for r in _records(history, "LocaleFrame", at) if any(c.what == "shut" for c in reference_of(r).changes)]
+    told = [record for record in history.of_kind("LocaleFrame", until=at)
+            if any(change.what == "shut" for change in reference_of(record).changes)]
     if not doors and told:
         yield Story(told[-1].ref, headline(told[-1]), describe_decision(history, told[-1]), ())
     elif not doors:

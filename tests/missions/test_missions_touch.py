@@ -16,8 +16,8 @@ from harvey.run_files.run_directory import RunDirectory
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
 from harvey.simulation.run import build_head, resume_mission, run_mission
+from harvey.story.turns import read_turning_points
 from harvey.why.journal import JournalHistory
-from harvey.why.on_the_way import read_turning_points
 from harvey.why.story import tell_stories
 from logs.recording.paths import CONTACTS, RANGES
 from sim.made_up.short_missions import OFFICE

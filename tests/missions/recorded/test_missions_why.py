@@ -192,9 +192,9 @@ def test_the_first_lines_tell_the_turning_points_that_the_result_keeps(
         told = capsys.readouterr().out
         kept = json.loads((run / "result.json").read_text(encoding="utf-8"))
         assert {point["kind"] for point in kept["turning_points"]} >= {"lost", "found"}
-        assert told.startswith("On the way:")
+        assert told.splitlines()[1] == "On the way:"
         for point in (*kept["turning_points"], *({**c, "kind": "collision"} for c in kept["contacts"])):
-            assert re.search(rf"^  cycle {point['cycle']} +{point['kind']} ", told, re.MULTILINE)
+            assert re.search(rf"^  cycle {point['cycle']} +[0-9.]+ s  {point['kind']} ", told, re.MULTILINE)
         assert len(kept["contacts"]) == kept["collisions"]
 
 

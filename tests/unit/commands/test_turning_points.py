@@ -15,52 +15,31 @@ from blackboard.board import Blackboard
 from blackboard.effect import Effect, Post, Revise
 from blackboard.journal import Decision, decision_line
 from blackboard.level import Level
-from blackboard.servoing import Discrepancy
 from harvey.campaign.progress import Lines
 from harvey.campaign.summary import format_result
 from harvey.campaign.tally import Tally
+from harvey.errors import BadInput
 from harvey.run_files.records import DecisionRecord, decision_of
 from harvey.run_files.run_directory import RunDirectory
-from harvey.runner.result import Contact, MissionResult
+from harvey.runner.result import Contact as Collision
+from harvey.runner.result import MissionResult
 from harvey.simulation.contacts import ContactWatch
+from harvey.story.head import levels_off
+from harvey.story.turns import read_turning_points, turn_lines
 from harvey.why.decisions import describe_decision
 from harvey.why.history import MemoryHistory
-from harvey.why.on_the_way import levels_off, on_the_way
 from harvey.why.story import headline, story
 from logs.turning_points import TurningPoint, TurningPointFinder
 from scripted_mission import house
+from scripted_turns import HELD, decisions
 from sim.body.simulated_body import SimulatedBody
 from sim.truth import Truth
 from world_models.entries.body import BodyFault, Recovery
-from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.task import Certificate, Milestone, Outcome
+from world_models.entries.door_state import DoorPicture, DoorState
+from world_models.entries.obstacle import Obstacle
+from world_models.entries.task import Outcome
+from world_models.entries.touch import Contact
 from world_models.frames import Pose2
-
-CERTIFICATE = Certificate("Milestone-1", "", "refuted", "1 of 9 lines", 9, 3, 1, 0.1, 1.0, 0.1, 0.0, 9.0, 30.0, 1.0)
-HELD = Hypothesis("kitchen", Pose2(1.0, 2.0, 0.0), diagonal(0.01, 0.01), "odometry")
-
-
-def decisions() -> list[Decision]:
-    """Refuted, lost, found, a fault, the end: one a cycle."""
-    board, made = Blackboard(), list[Decision]()
-
-    def act(*effects: Effect) -> None:
-        cycle = len(made) + 1
-        changes = board.apply(list(effects), author="source", cycle=cycle)
-        made.append(Decision(cycle, (), (), Level.ACTION, (), (), None, None, 0, changes, ""))
-
-    act(Post(HELD), Post(Milestone("PlanSketch-1", 2, "M2 of the route", 0.0)))
-    act(Post(CERTIFICATE))
-    doubt = Discrepancy(Level.PLAN, "M2 is refuted", 99.0, (9.0, 30.0), "px")
-    act(Post(doubt, (board.view["Hypothesis-1"],)))
-    act(Revise(board.view["Discrepancy-1"], replace(doubt, status="escalated"), (board.view["Hypothesis-1"],)))
-    there = replace(HELD, basis="relocalization", locale_from_robot=Pose2(3.0, 1.0, 0.0))
-    act(Revise(board.view["Hypothesis-1"], there))
-    fault = BodyFault("camera", "camera unplugged", "no such device", "Look-1", 7.0)
-    act(Post(fault))
-    act(Post(Recovery("BodyFault-1", "Look-1", 7.0, 2.0, tries=9, waited_s=30.0, status="in vain")))
-    act(Post(Outcome("failed", "camera unplugged")))
-    return made
 
 
 def records() -> list[DecisionRecord]:
@@ -72,26 +51,68 @@ def test_what_must_be_told_is_found_with_cycle_and_place() -> None:
     points = [point for decision in decisions() for point in finder.find(decision) if point.is_told]
     assert [(point.cycle, point.kind, point.text) for point in points] == [
         (2, "refuted", "M2 of the route: 1 of 9 lines"),
-        (4, "lost", "kitchen (1.00, 2.00) m by its belief; nothing fits"),
+        (4, "lost", "kitchen (1.00, 2.00) m by its belief; M2 is refuted"),
         (5, "found", "kitchen (3.00, 1.00) m; it knows again where it is"),
         (6, "fault", "camera: camera unplugged"),
     ]
 
 
-def test_why_tells_them_first_with_the_collisions_that_the_simulator_knows_of() -> None:
+def test_read_back_from_the_journal_they_are_the_same() -> None:
+    finder = TurningPointFinder()
+    assert list(read_turning_points(MemoryHistory(records()))) == [
+        point for decision in decisions() for point in finder.find(decision)]
+
+
+def test_a_door_and_a_thing_are_told_when_they_change_and_not_each_time_that_they_are_seen() -> None:
+    box = Obstacle("hallway/obstacle-1", "hallway", (), 0.05, 0.2, 0.3, 0.5, status="suspected")
+    picture = DoorPicture("Frame-3", (10.0, 20.0, 30.0, 40.0), 0.0, 0.0, 0.0, 3.0, "a leaf")
+    door = DoorState("library-door", ("hallway", "library"), "unknown", 0.6, 1.0, 1, picture, 5.0)
+    board, found, finder = Blackboard(), list[TurningPoint](), TurningPointFinder()
+    states = (("suspected", "unknown"), ("there", "shut"), ("there", "shut"), ("gone", "open"), ("gone", "open"))
+    for cycle, (thing, leaf) in enumerate(states, 1):
+        values = replace(box, status=cast(Any, thing)), replace(door, state=cast(Any, leaf))
+        entries = [board.view.get("Obstacle-1"), board.view.get("DoorState-1")]
+        effects: list[Effect] = [Post(value) if entry is None else Revise(entry, value)
+                                 for entry, value in zip(entries, values, strict=True)]
+        made = board.apply(effects, author="source", cycle=cycle)
+        found += finder.find(Decision(cycle, (), (), Level.ACTION, (), (), None, None, 0, made, ""))
+    assert [(point.cycle, point.kind) for point in found] == [(2, "thing"), (2, "door"), (4, "thing"), (4, "door")]
+    assert [point.text.partition(":")[0] for point in found] == [
+        "something 0.5 m wide at (0.20, 0.30) m of hallway is in the way (hallway/obstacle-1)", "library-door is shut",
+        "something 0.5 m wide at (0.20, 0.30) m of hallway is gone (hallway/obstacle-1)", "library-door is open"]
+
+
+def test_a_contact_is_told_with_the_place_where_it_believed_to_be() -> None:
+    board, finder = Blackboard(), TurningPointFinder()
+    made = board.apply([Post(HELD), Post(Contact("bumper", 0.0, 0.1, 3.5))], author="body", cycle=1)
+    (point,) = finder.find(Decision(1, made, made, Level.ACTION, (), (), None, None, 0, (), ""))
+    assert (point.kind, point.time_s) == ("contact", 3.5)
+    where = "at kitchen (1.00, 2.00) m by its belief"
+    assert point.text == f"the bumper touched something straight ahead (+-5.7 degrees), {where}"
+
+
+def test_a_short_account_tells_them_with_the_collisions_that_the_simulator_knows_of() -> None:
     contact = {"cycle": 3, "locale": "kitchen", "x_m": 1.5, "y_m": 2.0}
-    told = list(on_the_way(MemoryHistory(records()), {"collisions": 1, "contacts": [contact]}))
+    told = list(turn_lines(MemoryHistory(records()), {"collisions": 1, "contacts": [contact]}))
     assert told == [
         "On the way:",
         "  cycle 2  refuted    M2 of the route: 1 of 9 lines",
         "  cycle 3  collision  kitchen (1.50, 2.00) m, as only the simulator knows",
-        "  cycle 4  lost       kitchen (1.00, 2.00) m by its belief; nothing fits",
+        "  cycle 4  lost       kitchen (1.00, 2.00) m by its belief; M2 is refuted",
         "  cycle 5  found      kitchen (3.00, 1.00) m; it knows again where it is",
         "  cycle 6  fault      camera: camera unplugged",
     ]
-    lines = list(on_the_way(MemoryHistory(records()[:1]), {"collisions": 2}))
+    lines = list(turn_lines(MemoryHistory(records()[:1]), {"collisions": 2}))
     assert lines[-1] == "  2 collisions; this run does not say where"
-    assert "Nothing went wrong on the way" in next(on_the_way(MemoryHistory(records()[:1]), {}))
+    assert "Nothing went wrong on the way" in next(turn_lines(MemoryHistory(records()[:1]), {}))
+
+
+@pytest.mark.parametrize("contact", [{"cycle": 3}, {"cycle": "3", "locale": "", "x_m": 0.0, "y_m": 0.0}, 7, {},
+                                     {"cycle": 99, "locale": "", "x_m": 0.0, "y_m": 0.0},
+                                     {"cycle": 3, "locale": "", "x_m": "here", "y_m": 0.0}])
+def test_a_collision_that_is_none_is_one_error(contact: Any) -> None:
+    with pytest.raises(BadInput, match=r"result\.json: contacts: expected"):
+        list(turn_lines(MemoryHistory(records()), {"contacts": [contact]}))
 
 
 def test_the_time_of_a_decision_is_in_the_clock_of_the_run_also_while_a_fault_lasts() -> None:
@@ -129,15 +150,15 @@ def test_a_level_that_was_off_is_said(tmp_path: Path) -> None:
 
 
 def test_the_summary_tells_them_and_the_result_keeps_them() -> None:
-    contacts, points = (Contact(3, "kitchen", 1.5, 2.0, 0.38),), (TurningPoint(4, "lost", "here; nothing fits"),)
+    contacts, points = (Collision(3, "kitchen", 1.5, 2.0, 0.38),), (TurningPoint(4, "lost", "here; nothing fits"),)
     known = MissionResult(
         scenario="s", seed=0, outcome="reached", reason="so it was", goal="(ptrans)", final_error_m=0.01,
         final_heading_error_rad=0.0, path_length_m=20.0, sim_time_s=90.0, wall_time_s=10.0, frames=9, decisions=400,
         milestones={"verified": 5, "refuted": 1, "not_testable": 0, "false_accepts": 0}, replans=2, relocalizations=0,
         sketches=3, collisions=1, max_cross_track_m=1.0, contacts=contacts, turning_points=points)
     text = format_result(known, None)
-    assert "collisions    1: in cycle 3 at kitchen (1.50, 2.00) m at 0.38 m/s" in text
-    assert "lost          cycle 4: here; nothing fits" in text
+    assert "collisions    1\n" in text
+    assert format_result(known, None, ("On the way:", "  cycle 4  lost")).endswith("\n\nOn the way:\n  cycle 4  lost")
     assert MissionResult.of_record(json.loads(json.dumps(known.record()))) == replace(known, amiss=[])
 
 
@@ -150,7 +171,7 @@ def test_progress_says_that_it_is_lost_and_found() -> None:
         lines(decision)
         lost.append(tally.is_lost)
     assert lost == [False, False, False, True, False, False, False, False]
-    assert "cycle 4: lost: kitchen (1.00, 2.00) m by its belief; nothing fits\n" in out.getvalue()
+    assert "cycle 4: lost: kitchen (1.00, 2.00) m by its belief; M2 is refuted\n" in out.getvalue()
     assert "cycle 5: found: kitchen (3.00, 1.00) m; it knows again where it is\n" in out.getvalue()
 
 

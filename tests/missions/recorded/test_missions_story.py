@@ -1,0 +1,165 @@
+"""The story of whole missions: a good one, a kidnap, a bump, one that is blocked and one that stays lost."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from blackboard.journal import decision_line
+from harvey.agent import build_agent
+from harvey.campaign.campaign import Task, run_task
+from harvey.cli import main
+from harvey.run_files.observations import Originals
+from harvey.run_files.records import decision_of
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import RunHead
+from harvey.runner.replay import open_pictures, replay
+from harvey.story.story import RunStory, story_lines, tell_run
+from harvey.story.turns import read_turning_points
+from harvey.why.history import MemoryHistory
+from harvey.why.journal import JournalHistory
+from sim.made_up.short_missions import OFFICE, fault
+
+TOLD_SHUT = """
+description = "To Allen's office; that its door is shut is told at once."
+world = "research_center"
+details = ["research_center_details"]
+goal = "(ptrans (hallway (68,4,0)) (allens-office (13,12,0)))"
+
+[start]
+heading_deg = 0.0
+put_down_sigma_m = 0.02
+put_down_sigma_deg = 1.0
+
+[[told]]
+what = "allens-door"
+state = "shut"
+at_s = 0.0
+"""
+BUMP = OFFICE + fault("bump", "allens-office", 3.0, left_m=0.3, turn_deg=10.0)
+SCENARIOS = {
+    "good": (OFFICE, ()),
+    "kidnapped": (OFFICE + fault("kidnap", "allens-office", 3.0, distance_m=0.8, turn_deg=30.0), ()),
+    "bumped": (BUMP, ()),
+    "blocked": (TOLD_SHUT, ()),
+    "lost": (BUMP, (("servo.goal", "off"),)),
+}
+OUTCOMES = {"good": "reached", "kidnapped": "reached", "bumped": "reached", "blocked": "blocked", "lost": "lost"}
+CYCLE = re.compile(r"cycles? (\d+)")
+
+
+@pytest.fixture(scope="module", params=SCENARIOS)
+def told(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+    folder = tmp_path_factory.mktemp(request.param)
+    text, settings = SCENARIOS[request.param]
+    scenario = folder / f"{request.param}.toml"
+    scenario.write_text(text, encoding="utf-8")
+    assert run_task(Task(str(scenario), settings, 0, folder / "run")).outcome == OUTCOMES[request.param]
+    return request.param, folder / "run"
+
+
+@pytest.fixture(scope="module")
+def history(told: tuple[str, Path]) -> JournalHistory:
+    return JournalHistory(told[1] / "journal.jsonl")
+
+
+@pytest.fixture(scope="module")
+def story(told: tuple[str, Path], history: JournalHistory) -> RunStory:
+    return tell_run(RunDirectory(told[1]), history)
+
+
+def test_it_tells_how_the_run_went(told: tuple[str, Path], story: RunStory) -> None:
+    name, _ = told
+    page = "\n".join(story_lines(story))
+    assert page.startswith(f"{name}, seed 0: {OUTCOMES[name]} in cycle ")
+    assert ("It was lost: " in page) is (name in ("kidnapped", "bumped", "lost"))
+    assert ("It found out where it was, " in page) is (name in ("kidnapped", "bumped"))
+    assert ("It did not find out where it was." in page) is (name == "lost")
+    assert ("allens-door" in page.partition("How it ended")[2]) is (name == "blocked")
+
+
+def test_each_sentence_has_a_cycle_of_the_journal_and_entries_that_it_made(
+    story: RunStory, history: JournalHistory
+) -> None:
+    sentences = [sentence for section in story.sections for sentence in section.sentences]
+    known = set(history.refs)
+    for sentence in sentences:
+        assert sentence.cycle is None or sentence.cycle in history.cycles
+        assert set(sentence.refs) <= known
+        assert {int(number) for number in CYCLE.findall(sentence.text)} <= set(history.cycles)
+    for ref, cycle in ((ref, sentence.cycle) for sentence in sentences for ref in sentence.refs[:1]):
+        assert (history.entry(ref) or pytest.fail(ref)).cycle == cycle
+    assert {row.cycle for row in story.milestones} <= set(history.cycles)
+    assert {point.cycle for point in story.turning_points} <= set(history.cycles)
+
+
+def test_the_turning_points_are_those_that_the_run_found(told: tuple[str, Path], history: JournalHistory) -> None:
+    kept = RunDirectory(told[1]).read_result()["turning_points"]
+    read = [point for point in read_turning_points(history) if point.is_told]
+    assert [(p.cycle, p.kind, p.text, p.time_s) for p in read] == [
+        (p["cycle"], p["kind"], p["text"], p["time_s"]) for p in kept]
+
+
+def test_every_verdict_of_the_journal_is_a_row(story: RunStory, history: JournalHistory) -> None:
+    certificates = [record for record in history.of_kind("Certificate") if record.change == "Posted"]
+    judged = [row for row in story.milestones if row.p_false is not None]
+    assert [(row.cycle, row.verdict) for row in judged] == [(r.cycle, r.value["verdict"]) for r in certificates]
+    ids = {ref.rpartition(".")[0] for row in story.milestones for ref in row.refs if ref.startswith("Milestone-")}
+    assert ids == {id for id in history.newest if id.startswith("Milestone-")}
+
+
+def test_each_contact_is_told_with_its_cycle(told: tuple[str, Path], story: RunStory, history: JournalHistory) -> None:
+    felt = [record.cycle for record in history.of_kind("Contact")]
+    truly = [contact["cycle"] for contact in RunDirectory(told[1]).read_result()["contacts"]]
+    (section,) = (section for section in story.sections if section.title == "What it touched")
+    assert [s.cycle for s in section.sentences if s.cycle is not None] == [*felt, *truly]
+    assert all(re.search(r"\(-?[0-9.]+, -?[0-9.]+\) m", s.text) for s in section.sentences if s.cycle is not None)
+
+
+def test_its_first_lines_open_why(
+    told: tuple[str, Path], story: RunStory, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["why", str(told[1])]) == 0
+    assert capsys.readouterr().out.startswith("\n".join(story.opening))
+
+
+def test_the_story_of_a_replayed_run_is_the_same(told: tuple[str, Path], story: RunStory) -> None:
+    run = RunDirectory(told[1])
+    agent = build_agent(RunHead.read(run.path))
+    again = replay(run, Originals(open_pictures(run), agent.store), agent.scheduler())
+    decided = [decision.now for decision in again]
+    lines = [json.loads(decision_line(now)) for now in decided if now is not None]
+    assert tell_run(run, MemoryHistory(map(decision_of, lines))) == story
+
+
+def test_as_json_it_is_whole(told: tuple[str, Path], story: RunStory, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["story", str(told[1]), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(story.record()))
+
+
+def test_what_it_says_of_the_truth_comes_from_the_result_alone(told: tuple[str, Path], tmp_path: Path) -> None:
+    shutil.copytree(told[1], tmp_path / "run")
+    run = RunDirectory(tmp_path / "run")
+    run.result.unlink()
+    page = "\n".join(story_lines(tell_run(run, JournalHistory(run.journal))))
+    assert "In truth" not in page and "collision" not in page and "there is no result of the simulator" in page
+
+
+def test_a_run_that_was_cut_off_is_told_and_is_one_error(
+    told: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = RunDirectory(tmp_path / "run")
+    run.path.mkdir()
+    lines = (told[1] / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    whole = len(lines) // 2
+    run.journal.write_bytes(b"".join(lines[:whole]) + lines[whole][:30])
+    assert main(["story", str(run.path)]) == 2
+    printed = capsys.readouterr()
+    assert printed.out.startswith(f"run: cut off in cycle {whole}") and "\nMilestones\n" in printed.out
+    assert len(printed.err.splitlines()) == 1 and f"was cut off in cycle {whole}" in printed.err
+
+

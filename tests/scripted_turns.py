@@ -1,0 +1,41 @@
+"""A run of eight decisions in which it is refuted, lost, found, and its camera fails."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from blackboard.board import Blackboard
+from blackboard.effect import Effect, Post, Revise
+from blackboard.journal import Decision
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from world_models.entries.body import BodyFault, Recovery
+from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.task import Certificate, Milestone, Outcome
+from world_models.frames import Pose2
+
+CERTIFICATE = Certificate("Milestone-1", "", "refuted", "1 of 9 lines", 9, 3, 1, 0.1, 1.0, 0.1, 0.0, 9.0, 30.0, 1.0)
+HELD = Hypothesis("kitchen", Pose2(1.0, 2.0, 0.0), diagonal(0.01, 0.01), "odometry")
+
+
+def decisions() -> list[Decision]:
+    """Refuted, lost, found, a fault, the end: one a cycle."""
+    board, made = Blackboard(), list[Decision]()
+
+    def act(*effects: Effect) -> None:
+        cycle = len(made) + 1
+        changes = board.apply(list(effects), author="source", cycle=cycle)
+        made.append(Decision(cycle, (), (), Level.ACTION, (), (), None, None, 0, changes, ""))
+
+    act(Post(HELD), Post(Milestone("PlanSketch-1", 2, "M2 of the route", 0.0)))
+    act(Post(CERTIFICATE))
+    doubt = Discrepancy(Level.PLAN, "M2 is refuted", 99.0, (9.0, 30.0), "px")
+    act(Post(doubt, (board.view["Hypothesis-1"],)))
+    act(Revise(board.view["Discrepancy-1"], replace(doubt, status="escalated"), (board.view["Hypothesis-1"],)))
+    there = replace(HELD, basis="relocalization", locale_from_robot=Pose2(3.0, 1.0, 0.0))
+    act(Revise(board.view["Hypothesis-1"], there))
+    fault = BodyFault("camera", "camera unplugged", "no such device", "Look-1", 7.0)
+    act(Post(fault))
+    act(Post(Recovery("BodyFault-1", "Look-1", 7.0, 2.0, tries=9, waited_s=30.0, status="in vain")))
+    act(Post(Outcome("failed", "camera unplugged")))
+    return made
