@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 SILENT_S = 3.0
 """What takes longer than this shows a bar."""
+MIN_WALL_M, MAX_WALL_M = 1.0, 20.0
 LARGE_BYTES = 500_000
 """A world file of this size takes some seconds to read."""
 
@@ -24,19 +25,21 @@ LARGE_BYTES = 500_000
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("what", choices=("check", "show", "compile", "import"),
                         help="check for faults; show what is in it; compile it into one file that is read room by room;"
-                             " import a building from IFC or IndoorGML")
+                             " import a building from IFC, IndoorGML or a ROS map")
     parser.add_argument("file", metavar="FILE",
                         help="a world file (.toml, compiled: .world), or the name of one that comes with the project;"
-                             " import: a building (.ifc, .gml)")
+                             " import: a building (.ifc, .gml) or a ROS map (map.yaml)")
     parser.add_argument("--details", metavar="FILE", action="append", default=[], help="add what only the building has")
     parser.add_argument("--out", metavar="FILE", help="show: draw the plan there, as .svg or .png, or the building for"
                                                       " the viewer, as .rrd; compile: the .world file;"
                                                       " import: the .toml file")
+    parser.add_argument("--wall-height", metavar="METRES", type=float,
+                        help="import of a ROS map: the height of its walls (2.5)")
 
 
 def _run(args: Namespace) -> int:
     if args.what == "import":
-        return _import(args.file, args.out)
+        return _import(args.file, args.out, args.wall_height)
     if args.what == "compile":
         return _compile(args.file, args.details, args.out)
     world = _load(args.file, args.details)
@@ -79,7 +82,7 @@ def _compile(file: str, details: list[str], out: str | None) -> int:
     return 0
 
 
-def _import(file: str, out: str | None) -> int:
+def _import(file: str, out: str | None, wall_height_m: float | None) -> int:
     from world_models.files.importers import BuildingError, import_building
     from world_models.files.world_files import load_world
 
@@ -87,8 +90,10 @@ def _import(file: str, out: str | None) -> int:
     target = Path(out or path.with_suffix(".toml").name)
     if target.suffix != ".toml":
         raise BadInput(f"--out: expected a name that ends in .toml, got {str(target)!r}")
+    if wall_height_m is not None and not MIN_WALL_M <= wall_height_m <= MAX_WALL_M:
+        raise BadInput(f"--wall-height: expected {MIN_WALL_M:g} to {MAX_WALL_M:g} metres, got {wall_height_m:g}")
     try:
-        made = import_building(path)
+        made = import_building(path, wall_height_m)
     except BuildingError as error:
         raise BadInput(str(error)) from None
     target.write_text(made.text, encoding="utf-8")
@@ -180,6 +185,7 @@ COMMAND = Command(
         ("harvey world show campus --out plan.png", "and the plan, storey beside storey (or .svg)"),
         ("harvey world show campus --out campus.rrd", "and the building for the viewer: rerun campus.rrd"),
         ("harvey world import house.ifc --out house.toml", "what was used of a building, guessed and left out"),
+        ("harvey world import map.yaml --out floor.toml --wall-height 2.7", "rooms and doors traced from a ROS map"),
         ("harvey world compile campus.toml --out campus.world", "for worlds that are too large to read at once"),
     ),
     _arguments, _run,

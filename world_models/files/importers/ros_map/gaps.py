@@ -1,0 +1,232 @@
+"""Gaps of walls in a grid: doorways and wide openings, found from the narrow to the wide.
+
+A stretch of corridor between two doors looks like a gap too, as long as the doors are open. So gaps are closed from the
+narrow to the wide, and a wider one counts only where the floor with the narrower ones closed still widens beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+Mask = NDArray[np.bool_]
+MIN_DOOR_M, MAX_DOOR_M = 0.5, 1.3
+MAX_MOUTH_M, MAX_WIDE_M = 2.6, 4.5
+MAX_DEPTH_M, MAX_WIDE_DEPTH_M = 0.9, 0.6
+"""Depth of a gap: of a door through a thick wall, and of a wide opening. What is deeper is a corridor."""
+JAMB_M = 0.15
+"""How far the ends of a gap may lie from those of its first row."""
+MIN_STUB_M, MIN_STUB_SHARE = 0.25, 0.3
+"""Length of wall beside a gap with floor on both of its faces: at least this, and this share of the gap's width."""
+MIN_TALLER = 1.35
+"""The floor on both sides of a slanting gap has this many times its clearance."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A gap in a wall.
+
+    Attributes:
+        start, end: cells (row, column) of the wall at its two ends.
+        width: between them, in cells.
+        depth: thickness of the wall, in cells.
+        middle: (row, column) of its middle; the middle of a cell is a whole number.
+    """
+
+    start: tuple[int, int]
+    end: tuple[int, int]
+    width: float
+    depth: float
+    middle: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """Free runs of consecutive rows with nearly the same ends: rows, and columns from first to before last."""
+
+    rows: tuple[int, int]
+    first: int
+    last: int
+    is_turned: bool
+
+    @property
+    def width(self) -> int:
+        """Columns."""
+        return self.last - self.first
+
+    @property
+    def size(self) -> int:
+        """Width and depth together: of two gaps across one another, the thinner wall has the real one."""
+        return self.width + self.rows[1] - self.rows[0]
+
+
+def close_gaps(floor: Mask, cell_m: float) -> tuple[Mask, list[Gap]]:
+    """The floor with its gaps closed, and the gaps, the narrow ones first.
+
+    Args:
+        floor: (rows, columns) whose walls run mostly along the grid's axes.
+    """
+    cut, gaps = floor.copy(), []
+    blocks = [block for is_turned in (False, True) for block in _find_blocks(floor, cell_m, is_turned)]
+    for block in sorted(blocks, key=lambda b: b.size):
+        gaps += _close(cut, block, cell_m)
+    gaps += _close_slanting(cut, cell_m)
+    return cut, gaps
+
+
+def _find_blocks(floor: Mask, cell_m: float, is_turned: bool) -> Iterator[_Block]:
+    """Blocks of free runs as wide as doors and openings, and no deeper than walls."""
+    grid = floor.T if is_turned else floor
+    edge = np.diff(np.pad(grid, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    rows, first = np.nonzero(edge == 1)
+    last = np.nonzero(edge == -1)[1]
+    keep = ((last - first) * cell_m >= MIN_DOOR_M) & ((last - first) * cell_m <= MAX_WIDE_M)
+    jamb = max(1, round(JAMB_M / cell_m))
+    growing: list[list[tuple[int, int, int]]] = []
+    done: list[list[tuple[int, int, int]]] = []
+    for run in zip(rows[keep].tolist(), first[keep].tolist(), last[keep].tolist(), strict=True):
+        for block in [b for b in growing if b[-1][0] < run[0] - 1]:
+            growing.remove(block)
+            done.append(block)
+        for block in growing:
+            if block[-1][0] == run[0] - 1 and abs(block[0][1] - run[1]) <= jamb and abs(block[0][2] - run[2]) <= jamb:
+                block.append(run)
+                break
+        else:
+            growing.append([run])
+    for block in done + growing:
+        low, high = max(run[1] for run in block), min(run[2] for run in block)
+        width_m, depth_m = (high - low) * cell_m, len(block) * cell_m
+        if width_m >= MIN_DOOR_M and depth_m <= (MAX_DEPTH_M if width_m <= MAX_DOOR_M else MAX_WIDE_DEPTH_M):
+            yield _Block((block[0][0], block[-1][0]), low, high, is_turned)
+
+
+def _close(cut: Mask, block: _Block, cell_m: float) -> list[Gap]:
+    """Close a block in the floor where it still is a gap of a wall, and give the gap."""
+    grid = cut.T if block.is_turned else cut
+    row = (block.rows[0] + block.rows[1]) // 2
+    if not grid[row, block.first : block.last].all():
+        return []
+    before, after = _widening(grid, block, -1, cell_m), _widening(grid, block, 1, cell_m)
+    stub = int(np.minimum(before, after).sum())
+    is_beside_hall = block.width * cell_m <= MAX_MOUTH_M and max(before.sum(), after.sum()) >= block.width
+    share = 0.0 if is_beside_hall else MIN_STUB_SHARE
+    if min(before.min(), after.min()) < 0 or stub * cell_m < max(MIN_STUB_M, share * block.width * cell_m):
+        return []
+    first, last = _run_at(grid, row, (block.first + block.last) // 2)
+    grid[row, first:last] = False
+    ends = (row, first - 1), (row, last)
+    middle = (block.rows[0] + block.rows[1]) / 2, (block.first + block.last - 1) / 2
+    start, end = ((r, c) if not block.is_turned else (c, r) for r, c in ends)
+    return [Gap(start, end, block.width, block.rows[1] - block.rows[0] + 1,
+                middle if not block.is_turned else middle[::-1])]
+
+
+def _widening(grid: Mask, block: _Block, step: int, cell_m: float) -> NDArray[np.int64]:
+    """(2,) by how many cells the floor beside a block reaches further to the left and right; -1 where there is none."""
+    row = block.rows[0] if step < 0 else block.rows[1]
+    middle, best = (block.first + block.last) // 2, np.array([-1, -1])
+    for away in range(1, max(2, round(0.3 / cell_m)) + 1):
+        at = row + step * away
+        if not 0 <= at < len(grid) or not grid[at, middle]:
+            break
+        first, last = _run_at(grid, at, middle)
+        best = np.maximum(best, [block.first - first, last - block.last])
+    return best
+
+
+def _run_at(grid: Mask, row: int, column: int) -> tuple[int, int]:
+    """First column, and column after the last, of the free run that holds a cell."""
+    walls = np.flatnonzero(~grid[row])
+    at = int(np.searchsorted(walls, column))
+    return (int(walls[at - 1]) + 1 if at else 0), (int(walls[at]) if at < len(walls) else grid.shape[1])
+
+
+def _close_slanting(cut: Mask, cell_m: float) -> list[Gap]:
+    """Close doors in walls of any direction: where two basins of the distance to the walls meet in a narrow place."""
+    distance, nearest = ndimage.distance_transform_edt(cut, return_indices=True)
+    smooth = ndimage.gaussian_filter(distance, 1.0)
+    tops = (smooth == ndimage.maximum_filter(smooth, size=max(3, round(0.5 / cell_m)))) & (distance * cell_m > 0.3)
+    seeds, count = ndimage.label(tops, np.ones((3, 3)))
+    if count < 2:
+        return []
+    depth = np.asarray(np.clip(1.0 - smooth / distance.max(), 0.0, 1.0) * 65000, dtype=np.uint16)
+    basins = ndimage.watershed_ift(depth, np.where(cut, seeds, -1).astype(np.int32))
+    tallest = np.asarray(ndimage.maximum(distance, seeds, np.arange(count + 1)))
+    joined = list(range(count + 1))
+
+    def root(basin: int) -> int:
+        while joined[basin] != basin:
+            basin = joined[basin]
+        return basin
+
+    gaps = []
+    for (a, b), (clear, row, column) in sorted(_find_saddles(basins, distance).items(),
+                                               key=lambda item: (-item[1][0], item[0])):
+        one, other = root(a), root(b)
+        if one == other:
+            continue
+        width_m = 2 * clear * cell_m
+        if MIN_DOOR_M <= width_m <= MAX_DOOR_M and min(tallest[one], tallest[other]) >= MIN_TALLER * clear:
+            gap = _cross(distance, nearest, row, column)
+            if gap is not None and gap.width * cell_m <= 1.2 * MAX_DOOR_M:
+                gaps.append(gap)
+                for r, c in _line(gap):
+                    cut[r, c] = False
+                continue
+        joined[other], tallest[one] = one, max(tallest[one], tallest[other])
+    return gaps
+
+
+def _find_saddles(basins: NDArray[np.int32], distance: NDArray[np.float64],
+                  ) -> dict[tuple[int, int], tuple[float, int, int]]:
+    """The clearance, row and column of the widest place where two basins meet."""
+    saddles: dict[tuple[int, int], tuple[float, int, int]] = {}
+    for dr, dc in ((0, 1), (1, 0)):
+        one, other = basins[: basins.shape[0] - dr, : basins.shape[1] - dc], basins[dr:, dc:]
+        for r, c in zip(*np.nonzero((one != other) & (one > 0) & (other > 0)), strict=True):
+            pair = (int(min(one[r, c], other[r, c])), int(max(one[r, c], other[r, c])))
+            if distance[r, c] > saddles.get(pair, (-1.0, 0, 0))[0]:
+                saddles[pair] = float(distance[r, c]), int(r), int(c)
+    return saddles
+
+
+def _cross(distance: NDArray[np.float64], nearest: NDArray[np.int32], row: int, column: int) -> Gap | None:
+    """The shortest line through a saddle: from the nearest wall to one opposite it."""
+    at = np.array([row, column])
+    start = nearest[:, row, column]
+    ahead = (at - start) / max(float(np.linalg.norm(at - start)), 1e-9)
+    best: tuple[float, NDArray[np.int64]] | None = None
+    for angle in np.radians(np.arange(-50, 51, 5)):
+        c, s = np.cos(angle), np.sin(angle)
+        ray = np.array([ahead[0] * c - ahead[1] * s, ahead[0] * s + ahead[1] * c])
+        for length in np.arange(1.0, 3.0 * distance[row, column] + 3):
+            cell = (at + length * ray).round().astype(int)
+            if (cell < 0).any() or (cell >= distance.shape).any():
+                break
+            if distance[cell[0], cell[1]] == 0:
+                if best is None or length < best[0]:
+                    best = length, cell
+                break
+    if best is None:
+        return None
+    width = float(np.linalg.norm(best[1] - start)) - 1
+    middle = (start + best[1]) / 2
+    return Gap((int(start[0]), int(start[1])), (int(best[1][0]), int(best[1][1])), width, 1.0,
+               (float(middle[0]), float(middle[1])))
+
+
+def _line(gap: Gap) -> list[tuple[int, int]]:
+    """The cells of a gap, joined by their sides, so that floor joined by sides does not pass."""
+    (r0, c0), (r1, c1) = gap.start, gap.end
+    count = 2 * max(abs(r1 - r0), abs(c1 - c0), 1)
+    cells = [(round(r0 + (r1 - r0) * k / count), round(c0 + (c1 - c0) * k / count)) for k in range(count + 1)]
+    filled = []
+    for (a, b), (c, d) in pairwise(cells):
+        filled += [(a, b), (c, b)] if a != c and b != d else [(a, b)]
+    return [*filled, cells[-1]]
