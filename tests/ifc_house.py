@@ -167,12 +167,13 @@ class House:
 
     def element(self, kind: str, corners: Points, low: float, height: float, *, storey: Any = None,
                 name: str | None = None, at: Sequence[float] = (0.0, 0.0, 0.0), turn_deg: float = 0.0,
-                **values: Any) -> Any:
-        """A prism that is contained in a storey; its corners are in its own frame, which stands at ``at``."""
+                contained: bool = True, **values: Any) -> Any:
+        """A prism over its storey, which contains it or not; its corners are in its own frame, which stands at ``at``.
+        """
         storey = storey if storey is not None else self.storeys[-1]
         made = self.rooted(kind, name, ObjectPlacement=self.place(at, turn_deg, above=storey),
                            Representation=self.shape(self.extruded(self.profile(corners), low, height)), **values)
-        if not kind.startswith("IfcOpening"):
+        if contained and not kind.startswith("IfcOpening"):
             self.contain(storey, made)
         return made
 
