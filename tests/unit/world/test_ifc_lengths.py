@@ -8,14 +8,13 @@ states in words counts, and not only its shapes.
 from __future__ import annotations
 
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from ifc_house import House, box
 from numpy.typing import NDArray
 
+from ifc_house import House, box
 from world_models.files.importers import read_plan
 from world_models.files.importers.building_plan import BuildingPlan
 
