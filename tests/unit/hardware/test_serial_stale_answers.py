@@ -125,6 +125,8 @@ class HandMadeDenning:
     def _answer(self, token: str, seq: int, verb: str, words: list[str]) -> bytes:
         if verb == "HELLO":
             return say(f"{TOKEN} 0 HI {words[0]} 0.5 1.0 0.5")
+        if token != TOKEN:
+            return say(f"{token} {seq} NO session")
         if verb == "GO":
             return say(f"{token} {seq} DONE ok {words[0]} {words[1]} 1.5 2.5")
         if verb == "STOP":
