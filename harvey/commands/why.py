@@ -78,7 +78,10 @@ def _describe_unfinished(run: RunDirectory, cycle: int) -> str:
 def _stories(run: RunDirectory, history: History, args: Namespace) -> Iterator[Story]:
     world = WorldFile(run)
     if args.entry is not None and is_question(args.entry):
-        yield from answers(history, args.entry, args.at)
+        from harvey.story.questions import answers as answers_of_the_run
+
+        of_the_run = answers_of_the_run(run, history, args.entry, args.at)
+        yield from answers(history, args.entry, args.at) if of_the_run is None else of_the_run
         return
     if args.milestone is None:
         yield from stories_of(history, args.entry if args.at is None else args.at, world)
@@ -142,6 +145,9 @@ COMMAND = Command(
         ("harvey why runs/lab-to-allens-office-0 --milestone 'M1 of hallway'", "what was expected, seen and judged"),
         ("harvey why runs/lab-to-allens-office-0 --not relocalizer --at 88", "why a knowledge source did not act then"),
         ("harvey why runs/lab-to-allens-office-0 --not Hypothesis-1.20", "what came of an entry, and what instead"),
+        ("harvey why runs/hallway-kidnap-0 'when was it lost?'", "where and why too, and how it was found"),
+        ("harvey why runs/hallway-kidnap-0 'where did it touch anything?'", "what it felt, and what the simulator saw"),
+        ("harvey why runs/hallway-kidnap-0 'how far off was it?' --at 350", "belief against truth, from the recording"),
         ("harvey why runs/box-in-the-way-0 'what is in the way?'", "each thing that the model lacks, down to pixels"),
         ("harvey why runs/box-in-the-way-0 'why did you stop?' --at 120", "the last stop up to cycle 120"),
         ("harvey why runs/box-in-the-way-0 'why that detour?'", "for what plans were withdrawn, and what came instead"),

@@ -29,7 +29,7 @@ def tell_lost(history: History) -> Section:
     found = [record for record in history.of_kind("Hypothesis") if is_found(record)]
     for record in lost:
         until = next((one for one in found if one.cycle >= record.cycle), None)
-        told += _tell(history, record, until)
+        told += sorted(_tell(history, record, until), key=lambda one: one.cycle or 0)
     return Section("Lost and found", tuple(told) or (Sentence("It was never lost."),))
 
 
@@ -73,11 +73,8 @@ def _tell_reasons(history: History, lost: EntryRecord) -> Iterator[Sentence]:
     what = value_of(lost, Discrepancy).what
     for record in within(history, lost):
         if record.type == "Discrepancy" and value_of(record, Discrepancy).what != what:
-            yield sentence_of(
-                history,
-                f"The doubt had begun in cycle {_first(history, record).cycle}: {value_of(record, Discrepancy).what}.",
-                _first(history, record),
-            )
+            first = _first(history, record)
+            yield sentence_of(history, f"It began to doubt: {value_of(record, Discrepancy).what}.", first)
             return
 
 

@@ -22,7 +22,9 @@ from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Leg, Outcome
 from world_models.words import count
 
-QUESTIONS = ("what is in the way?", "why did you stop?", "why that detour?", "is the door shut?")
+OF_THE_RUN = ("when was it lost?", "where did it touch anything?", "how far off was it?")
+"""Questions that :mod:`harvey.story.questions` answers."""
+QUESTIONS = ("what is in the way?", "why did you stop?", "why that detour?", "is the door shut?", *OF_THE_RUN)
 MOST_STORIES = 6
 """So many things, stops or doors are told of, the newest."""
 MOST_SIGHTS = 4

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import shutil
 from pathlib import Path
@@ -19,9 +20,12 @@ from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import RunHead
 from harvey.runner.replay import open_pictures, replay
 from harvey.story.story import RunStory, story_lines, tell_run
+from harvey.story.truth import error_at, read_errors
 from harvey.story.turns import read_turning_points
 from harvey.why.history import MemoryHistory
 from harvey.why.journal import JournalHistory
+from logs.reader import read_series
+from logs.recording.paths import POSITION
 from sim.made_up.short_missions import OFFICE, fault
 
 TOLD_SHUT = """
@@ -163,3 +167,39 @@ def test_a_run_that_was_cut_off_is_told_and_is_one_error(
     assert len(printed.err.splitlines()) == 1 and f"was cut off in cycle {whole}" in printed.err
 
 
+
+
+def test_how_far_off_it_was_is_what_the_recording_has_drawn(told: tuple[str, Path], history: JournalHistory) -> None:
+    run = RunDirectory(told[1])
+    drawn = dict(read_series(run.recording, POSITION, "Measurements:values"))
+    errors = {error.cycle: error for error in read_errors(run, history)}
+    assert errors and errors.keys() <= drawn.keys()
+    for cycle, values in drawn.items():  # it is drawn also where a candidate is posted beside the belief
+        error = errors.get(cycle) or error_at(run, history, cycle)
+        assert error is not None and 1e3 * error.off_m == pytest.approx(math.hypot(*values), abs=0.01)
+    assert error_at(run, history, max(errors)) == errors[max(errors)]
+
+
+def test_the_questions_after_a_bad_run_are_answered_without_the_viewer(
+    told: tuple[str, Path], history: JournalHistory, story: RunStory, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = str(told[1])
+    for question, kind in (("when was it lost?", "lost"), ("where did it touch anything?", "contact")):
+        assert main(["why", run, question]) == 0
+        answer = capsys.readouterr().out
+        assert all(f"In cycle {point.cycle}" in answer for point in story.turning_points if point.kind == kind)
+    last = history.cycles[-1]
+    assert main(["why", run, "how far off was it in truth?", "--at", str(last)]) == 0
+    assert f"In cycle {last} it stood " in capsys.readouterr().out
+    assert main(["why", run, "how far off was it?", "--at", str(last + 1)]) == 2
+    assert f"got {last + 1}" in capsys.readouterr().err
+
+
+def test_without_the_recording_nothing_is_said_of_the_truth(
+    told: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(told[1], tmp_path / "run")
+    RunDirectory(tmp_path / "run").recording.unlink()
+    assert main(["why", str(tmp_path / "run"), "how far off was it?"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == "" and "harvey repair" in printed.err
