@@ -10,13 +10,15 @@ import errno
 import gc
 import os
 import sys
-from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from argparse import Action, ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
+from typing import Any
 
 EPILOG = """examples:
   harvey list                                       what there is to run
   harvey run lab-to-allens-office                   drive a mission
   harvey view runs/lab-to-allens-office-0           look at its recording
+  harvey story runs/lab-to-allens-office-0          have it told in a page
   harvey why runs/lab-to-allens-office-0 --at 88    ask why it did what it did
 
 exit codes: 0 reached, or success; 1 not reached; 2 bad input; 130 interrupted.
@@ -38,22 +40,29 @@ def main(argv: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
+class _PrintVersion(Action):
+    """Looks the version up only when it is asked for."""
+
+    def __call__(self, parser: ArgumentParser, *_: Any) -> None:
+        from importlib.metadata import version
+
+        print(f"harvey {version('harvey')}")
+        parser.exit()
+
+
 def parser() -> ArgumentParser:
     """The parser of all commands."""
     from harvey.commands import COMMANDS
+    from harvey.commands.command import add_parser
 
     top = ArgumentParser(
         prog="harvey", epilog=EPILOG, formatter_class=RawDescriptionHelpFormatter,
         description="Model-directed mobile robot navigation on a blackboard, after the UMass Mobile Robot system.",
     )
+    top.add_argument("--version", action=_PrintVersion, nargs=0, help="print the version, and exit")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for command in COMMANDS:
-        sub = commands.add_parser(
-            command.name, help=command.summary, epilog=command.epilog, formatter_class=RawDescriptionHelpFormatter,
-            description=f"{command.summary[0].upper()}{command.summary[1:]}.\n{command.details}".rstrip(),
-        )
-        command.arguments(sub)
-        sub.set_defaults(command=command, parser=sub)
+        add_parser(commands, command).set_defaults(command=command)
     return top
 
 

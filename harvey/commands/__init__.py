@@ -11,6 +11,7 @@ from harvey.commands import (
     drive,
     emulate,
     experiment,
+    export,
     listing,
     repair,
     replay,
@@ -26,6 +27,6 @@ from harvey.commands.command import Command
 
 COMMANDS: tuple[Command, ...] = (
     listing.COMMAND, run.COMMAND, view.COMMAND, story.COMMAND, why.COMMAND, replay.COMMAND, diff.COMMAND,
-    resume.COMMAND, repair.COMMAND, world.COMMAND, settings.COMMAND, experiment.COMMAND, drive.COMMAND,
+    export.COMMAND, resume.COMMAND, repair.COMMAND, world.COMMAND, settings.COMMAND, experiment.COMMAND, drive.COMMAND,
     calibrate.COMMAND, emulate.COMMAND,
 )

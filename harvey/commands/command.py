@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,16 @@ class Command:
     def epilog(self) -> str:
         width = max(len(command) for command, _ in self.examples)
         return "examples:\n" + "\n".join(f"  {command.ljust(width)}   {what}" for command, what in self.examples)
+
+
+def add_parser(commands: Any, command: Command) -> ArgumentParser:
+    """The parser of a command, with its help and examples, among those of argparse's ``add_subparsers``."""
+    parser: ArgumentParser = commands.add_parser(
+        command.name, help=command.summary, epilog=command.epilog, formatter_class=RawDescriptionHelpFormatter,
+        description=f"{command.summary[0].upper()}{command.summary[1:]}.\n{command.details}".rstrip())
+    command.arguments(parser)
+    parser.set_defaults(parser=parser)
+    return parser
 
 
 def whole(text: str) -> int:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harvey.commands.command import Command
+from harvey.commands.command import Command, add_parser
 from harvey.errors import BadInput
 from world_models.words import count
 
@@ -23,27 +23,38 @@ LARGE_BYTES = 500_000
 
 
 def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("what", choices=("check", "show", "compile", "import"),
-                        help="check for faults; show what is in it; compile it into one file that is read room by room;"
-                             " import a building from IFC, IndoorGML or a ROS map")
+    verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
+    for verb in VERBS:
+        add_parser(verbs, verb).set_defaults(verb=verb)
+
+
+def _file(parser: ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE",
-                        help="a world file (.toml, compiled: .world), or the name of one that comes with the project;"
-                             " import: a building (.ifc, .gml) or a ROS map (map.yaml)")
+                        help="a world file (.toml, compiled: .world), or the name of one that comes with the project")
     parser.add_argument("--details", metavar="FILE", action="append", default=[], help="add what only the building has")
-    parser.add_argument("--out", metavar="FILE", help="show: draw the plan there, as .svg or .png, or the building for"
-                                                      " the viewer, as .rrd; compile: the .world file;"
-                                                      " import: the .toml file")
+
+
+def _show_arguments(parser: ArgumentParser) -> None:
+    _file(parser)
+    parser.add_argument("--out", metavar="FILE",
+                        help="draw the plan there, as .svg or .png, or the building for the viewer, as .rrd")
+
+
+def _compile_arguments(parser: ArgumentParser) -> None:
+    _file(parser)
+    parser.add_argument("--out", metavar="FILE", help="the .world file (named as the world, here)")
+
+
+def _import_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="a building (.ifc, .gml) or a ROS map (map.yaml)")
+    parser.add_argument("--out", metavar="FILE", help="the .toml file (named as the building, here)")
     parser.add_argument("--wall-height", metavar="METRES", type=float,
-                        help="import of a ROS map: the height of its walls (2.5)")
+                        help="of a ROS map: the height of its walls (2.5)")
 
 
 def _run(args: Namespace) -> int:
-    if args.what == "import":
-        return _import(args.file, args.out, args.wall_height)
-    if args.what == "compile":
-        return _compile(args.file, args.details, args.out)
-    world = _load(args.file, args.details)
-    return _check(world, args.file) if args.what == "check" else _show(world, args.out)
+    verb: Command = args.verb
+    return verb.run(args)
 
 
 def _load(file: str, details: list[str]) -> World:
@@ -177,16 +188,39 @@ def _recording(world: World, out: Path) -> None:
     record_building(world, out)
 
 
+VERBS = (
+    Command(
+        "check", "check a world for faults",
+        (("harvey world check my_floor.toml", "faults with file and line; exit code 2 where there are any"),
+         ("harvey world check research_center", "one that comes with the project"),
+         ("harvey world check floor.toml --details clutter.toml", "with what only the building has")),
+        _file, lambda args: _check(_load(args.file, args.details), args.file),
+        "Exit code 0 where there are none, 2 where there are any.",
+    ),
+    Command(
+        "show", "show what is in a world, and draw its plan",
+        (("harvey world show research_center", "rooms, doorways and what is in them"),
+         ("harvey world show campus --out plan.png", "and the plan, storey beside storey (or .svg)"),
+         ("harvey world show campus --out campus.rrd", "and the building for the viewer: rerun campus.rrd")),
+        _show_arguments, lambda args: _show(_load(args.file, args.details), args.out),
+    ),
+    Command(
+        "compile", "compile a world into one file that is read room by room",
+        (("harvey world compile campus.toml --out campus.world", "for worlds that are too large to read at once"),
+         ("harvey run mission.toml", "a mission names it as any world: world = \"campus.world\"")),
+        _compile_arguments, lambda args: _compile(args.file, args.details, args.out),
+    ),
+    Command(
+        "import", "import a building from IFC, IndoorGML or a ROS map",
+        (("harvey world import house.ifc --out house.toml", "what was used of a building, guessed and left out"),
+         ("harvey world import campus.gml --out campus.toml", "IndoorGML 1.0, 1.1 and the core of 2.0"),
+         ("harvey world import map.yaml --out floor.toml --wall-height 2.7", "rooms and doors traced from a ROS map")),
+        _import_arguments, lambda args: _import(args.file, args.out, args.wall_height),
+        "Then checks it, as harvey world check does.",
+    ),
+)
 COMMAND = Command(
     "world", "check, show, compile or import a world file",
-    (
-        ("harvey world check my_floor.toml", "faults with file and line; exit code 2 where there are any"),
-        ("harvey world show research_center", "rooms, doorways and what is in them"),
-        ("harvey world show campus --out plan.png", "and the plan, storey beside storey (or .svg)"),
-        ("harvey world show campus --out campus.rrd", "and the building for the viewer: rerun campus.rrd"),
-        ("harvey world import house.ifc --out house.toml", "what was used of a building, guessed and left out"),
-        ("harvey world import map.yaml --out floor.toml --wall-height 2.7", "rooms and doors traced from a ROS map"),
-        ("harvey world compile campus.toml --out campus.world", "for worlds that are too large to read at once"),
-    ),
-    _arguments, _run,
+    tuple(verb.examples[0] for verb in VERBS), _arguments, _run,
+    "harvey world VERB --help tells more of each and gives examples.",
 )

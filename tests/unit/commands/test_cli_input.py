@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from harvey.cli import main
 from harvey.commands import COMMANDS
+from harvey.commands.world import VERBS
 from harvey.run_files.run_directory import prepare_directory
 from sim.scenario import SCENARIOS
 from world_models.entries.task import Outcome
@@ -147,6 +148,22 @@ def test_every_command_teaches_by_example(command: str, capsys: pytest.CaptureFi
     assert main([command, "--help"]) == 0
     out = capsys.readouterr().out
     assert f"harvey {command}" in out.partition("examples:")[2]
+
+
+@pytest.mark.parametrize("verb", [verb.name for verb in VERBS])
+def test_every_verb_of_world_teaches_by_example(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["world", verb, "--help"]) == 0
+    assert f"harvey world {verb}" in capsys.readouterr().out.partition("examples:")[2]
+
+
+def test_a_verb_refuses_the_options_of_another(capsys: pytest.CaptureFixture[str]) -> None:
+    code, err = said(capsys, ["world", "check", "two_ways", "--out", "plan.svg"])
+    assert code == 2 and "harvey world check: error: expected no '--out' here" in err
+
+
+def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"harvey {version('harvey')}\n"
 
 
 def test_the_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
