@@ -68,9 +68,9 @@ class FloorWatcher(RobotKnowledgeSource):
             robot.on_floor_of(locale), locale, pose, belief.value.covariance_world(robot.world), frame.value.jpeg,
             [Seen(view[e.value.frame].value.jpeg, _pose_of(e.value)) for e in earlier],
             {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings)
-        yield Post(seen, (frame, belief, *earlier[:1], *(known[name] for name in (locale,) if name in known)))
+        yield Post(seen, (frame, belief, *earlier, *(known[name] for name in (locale,) if name in known)))
         for appearance in learnt:
-            old, because = known.get(appearance.locale), (frame, belief, *earlier[-1:])
+            old, because = known.get(appearance.locale), (frame, belief, *earlier)
             yield Post(appearance, because) if old is None else Revise(old, appearance, (*because, old))
         if not kept or _measure_way_m(kept[0].value, pose) >= apart_m:
             yield Post(FloorView(frame.id, belief.id, pose.x_m, pose.y_m, pose.heading_rad, floor_m,

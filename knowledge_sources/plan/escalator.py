@@ -8,11 +8,12 @@ from dataclasses import replace
 from blackboard.board import View
 from blackboard.change import Change, Watch
 from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy, last_escalated
 from knowledge_sources.questions import deepest_sketch, is_over
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.task import Outcome
+from world_models.entries.task import Outcome, PlanSketch
 
 GIVEN_UP: Mapping[Level, tuple[str, str]] = {
     Level.PLAN: ("blocked", "on the way to one place it was not as expected {times} times, the last one:"),
@@ -37,9 +38,11 @@ class Escalator(RobotKnowledgeSource):
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         closed, raised = trigger.entry.value.escalated()
-        tried, last = _describe_attempt(view, raised.level), last_escalated(view, closed.level)
+        sketch = deepest_sketch(view) if raised.level is Level.PLAN else None
+        tried, last = _describe_attempt(sketch), last_escalated(view, closed.level)
         times = 1 + (last.value.times if last is not None and last.value.tried == tried else 0)
-        close = Revise(trigger.entry, replace(closed, tried=tried, times=times), trigger.entry.because)
+        counted = tuple(entry for entry in (sketch, last) if entry is not None)
+        close = Revise(trigger.entry, replace(closed, tried=tried, times=times), (*trigger.entry.because, *counted))
         yield close
         yield Post(raised, (close,))
         s = self._settings.plan
@@ -49,7 +52,6 @@ class Escalator(RobotKnowledgeSource):
             yield Post(Outcome(kind, f"{why.format(times=times)} {closed.what}"), (close,))
 
 
-def _describe_attempt(view: View, level: Level) -> str:
+def _describe_attempt(sketch: Entry[PlanSketch] | None) -> str:
     """What the robot is at: a subgoal for the plan level, the mission for the goal level."""
-    sketch = deepest_sketch(view) if level is Level.PLAN else None
     return "the mission" if sketch is None else f"subgoal {sketch.value.at} of {sketch.id}"

@@ -1,0 +1,121 @@
+"""Laws of how sure a tracked pose is, after one picture and after a chain of them, and of the tolerance made from it.
+
+The robot is put together without pictures: templates are cut where the belief has landmarks, so that what they show is
+off by the belief's own error, and stays so until they are cut anew.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from consistency import assert_consistent, compute_error, compute_nees
+from harvey.simulation.run import build_robot_model
+from knowledge_sources.methods.tracking.template_tracking import correct_pose
+from knowledge_sources.questions import NOWHERE
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.tolerances import action_px
+from sim.scenario import load_scenario
+from world_models.actuator import ActuatorModel
+from world_models.camera import Camera, CameraMount
+from world_models.entries.location import Hypothesis, covariance_tuple, diagonal
+from world_models.entries.percepts import Anchor, Track
+from world_models.files.world_files import load_world
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+
+CAMERA, MOUNT = Camera.from_field_of_view(np.radians(65.0)), CameraMount(1.0, 0.1, 0.05)
+ROBOT = RobotModel(NOWHERE, CAMERA, MOUNT, ActuatorModel())
+AT_FIRST, STEP = np.diag([0.01, 0.01, 0.02]) ** 2, np.diag([0.01, 0.01, 0.005]) ** 2
+SIGMA_PX, LANDMARKS, PICTURES = 0.3, 12, 4
+Array = NDArray[np.float64]
+
+
+def turn_into_world(heading_rad: float) -> Array:
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def drive(seed: int, legs: int, noise: float) -> list[float]:
+    """NEES after each picture: each leg cuts templates where the robot believes to be, and tracks them."""
+    rng = np.random.default_rng(seed)
+    truth = Pose2(0.0, 0.0, rng.uniform(-3.0, 3.0))
+    off = rng.multivariate_normal(np.zeros(3), AT_FIRST)
+    belief, covariance = Pose2(off[0], off[1], truth.heading_rad + off[2]), AT_FIRST
+    out = []
+    for leg in range(legs):
+        by_belief, by_truth = (MOUNT.camera_from_robot @ pose.lifted().inverse() for pose in (belief, truth))
+        model = belief.lifted().apply(rng.uniform((4.5, -1.2, 0.0), (9.0, 1.2, 2.2), (LANDMARKS, 3)))
+        shown = by_truth.inverse().apply(by_belief.apply(model))
+        anchor = Anchor(f"frame {leg}", belief.x_m, belief.y_m, covariance_tuple(covariance))
+        for _ in range(PICTURES):
+            turn, move_m = rng.uniform(-0.05, 0.05), 0.5
+            error = rng.multivariate_normal(np.zeros(3), STEP)
+            truth = truth @ Pose2(move_m + error[0], error[1], turn + error[2])
+            lever = np.eye(3)
+            lever[:2, 2] = -move_m * math.sin(belief.heading_rad), move_m * math.cos(belief.heading_rad)
+            into = turn_into_world(belief.heading_rad)
+            covariance = lever @ covariance @ lever.T + into @ STEP @ into.T
+            belief = belief @ Pose2(move_m, 0.0, turn)
+            seen_px = CAMERA.project((MOUNT.camera_from_robot @ truth.lifted().inverse()).apply(shown))
+            seen_px += rng.normal(0.0, noise * SIGMA_PX, seen_px.shape)
+            tracks = [Track("landmark", (x, y, z), anchor.frame, (0.0, 0.0), 1.0, (0.0, 0.0), (u, v), 1.0, SIGMA_PX)
+                      for (x, y, z), (u, v) in zip(model.tolist(), seen_px.tolist(), strict=True)]
+            found = correct_pose(ROBOT, tracks, (anchor,), belief, covariance)
+            belief, covariance = found.world_from_robot, found.covariance
+            out.append(compute_nees(compute_error(belief, truth), covariance))
+    return out
+
+
+@pytest.mark.parametrize("noise", [1.0, 1.5, 2.0])
+def test_a_tracked_pose_is_as_far_off_as_it_says_after_a_chain_of_pictures(noise: float) -> None:
+    """It may say a little too much: the error of where templates were cut is a part of the belief's, and counts twice.
+    """
+    drives = np.array([drive(seed, 2, noise) for seed in range(100)])
+    for column in drives.T:
+        assert_consistent(column, 3, most_surplus=1.5)
+
+
+@cache
+def build_robot() -> RobotModel:
+    scenario = load_scenario("lab-to-allens-office")
+    return build_robot_model(scenario, load_world(scenario.world))
+
+
+def believe(sigma_m: float, sigma_rad: float) -> Hypothesis:
+    return Hypothesis("allens-office", Pose2(2.0, 2.0, 0.7), diagonal(sigma_m, sigma_rad), "odometry")
+
+
+def compute_tolerance_px(sigma_m: float, sigma_rad: float, ahead_m: float) -> float:
+    """With one landmark so far ahead of the camera."""
+    robot, belief = build_robot(), believe(sigma_m, sigma_rad)
+    from_world = robot.on_floor_of(belief.locale).camera_from_world(belief.world_from_robot(robot.world))
+    return action_px(robot, belief, from_world.inverse().apply(np.array([[0.1, 0.0, ahead_m]])))
+
+
+@pytest.mark.parametrize(
+    ("sigma_m", "sigma_rad"), [(0.0, 0.0), (0.01, 0.0), (0.0, 0.005), (0.02, 0.004), (0.03, 0.006)])
+@pytest.mark.parametrize("ahead_m", [2.0, 5.0])
+def test_the_tolerance_is_what_the_belief_leaves_open_up_to_the_plans_bound(
+    sigma_m: float, sigma_rad: float, ahead_m: float
+) -> None:
+    """By moving the believed camera by so many deviations, and looking how far the landmark goes in the picture."""
+    s, focal_px = DEFAULT.action, build_robot().camera.fx
+    aside_px, turned_px = focal_px * sigma_m / ahead_m, focal_px * math.tan(sigma_rad)
+    open_px = s.min_tolerance_px + s.tolerance_sigmas * math.hypot(aside_px, turned_px)
+    assert compute_tolerance_px(sigma_m, sigma_rad, ahead_m) == pytest.approx(
+        min(open_px, DEFAULT.plan.max_deviation_px), rel=1e-3)
+
+
+def test_the_tolerance_ends_at_the_plans_bound_and_not_before() -> None:
+    """Just below the bound, and far beyond: no belief is so loose that the action level may correct more."""
+    s, most_px = DEFAULT.action, DEFAULT.plan.max_deviation_px
+    at_bound = math.atan((most_px - s.min_tolerance_px) / s.tolerance_sigmas / build_robot().camera.fx)
+    assert compute_tolerance_px(0.0, 0.98 * at_bound, 3.0) == pytest.approx(most_px, rel=0.03)
+    assert compute_tolerance_px(0.0, 0.98 * at_bound, 3.0) < most_px
+    for more in (1.02, 2.0, 10.0):
+        assert compute_tolerance_px(0.0, more * at_bound, 3.0) == most_px
