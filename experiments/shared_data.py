@@ -10,6 +10,7 @@ SHOWN = "../shared/data"
 VARIABLE = "HARVEY_DATA"
 CORRIDOR = "corridor"
 DUPLEX, UNIVERSITY = "buildings/Ifc2x3_Duplex_Architecture.ifc", "buildings/pnu_abc.gml"
+MAP_PLANS = "maps/plans"
 
 
 def data_path(name: str) -> Path:

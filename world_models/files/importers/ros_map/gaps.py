@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from world_models.files.importers.building_plan import Floats
+
 Mask = NDArray[np.bool_]
 MIN_DOOR_M, MAX_DOOR_M = 0.5, 1.3
 MAX_MOUTH_M, MAX_WIDE_M = 2.6, 4.5
@@ -21,10 +23,18 @@ MAX_DEPTH_M, MAX_WIDE_DEPTH_M = 0.9, 0.6
 """Depth of a gap: of a door through a thick wall, and of a wide opening. What is deeper is a corridor."""
 JAMB_M = 0.15
 """How far the ends of a gap may lie from those of its first row."""
+LOOK_M = 0.3
+"""How far before and behind a gap the floor is looked for that reaches further."""
 MIN_STUB_M, MIN_STUB_SHARE = 0.25, 0.3
 """Length of wall beside a gap with floor on both of its faces: at least this, and this share of the gap's width."""
 MIN_TALLER = 1.35
 """The floor on both sides of a slanting gap has this many times its clearance."""
+
+HALL_RADII_M = (2.5, 1.75)
+"""A hall holds a circle of such a radius; a corridor is narrower by MAX_MOUTH_SHARE and longer than wide."""
+MAX_MOUTH_SHARE, MIN_LONGER = 1.1, 2.0
+ROUGH_CELLS = 2
+"""Roughness of the walls."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +71,8 @@ class _Block:
 
     @property
     def size(self) -> int:
-        """Width and depth together: of two gaps across one another, the thinner wall has the real one."""
-        return self.width + self.rows[1] - self.rows[0]
+        """Width and twice the depth: of two gaps across one another, the one in the thinner wall is real."""
+        return self.width + 2 * (self.rows[1] - self.rows[0])
 
 
 def close_gaps(floor: Mask, cell_m: float) -> tuple[Mask, list[Gap]]:
@@ -76,6 +86,8 @@ def close_gaps(floor: Mask, cell_m: float) -> tuple[Mask, list[Gap]]:
     for block in sorted(blocks, key=lambda b: b.size):
         gaps += _close(cut, block, cell_m)
     gaps += _close_slanting(cut, cell_m)
+    for radius_m in HALL_RADII_M:
+        gaps += _close_mouths(cut, radius_m / cell_m)
     return cut, gaps
 
 
@@ -131,7 +143,7 @@ def _widening(grid: Mask, block: _Block, step: int, cell_m: float) -> NDArray[np
     """(2,) by how many cells the floor beside a block reaches further to the left and right; -1 where there is none."""
     row = block.rows[0] if step < 0 else block.rows[1]
     middle, best = (block.first + block.last) // 2, np.array([-1, -1])
-    for away in range(1, max(2, round(0.3 / cell_m)) + 1):
+    for away in range(1, max(2, round(LOOK_M / cell_m)) + 1):
         at = row + step * away
         if not 0 <= at < len(grid) or not grid[at, middle]:
             break
@@ -181,6 +193,44 @@ def _close_slanting(cut: Mask, cell_m: float) -> list[Gap]:
                 continue
         joined[other], tallest[one] = one, max(tallest[one], tallest[other])
     return gaps
+
+
+def _close_mouths(cut: Mask, radius: float) -> list[Gap]:
+    """Close the mouths of corridors that open into a hall, which holds a circle of so many cells."""
+    core = ndimage.distance_transform_edt(cut) > radius
+    if not core.any():
+        return []
+    hall = cut & (ndimage.distance_transform_edt(~core) <= radius + ROUGH_CELLS)
+    rest, count = ndimage.label(cut & ~hall)
+    areas = np.bincount(rest.ravel(), minlength=count + 1)
+    beside = ndimage.binary_dilation(hall) & (rest > 0)
+    borders, number = ndimage.label(beside, np.ones((3, 3)))
+    distance, nearest = ndimage.distance_transform_edt(cut, return_indices=True)
+    gaps = []
+    for index in range(1, number + 1):
+        cells = np.argwhere(borders == index)
+        ends = cells[[int(np.argmin(d)) for d in _along(cells)]]
+        chord = float(np.linalg.norm(ends[1] - ends[0]))
+        area = areas[rest[tuple(cells[0])]]
+        if not 4 < chord <= MAX_MOUTH_SHARE * radius or area < MIN_LONGER * chord**2:
+            continue
+        if max(distance[tuple(end)] for end in ends) > 3 + ROUGH_CELLS:
+            continue
+        walls = [nearest[:, end[0], end[1]] for end in ends]
+        gap = Gap((int(walls[0][0]), int(walls[0][1])), (int(walls[1][0]), int(walls[1][1])),
+                  float(np.linalg.norm(walls[1] - walls[0])) - 1, 1.0,
+                  (float(walls[0][0] + walls[1][0]) / 2, float(walls[0][1] + walls[1][1]) / 2))
+        gaps.append(gap)
+        for r, c in _line(gap):
+            cut[r, c] = False
+    return gaps
+
+
+def _along(cells: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    """Coordinates of cells along their longest extent, and against it."""
+    centred = cells - cells.mean(axis=0)
+    axis = np.linalg.svd(centred, full_matrices=False)[2][0]
+    return centred @ axis, -(centred @ axis)
 
 
 def _find_saddles(basins: NDArray[np.int32], distance: NDArray[np.float64],
