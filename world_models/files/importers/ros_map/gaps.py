@@ -19,8 +19,9 @@ from world_models.files.importers.building_plan import Floats
 Mask = NDArray[np.bool_]
 MIN_DOOR_M, MAX_DOOR_M = 0.5, 1.3
 MAX_MOUTH_M, MAX_WIDE_M = 2.6, 4.5
-MAX_DEPTH_M, MAX_WIDE_DEPTH_M = 0.9, 0.6
-"""Depth of a gap: of a door through a thick wall, and of a wide opening. What is deeper is a corridor."""
+MAX_DEPTH_M, MAX_WIDE_DEPTH_M = 0.9, 0.4
+"""Depth of a gap: of a door through a thick wall, and of a wide opening. What is deeper is a corridor, or
+between furniture."""
 JAMB_M = 0.15
 """How far the ends of a gap may lie from those of its first row."""
 LOOK_M = 0.3
