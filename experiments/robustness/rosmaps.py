@@ -2,7 +2,8 @@
 
 The plans are those of a public benchmark of room segmentation (Bormann et al., "Room segmentation: survey,
 implementation, and analysis", ICRA 2016), drawn by others. The floors are generated ones of seeds from JUDGED_SEED on,
-drawn with their furniture as a noisy scanner draws them, at a random angle. Missions take the traced world for the building.
+drawn with their furniture as a noisy scanner draws them, at a random angle. Missions take the traced world for the
+building.
 """
 
 from __future__ import annotations
