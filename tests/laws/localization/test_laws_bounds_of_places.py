@@ -1,0 +1,202 @@
+"""A lost robot at its bounds: what is believed of a place just below and just above each number that decides it.
+
+A table of boards or results, and the decision that follows. Both sides of each bound must occur.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from knowledge_sources.goal.relocalizer import Relocalizer, _find_prior, _prefer_reachable
+from knowledge_sources.methods.localization.global_localization import (
+    Candidate,
+    LocalizationResult,
+    LocalizationStatus,
+    decide,
+    rank_candidates,
+)
+from knowledge_sources.methods.localization.log_likelihood import PoseLikelihood
+from knowledge_sources.methods.localization.next_view import SensingAction
+from knowledge_sources.methods.localization.place_odds import (
+    ToldPlace,
+    compute_place_odds,
+    compute_prior,
+    is_within_reach,
+    weigh_told,
+)
+from knowledge_sources.settings import DEFAULT
+from sim.made_up.generated_floors import generated_floor
+from world_models.actuator import ActuatorModel
+from world_models.camera import Camera, CameraMount
+from world_models.entries.percepts import Segments
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+
+FOUND, PROBE, AMBIGUOUS = LocalizationStatus.FOUND, LocalizationStatus.PROBE, LocalizationStatus.AMBIGUOUS
+S = DEFAULT.localization
+LOOKS = [Pose2(0.0, 0.0, 0.5 * k) for k in range(8)]
+SMALL = 1e-6
+ROBOT = RobotModel(generated_floor(11, 4, symmetric=True).world, Camera.from_field_of_view(1.1), CameraMount(1.0, 0.1),
+                   ActuatorModel())
+
+
+def place(x_m: float = 2.0, log: float = 40.0, accepted: bool = True, room: str = "corridor-0") -> Candidate:
+    likelihood = PoseLikelihood(20, 20, log, 1.0, 1.0)
+    return Candidate(room, Pose2(x_m, 2.0, 0.0), np.diag([1e-4, 1e-4, 1e-5]), likelihood, accepted)
+
+
+@pytest.mark.parametrize(("places", "looks", "status"), [
+    ((place(),), S.min_views, FOUND),
+    ((place(),), S.min_views + 1, FOUND),
+    ((place(),), S.min_views - 1, PROBE),
+    ((place(),), 1, PROBE),
+    ((place(accepted=False),), S.min_views, PROBE),
+    ((place(accepted=False),), S.min_views + 3, PROBE),
+    ((), S.min_views, PROBE),
+    ((place(2.0), place(6.0, accepted=False)), S.min_views, PROBE),
+])
+def test_one_accepted_place_is_found_after_enough_looks(
+    places: tuple[Candidate, ...], looks: int, status: LocalizationStatus
+) -> None:
+    assert S.min_views > 1
+    assert decide(ROBOT, places, LOOKS[:looks]).status is status
+
+
+def is_like(like: dict[str, Any]) -> bool:
+    base = PoseLikelihood(visible=40, matched=36, log_likelihood=20.0, explained=0.9, weakest_view=0.9)
+    return replace(base, **like).is_sufficient(S)
+
+
+def test_each_part_of_the_evidence_must_be_enough() -> None:
+    """Just above and just below each bound, with all else as good as can be."""
+    visible = 1000
+    for above, below in (
+        ({"visible": S.min_matched_lines, "matched": S.min_matched_lines},
+         {"visible": S.min_matched_lines - 1, "matched": S.min_matched_lines - 1}),
+        ({"visible": visible, "matched": int(np.ceil(S.min_matched_fraction * visible)), "explained": 1.0},
+         {"visible": visible, "matched": int(np.ceil(S.min_matched_fraction * visible)) - 1, "explained": 1.0}),
+        ({"weakest_view": S.min_view_fraction + SMALL}, {"weakest_view": S.min_view_fraction - SMALL}),
+        ({"explained": max(S.min_explained_fraction, S.min_fraction_sum - 0.9) + SMALL},
+         {"explained": max(S.min_explained_fraction, S.min_fraction_sum - 0.9) - SMALL}),
+        ({"explained": 0.0, "log_likelihood": S.sure_log_likelihood + SMALL},
+         {"explained": 0.0, "log_likelihood": S.sure_log_likelihood - SMALL}),
+        ({"explained": 0.0, "log_likelihood": 1e3, "visible": visible,
+          "matched": int(np.ceil(S.sure_matched_fraction * visible))},
+         {"explained": 0.0, "log_likelihood": 1e3, "visible": visible,
+          "matched": int(np.ceil(S.sure_matched_fraction * visible)) - 1}),
+    ):
+        assert is_like(above) and not is_like(below), (above, below)
+
+
+def test_unlikely_places_are_dropped_and_refuted_ones_unless_they_look_alike() -> None:
+    def rank(*logs: float, alike: bool = False) -> list[float]:
+        found = [place(2.0 + k, log) for k, log in enumerate(logs)]
+        return [c.likelihood.log_likelihood for c in rank_candidates(found, lambda one, other: alike)]
+
+    low = S.min_log_likelihood
+    assert rank(low + SMALL) == [low + SMALL] and rank(low - SMALL) == []
+    near, far = 50.0 - S.refuting_log_ratio + SMALL, 50.0 - S.refuting_log_ratio - SMALL
+    assert rank(50.0, near) == [50.0, near] and rank(50.0, far) == [50.0]
+    assert rank(50.0, far, alike=True) in ([50.0, far], [50.0, far][:1 + (far >= low)])
+    many = [50.0 - SMALL * k for k in range(S.max_hypotheses + 3)]
+    assert rank(*many) == many[:S.max_hypotheses]
+
+
+HERE = ToldPlace(Pose2(2.0, 2.0, 0.0), np.diag([1e-4, 1e-4, 1e-5]), 0.5)
+
+
+def find_told_probability(p_told: float, logs: tuple[float, float]) -> float:
+    return compute_place_odds(logs, [True, False], [False, False], p_told)[0]
+
+
+@pytest.mark.parametrize(("tied", "bound"), [(True, S.min_p_believed), (False, S.min_p_sure)])
+def test_the_told_place_is_believed_at_the_stated_odds(tied: bool, bound: float) -> None:
+    """By the prior alone, with two places of equal pictures: the posterior is the prior."""
+    two = (place(2.0), place(9.0))
+    seen = LocalizationResult(AMBIGUOUS if tied else PROBE, two, None if tied else SensingAction(1.0, 0.0, 1.0))
+
+    def weigh(p_told: float, looks: int = S.min_views, result: LocalizationResult = seen) -> LocalizationStatus:
+        return weigh_told(result, replace(HERE, p_told=p_told), lambda one, other: False, looks).status
+
+    above, below = bound + 0.5 * (1.0 - bound), bound - 1e-3
+    assert find_told_probability(above, (40.0, 40.0)) == pytest.approx(above)
+    assert weigh(above) is FOUND and weigh(below) is seen.status
+    assert weigh(above, S.min_views - 1) is seen.status
+    doubtful = replace(seen, candidates=(place(2.0, accepted=False), place(9.0)))
+    assert weigh(above, result=doubtful) is seen.status
+    elsewhere = replace(seen, candidates=(place(9.0), place(12.0)))
+    assert weigh(above, result=elsewhere).name == seen.status.name
+    assert S.min_p_believed < S.min_p_sure
+
+
+def test_a_place_is_the_told_one_up_to_the_stated_distance() -> None:
+    covariance = np.diag([0.02, 0.03, 0.01])
+    beyond = np.diag(np.square([S.told_sigma_m, S.told_sigma_m, S.told_sigma_rad]))
+    sigma_m = float(np.sqrt((2.0 * covariance + beyond)[0, 0]))
+    for part, is_there in ((0.999, True), (1.001, False)):
+        pose = Pose2(part * sigma_m * np.sqrt(S.max_told_chi2), 0.0, 0.0)
+        assert is_within_reach(pose, covariance, Pose2(0.0, 0.0, 0.0), covariance) is is_there
+
+
+def test_each_time_it_was_lost_again_the_told_place_is_less_likely() -> None:
+    odds = [p / (1.0 - p) for p in (compute_prior(times, S) for times in range(4))]
+    assert odds[0] == pytest.approx(S.p_told / (1.0 - S.p_told))
+    assert [b / a for a, b in pairwise(odds)] == pytest.approx([S.lost_again_odds] * 3)
+
+
+class Reach:
+    """A building in which wheels lead to some rooms."""
+
+    def __init__(self, *rooms: str) -> None:
+        self.rooms = rooms
+
+    def route(self, origin: str, room: str) -> object:
+        return () if room in self.rooms else None
+
+
+@pytest.mark.parametrize(("reach", "places", "status", "room"), [
+    (("a",), (place(room="a"), place(room="b")), FOUND, "a"),
+    (("b",), (place(room="a"), place(room="b")), FOUND, "b"),
+    (("a",), (place(room="a", accepted=False), place(room="b")), AMBIGUOUS, ""),
+    (("a",), (place(room="a", accepted=False),), AMBIGUOUS, ""),
+    (("a", "b"), (place(room="a"), place(room="b")), AMBIGUOUS, ""),
+    ((), (place(room="a"), place(room="b")), AMBIGUOUS, ""),
+])
+def test_the_only_place_within_reach_is_believed_if_it_stands_by_itself(
+    reach: tuple[str, ...], places: tuple[Candidate, ...], status: LocalizationStatus, room: str
+) -> None:
+    building: Any = Reach(*reach)
+    found = _prefer_reachable(building, LocalizationResult(AMBIGUOUS, places), "here")
+    assert found.status is status
+    assert status is not FOUND or [c.room for c in found.candidates] == [room]
+
+
+def test_a_dark_frame_is_dark_by_contrast_and_brightness_together() -> None:
+    g = DEFAULT.goal
+
+    def is_dark(contrast: float, brightness: float) -> bool:
+        empty = np.zeros((0, 2, 2))
+        return Relocalizer()._is_dark(Segments("Frame-1", "", empty, np.zeros(0), contrast, brightness))
+
+    assert is_dark(g.min_contrast - SMALL, g.min_brightness - SMALL)
+    assert not is_dark(g.min_contrast + SMALL, g.min_brightness - SMALL)
+    assert not is_dark(g.min_contrast - SMALL, g.min_brightness + SMALL)
+
+
+def test_the_prior_is_the_smaller_of_what_was_told_and_what_twins_leave() -> None:
+    def find(p_twins: float | None, times: int) -> float:
+        known = None if p_twins is None else SimpleNamespace(value=SimpleNamespace(probability=p_twins))
+        view: Any = SimpleNamespace(latest=lambda kind: known, where=lambda kind, which: (None,) * times)
+        return _find_prior(view, S)
+
+    assert find(None, 0) == pytest.approx(S.p_told)
+    assert find(S.p_told - 0.1, 0) == pytest.approx(S.p_told - 0.1)
+    assert find(min(1.0, S.p_told + 0.01), 0) == pytest.approx(S.p_told)
+    assert find(0.0, 0) == S.min_p_twin
+    assert find(None, 1) < find(None, 0)
