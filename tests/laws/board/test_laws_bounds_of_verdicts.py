@@ -1,0 +1,181 @@
+"""The milestone judge at its bounds: verified, refuted or not testable just below and just above each number.
+
+The verdicts of a table of weighed pictures; and, on the boards of a mission, how much evidence is asked for by whether
+the robot is in doubt, has followed landmarks, or has not: each state has its own number, and that alone decides.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Iterable, Iterator
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, TypeVar
+
+import numpy as np
+import pytest
+
+from blackboard.board import Blackboard, TracedView, View
+from blackboard.change import Change
+from blackboard.effect import Effect
+from blackboard.entry import Entry
+from blackboard.entry_store import Index
+from blackboard.level import Level
+from blackboard.servoing import OPEN, Discrepancy
+from harvey.simulation.run import run_mission
+from harvey.wiring import knowledge_sources
+from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
+from knowledge_sources.plan.milestone_judge import MilestoneJudge, Verdict, _update
+from knowledge_sources.settings import DEFAULT, Settings
+from sim.made_up.short_missions import OFFICE
+from sim.scenario import parse_scenario
+from sim.stage import build_stage
+from world_models.entries.percepts import Segments, Track, Tracks
+from world_models.entries.task import Milestone
+
+T = TypeVar("T")
+PLAN, VERIFICATION = DEFAULT.plan, DEFAULT.verification
+SMALL = 1e-6
+NO_LINES = np.zeros((0, 2, 2))
+
+
+def weigh(**changed: Any) -> Any:
+    """A picture that is verified as it is, otherwise as said."""
+    contrast = changed.pop("contrast", 40.0)
+    matched = changed.pop("matched", 20)
+    agreement = SimpleNamespace(matched=matched, visible=20, chance=0.2)
+    plain = {
+        "segments": Segments("Frame-1", "Milestone-1", NO_LINES, np.zeros(0), contrast), "expected": 20,
+        "lines": SimpleNamespace(agreement=agreement, coverage=0.9), "faces": changed.pop("faces", NO_FACES),
+        "p_false": 0.5 * POSE_CONFIDENCE.accept, "is_enough": True, "shift_px": 3.0, "tolerance_px": 10.0,
+        "is_weak": False, "is_inexact": False, "camera_chi2": 0.0, "is_camera_known": True,
+    }
+    return SimpleNamespace(**(plain | changed))
+
+
+NO_FACES: Any = SimpleNamespace(is_testable=False, agreeing=0.0, count=0)
+FEW, REFUTE, CHI2 = VERIFICATION.min_matched_lines, POSE_CONFIDENCE.refute, DEFAULT.camera_state.max_chi2
+
+
+@pytest.mark.parametrize(("changed", "verdict"), [
+    ({}, "verified"),
+    ({"contrast": PLAN.min_contrast + SMALL}, "verified"),
+    ({"contrast": PLAN.min_contrast - SMALL}, "not testable"),
+    ({"expected": FEW}, "verified"),
+    ({"expected": FEW - 1}, "not testable"),
+    ({"matched": FEW}, "verified"),
+    ({"matched": FEW - 1}, "not testable"),
+    ({"is_enough": False}, "not testable"),
+    ({"p_false": REFUTE - SMALL, "is_enough": False}, "not testable"),
+    ({"p_false": REFUTE + SMALL, "is_enough": False}, "refuted"),
+    ({"p_false": REFUTE + SMALL, "is_enough": False, "is_inexact": True}, "not testable"),
+    ({"p_false": REFUTE + SMALL, "is_enough": False, "is_camera_known": False}, "not testable"),
+    ({"camera_chi2": CHI2 - SMALL}, "verified"),
+    ({"camera_chi2": CHI2 + SMALL}, "refuted"),
+    ({"shift_px": 10.0 - SMALL}, "verified"),
+    ({"shift_px": 10.0 + SMALL}, "refuted"),
+    ({"shift_px": math.inf}, "refuted"),
+    ({"shift_px": 10.0 + SMALL, "is_enough": False}, "not testable"),
+])
+def test_the_verdict_just_below_and_just_above_each_bound(changed: dict[str, Any], verdict: str) -> None:
+    assert MilestoneJudge()._first_verdict(weigh(**changed))[0] == verdict
+
+
+@pytest.mark.parametrize(("modes", "told", "most"), [
+    ((), 0.0, PLAN.max_looks), (("wall",), 0.0, PLAN.max_inexact_looks), ((), 1.0, PLAN.max_inexact_looks)])
+def test_it_looks_again_as_often_as_it_may(modes: tuple[str, ...], told: float, most: int) -> None:
+    judge = MilestoneJudge()
+    for tried in range(most + 2):
+        milestone: Any = SimpleNamespace(modes=modes, told=told, tried=(0.0,) * tried)
+        assert judge._may_look_again(Verdict("not testable", "", 0.1), milestone) is (tried + 1 < most)
+        assert not judge._may_look_again(Verdict("refuted", "", 0.1), milestone)
+
+
+@pytest.mark.parametrize("p", [0.001, 0.1, 0.5, 0.9])
+@pytest.mark.parametrize("log_odds", [-3.0, 0.0, 0.5, 3.0])
+def test_what_was_told_changes_the_odds_by_bayes_rule(p: float, log_odds: float) -> None:
+    updated = _update(p, log_odds)
+    assert updated / (1.0 - updated) == pytest.approx(p / (1.0 - p) * math.exp(log_odds))
+
+
+@pytest.mark.parametrize("p_wrong", [0.001, 0.05, 0.5, 0.9])
+def test_a_pose_is_accepted_up_to_the_stated_probability_of_being_wrong(p_wrong: float) -> None:
+    """After Bayes' rule with what was believed before: both sides of the bound."""
+    odds = POSE_CONFIDENCE.accept / (1.0 - POSE_CONFIDENCE.accept) * (1.0 - p_wrong) / p_wrong
+    bound = odds / (1.0 + odds)
+    assert POSE_CONFIDENCE.accepts(bound * (1.0 - 1e-9), p_wrong)
+    assert not POSE_CONFIDENCE.accepts(bound * (1.0 + 1e-6), p_wrong)
+
+
+class StateView(TracedView):
+    """The board as if the robot were in doubt or not, and had followed so many landmarks or none."""
+
+    __slots__ = ("_doubt", "_tracks")
+
+    def __init__(self, board: Blackboard, in_doubt: bool, followed: int) -> None:
+        super().__init__(board, ())
+        doubt = Discrepancy(Level.PLAN, "a milestone is elsewhere", 9.0, (0.0, 30.0), "px")
+        self._doubt = Entry("Discrepancy-999", 0, doubt, "test", 0, ()) if in_doubt else None
+        track = Track("a", (0.0, 0.0, 0.0), "Frame-1", (0.0, 0.0), 1.0, (0.0, 0.0), (1.0, 1.0), 1.0, 0.3)
+        self._tracks = Entry("Tracks-999", 0, Tracks("Frame-1", 10, (track,) * followed), "test", 0, ())
+
+    def newest(self, index: Index[T], key: Hashable) -> Entry[T] | None:
+        held: Any = self._doubt
+        return held if index is OPEN and key is Level.PLAN else super().newest(index, key)
+
+    def newest_first(self, kind: type[T]) -> Iterator[Entry[T]]:
+        held: Any = self._tracks
+        return iter((held,)) if kind is Tracks else super().newest_first(kind)
+
+
+def tune(**plan: float) -> Settings:
+    return replace(DEFAULT, plan=replace(PLAN, **plan))
+
+
+def find_prior_at_bound(p_false: float) -> float:
+    """The probability of a wrong place before a picture, by which it is just accepted."""
+    odds = POSE_CONFIDENCE.accept / (1.0 - POSE_CONFIDENCE.accept) * (1.0 - p_false) / p_false
+    return odds / (1.0 + odds)
+
+
+def test_each_state_of_the_robot_asks_for_its_own_evidence() -> None:
+    """In doubt, with landmarks followed, and without: on the board of each judgement of a mission."""
+    least, checked = DEFAULT.action.min_followed_landmarks, []
+    states = {"p_wrong_in_doubt": ((True, least), (True, 0)), "p_wrong_followed": ((False, least), (False, least + 1)),
+              "p_wrong_unfollowed": ((False, 0), (False, least - 1))}
+
+    def check(board: Blackboard, trigger: Change) -> None:
+        fix = trigger.entry.value
+        milestone: Milestone = board.view[board.view[fix.match].value.milestone].value
+        for own, boards in states.items():
+            for in_doubt, followed in boards:
+                view = StateView(board, in_doubt, followed)
+                weighed = MilestoneJudge()._weigh(view, fix, milestone)
+                assert weighed.is_weak is (in_doubt or followed < least)
+                bound = find_prior_at_bound(weighed.p_false)
+                for value, enough in ((bound * 0.99, True), (bound + 0.01 * (1.0 - bound), False)):
+                    others = {name: (0.999 if enough else 1e-9) for name in states if name != own}
+                    judge = MilestoneJudge(tune(**others, **{own: value}))
+                    assert judge._weigh(view, fix, milestone).is_enough is enough, (own, in_doubt, followed, value)
+                checked.append(own)
+
+    def sources(settings: Settings) -> list[Any]:
+        out: list[Any] = list(knowledge_sources(settings))
+        judge = next(source for source in out if isinstance(source, MilestoneJudge))
+        real = judge.act
+
+        def act(view: View, trigger: Change) -> Iterable[Effect]:
+            check(view._board, trigger)
+            return real(view, trigger)
+
+        judge.act = act
+        return out
+
+    run_mission(build_stage(parse_scenario(OFFICE)), 3, sources=sources)
+    assert set(checked) == set(states) and len(checked) >= 6
+
+
+def test_in_doubt_more_is_asked_than_without_landmarks_and_there_more_than_with_them() -> None:
+    assert PLAN.p_wrong_followed < PLAN.p_wrong_unfollowed < PLAN.p_wrong_in_doubt
+
+
