@@ -15,6 +15,7 @@ from harvey.commands import (
     listing,
     repair,
     replay,
+    report,
     resume,
     run,
     settings,
@@ -27,6 +28,6 @@ from harvey.commands.command import Command
 
 COMMANDS: tuple[Command, ...] = (
     listing.COMMAND, run.COMMAND, view.COMMAND, story.COMMAND, why.COMMAND, replay.COMMAND, diff.COMMAND,
-    export.COMMAND, resume.COMMAND, repair.COMMAND, world.COMMAND, settings.COMMAND, experiment.COMMAND, drive.COMMAND,
-    calibrate.COMMAND, emulate.COMMAND,
+    report.COMMAND, export.COMMAND, resume.COMMAND, repair.COMMAND, world.COMMAND, settings.COMMAND,
+    experiment.COMMAND, drive.COMMAND, calibrate.COMMAND, emulate.COMMAND,
 )

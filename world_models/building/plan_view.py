@@ -48,10 +48,30 @@ class Drawing:
     shapes: tuple[Shape, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class Storey:
+    """A storey as it is drawn by itself.
+
+    Attributes:
+        rooms: whose floors are at its height.
+        origin: (2,) the point of the world frame that is 0, 0 on the drawing [m].
+        drawing: north is up.
+    """
+
+    rooms: tuple[str, ...]
+    origin: Floats
+    drawing: Drawing
+
+
+def draw_storeys(world: World) -> list[Storey]:
+    """Each storey by itself, from the lowest."""
+    storeys = _find_storeys(world)
+    return [_draw_panel(world, floor_m, rooms, len(storeys) > 1) for floor_m, rooms in storeys]
+
+
 def build_drawing(world: World) -> Drawing:
     """All storeys on one page, from the lowest; north is up."""
-    storeys = _find_storeys(world)
-    panels = [_draw_panel(world, floor_m, rooms, len(storeys) > 1) for floor_m, rooms in storeys]
+    panels = [storey.drawing for storey in draw_storeys(world)]
     columns = math.ceil(math.sqrt(len(panels)))
     rows = [panels[i : i + columns] for i in range(0, len(panels), columns)]
     heights = [max(float(panel.size[1]) for panel in row) for row in rows]
@@ -68,7 +88,7 @@ def build_drawing(world: World) -> Drawing:
     return Drawing(np.array([width, math.fsum(heights)]), tuple(shapes))
 
 
-def _draw_panel(world: World, floor_m: float, rooms: list[str], titled: bool) -> Drawing:
+def _draw_panel(world: World, floor_m: float, rooms: list[str], titled: bool) -> Storey:
     """One storey, its south-west corner at 0, 0."""
     corners = np.concatenate([world.outline(name) for name in rooms])
     low, high = corners.min(axis=0) - MARGIN_M, corners.max(axis=0) + MARGIN_M
@@ -77,7 +97,8 @@ def _draw_panel(world: World, floor_m: float, rooms: list[str], titled: bool) ->
     if titled:
         text = f"{_title_of(world, rooms)}, floor at {floor_m:.2f} m"
         shapes.append(Shape("title", np.array([[width / 2, height + TITLE_M / 3]]), text))
-    return Drawing(np.array([width, height + (TITLE_M if titled else 0.0)]), tuple(shapes))
+    size = np.array([width, height + (TITLE_M if titled else 0.0)])
+    return Storey(tuple(rooms), low, Drawing(size, tuple(shapes)))
 
 
 def _find_storeys(world: World) -> list[tuple[float, list[str]]]:
@@ -127,11 +148,17 @@ def _footprint(face: Face) -> Floats:
 
 def plan_svg(world: World) -> str:
     """The floor plan as an SVG text, 40 units per metre."""
-    drawing = build_drawing(world)
+    return drawing_svg(build_drawing(world))
+
+
+def drawing_svg(drawing: Drawing, more: str = "") -> str:
+    """A drawing as an SVG text, 40 units per metre, y down; ``more`` is drawn over it."""
     width, height = drawing.size * SCALE
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}">'
+    head = (f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}"'
+            f' viewBox="0 0 {width:.0f} {height:.0f}">')
     ground = f'<rect width="{width:.0f}" height="{height:.0f}" fill="{GROUND}"/>'
-    return "\n".join([head, _STYLE, ground, *(_svg_element(shape, height) for shape in drawing.shapes), "</svg>\n"])
+    shapes = (_svg_element(shape, height) for shape in drawing.shapes)
+    return "\n".join([head, _STYLE, ground, *shapes, *([more] if more else []), "</svg>\n"])
 
 
 GROUND = "#777"

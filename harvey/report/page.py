@@ -1,0 +1,135 @@
+"""The report of a run: story, replay and plots in one HTML file that asks the network for nothing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+from harvey.errors import BadInput
+from harvey.report import data
+from harvey.report.errors import draw_errors
+from harvey.report.pictures import read_pictures
+from harvey.report.plan import draw_plans
+from harvey.run_files.run_directory import RunDirectory
+from harvey.run_files.run_head import SIMULATOR, RunHead
+from harvey.runner.replay import open_pictures
+from harvey.story.head import run_name
+from harvey.story.story import RunStory, tell_run
+from harvey.story.truth import read_errors
+from harvey.why.history import History
+from logs.reader import read_true_track
+from world_models.building.world import World
+from world_models.camera import Camera
+
+
+def build_page(run: RunDirectory, history: History) -> str:
+    """The whole file.
+
+    Raises:
+        BadInput, RecordingError: journal, pictures, result or recording cannot be read.
+    """
+    story = tell_run(run, history)
+    world, camera, is_simulated = _known(run)
+    track = read_true_track(run.recording) if is_simulated and world is not None else []
+    errors = read_errors(run, history) if track else ()
+    beliefs = list(data.beliefs(history, world))
+    plans = [] if world is None else draw_plans(world, beliefs, track)
+    contents = {
+        "cycles": list(data.cycles(history)), "entries": data.entries(history), "beliefs": beliefs,
+        "candidates": list(data.candidates(history, world)), "track": track,
+        "errors": [asdict(error) for error in errors],
+        "plans": [{key: value for key, value in plan.items() if key != "svg"} for plan in plans],
+        "pictures": list(read_pictures(history, open_pictures(run), camera)),
+        "turns": [asdict(point) for point in story.turning_points if point.is_told],
+    }
+    title = run_name(run)
+    parts = {
+        "title": escape(title), "style": _read("page.css"), "script": _read("page.js"), "data": embedded(contents),
+        "opening": _opening(story), "plans": "\n".join(plan["svg"] for plan in plans),
+        "errors": draw_errors(beliefs, errors, lost_spans(story, history)) if beliefs else "",
+        "sections": "\n".join(_sections(story)), "milestones": "\n".join(_milestones(story)),
+        "last": str(history.cycles[-1]),
+    }
+    return fill_in(_read("page.html"), parts)
+
+
+def fill_in(frame: str, parts: Mapping[str, str]) -> str:
+    """The frame with each ``{{name}}`` replaced once; what is put in is not looked at again."""
+    pieces = frame.split("{{")
+    found = [pieces[0]]
+    for piece in pieces[1:]:
+        name, _, rest = piece.partition("}}")
+        found += [parts[name], rest]
+    return "".join(found)
+
+
+def embedded(contents: Any) -> str:
+    """JSON that can stand in a script element: no text of it ends that, or begins a comment."""
+    text = json.dumps(contents, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def lost_spans(story: RunStory, history: History) -> Iterator[tuple[int, int]]:
+    """From each cycle in which it was lost to that in which it was found, or to the end."""
+    since: int | None = None
+    for point in story.turning_points:
+        if point.kind == "lost" and since is None:
+            since = point.cycle
+        elif point.kind == "found" and since is not None:
+            yield since, point.cycle
+            since = None
+    if since is not None:
+        yield since, history.cycles[-1]
+
+
+def _known(run: RunDirectory) -> tuple[World | None, Camera | None, bool]:
+    """World and camera of the run, where its files are as they were; and whether the truth is recorded."""
+    try:
+        head = RunHead.read(run.path)
+        world = head.load_world()
+        return world, head.model(world).lens, head.kind == SIMULATOR and run.recording.is_file()
+    except BadInput:
+        return None, None, False
+
+
+def _read(name: str) -> str:
+    return (files("harvey.report") / name).read_text(encoding="utf-8")
+
+
+def _opening(story: RunStory) -> str:
+    first, *rest = story.opening
+    return f"<p><strong>{escape(first)}</strong></p>\n<pre>{escape(chr(10).join(rest))}</pre>"
+
+
+def _sections(story: RunStory) -> Iterator[str]:
+    for section in story.sections:
+        yield f"<h3>{escape(section.title)}</h3>\n<table>"
+        for one in section.sentences:
+            time = "" if one.time_s is None else f"{one.time_s:.1f} s"
+            refs = " ".join(_reference(ref) for ref in one.refs)
+            yield f"<tr><td>{_cycle(one.cycle)}</td><td>{time}</td><td>{escape(one.text)} {refs}</td></tr>"
+        yield "</table>"
+
+
+def _milestones(story: RunStory) -> Iterator[str]:
+    for row in story.milestones:
+        numbers: Sequence[str] = (
+            "" if row.time_s is None else f"{row.time_s:.1f}", f"{row.matched} of {row.expected}",
+            "" if row.deviation_m is None else f"{1e3 * row.deviation_m:.1f}",
+            "" if row.p_false is None else f"{row.p_false:.1g}")
+        when, *others = (f"<td>{escape(cell)}</td>" for cell in numbers)
+        name = f"<td>{escape(row.name)} {' '.join(_reference(ref) for ref in row.refs[:1])}</td>"
+        verdict = f'<td class="{escape(row.verdict.replace(" ", "-"))}">{escape(row.verdict)}</td>'
+        yield f"<tr><td>{_cycle(row.cycle)}</td>{when}{name}{verdict}{''.join(others)}</tr>"
+
+
+def _cycle(cycle: int | None) -> str:
+    return "" if cycle is None else f'<button type="button" data-cycle="{cycle}">{cycle}</button>'
+
+
+def _reference(ref: str) -> str:
+    return f'<button type="button" data-entry="{escape(ref)}">{escape(ref)}</button>'
