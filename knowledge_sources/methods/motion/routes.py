@@ -24,8 +24,8 @@ SLACK_M = 1e-6
 """Distance below which two places are the same: rounding of shapely's geometry."""
 
 CORNER_STEPS = 4
-"""Corners of a quarter circle round what is no rectangle: the way round it is at most 4.4 % too near (a step may be half
-as long again where the corner's angle is no multiple of a step: 1 - cos(16.9 degrees))."""
+"""Corners of a quarter circle round what is no rectangle: the way round it is at most 4.4 % too near (where the
+corner's angle is no multiple of a step, a step may be half as long again: 1 - cos(16.9 degrees))."""
 
 MAX_FREE_SPACES = 64
 """Size of the cache of free spaces."""

@@ -1,6 +1,7 @@
 """Laws of hidden-line removal: against rays cast one by one at every surface, and against plain projection."""
 
 import math
+from typing import Any
 
 import numpy as np
 from hypothesis import assume, given, settings
@@ -11,7 +12,7 @@ from world_models.building.geometry.outlines import inside_polygon
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose, Pose2
-from world_models.visibility.lines_and_points import VisibleLines, visible_lines, visible_points
+from world_models.visibility.lines_and_points import VisibleLines, find_hidden, visible_lines, visible_points
 from world_models.visibility.shadows import CONTACT_M
 
 WORLD = load_world(WORLDS / "research_center.toml", details=[])
@@ -100,6 +101,59 @@ def test_lines_are_seen_where_no_single_ray_is_stopped(camera_from_world: Pose, 
         if surely == nearly:
             where = (int(scene.line_landmark[number]), int(scene.line_index[number]))
             assert is_covered(found, *where, point) != surely
+
+
+def cast_rays(centre: NDArray[np.float64], points: NDArray[np.float64]) -> tuple[Any, Any]:
+    """(n,) as :func:`is_hidden`, of points (n, 3), each by its own ray at the front of every triangle, all at once.
+
+    The plane's equation and the signs of the sub-triangles' areas: another test than Moeller's and Trumbore's.
+    """
+    corners = [TRIANGLES[:, k] for k in range(3)]
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    size = np.linalg.norm(normal, axis=1)
+    normal = normal[size > 1e-9] / size[size > 1e-9, None]
+    corners = [corner[size > 1e-9] for corner in corners]
+    above = np.sum(normal * (centre - corners[0]), axis=1)
+    below = points @ normal.T - np.sum(normal * corners[0], axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = above / (above - below)
+    hit = centre + part[..., None] * (points[:, None] - centre)
+    least = np.full(part.shape, np.inf)
+    for k in range(3):
+        edge = corners[(k + 1) % 3] - corners[k]
+        inward = np.cross(normal, edge) / np.linalg.norm(edge, axis=1)[:, None]
+        least = np.minimum(least, np.sum(inward * (hit - corners[k]), axis=2))
+    stops = (above > 1e-6) & (part > 0.0)
+    surely = stops & (least > 1e-6) & (-below > CONTACT_M + 1e-6)
+    nearly = stops & (least > -1e-6) & (-below > CONTACT_M - 1e-6)
+    return surely.any(axis=1), nearly.any(axis=1)
+
+
+def test_what_is_hidden_is_what_a_ray_does_not_reach_in_every_room() -> None:
+    """Points on the edges of each room, from places all over it: a surface hides by its front only."""
+    rng, checked, hidden = np.random.default_rng(5), 0, 0
+    for room in WORLD.rooms:
+        lines = np.array([line for mark in WORLD.landmarks if mark.locale == room for line in mark.lines_world])
+        outline = WORLD.outline(room)
+        for _ in range(6):
+            u, v = rng.uniform(0.05, 0.95, 2)
+            x, y = outline[0] + u * (outline[1] - outline[0]) + v * (outline[3] - outline[0])
+            mount = CameraMount(rng.uniform(0.5, 1.5), 0.0, rng.uniform(-0.3, 0.3))
+            view = mount.camera_from_robot @ Pose2(x, y, rng.uniform(-math.pi, math.pi)).lifted().inverse()
+            along = rng.uniform(0.0, 1.0, (120, 1))
+            chosen = lines[rng.integers(len(lines), size=120)]
+            points = chosen[:, 0] + along * (chosen[:, 1] - chosen[:, 0])
+            in_camera = view.apply(points)
+            seen = in_camera[:, 2] > 0.1
+            seen[seen] = CAMERA.inside(CAMERA.project(in_camera[seen]), 0.01)
+            if not seen.any():
+                continue
+            surely, nearly = cast_rays(view.inverse().translation, points[seen])
+            clear = surely == nearly
+            found = find_hidden(WORLD, CAMERA, view, points[seen])
+            assert np.array_equal(found[clear], surely[clear]), f"{room} from ({x:.2f}, {y:.2f})"
+            checked, hidden = checked + int(clear.sum()), hidden + int(surely[clear].sum())
+    assert checked > 500 and 0.02 * checked < hidden < 0.8 * checked
 
 
 @settings(deadline=None, max_examples=25)
