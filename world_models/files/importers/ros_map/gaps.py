@@ -221,6 +221,8 @@ def _close_mouths(cut: Mask, radius: float) -> list[Gap]:
         gap = Gap((int(walls[0][0]), int(walls[0][1])), (int(walls[1][0]), int(walls[1][1])),
                   float(np.linalg.norm(walls[1] - walls[0])) - 1, 1.0,
                   (float(walls[0][0] + walls[1][0]) / 2, float(walls[0][1] + walls[1][1]) / 2))
+        if gap.width > MAX_MOUTH_SHARE * radius:
+            continue
         gaps.append(gap)
         for r, c in _line(gap):
             cut[r, c] = False

@@ -8,7 +8,15 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from world_models.files.importers.building_plan import BuildingError, BuildingPlan, Space, Storey, WallOpening, slug
+from world_models.files.importers.building_plan import (
+    BuildingError,
+    BuildingPlan,
+    Floats,
+    Space,
+    Storey,
+    WallOpening,
+    slug,
+)
 from world_models.files.importers.polygons import extract_outline
 from world_models.files.importers.ros_map.gaps import Gap
 from world_models.files.importers.ros_map.grid import Grid, make_grid
@@ -52,7 +60,7 @@ def _add_rooms(plan: BuildingPlan, labels: Labels, gaps: list[Gap], grid: Grid, 
         beside = [(gap, 1 if rooms[0] == number else -1) for gap in gaps
                   if number in (rooms := rooms_beside(gap, labels, grid.cell_m))]
         shape = room_shape(labels == number, beside, grid.cell_m)
-        outline = extract_outline(shapely.orient_polygons(grid.to_map_polygon(shape))) if shape is not None else None
+        outline = _trace(grid.to_map_polygon(shape)) if shape is not None else None
         if outline is None:
             area_m2 = float((labels == number).sum()) * grid.cell_m**2
             plan.report.left_out.append(f"a part of {area_m2:.1f} m2: no outline could be traced")
@@ -60,6 +68,16 @@ def _add_rooms(plan: BuildingPlan, labels: Labels, gaps: list[Gap], grid: Grid, 
         names[number] = f"room-{len(names) + 1}"
         plan.spaces.append(Space(names[number], "room", names[number], STOREY, outline, 0.0, wall_height_m))
     return names
+
+
+def _trace(shape: shapely.Geometry) -> Floats | None:
+    """The outline (k, 2) of a shape; where it touches itself, without its narrowest parts."""
+    for narrow_m in (0.0, 0.03, 0.06, 0.12):
+        part = shape.buffer(-narrow_m, join_style="mitre").buffer(narrow_m, join_style="mitre") if narrow_m else shape
+        outline = extract_outline(part)
+        if outline is not None:
+            return outline
+    return None
 
 
 def _add_doors(plan: BuildingPlan, labels: Labels, gaps: list[Gap], names: dict[int, str], grid: Grid) -> None:

@@ -14,6 +14,8 @@ RAY_M = 0.3
 """Free strips narrower than this are rays of the scanner through windows, or gaps in a wall's picture."""
 LEG_M = 0.5
 """Things on the floor up to this size, that stand free, are no walls."""
+MIN_HOLLOW_M, MIN_FILLED, RIM_M = 0.15, 0.6, 0.1
+"""Of a hollow thing: its sides at least, the share of its bounds that it fills, and the thickness of its rim."""
 MAX_FURNITURE_M, MIN_FURNITURE_THICK_M = 2.5, 0.4
 """Larger things that stand free are furniture where they are no longer, and no thinner, than this."""
 REACH_M = 0.6
@@ -34,11 +36,25 @@ def clean_floor(free: Mask, cell_m: float) -> tuple[Mask, list[tuple[slice, slic
             is_thing[number] = not touches
             if not touches:
                 things.append(bounds)
-    floor = free | is_thing[around]
+    floor = free | is_thing[around] | _find_hollow(free, cell_m)
     radius = max(1, round(RAY_M / 2 / cell_m))
     inside = ndimage.distance_transform_edt(np.pad(floor, 1))[1:-1, 1:-1] > radius
     opened = ndimage.distance_transform_edt(~inside) <= radius if inside.any() else inside
     return np.asarray(opened & floor, dtype=bool), things
+
+
+def _find_hollow(free: Mask, cell_m: float) -> Mask:
+    """Small things that are drawn hollow and may touch a wall, such as bins: the free cells in them and their rims.
+
+    A rim that is also the wall's face leaves a hole in the wall, narrower than RAY_M.
+    """
+    pockets, count = ndimage.label(free)
+    keep = np.zeros(count + 1, bool)
+    for number, bounds in enumerate(ndimage.find_objects(pockets), 1):
+        sides_m = [(s.stop - s.start) * cell_m for s in bounds]
+        filled = float((pockets[bounds] == number).mean())
+        keep[number] = min(sides_m) >= MIN_HOLLOW_M and max(sides_m) <= LEG_M and filled >= MIN_FILLED
+    return np.asarray(ndimage.binary_dilation(keep[pockets], np.ones((3, 3)), round(RIM_M / cell_m)), dtype=bool)
 
 
 def part_rooms(floor: Mask, cell_m: float) -> tuple[Labels, list[Gap]]:
