@@ -16,6 +16,7 @@ LEG_M = 0.5
 """Things on the floor up to this size, that stand free, are no walls."""
 MIN_HOLLOW_M, MIN_FILLED, RIM_M = 0.15, 0.6, 0.1
 """Of a hollow thing: its sides at least, the share of its bounds that it fills, and the thickness of its rim."""
+STRAIGHT_M = 0.8
 MAX_FURNITURE_M, MIN_FURNITURE_THICK_M = 2.5, 0.4
 """Larger things that stand free are furniture where they are no longer, and no thinner, than this."""
 REACH_M = 0.6
@@ -46,7 +47,7 @@ def clean_floor(free: Mask, cell_m: float) -> tuple[Mask, list[tuple[slice, slic
 def _find_hollow(free: Mask, cell_m: float) -> Mask:
     """Small things that are drawn hollow and may touch a wall, such as bins: the free cells in them and their rims.
 
-    A rim that is also the wall's face leaves a hole in the wall, narrower than RAY_M.
+    What is part of a straight run of STRAIGHT_M or more stays: it is the wall behind.
     """
     pockets, count = ndimage.label(free)
     keep = np.zeros(count + 1, bool)
@@ -54,7 +55,12 @@ def _find_hollow(free: Mask, cell_m: float) -> Mask:
         sides_m = [(s.stop - s.start) * cell_m for s in bounds]
         filled = float((pockets[bounds] == number).mean())
         keep[number] = min(sides_m) >= MIN_HOLLOW_M and max(sides_m) <= LEG_M and filled >= MIN_FILLED
-    return np.asarray(ndimage.binary_dilation(keep[pockets], np.ones((3, 3)), round(RIM_M / cell_m)), dtype=bool)
+    if not keep.any():
+        return np.zeros_like(free)
+    run = np.ones((1, round(STRAIGHT_M / cell_m)), bool)
+    straight = ndimage.binary_opening(~free, run) | ndimage.binary_opening(~free, run.T)
+    hollow = ndimage.binary_dilation(keep[pockets], np.ones((3, 3)), max(1, round(RIM_M / cell_m)))
+    return np.asarray(hollow & ~straight, dtype=bool)
 
 
 def part_rooms(floor: Mask, cell_m: float) -> tuple[Labels, list[Gap]]:
