@@ -15,7 +15,9 @@ from world_models.files.importers.ros_map.occupancy import FREE, OCCUPIED, UNKNO
 
 MARGIN_CELLS = 3
 MIN_TURN_RAD = math.radians(0.3)
-COARSE_DEG, FINE_DEG = 0.5, 0.1
+COARSE_DEG, NEAR_DEG, FINE_DEG = 0.5, 1.5, 0.1
+PLATEAU = 0.96
+"""Thick walls make the top of the profile flat: its middle is taken, from this share of the top on."""
 MIN_CONTRAST = 1.3
 """The profile along the walls is this many times the median of all directions, or none prevails."""
 MIN_WALL_CELLS, MAX_WALL_CELLS = 50, 30_000
@@ -97,8 +99,9 @@ def find_wall_turn(cells: Cells) -> float:
     best = coarse[int(np.argmax(heights))]
     if heights.max() < MIN_CONTRAST * np.median(heights):
         return 0.0
-    fine = best + np.arange(-COARSE_DEG, COARSE_DEG + FINE_DEG / 2, FINE_DEG)
-    turn = math.radians(float(fine[int(np.argmax([_profile(x, y, angle) for angle in fine]))]))
+    fine = best + np.arange(-NEAR_DEG, NEAR_DEG + FINE_DEG / 2, FINE_DEG)
+    heights = np.array([_profile(x, y, angle) for angle in fine])
+    turn = math.radians(float(fine[heights >= PLATEAU * heights.max()].mean()))
     return turn if abs(turn) > MIN_TURN_RAD else 0.0
 
 
