@@ -6,12 +6,13 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from harvey.run_files.records import EntryRecord
 from harvey.tables import table
 from harvey.why.decisions import time_at
 from harvey.why.history import History
 from harvey.why.links import reason
 from harvey.why.sentences import value_of
-from world_models.entries.task import Certificate, Milestone
+from world_models.entries.task import Certificate
 
 COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong")
 MOST_ROWS = 60
@@ -58,7 +59,7 @@ def _judged(history: History) -> Iterator[MilestoneRow]:
         if record.change == "Retracted":
             continue
         certificate, below = value_of(record, Certificate), reason(history, record, "Milestone")
-        name = certificate.milestone if below is None else value_of(below, Milestone).name()
+        name = certificate.milestone if below is None else _name(below)
         refs = (record.ref, below.ref if below is not None else f"{certificate.milestone}.0")
         yield MilestoneRow(
             record.cycle,
@@ -78,19 +79,14 @@ def _not_judged(history: History, judged: set[str]) -> Iterator[MilestoneRow]:
     for id, ref in history.newest.items():
         record = history.entry(ref) if id.startswith("Milestone-") and id not in judged else None
         if record is not None:
-            value = value_of(record, Milestone)
             yield MilestoneRow(
-                record.cycle,
-                time_at(history, record.cycle),
-                value.name(),
-                value.status,
-                len(value.expected),
-                0,
-                None,
-                None,
-                None,
-                (ref,),
-            )
+                record.cycle, time_at(history, record.cycle), _name(record), str(record.value["status"]),
+                len(record.value["expected"]), 0, None, None, None, (ref,))
+
+
+def _name(record: EntryRecord) -> str:
+    """As :meth:`~world_models.entries.task.Milestone.name`, without decoding its lines."""
+    return str(record.value["what"]).partition(", because")[0]
 
 
 def milestone_lines(rows: Sequence[MilestoneRow]) -> Iterator[str]:

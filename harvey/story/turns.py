@@ -23,42 +23,49 @@ from world_models.words import count
 
 MARKS = ("escalated", "relocalization")
 """A turning point has one of these words in its line of the journal, or is of one of these kinds."""
-KINDS = (
-    "Goal",
-    "PlanSketch",
-    "Certificate",
-    "BodyFault",
-    "Contact",
-    "DoorState",
-    "Obstacle",
-    "Resumed",
-    "Told",
-    "Outcome",
-)
+TOLD_KINDS = ("BodyFault", "Contact", "DoorState", "Obstacle", "Resumed", "Told")
+KINDS = (*TOLD_KINDS, "Goal", "PlanSketch", "Certificate", "Outcome")
+NOT_VERIFIED = ("refuted", "not testable")
 WIDTH = 120
 NOTHING = "Nothing went wrong on the way: it was never lost, each milestone was verified, and there was no fault."
 
 
-def read_turning_points(history: History) -> Iterator[TurningPoint]:
-    """What :class:`~logs.turning_points.TurningPointFinder` finds, from those lines only that may hold one.
+def read_turning_points(history: History, *, told: bool = False) -> Iterator[TurningPoint]:
+    """What :class:`~logs.turning_points.TurningPointFinder` finds, from those entries only that may be one.
 
     Entries of another version are passed over.
+
+    Args:
+        told: only those that a short account must not leave out; of a long run they are read much faster.
     """
-    cycles = {decision.cycle for mark in MARKS for decision in history.naming(mark)}
-    cycles |= {record.cycle for record in history.of_kind(*KINDS)}
+    marks, kinds = ((*MARKS, *NOT_VERIFIED), TOLD_KINDS) if told else (MARKS, KINDS)
+    cycles = {decision.cycle for mark in marks for decision in history.naming(mark)}
+    cycles |= {record.cycle for record in history.of_kind(*kinds)}
     beliefs = [ref for ref in history.refs if ref.startswith("Hypothesis-")]
     states: dict[str, str] = {}
     for cycle in sorted(cycles):
         decision = history.decision(cycle)
         for record in (*decision.observed, *decision.made):
-            entry = _entry(record)
-            if entry is None or record.change == "Retracted":
+            entry = _entry(record) if _may_turn(record) else None
+            if entry is None:
                 continue
             change = Posted(entry) if record.change == "Posted" else Revised(entry)
             was, states[record.id] = states.get(record.id, ""), state_of(entry.value)
             belief = _belief(history, beliefs, cycle) if record.type in ("Discrepancy", "Contact") else None
             for point in turning_points(change, cycle, lambda id: _newest(history, id), belief, was):
-                yield replace(point, time_s=time_at(history, cycle))
+                if point.is_told or not told:
+                    yield replace(point, time_s=time_at(history, cycle))
+
+
+def _may_turn(record: EntryRecord) -> bool:
+    """Whether a record can be a turning point, as far as is seen without decoding it."""
+    if record.change == "Retracted" or not isinstance(record.value, dict):
+        return False
+    if record.type == "Discrepancy":
+        return record.value.get("status") == "escalated"
+    if record.type == "Hypothesis":
+        return record.value.get("basis") == "relocalization"
+    return record.type in KINDS
 
 
 def read_collisions(history: History, result: Mapping[str, Any]) -> Iterator[TurningPoint]:
@@ -79,7 +86,7 @@ def read_collisions(history: History, result: Mapping[str, Any]) -> Iterator[Tur
 
 def turn_lines(history: History, result: Mapping[str, Any]) -> Iterator[str]:
     """Those turning points that a short account must not leave out, and the collisions, a line each."""
-    told = (point for point in read_turning_points(history) if point.is_told)
+    told = read_turning_points(history, told=True)
     points = sorted([*told, *read_collisions(history, result)], key=lambda point: point.cycle)
     unplaced = (result.get("collisions") or 0) - sum(point.kind == "collision" for point in points)
     if not points and unplaced <= 0:
@@ -111,7 +118,10 @@ def _cycle(history: History, ref: str) -> int:
 
 
 def _newest(history: History, id: str) -> Entry[Any] | None:
+    """An entry as it was last; of a milestone without its lines, which take long to decode and are not told."""
     record = history.entry(history.newest[id]) if id in history.newest else None
+    if record is not None and record.type == "Milestone" and isinstance(record.value, dict):
+        record = replace(record, value={k: [] if isinstance(v, list) else v for k, v in record.value.items()})
     return None if record is None else _entry(record)
 
 
