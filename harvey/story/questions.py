@@ -74,7 +74,7 @@ def _tell_error(run: RunDirectory, history: History, at: int | None) -> Iterator
 
 Answer = Callable[[RunDirectory, History, int | None], Iterator[Story]]
 ANSWERS: Mapping[frozenset[str], Answer] = {
-    frozenset({"lost", "found"}): _tell_lost,
+    frozenset({"lost"}): _tell_lost,
     frozenset({"touch", "touched", "contact", "contacts", "collide", "collided", "collision", "collisions", "hit"}):
         _tell_touched,
     frozenset({"far", "off", "truth", "truly", "error"}): _tell_error,

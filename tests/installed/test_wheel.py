@@ -78,6 +78,7 @@ def test_the_wheel_has_the_packages_their_data_and_their_types(wheel: Path) -> N
     assert {name.split("/")[0] for name in names if not name.startswith("harvey-")} == set(PACKAGES)
     assert {f"{package}/py.typed" for package in PACKAGES} <= set(names)
     for data in ("world_models/worlds/research_center.toml", "sim/scenarios/figure9.toml",
+                 "harvey/report/page.html", "harvey/report/page.css", "harvey/report/page.js",
                  "knowledge_sources/methods/verification/verification_weights.toml"):
         assert data in names
 

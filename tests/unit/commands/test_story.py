@@ -16,6 +16,7 @@ from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory
 from harvey.story.lost import tell_lost
 from harvey.story.milestones import MOST_ROWS, MilestoneRow, milestone_lines
+from harvey.story.questions import answers
 from harvey.story.story import story_lines, tell_run
 from harvey.why.journal import JournalHistory
 from scripted_turns import decisions
@@ -119,3 +120,16 @@ def test_the_page_has_every_section_once(tmp_path: Path) -> None:
     for title in ("Milestones", *(section.title for section in story.sections)):
         assert lines.count(title) == 1
     assert [line for line in lines if len(line) > 120] == []
+
+
+@pytest.mark.parametrize(("question", "is_of_the_run"), [
+    ("when was it lost?", True), ("What did it hit?", True), ("how far off was it in truth", True),
+    ("was the door found shut?", False), ("what is in the way?", False), ("why did you stop?", False)])
+def test_a_question_of_the_run_is_known_by_its_words(tmp_path: Path, question: str, is_of_the_run: bool) -> None:
+    run = run_of(tmp_path, "".join(LINES).encode())
+    try:
+        found = answers(run, JournalHistory(run.journal), question)
+    except BadInput as error:  # of a run without its head nobody knows the truth
+        found = []
+        assert "run.json" in str(error)
+    assert (found is not None) is is_of_the_run
