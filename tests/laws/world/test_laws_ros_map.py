@@ -85,7 +85,7 @@ def test_a_cell_of_the_grid_is_where_the_map_server_puts_it(turn_deg: float, x: 
     flat = np.array([(true[1] + 0.5) * 0.1, (120 - 0.5 - true[0]) * 0.1])
     turned = np.array([math.cos(yaw) * flat[0] - math.sin(yaw) * flat[1],
                        math.sin(yaw) * flat[0] + math.cos(yaw) * flat[1]])
-    assert grid.to_map(middle[None])[0] == pytest.approx(turned + [x, y], abs=0.1)
+    assert grid.to_map(middle[None])[0] == pytest.approx(turned + np.array([x, y]), abs=0.1)
     assert math.degrees(find_wall_turn(cells)) == pytest.approx(turn_deg, abs=2.0)
 
 

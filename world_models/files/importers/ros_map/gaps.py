@@ -19,11 +19,12 @@ from world_models.files.importers.building_plan import Floats
 Mask = NDArray[np.bool_]
 MIN_DOOR_M, MAX_DOOR_M = 0.5, 1.3
 MAX_MOUTH_M, MAX_WIDE_M = 2.6, 4.5
-MAX_DEPTH_M, MAX_WIDE_DEPTH_M = 0.9, 0.4
-"""Depth of a gap: of a door through a thick wall, and of a wide opening. What is deeper is a corridor, or
-between furniture."""
+MAX_DEPTH_M, MAX_WIDE_DEPTH_M, THIN_M = 0.9, 0.6, 0.4
+"""Depth of a gap: of a door through a thick wall, and of a wide opening. What is deeper is a corridor.
+A wall beside a wide opening that is thicker than THIN_M is furniture unless it is MIN_SLENDER times as long."""
 JAMB_M = 0.15
 """How far the ends of a gap may lie from those of its first row."""
+MIN_SLENDER = 2.0
 LOOK_M = 0.3
 """How far before and behind a gap the floor is looked for that reaches further."""
 MIN_STUB_M, MIN_STUB_SHARE = 0.25, 0.3
@@ -131,12 +132,15 @@ def _close(cut: Mask, block: _Block, cell_m: float) -> list[Gap]:
     share = 0.0 if is_beside_hall else MIN_STUB_SHARE
     if min(before.min(), after.min()) < 0 or stub * cell_m < max(MIN_STUB_M, share * block.width * cell_m):
         return []
+    depth = block.rows[1] - block.rows[0] + 1
+    if block.width * cell_m > MAX_DOOR_M and depth * cell_m > THIN_M and stub < MIN_SLENDER * depth:
+        return []
     first, last = _run_at(grid, row, (block.first + block.last) // 2)
     grid[row, first:last] = False
     ends = (row, first - 1), (row, last)
     middle = (block.rows[0] + block.rows[1]) / 2, (block.first + block.last - 1) / 2
     start, end = ((r, c) if not block.is_turned else (c, r) for r, c in ends)
-    return [Gap(start, end, block.width, block.rows[1] - block.rows[0] + 1,
+    return [Gap(start, end, block.width, depth,
                 middle if not block.is_turned else middle[::-1])]
 
 
