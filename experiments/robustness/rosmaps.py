@@ -72,15 +72,15 @@ class Score:
     faults: int
 
 
-def run(quick: bool, seed: int) -> Report:
-    """Trace the plans and the generated floors, and drive."""
+def run(quick: bool, seed: int, missions: int | None = None) -> Report:
+    """Trace the plans and the generated floors, and drive so many missions (MISSIONS)."""
     from harvey.runner.result import MissionResult
 
     folder = campaign_folder("rosmaps", seed, quick=quick)
     scores = list(_score_plans(folder, QUICK_ENDS if quick else ENDS))
     floors = list(_trace_floors(folder, QUICK_FLOORS if quick else FLOORS, seed))
     scores += [score for _, _, score in floors]
-    trips = list(_draw(floors, QUICK_MISSIONS if quick else MISSIONS, seed))
+    trips = list(_draw(floors, missions or (QUICK_MISSIONS if quick else MISSIONS), seed))
     tasks = [_task(trip, world, folder, seed) for world, trip in trips]
     ends = run_trials(run_task, tasks, MissionResult, folder, "mission")
     arrived = [end for end in ends if _has_arrived(end)]
