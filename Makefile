@@ -2,6 +2,9 @@
 PYTHON ?= python3
 VENV ?= .venv
 SCENARIO ?= lab-to-allens-office
+ROOM ?= pose
+SAMPLE ?= 60
+SEED ?= 0
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --quiet --disable-pip-version-check
@@ -13,11 +16,12 @@ COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help run test environment lock clean
+.PHONY: help run test mutants environment lock clean
 
 help:
 	@echo "make run          prepare everything, then drive: harvey run $(SCENARIO)"
 	@echo "make test         ruff, mypy, import contracts, pytest; installs every extra, and says what was skipped and why"
+	@echo "make mutants      mutation testing of ROOM=$(ROOM), SAMPLE=$(SAMPLE); goes on where it stopped, and reports"
 	@echo "make environment  only prepare $(VENV), for running and for testing"
 	@echo "make lock         write requirements.lock and requirements-dev.lock anew from pyproject.toml"
 	@echo "make clean        remove environments and caches; recordings in runs/ stay"
@@ -31,6 +35,16 @@ test: $(VENV)/.ready-to-test
 	@echo "== mypy" && $(BIN)/mypy
 	@echo "== import contracts" && $(BIN)/lint-imports
 	@echo "== pytest" && $(BIN)/pytest -n 2
+
+# Minutes to hours; not in CI. Rooms and equivalent mutants: tests/mutants.toml.
+mutants: $(VENV)/.ready-to-test .venv-mutants/.ready
+	@.venv-mutants/bin/python tests/mutants.py $(ROOM) --sample $(SAMPLE) --seed $(SEED) --python $(BIN)/python
+
+.venv-mutants/.ready: pyproject.toml
+	@$(PYTHON) -m venv .venv-mutants
+	@$(PYTHON) -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']\
+	['mutants'], sep='\n')" | .venv-mutants/bin/pip install --quiet --quiet -r /dev/stdin
+	@touch $@
 
 environment: $(VENV)/.ready-to-test
 
@@ -59,10 +73,10 @@ lock:
 	@$(PYTHON) -m venv $(LOCK)
 	@$(LOCK)/bin/pip install --quiet --quiet pip-tools
 	@echo "== requirements.lock" && $(COMPILE) --build-deps-for editable -o requirements.lock pyproject.toml
-	@echo "== requirements-dev.lock" && $(PYTHON) -c "import tomllib; print(*sum(tomllib.load(open('pyproject.toml', 'rb'))\
-	['project']['optional-dependencies'].values(), []), sep='\n')" | $(COMPILE) -c requirements.lock -o requirements-dev.lock -
+	@echo "== requirements-dev.lock" && $(PYTHON) -c "import tomllib; print(*sum((names for extra, names in tomllib.load(\
+	open('pyproject.toml', 'rb'))['project']['optional-dependencies'].items() if extra != 'mutants'), []), sep='\n')" | $(COMPILE) -c requirements.lock -o requirements-dev.lock -
 	@rm -rf $(LOCK)
 
 clean:
-	rm -rf build .venv .venv-* .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf build .mutants .venv .venv-* .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
