@@ -25,7 +25,7 @@ from knowledge_sources.methods.motion.footprints import build_free_floor, build_
 from knowledge_sources.questions import active_goal, deepest_sketch, find_robot
 from knowledge_sources.settings import Settings
 from knowledge_sources.settings.action import ActionSettings
-from world_models.building.things import EXTRA_KIND
+from world_models.building.things import EXTRA_KIND, Thing
 from world_models.entries.body import Frame, MotionReport, RideReport
 from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis
@@ -68,7 +68,8 @@ class FloorAhead:
         self.scans = _find_scans(view, belief, settings)
         self._seen = SeenFloor(
             tuple(entry.value for entry in self.scans), self._list_discs(view),
-            tuple(np.asarray(corners) for name in self._locales for corners in self._robot.world.obstacles(name)))
+            tuple(_list_taken(thing, whole.plan.overhang_m) for name in self._locales
+                  for thing in self._robot.world.things_of(name) if thing.is_obstacle))
 
     def limit_move(self, move_m: float) -> Caution:
         """How far, of a move to the leg's end, the robot may go at once; a move of any other kind is no longer."""
@@ -140,6 +141,14 @@ class FloorAhead:
 
     def _list_discs(self, view: View) -> Floats:
         return list_free_discs(view, self._robot, self._here, self.scans, self._settings)
+
+
+def _list_taken(thing: Thing, overhang_m: float) -> Floats:
+    """(k, 2) corners of the floor that a thing takes; of what the model lacks the top may be wider than its feet."""
+    if thing.kind != EXTRA_KIND:
+        return thing.footprint_world
+    wide = shapely.buffer(build_polygon(thing.footprint_world), overhang_m, join_style="mitre")
+    return np.asarray(shapely.get_coordinates(wide)[:-1])
 
 
 def _list_what_may_stand(view: View) -> list[shapely.Polygon]:

@@ -74,7 +74,7 @@ class DeadReckoner(RobotKnowledgeSource):
         travel = view.latest(Travel)
         if travel is None or belief.value.basis in UNSEEN:
             known_to = belief.value.covariance_world(world)
-            way = begin_travel(before, known_to, camera.mount.yaw_rad, yaw_variance, belief.id)
+            way = begin_travel(before, known_to, camera.mount.yaw_rad, yaw_variance)
         else:
             way = travel.value
         slip_m = actuator.skitter_m * min(1.0, abs(report.turn_rad) / (math.pi / 2.0))

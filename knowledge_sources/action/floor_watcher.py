@@ -17,6 +17,7 @@ from knowledge_sources.questions import (
     is_in_doubt,
     is_over,
     is_up_to_date,
+    rolling_course,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Frame
@@ -51,7 +52,9 @@ class FloorWatcher(RobotKnowledgeSource):
         s = self._settings.action
         if belief.value.sigma_m > s.max_floor_sigma_m or belief.value.sigma_rad > s.max_floor_sigma_rad:
             return None
-        return None if _is_seen(view, frame) else 0.8
+        if _is_seen(view, frame) or (rolling_course(view) is not None and self._is_near_last(view, belief.value)):
+            return None
+        return 0.8
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         frame, belief = view.latest(Frame), find_belief(view)
@@ -75,6 +78,18 @@ class FloorWatcher(RobotKnowledgeSource):
         if not kept or _measure_way_m(kept[0].value, pose) >= apart_m:
             yield Post(FloorView(frame.id, belief.id, pose.x_m, pose.y_m, pose.heading_rad, floor_m,
                                  frame.value.sim_time_s), (frame, belief))
+
+
+    def _is_near_last(self, view: View, belief: Hypothesis) -> bool:
+        """Whether the floor was looked at from about here: on the move each picture shows hardly more than the last.
+
+        Only so many looks stay on the board; they must reach back to where what is before the robot now was in sight.
+        """
+        last, robot = view.latest(FreeFloor, lambda f: f.sense == "camera"), find_robot(view)
+        if last is None:
+            return False
+        eye = belief.world_from_robot(robot.world) @ Pose2(robot.mount.forward_m, 0.0, 0.0)
+        return math.hypot(last.value.x_m - eye.x_m, last.value.y_m - eye.y_m) < self._settings.action.floor_step_m
 
 
 def _is_seen(view: View, frame: Entry[Frame]) -> bool:

@@ -181,12 +181,11 @@ class ObstacleFinder(RobotKnowledgeSource):
         for draft in drafts.values():
             is_next = draft.new.status == "suspected" and build_polygon(draft.new.footprint).intersects(ahead)
             yield replace(draft, new=replace(draft.new, status="there")) if is_next else draft
-        seen = [build_polygon(thing.footprint).buffer(2.0 * thing.sigma_m) for thing in f.things]
+        seen = shapely.union_all([build_polygon(thing.footprint).buffer(2.0 * thing.sigma_m) for thing in f.things])
         for entry in known.values():
             if entry.id in drafts or not _may_be_there(entry.value):
                 continue
-            polygon = build_polygon(entry.value.footprint)
-            if not any(polygon.intersects(shape) for shape in seen):
+            if measure_free_part(entry.value.footprint, seen) <= s.max_shared_part:
                 gone = self._miss(find_building(view), entry.value, free, f.seen_s)
                 if gone is not None:
                     yield _Draft(entry, gone, [scan, entry])

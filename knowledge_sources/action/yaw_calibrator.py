@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from blackboard.board import View
-from blackboard.change import Change, Revised, Watch
+from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
+from blackboard.servoing import Discrepancy
 from knowledge_sources.camera_knowledge import compute_camera_covariance, find_camera, to_tuples
 from knowledge_sources.questions import find_belief, find_building, is_standing
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -37,21 +38,26 @@ class YawCalibrator(RobotKnowledgeSource):
 
     No single picture can tell it from the robot's heading. Where the heading is wrong by the yaw, the robot comes to a
     place beside the one that the wheels and the headings say. With the yaw the believed heading turns, as the camera's
-    own direction is what is known.
+    own direction is what is known. A way on which something pushed or stopped the robot, or it was lost, tells nothing.
     """
 
     level = Level.ACTION
-    watches = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),)
+    watches = (
+        Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),
+        Watch(Discrepancy, (Posted,), lambda d: d.level is Level.GOAL or d.magnitude == math.inf),
+    )
     writes = (CameraState, Hypothesis, Drift, Travel)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         travel, belief = view.latest(Travel), find_belief(view)
+        if isinstance(trigger.entry.value, Discrepancy):
+            return None if travel is None or travel.value.is_broken else 0.95
         if travel is None or belief is None or not is_standing(view):
             return None
         milestone = view.latest(Milestone)
         if milestone is not None and milestone.value.modes:  # an inexact model bends the way more than the yaw does
             return None
-        if self._is_spent(travel.value, belief.id):
+        if self._is_spent(travel.value):
             return 1.0
         measured = self._measure(view, travel.value, belief)
         if measured is None:
@@ -61,6 +67,9 @@ class YawCalibrator(RobotKnowledgeSource):
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         travel, belief, camera = view.latest(Travel), find_belief(view), view.latest(CameraState)
+        if travel is not None and isinstance(trigger.entry.value, Discrepancy):
+            yield Revise(travel, replace(travel.value, is_broken=True), (travel, trigger.entry))
+            return
         if travel is None or belief is None or camera is None:
             return
         measured, pose = self._measure(view, travel.value, belief), _find_pose(view, belief.value)
@@ -76,18 +85,18 @@ class YawCalibrator(RobotKnowledgeSource):
             yield Revise(camera, learnt, (travel, belief, camera))
             yield from self._turn(view, belief, camera.value, -step_rad, pose)
             way = way.turned(-step_rad, camera.value.mount.forward_m)
-        if self._is_spent(way, belief.id):
+        if self._is_spent(way):
             here = turn_about_camera(pose, -step_rad, camera.value.mount.forward_m)
             variance = float(compute_camera_covariance(camera.value, self._settings.camera_state)[YAW, YAW])
             way = begin_travel(here, belief.value.covariance_world(find_building(view)),
                                camera.value.mount.yaw_rad + step_rad,
-                               variance if measured is None else measured.variance, belief.id)
+                               variance if measured is None else measured.variance)
         yield Revise(travel, way, (travel, belief))
 
-    def _is_spent(self, travel: Travel, belief: str) -> bool:
-        """Whether a way is too long or too bent to measure more by it, or began before the robot was lost."""
+    def _is_spent(self, travel: Travel) -> bool:
+        """Whether a way is too long or too bent to measure more by it, or the robot was pushed or lost on it."""
         s = self._settings.camera_state
-        return travel.belief not in ("", belief) or travel.gone_m > s.max_travel_m or (
+        return travel.is_broken or travel.gone_m > s.max_travel_m or (
             travel.gone_m > s.min_travel_m and travel.net_m < s.min_straightness * travel.gone_m)
 
     def _measure(self, view: View, travel: Travel, held: Entry[Hypothesis]) -> Measured | None:
@@ -96,7 +105,7 @@ class YawCalibrator(RobotKnowledgeSource):
         Nor does a way tell anything that ends where no likely yaw leads: something else has moved the robot.
         """
         s, belief = self._settings.camera_state, held.value
-        if travel.belief not in ("", held.id):
+        if travel.is_broken:
             return None
         pose = _find_pose(view, belief)
         way = travel.seen(pose.heading_rad)

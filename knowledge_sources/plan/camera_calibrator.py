@@ -46,5 +46,5 @@ class CameraCalibrator(RobotKnowledgeSource):
         before = compute_camera_covariance(camera.value, self._settings.camera_state)[YAW, YAW]
         travel, variance = view.latest(Travel), state.covariance[YAW][YAW]
         if travel is not None and variance > before:
-            way = begin_travel(f.world_from_robot, f.covariance, state.mount.yaw_rad, variance, travel.value.belief)
+            way = begin_travel(f.world_from_robot, f.covariance, state.mount.yaw_rad, variance)
             yield Revise(travel, way, (learnt,))

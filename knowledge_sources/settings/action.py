@@ -38,13 +38,15 @@ class ActionSettings:
 
     # Floor ahead: motor and path follower
     keeps_to_seen_floor: bool = setting(
-        False, "yes/no", "Whether the robot drives only where it has seen the floor free; else it looks or creeps.",
+        True, "yes/no", "Whether the robot drives only where it has seen the floor free; else it looks or creeps.",
         "§4")
     seen_margin_m: float = setting(
         0.03, "m", "Margin round the robot's disc within which the floor must be seen to be free.",
         "engineering judgement")
     max_seen_age_s: float = setting(
         60.0, "s", "What was seen to be free longer ago must be seen again.", "engineering judgement")
+    floor_step_m: float = setting(
+        0.04, "m", "On the move the floor is looked at again after so much of the way.", "engineering judgement")
     put_down_free_m: float = setting(
         0.75, "m", "Round where it was put down the floor is free to this distance: a person sees it.",
         "engineering judgement")
@@ -171,6 +173,9 @@ class ActionSettings:
         0.5, "1", "An obstacle that is less certain is gone.", "engineering judgement")
     min_free_part: float = setting(
         0.5, "1", "Part of an obstacle's footprint that must be seen free to tell that it is not there any more.",
+        "engineering judgement")
+    max_shared_part: float = setting(
+        0.25, "1", "Where a thing that is seen takes more of the footprint, the rest seen free tells nothing of it.",
         "engineering judgement")
     free_floor_odds: float = setting(
         0.03, "1", "Odds of an obstacle that is there while all of its footprint is seen free.",

@@ -23,6 +23,9 @@ class FloorSettings:
     # How far
     sight_m: float = setting(
         4.5, "m", "The floor is looked at up to this distance from the camera.", "engineering judgement")
+    max_untold_m: float = setting(
+        0.15, "m", "Depth of floor beside the model's own parts that is taken to be free, though its looks tell nothing"
+        " there.", "engineering judgement")
     max_hidden_m: float = setting(
         0.2, "m", "Floor counts as seen where nothing higher than this can hide below the picture's lower border.",
         "engineering judgement")

@@ -20,6 +20,9 @@ class PlanSettings:
     clearances_m: tuple[float, ...] = setting(
         (0.12, 0.06, 0.03), "m", "Margins round the robot's disc, tried in this order; the last must always be kept.",
         "engineering judgement")
+    overhang_m: float = setting(
+        0.15, "m", "So much wider than its feet something that the model lacks may be: where there is room, the way is"
+        " led so much farther round it, and nearer to it the robot creeps.", "engineering judgement")
     doorway_distances_m: tuple[float, ...] = setting(
         (0.65, 0.55, 0.47, 0.40), "m",
         "Distances from a doorway at which it is approached straight, tried in this order.", "engineering judgement")
@@ -28,7 +31,7 @@ class PlanSettings:
         "Distances from its middle, to either side, at which it is approached aslant, past what stands before it.",
         "engineering judgement")
     max_lookouts: int = setting(
-        3, "count", "So often the robot looks again, from elsewhere, at what leaves no way; then it is blocked.",
+        6, "count", "So often the robot looks again, from elsewhere, at what leaves no way; then it is blocked.",
         "engineering judgement")
     lookout_distances_m: tuple[float, ...] = setting(
         (1.8, 2.4, 3.0), "m", "Distances from which it does so: the floor before it is in the picture.",

@@ -55,7 +55,7 @@ def driven(stage: Stage, kind: type[DeviceFault], duration_s: float) -> tuple[Mi
 
 @pytest.mark.parametrize("kind", DEVICE_FAULTS)
 def test_what_passes_is_told_waited_for_and_the_goal_is_reached(short_stage: Stage, kind: type[DeviceFault]) -> None:
-    result, watched = driven(short_stage, kind, 4.0)
+    result, watched = driven(short_stage, kind, 10.0)
     assert result.outcome == "reached", result.reason
     assert result.final_error_m < 0.0254 and result.collisions == 0
     assert [(f.part, f.what, f.status) for f in watched.of(BodyFault)] == [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,8 @@ def without_watchers(settings: Settings) -> Sequence[KnowledgeSource]:
     In these missions what is told is not so, or half of it; who looks sees that.
     """
     watchers = ("floor_watcher", "door_watcher", "door_doubter")
-    return [source for source in knowledge_sources(settings) if source.name not in watchers]
+    blind = replace(settings, action=replace(settings.action, keeps_to_seen_floor=False))
+    return [source for source in knowledge_sources(blind) if source.name not in watchers]
 
 
 def drive(stage: Stage) -> tuple[MissionResult, list[Decision]]:

@@ -34,7 +34,7 @@ y_m = 1.0
 """
 
 
-BLIND = (("floor.use_appearance", "false"), ("floor.use_ranges", "false"))
+BLIND = (("floor.use_appearance", "false"), ("floor.use_ranges", "false"), ("action.keeps_to_seen_floor", "false"))
 """It sees and ranges nothing on the floor: it is touch that tells."""
 
 

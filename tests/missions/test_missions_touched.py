@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -51,7 +52,8 @@ put_down_sigma_deg = 1.0
 
 def without_floor_watcher(settings: Settings) -> Sequence[KnowledgeSource]:
     """The knowledge sources of a robot whose camera misses what stands on the floor."""
-    return [source for source in knowledge_sources(settings) if source.name != "floor_watcher"]
+    blind = replace(settings, action=replace(settings.action, keeps_to_seen_floor=False))
+    return [source for source in knowledge_sources(blind) if source.name != "floor_watcher"]
 
 
 def test_a_carton_that_the_model_lacks_is_seen_and_driven_round(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ locale = "allens-office"
 x_ft = 4.0
 y_ft = 9.0
 at_s = 2.0
-until_s = 6.0
+until_s = 14.0
 """
 
 

@@ -26,7 +26,7 @@ class Travel:
         heading_rad: believed by the wheels after the last motion.
         slip_m2: variance of what the wheels slipped aside in turns.
         yaw_rad, yaw_variance: of the camera, as known when it began.
-        belief: id of the hypothesis that was held then; with another one the way ends.
+        is_broken: the robot was pushed, stopped or lost on it.
     """
 
     began: Pose2
@@ -39,7 +39,7 @@ class Travel:
     pending_m: float = 0.0
     heading_rad: float = 0.0
     slip_m2: float = 0.0
-    belief: str = ""
+    is_broken: bool = False
 
     def seen(self, heading_rad: float) -> Travel:
         """With the heading that was seen after the last motion: on an arc its way is half-way between both ends."""
@@ -72,12 +72,9 @@ class Travel:
                 " the headings")
 
 
-def begin_travel(
-    pose: Pose2, covariance: object, yaw_rad: float, yaw_variance: float, belief: str = ""
-) -> Travel:
+def begin_travel(pose: Pose2, covariance: object, yaw_rad: float, yaw_variance: float) -> Travel:
     """A way that begins at a pose (world) with its covariance (3, 3)."""
-    return Travel(pose, covariance_tuple(covariance), yaw_rad, yaw_variance, heading_rad=pose.heading_rad,
-                  belief=belief)
+    return Travel(pose, covariance_tuple(covariance), yaw_rad, yaw_variance, heading_rad=pose.heading_rad)
 
 
 def turn_about_camera(pose: Pose2, turn_rad: float, forward_m: float) -> Pose2:

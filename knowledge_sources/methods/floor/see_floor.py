@@ -200,12 +200,14 @@ def _scan(
         near_m = lowest_m * max(0.0, 1.0 - settings.max_hidden_m / grid.camera_height_m)
         at_thing, at_model = int(first_thing[group].min()), int(first_model[group].min())
         stop = min(at_thing, at_model)
-        told = tells[up][:max(stop, 1), group].any()
+        told = np.flatnonzero(tells[up][:max(stop, 1), group].any(axis=1))
         range_m = settings.sight_m if stop >= rows else float(grid.ranges_m[rows - 1 - stop, group].min())
+        if len(told):  # next to the model's own parts the looks tell nothing, and something may stand there
+            range_m = min(range_m, float(grid.ranges_m[rows - 1 - told[-1], group].min()) + settings.max_untold_m)
         if at_thing <= at_model and stop < rows:
             range_m *= float(parts[group].min())
         end: FloorEnd = "sight" if range_m >= settings.sight_m else "thing" if at_thing <= at_model else "model"
-        if stop == 0 or not told:  # nothing of the floor is seen, or its looks are not known
+        if stop == 0 or not len(told):  # nothing of the floor is seen, or its looks are not known
             range_m = 0.0
             end = end if stop == 0 else "sight"
         near.append(round(near_m, 3))

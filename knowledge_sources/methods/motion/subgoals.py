@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 from shapely import Geometry, LineString, Point
 
 from knowledge_sources.methods.arrays import Floats
@@ -17,6 +18,7 @@ from knowledge_sources.methods.motion.doorways import compute_free_passage, find
 from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.methods.motion.lookouts import list_lookouts
 from knowledge_sources.methods.motion.routes import (
+    compute_free_space,
     find_free_space,
     find_nearest,
     find_shortest_route,
@@ -252,16 +254,35 @@ class SubgoalPlanner:
     def _find_way(self, locale: str, start: Floats, end: Floats) -> list[Floats] | None:
         """The shortest way across a locale, with the largest margin that leaves one; None where none does."""
         def floor() -> Geometry:
-            return self._free_space(locale, -self._robot.radius_m)
+            openings = [shapely.convex_hull(shapely.multipoints(doorway.thresholds_world.reshape(-1, 2)))
+                        for doorway in self._building.doorways_of(locale)]  # it may stand in one
+            return shapely.union_all([self._free_space(locale, -self._robot.radius_m), *openings])
 
-        least_m = self._settings.clearances_m[-1]
-        tried = (*((clearance_m, False) for clearance_m in self._settings.clearances_m), (least_m, True))
-        for clearance_m, is_round in tried:
-            free = self._free_space(locale, clearance_m, is_round=is_round)
+        for free in self._list_free_spaces(locale):
             route = find_shortest_route(free, start, end, floor)
             if route is not None:
                 return route
         return None
+
+    def _list_free_spaces(self, locale: str) -> Iterator[Geometry]:
+        """Where the robot's centre may be, with ever smaller margins."""
+        margins_m = self._settings.clearances_m
+        if locale in self._cluttered:
+            yield self._find_wide_space(locale)
+        for margin_m in margins_m:
+            yield self._free_space(locale, margin_m)
+        yield self._free_space(locale, margins_m[-1], is_round=True)
+
+    def _find_wide_space(self, locale: str) -> Geometry:
+        """Where the robot's centre may be with more room to what the model lacks: its top may be wider than its feet.
+        """
+        s = self._settings
+        found = [obstacle.footprint for obstacle in self._obstacles if obstacle.locale == locale]
+        low_x, low_y, high_x, high_y = shapely.bounds(shapely.multipoints(np.asarray(self._building.outline(locale))))
+        away_m = self._robot.radius_m + s.clearances_m[0] + s.overhang_m
+        around = shapely.box(*(np.array([low_x, low_y, high_x, high_y]) + away_m * np.array([-2.0, -2.0, 2.0, 2.0])))
+        clear = compute_free_space(shapely.get_coordinates(around)[:-1], found, away_m)
+        return shapely.intersection(self._free_space(locale, s.clearances_m[0]), clear)
 
     def _is_passed(self, middle: Floats, before: Floats, locale: str) -> bool:
         """Whether the robot clears all obstacles of a locale between a doorway and a place before it."""

@@ -19,7 +19,7 @@ SCENARIO = (
     HALLWAY
     + fault("bump", "hallway", 5.0, left_m=0.3, turn_deg=10.0)
     + fault("kidnap", "hallway", 12.0, forward_m=0.8, turn_deg=15.0)
-    + fault("camera_unplugged", "", 2.0, duration_s=4.0)
+    + fault("camera_unplugged", "", 2.0, duration_s=10.0)
 )
 """Unplugged, pushed aside and carried off in the hallway."""
 

@@ -30,7 +30,7 @@ WHERE = re.compile(r"([\w-]+)(?: of ([\w-]+))? \(([\w/.-]+):(\d+)\)")
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
     folder = tmp_path_factory.mktemp("told") / "shut-door"
-    run_task(Task("shut-door", (("limits.max_cycles", "130"),), 0, folder))
+    run_task(Task("shut-door", (("limits.max_cycles", "300"),), 0, folder))
     return RunDirectory(folder)
 
 
