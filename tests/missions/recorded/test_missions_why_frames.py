@@ -186,7 +186,7 @@ def test_without_the_worlds_file_it_answers_and_says_so(
     else:
         head = json.loads((copy / "run.json").read_text(encoding="utf-8"))
         (copy / "run.json").write_text(json.dumps({**head, "world": "nowhere.toml"}), encoding="utf-8")
-    for name in ("MotorCommand-2", DOOR, "north-hall", "LocaleFrame-4"):
+    for name in ("MotorCommand-2", "reception-north-door", "north-hall", "LocaleFrame-4"):
         assert main(["why", str(copy), name]) == 0
         out = " ".join(capsys.readouterr().out.split())
         assert "cannot be told: " in out
