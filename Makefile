@@ -37,14 +37,8 @@ test: $(VENV)/.ready-to-test
 	@echo "== pytest" && $(BIN)/pytest -n 2
 
 # Minutes to hours; not in CI. Rooms and equivalent mutants: tests/mutants.toml.
-mutants: $(VENV)/.ready-to-test .venv-mutants/.ready
-	@.venv-mutants/bin/python tests/mutants.py $(ROOM) --sample $(SAMPLE) --seed $(SEED) --python $(BIN)/python
-
-.venv-mutants/.ready: pyproject.toml
-	@$(PYTHON) -m venv .venv-mutants
-	@$(PYTHON) -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']\
-	['mutants'], sep='\n')" | .venv-mutants/bin/pip install --quiet --quiet -r /dev/stdin
-	@touch $@
+mutants: $(VENV)/.ready-to-test
+	@$(BIN)/python tests/mutants.py $(ROOM) --sample $(SAMPLE) --seed $(SEED) --python $(BIN)/python
 
 environment: $(VENV)/.ready-to-test
 
@@ -73,8 +67,8 @@ lock:
 	@$(PYTHON) -m venv $(LOCK)
 	@$(LOCK)/bin/pip install --quiet --quiet pip-tools
 	@echo "== requirements.lock" && $(COMPILE) --build-deps-for editable -o requirements.lock pyproject.toml
-	@echo "== requirements-dev.lock" && $(PYTHON) -c "import tomllib; print(*sum((names for extra, names in tomllib.load(\
-	open('pyproject.toml', 'rb'))['project']['optional-dependencies'].items() if extra != 'mutants'), []), sep='\n')" | $(COMPILE) -c requirements.lock -o requirements-dev.lock -
+	@echo "== requirements-dev.lock" && $(PYTHON) -c "import tomllib; print(*sum(tomllib.load(open('pyproject.toml', 'rb'))\
+	['project']['optional-dependencies'].values(), []), sep='\n')" | $(COMPILE) -c requirements.lock -o requirements-dev.lock -
 	@rm -rf $(LOCK)
 
 clean:
