@@ -79,7 +79,6 @@ class FloorWatcher(RobotKnowledgeSource):
             yield Post(FloorView(frame.id, belief.id, pose.x_m, pose.y_m, pose.heading_rad, floor_m,
                                  frame.value.sim_time_s), (frame, belief))
 
-
     def _is_near_last(self, view: View, belief: Hypothesis) -> bool:
         """Whether the floor was looked at from about here: on the move each picture shows hardly more than the last.
 

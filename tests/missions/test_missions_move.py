@@ -90,6 +90,7 @@ def test_who_is_carried_off_on_the_move_stops_at_once(tmp_path: Path) -> None:
     run = RunDirectory(tmp_path / "run")
     result = run_mission(stage, SEED, out=run.path)
     assert result.outcome == "reached" and result.collisions == 0 and result.milestones["false_accepts"] == 0
+    assert result.camera == (), "the camera was not turned: somebody carried the robot"
     records = list(read_records(run.journal))
     at = next(i for i, r in enumerate(records) for e in r.made if e.type == "Discrepancy" and e.author
               == "correlator_tracker" and e.value["magnitude"] in ("inf", float("inf")))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+import shapely
 
 from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
 from knowledge_sources.settings import DEFAULT
@@ -11,8 +14,10 @@ from two_doors import two_doors
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.location import Place
+from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle
+from world_models.entries.task import Subgoal
+from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
 DOORS = ("north-door", "south-door")
@@ -30,6 +35,15 @@ def list_doors(world: World, obstacles: list[Obstacle]) -> list[str] | None:
     here, there = Place("study", 3.4, 4.1), Place("parlour", 1.3, 3.7)
     parts = SubgoalPlanner(robot, DEFAULT.plan, obstacles).plan_between_locales(here, there, 0.1)
     return None if parts is None else [part.passage for part in parts if part.passage]
+
+
+def plan_across(world: World, obstacles: list[Obstacle], here: Pose2, there: Place) -> list[Any] | None:
+    """The way (k, 2) across the study from a pose [world]; None where none is left."""
+    robot = RobotModel(world, Camera.from_field_of_view(1.1), CameraMount(1.0), ActuatorModel())
+    belief = Hypothesis.of_world(world, "study", here, np.eye(3) * 1e-6, "milestone")
+    subgoal = Subgoal(Place.of_world(world, "study", here.x_m, here.y_m), there, False)
+    parts = SubgoalPlanner(robot, DEFAULT.plan, obstacles).plan_across(subgoal, belief)
+    return None if parts is None else [here.position, *(p.destination.in_world(world).position for p in parts)]
 
 
 def stand_before(world: World, door: str, side: str = "study", away_m: float = 0.6) -> Obstacle:
@@ -63,3 +77,23 @@ def test_what_is_only_suspected_or_gone_blocks_nothing(world: World) -> None:
     gone = stand_before(world, "north-door")
     assert list_doors(world, [Obstacle(**{f: getattr(gone, f) for f in gone.__slots__} | {"status": "gone"})]) == [
         "north-door"]
+
+
+@pytest.mark.parametrize("off_m", [0.02, 0.05, -0.05])
+def test_a_robot_that_stands_in_a_doorway_finds_its_way_back(world: World, off_m: float) -> None:
+    doorway = next(d for d in world.doorways_of("study") if d.name == "north-door")
+    x_m, y_m = doorway.threshold_of("study").mean(axis=0) + off_m * doorway.outward_from("study")
+    for obstacles in ([], [stand("study", (1.5, 1.5), (0.25, 0.25))]):
+        assert plan_across(world, obstacles, Pose2(float(x_m), float(y_m), 0.0), Place("study", 3.4, 4.1)) is not None
+
+
+def test_where_there_is_room_the_way_keeps_away_from_what_the_model_lacks(world: World) -> None:
+    """Its top may be wider than its feet."""
+    start, end = Place("study", 3.4, 4.1).in_world(world), Place("study", 1.2, 1.2)
+    middle = 0.5 * (start.position + end.in_world(world).position)
+    thing = stand("study", (float(middle[0]), float(middle[1])), (0.1, 0.1))
+    way = plan_across(world, [thing], start, end)
+    assert way is not None
+    radius_m = RobotModel(world, Camera.from_field_of_view(1.1), CameraMount(1.0), ActuatorModel()).radius_m
+    away_m = shapely.LineString(way).distance(shapely.Polygon(thing.footprint))
+    assert away_m > radius_m + DEFAULT.plan.clearances_m[0] + DEFAULT.plan.overhang_m - 0.01
