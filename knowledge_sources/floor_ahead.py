@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -65,11 +65,18 @@ class FloorAhead:
                  for thing in self._robot.world.things_of(name) if thing.kind == EXTRA_KIND]
         self._asked = shapely.buffer(shapely.union_all([self._floor, *found]), -settings.near_model_m)
         self._suspected = _list_what_may_stand(view)
-        self.scans = _find_scans(view, belief, settings)
+        self._scans = _find_scans(view, belief, settings)
+        self._discs = list_free_discs(view, self._robot, self._here, self._scans, settings)
+        self._told = dict[str, Entry[Any]]()
         self._seen = SeenFloor(
-            tuple(entry.value for entry in self.scans), self._list_discs(view),
+            tuple(entry.value for entry in self._scans), np.array([disc.circle for disc in self._discs]),
             tuple(_list_taken(thing, whole.plan.overhang_m) for name in self._locales
                   for thing in self._robot.world.things_of(name) if thing.is_obstacle))
+
+    @property
+    def because(self) -> tuple[Entry[Any], ...]:
+        """What has told something in the answers so far: looks at the floor, and things that may stand on it."""
+        return tuple(sorted(self._told.values(), key=lambda entry: (entry.cycle, entry.id)))
 
     def limit_move(self, move_m: float) -> Caution:
         """How far, of a move to the leg's end, the robot may go at once; a move of any other kind is no longer."""
@@ -85,11 +92,12 @@ class FloorAhead:
         along = np.arange(0.0, most_m + step_m, step_m)
         points = shapely.line_interpolate_point(way, along)
         free_m = most_m
-        for polygon in self._suspected:
+        for entry, polygon in self._suspected:
             gaps = shapely.distance(points, polygon)
             met = np.flatnonzero((gaps[1:] < self._robot.radius_m) & (gaps[1:] < gaps[:-1] - 1e-9))
             if len(met):
                 free_m = min(free_m, float(along[met[0]]))
+                self._told[entry.id] = entry
         return free_m
 
     def measure_free_m(self, most_m: float) -> float:
@@ -137,10 +145,11 @@ class FloorAhead:
     def _find_unseen(self, sweep: Sweep) -> Sweep:
         """The part of a sweep that is not seen free, and not hard by something that the model has."""
         asked = sweep.only(shapely.contains_xy(self._asked, sweep.points[:, 0], sweep.points[:, 1]))
-        return asked.only(~self._seen.find_free(asked.points))
-
-    def _list_discs(self, view: View) -> Floats:
-        return list_free_discs(view, self._robot, self._here, self.scans, self._settings)
+        free, scans, discs = self._seen.ask(asked.points)
+        told = [self._scans[k] for k in np.flatnonzero(scans)]
+        told += [entry for k in np.flatnonzero(discs) for entry in self._discs[k].because]
+        self._told.update((entry.id, entry) for entry in told)
+        return asked.only(~free)
 
 
 def _list_taken(thing: Thing, overhang_m: float) -> Floats:
@@ -151,12 +160,12 @@ def _list_taken(thing: Thing, overhang_m: float) -> Floats:
     return np.asarray(shapely.get_coordinates(wide)[:-1])
 
 
-def _list_what_may_stand(view: View) -> list[shapely.Polygon]:
+def _list_what_may_stand(view: View) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
     """What the robot does not creep into: all that what is suspected may take; of what is there what was seen of it,
     as the sketcher leads through the rest only where nothing else is left.
     """
-    found = [entry.value for entry in view.where(Obstacle, lambda o: o.status != "gone")]
-    return [build_polygon(o.core if o.is_there and o.core else o.footprint) for o in found]
+    found = [(entry, entry.value) for entry in view.where(Obstacle, lambda o: o.status != "gone")]
+    return [(entry, build_polygon(o.core if o.is_there and o.core else o.footprint)) for entry, o in found]
 
 
 def find_known_free(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> shapely.Geometry:
@@ -165,36 +174,49 @@ def find_known_free(view: View, belief: Entry[Hypothesis], settings: ActionSetti
     discs = list_free_discs(view, robot, belief.value.world_from_robot(robot.world), scans, settings)
     seen = [build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
             for f in (entry.value for entry in scans)]
-    return shapely.union_all([*seen, *shapely.buffer(shapely.points(discs[:, :2]), discs[:, 2])])
+    circles = np.array([disc.circle for disc in discs])
+    return shapely.union_all([*seen, *shapely.buffer(shapely.points(circles[:, :2]), circles[:, 2])])
+
+
+class FreeDisc(NamedTuple):
+    """Floor that is free without being seen.
+
+    Attributes:
+        circle: x, y, radius [m, world].
+        because: what tells where it is, beside the belief.
+    """
+
+    circle: tuple[float, float, float]
+    because: tuple[Entry[FreeFloor], ...] = ()
 
 
 def list_free_discs(
     view: View, robot: RobotModel, here: Pose2, scans: Sequence[Entry[FreeFloor]], settings: ActionSettings
-) -> Floats:
-    """(k, 3) centres and radii of floor that is free without being seen: under the robot, where it has driven, and
-    where it was put down.
-    """
+) -> list[FreeDisc]:
+    """What is free under the robot, where it has driven from look to look, and where it was put down."""
     radius_m = robot.radius_m
     step_m = 0.3 * radius_m  # so near to one another they leave no gap at the sides
-    discs = [(here.x_m, here.y_m, radius_m + settings.seen_margin_m)]
-    for a, b in pairwise([e.value for e in scans if e.value.sense == "camera"]):
+    discs = [FreeDisc((here.x_m, here.y_m, radius_m + settings.seen_margin_m))]
+    for pair in pairwise([entry for entry in scans if entry.value.sense == "camera"]):
+        a, b = (entry.value for entry in pair)
         gap_m = math.dist((a.x_m, a.y_m), (b.x_m, b.y_m))
         if step_m < gap_m <= settings.max_driven_gap_m:
-            parts = np.linspace(0.0, 1.0, math.ceil(gap_m / step_m) + 1)
-            discs += [(a.x_m + part * (b.x_m - a.x_m), a.y_m + part * (b.y_m - a.y_m), radius_m) for part in parts]
+            parts = np.linspace(0.0, 1.0, math.ceil(gap_m / step_m) + 1).tolist()
+            discs += [FreeDisc((a.x_m + part * (b.x_m - a.x_m), a.y_m + part * (b.y_m - a.y_m), radius_m), pair)
+                      for part in parts]
     goal = active_goal(view)
     if goal is not None and goal.id == f"{Goal.__name__}-1" and view.latest(RideReport) is None:
-        discs.append((*_find_start(view, robot, goal.value, settings), settings.put_down_free_m))
-    return np.array(discs)
+        discs.append(_find_put_down(view, robot, goal.value, settings))
+    return discs
 
 
-def _find_start(view: View, robot: RobotModel, goal: Goal, settings: ActionSettings) -> Point:
-    """Where the robot was put down: by the first picture, if it is still on the board, else by what was said."""
+def _find_put_down(view: View, robot: RobotModel, goal: Goal, settings: ActionSettings) -> FreeDisc:
+    """Round where the robot was put down: by the first picture, if it is still on the board, else by what was said."""
     first = view.get(f"{FreeFloor.__name__}-1")
     start = goal.origin.in_world(robot.world)
     if first is None or math.dist((first.value.x_m, first.value.y_m), start.position) > settings.max_driven_gap_m:
-        return start.x_m, start.y_m
-    return first.value.x_m, first.value.y_m
+        return FreeDisc((start.x_m, start.y_m, settings.put_down_free_m), () if first is None else (first,))
+    return FreeDisc((first.value.x_m, first.value.y_m, settings.put_down_free_m), (first,))
 
 
 def limit_move(unseen: Sweep, move_m: float, settings: ActionSettings) -> Caution:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
@@ -37,7 +38,6 @@ from knowledge_sources.questions import (
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import BodyFault, MotorCommand
-from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot import Drift
 from world_models.entries.task import Leg, Milestone, PlanSketch
@@ -117,15 +117,15 @@ class Motor(RobotKnowledgeSource):
         here = belief.value.world_from_robot(robot.world)
         curvature_per_m = 0.0 if drift is None else drift.value.curvature_per_m
         seen = update_leg(leg.value, here, self._aim(leg.value, here))
-        scans: tuple[Entry[FreeFloor], ...] = ()
+        told: tuple[Entry[Any], ...] = ()
         command = self._go_on_looking(seen, here, robot.actuator)
         if command is None:
             seen = replace(seen, looking_rad=None)
             command = self._plan_increment(robot.actuator, seen, here, curvature_per_m)
             if command is not None and command.move_m > 0.0 and self._settings.action.keeps_to_seen_floor:
-                seen, command, scans = self._keep_to_seen_floor(view, seen, belief, command)
+                seen, command, told = self._keep_to_seen_floor(view, seen, belief, command)
                 if command is None:
-                    yield Revise(leg, replace(seen, status="halted"), (leg, belief, *scans))
+                    yield Revise(leg, replace(seen, status="halted"), (leg, belief, *told))
                     return
         discrepancy = open_discrepancy(view, Level.ACTION)
         corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
@@ -135,7 +135,7 @@ class Motor(RobotKnowledgeSource):
             return
         step = Revise(leg, replace(seen, increments=seen.increments + 1), (leg, belief, *corrected))
         yield step
-        yield Post(command, (step, belief, *(() if drift is None else (drift,)), *scans))
+        yield Post(command, (step, belief, *(() if drift is None else (drift,)), *told))
 
     def _go_on_looking(self, leg: Leg, here: Pose2, actuator: ActuatorModel) -> MotorCommand | None:
         """The turn to where the floor is to be seen; None when the robot faces there, or looks for none."""
@@ -147,29 +147,29 @@ class Motor(RobotKnowledgeSource):
 
     def _keep_to_seen_floor(
         self, view: View, leg: Leg, belief: Entry[Hypothesis], command: MotorCommand
-    ) -> tuple[Leg, MotorCommand | None, tuple[Entry[FreeFloor], ...]]:
+    ) -> tuple[Leg, MotorCommand | None, tuple[Entry[Any], ...]]:
         """A move only as far as the floor is seen to be free; before it a look at what will be needed behind the leg.
 
-        Returns the leg, the command, and the newest scan that it rests on. The command is None where something may
+        Returns the leg, the command, and what of the floor both rest on. The command is None where something may
         stand in floor that is not seen, right before the robot.
         """
         s, actuator = self._settings.action, find_robot(view).actuator
         floor = FloorAhead(view, leg, belief, self._settings)
-        because, here = floor.scans[-1:], belief.value.world_from_robot(find_building(view))
+        here = belief.value.world_from_robot(find_building(view))
         look = floor.choose_look()
         if look is not None:
             looking = replace(leg, looking_rad=look.heading_rad, looks=(
                 *leg.looks, (here.x_m, here.y_m, look.heading_rad)))
             turned = self._go_on_looking(looking, here, actuator)
             if turned is not None:
-                return looking, turned, because
+                return looking, turned, floor.because
         wanted_m = actuator.reach * command.move_m
         caution = floor.limit_move(wanted_m)
         if caution.creeps and caution.move_m < min(s.min_creep_m, wanted_m):
-            return leg, None, because
+            return leg, None, floor.because
         move_m = min(command.move_m, actuator.compute_command_m(caution.move_m))
         slowly = s.creep_speed_m_per_s if caution.creeps else None
-        return leg, MotorCommand(command.turn_rad, move_m, slowly), because
+        return leg, MotorCommand(command.turn_rad, move_m, slowly), floor.because
 
     def _plan_increment(
         self, actuator: ActuatorModel, leg: Leg, here: Pose2, curvature_per_m: float

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
@@ -72,7 +73,9 @@ class PathFollower(RobotKnowledgeSource):
         if belief is None:
             return
         if course is not None and (driving is None or self._must_stop(view)):
-            yield Revise(course, replace(course.value, speed_m_per_s=0.0), (course, belief, *_reasons(view)))
+            told = () if driving is None else self._look_ahead(
+                view, driving[0].value, belief, find_robot(view).actuator)[1]
+            yield Revise(course, replace(course.value, speed_m_per_s=0.0), (course, belief, *_reasons(view), *told))
         elif driving is not None:
             yield from self._steer(view, course, driving[0], belief)
 
@@ -92,26 +95,30 @@ class PathFollower(RobotKnowledgeSource):
         yield step
         wanted = compute_curvature_to(point, here) - (0.0 if drift is None else drift.value.curvature_per_m)
         curvature = min(max(wanted, -s.max_curvature_per_m), s.max_curvature_per_m)
-        new = Course(leg.id, self._choose_speed(view, leg.value, belief, robot.actuator), curvature)
-        because = (step, belief, *(() if drift is None else (drift,)))
+        free_m, told = self._look_ahead(view, leg.value, belief, robot.actuator)
+        new = Course(leg.id, self._choose_speed(free_m, robot.actuator), curvature)
+        because = (step, belief, *(() if drift is None else (drift,)), *told)
         yield Post(new, because) if course is None else Revise(course, new, (course, *because))
 
-    def _choose_speed(self, view: View, leg: Leg, belief: Entry[Hypothesis], actuator: ActuatorModel) -> float:
+    def _choose_speed(self, free_m: float, actuator: ActuatorModel) -> float:
         """The full speed, or what can be stopped from before the floor ends that is seen to be free."""
-        free_m = self._measure_free_m(view, leg, belief, actuator) - self._settings.action.rolling_stop_margin_m
-        fastest = math.sqrt(2.0 * actuator.brake_m_per_s2 * max(0.0, free_m))
+        room_m = max(0.0, free_m - self._settings.action.rolling_stop_margin_m)
+        fastest = math.sqrt(2.0 * actuator.brake_m_per_s2 * room_m)
         return min(actuator.speed_m_per_s, max(fastest, self._settings.action.creep_speed_m_per_s))
 
-    def _measure_free_m(self, view: View, leg: Leg, belief: Entry[Hypothesis], actuator: ActuatorModel) -> float:
-        """How far ahead the floor is seen to be free, as far as that matters at full speed."""
+    def _look_ahead(
+        self, view: View, leg: Leg, belief: Entry[Hypothesis], actuator: ActuatorModel
+    ) -> tuple[float, tuple[Entry[Any], ...]]:
+        """How far ahead the floor is seen to be free, as far as that matters at full speed; and what tells that."""
         most_m = actuator.stopping_distance_m() + self._settings.action.min_rolling_leg_m
         if not self._settings.action.keeps_to_seen_floor:
-            return most_m
-        return FloorAhead(view, leg, belief, self._settings).measure_free_m(most_m)
+            return most_m, ()
+        floor = FloorAhead(view, leg, belief, self._settings)
+        return floor.measure_free_m(most_m), floor.because
 
     def _is_floor_ahead(self, view: View, leg: Leg, belief: Entry[Hypothesis], actuator: ActuatorModel) -> bool:
         """Whether enough floor ahead is seen to be free to roll on."""
-        free_m = self._measure_free_m(view, leg, belief, actuator)
+        free_m, _ = self._look_ahead(view, leg, belief, actuator)
         return free_m > 2.0 * self._settings.action.rolling_stop_margin_m
 
     def _may_start(self, view: View) -> bool:

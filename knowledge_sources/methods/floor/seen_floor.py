@@ -62,21 +62,28 @@ class SeenFloor:
 
     def find_free(self, points: Floats) -> Mask:
         """Which of the points (n, 2) are seen free."""
+        return self.ask(points)[0]
+
+    def ask(self, points: Floats) -> tuple[Mask, Mask, Mask]:
+        """Which of the points (n, 2) are seen free; and which scans, and which discs, tell that or the contrary."""
         free, open_ = np.zeros(len(points), bool), np.ones(len(points), bool)
-        for scan in reversed(self.scans):
+        scans, discs = np.zeros(len(self.scans), bool), np.zeros(len(self.discs), bool)
+        for k in range(len(self.scans) - 1, -1, -1):
             rest = np.flatnonzero(open_)
             if not len(rest):
                 break
-            is_free, is_taken = _ask_scan(_read_scan(scan), points[rest])
+            is_free, is_taken = _ask_scan(_read_scan(self.scans[k]), points[rest])
             free[rest[is_free]] = True
             open_[rest[is_free | is_taken]] = False
+            scans[k] = (is_free | is_taken).any()
         rest = np.flatnonzero(open_)
         if len(rest) and len(self.discs):
-            away = np.linalg.norm(points[rest, None] - self.discs[None, :, :2], axis=2)
-            free[rest] = (away <= self.discs[:, 2]).any(axis=1)
+            covers = np.linalg.norm(points[rest, None] - self.discs[None, :, :2], axis=2) <= self.discs[:, 2]
+            free[rest] = covers.any(axis=1)
+            discs[covers.argmax(axis=1)[covers.any(axis=1)]] = True
         for corners in self.taken:
             free &= ~shapely.intersects_xy(shapely.Polygon(corners), points[:, 0], points[:, 1])
-        return free
+        return free, scans, discs
 
 
 def _ask_scan(scan: _Scan, points: Floats) -> tuple[Mask, Mask]:
