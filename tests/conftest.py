@@ -4,9 +4,15 @@
 an ``@example`` beside its law. Neither asks how long an example takes: the first one may compile what it calls.
 """
 
+import signal
+
 from hypothesis import settings
 
 import harvey  # noqa: F401  # before numpy: it tells the libraries how to calculate
+
+# A shell that starts the tests in the background has them ignore Ctrl-C, and so would what they start and interrupt.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("search", derandomize=False, print_blob=True, deadline=None)

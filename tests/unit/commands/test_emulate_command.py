@@ -29,7 +29,10 @@ def test_a_driver_in_another_process_finds_a_base_there(kind: str) -> None:
                 base.close()
         finally:  # whatever went wrong: the process does not end by itself
             process.send_signal(signal.SIGINT)
-        traffic, farewell = process.communicate(timeout=300)
+        try:
+            traffic, farewell = process.communicate(timeout=60)
+        finally:
+            process.kill()  # else leaving the block waits for it for ever
     assert report.move_m == pytest.approx(0.2, abs=0.03)
     assert " < " in traffic and " > " in traffic
     assert process.returncode == 0 and farewell == "the base is gone\n"
