@@ -150,7 +150,8 @@ class MilestoneJudge(RobotKnowledgeSource):
             expected_px = robot.camera.project_segments(lines, robot.camera_from_world(before))[0]
         is_as_put_down = belief is not None and belief.value.basis == "command"
         if is_sure or in_doubt:
-            tolerance_px = max(s.plan.max_deviation_px, tolerance_px * is_as_put_down)
+            most_px = s.plan.max_deviation_px
+            tolerance_px = max(most_px, tolerance_px) if is_as_put_down else most_px
         p_wrong = s.plan.p_wrong_followed if followed else s.plan.p_wrong_unfollowed
         p_wrong = _update(s.plan.p_wrong_in_doubt if in_doubt else p_wrong, milestone.told)
         return Weighed(

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.body.free_floor import find_free_floor, has_way
 from sim.differences.inexact import TrueInexact
+from sim.made_up.drivable import is_drivable
 from sim.made_up.generated_floors import generated_floor
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
@@ -18,8 +18,6 @@ from world_models.units import FOOT_M
 ROOMS = 6
 MARGIN_FT = 2.5
 """Start and goal are as far from the walls of their rooms."""
-ROOM_M, WAY_MARGIN_M = 0.3, 0.06
-"""Free floor round start and goal, and beside the robot on a way that counts as one."""
 MAX_DRAWS = 100
 WHEELS_WORSE = (
     "[actuator]\nturn_scale_sigma = 0.06\nturn_sigma_deg = 0.3\nskitter_sigma_m = 0.009\n"
@@ -60,9 +58,7 @@ def write_inexact_mission(
             stage = build_stage(parse_scenario(text, "inexact", folder))
         except ValueError:
             continue
-        obstacles, start, goal = stage.building.obstacles, stage.start_world, stage.goal_world
-        has_room = min(obstacles.clearance_m(start), obstacles.clearance_m(goal)) >= ROOM_M
-        if has_room and has_way(find_free_floor(obstacles, WAY_MARGIN_M), start, goal):
+        if is_drivable(stage.building.obstacles, stage.start_world, stage.goal_world):
             path = folder / f"inexact-{seed}.toml"
             path.write_text(text, "utf-8")
             return path

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.body.free_floor import find_free_floor, has_way
+from sim.made_up.drivable import is_drivable
 from sim.made_up.generated_floors import generated_floor
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
@@ -17,8 +17,6 @@ from world_models.units import FOOT_M
 MIN_ROOMS, MAX_ROOMS = 5, 40
 MARGIN_FT = 3.0
 """Start and goal are as far from the walls of their rooms."""
-ROOM_M, WAY_MARGIN_M = 0.3, 0.06
-"""Free floor round start and goal, and beside the robot on a way that counts as one."""
 MAX_DRAWS = 200
 
 
@@ -66,9 +64,7 @@ def write_twin_mission(folder: Path, seed: int, *, is_told_right: bool, rooms: i
             stage = build_stage(parse_scenario(text, "twins", folder))
         except ValueError:
             continue
-        obstacles, down, there = stage.building.obstacles, stage.put_down_world, stage.goal_world
-        has_room = min(obstacles.clearance_m(down), obstacles.clearance_m(there)) >= ROOM_M
-        if has_room and has_way(find_free_floor(obstacles, WAY_MARGIN_M), down, there):
+        if is_drivable(stage.building.obstacles, stage.put_down_world, stage.goal_world):
             path = folder / f"twins-{seed}.toml"
             path.write_text(text, "utf-8")
             return TwinMission(path, told, told if is_told_right else twin, rooms or drawn)

@@ -91,7 +91,7 @@ def evaluate_by_hand(space: PairSpace, terms: Terms, chosen: Mask) -> float:
 
 
 def list_moves(space: PairSpace, chosen: Mask, exchange: bool) -> list[Mask]:
-    """Every state one move away: a pair taken out, or put in, with its data line taken from whoever has it."""
+    """Every state one move away: a pair taken out, or put in, which takes its data line from the pair that has it."""
     states = []
     for p in range(len(chosen)):
         after = chosen.copy()

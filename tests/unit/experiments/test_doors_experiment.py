@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from experiments import trials
+from driven_here import run_here
 from experiments.differences import doors
 from experiments.differences.doors_trial import DoorResult, DoorTrial, run_door_mission
 from sim.made_up.door_missions import write_door_mission
@@ -25,15 +24,6 @@ def end(trial: DoorTrial, **other: Any) -> DoorResult:
     return DoorResult(trial.case, trial.floor, **(values | other))
 
 
-def report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, work: Callable[[DoorTrial], DoorResult], **how: Any) -> Any:
-    def here(_: Any, jobs: Sequence[DoorTrial], *__: Any) -> list[DoorResult]:
-        return [work(job) for job in jobs]
-
-    monkeypatch.setattr(trials, "RUNS", tmp_path)
-    monkeypatch.setattr(doors, "run_trials", here)
-    return doors.run(seed=0, **how)
-
-
 @pytest.mark.parametrize("case", ["another way", "no way", "stands open"])
 def test_a_mission_is_written_the_same_again_and_can_be_staged(tmp_path: Path, case: Any) -> None:
     one = write_door_mission(tmp_path, 3, case)
@@ -45,7 +35,7 @@ def test_a_mission_is_written_the_same_again_and_can_be_staged(tmp_path: Path, c
 
 
 def test_flawless_missions_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    found = report(monkeypatch, tmp_path, end, quick=False)
+    found = run_here(monkeypatch, tmp_path, doors, end, quick=False)
     assert found.failing == ()
     assert sum(row[3] for row in found.rows) == 1_000
 
@@ -61,11 +51,11 @@ def test_flawless_missions_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp
 def test_a_flaw_fails_its_claim(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, flaw: dict[str, Any], told: str
 ) -> None:
-    found = report(monkeypatch, tmp_path, lambda trial: end(trial, **flaw), quick=False, missions=30)
+    found = run_here(monkeypatch, tmp_path, doors, lambda trial: end(trial, **flaw), quick=False, missions=30)
     assert any(told in claim for claim in found.failing)
 
 
 def test_the_small_version_drives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    found = report(monkeypatch, tmp_path, run_door_mission, quick=True)
+    found = run_here(monkeypatch, tmp_path, doors, run_door_mission, quick=True)
     assert found.holds, found.text()
     assert sum(row[3] for row in found.rows) == doors.QUICK_MISSIONS

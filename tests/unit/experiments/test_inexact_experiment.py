@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from experiments import trials
+from driven_here import run_here
 from experiments.differences import inexact
 from experiments.differences.inexact_trial import InexactResult, InexactTrial, run_inexact_mission
 from sim.differences.inexact import TrueInexact
@@ -27,17 +26,6 @@ def end(trial: InexactTrial, **other: Any) -> InexactResult:
     return InexactResult(trial.row, trial.seed, **(values | other))
 
 
-def report(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, work: Callable[[InexactTrial], InexactResult], **how: Any
-) -> Any:
-    def here(_: Any, jobs: Sequence[InexactTrial], *__: Any) -> list[InexactResult]:
-        return [work(job) for job in jobs]
-
-    monkeypatch.setattr(trials, "RUNS", tmp_path)
-    monkeypatch.setattr(inexact, "run_trials", here)
-    return inexact.run(seed=0, **how)
-
-
 def test_a_mission_is_written_the_same_again_and_states_how_well_things_are_known(tmp_path: Path) -> None:
     truth = TrueInexact(sigma_m=0.05, missing=0.3, extra=0.1)
     path = write_inexact_mission(tmp_path, 3, truth, stated_m=0.05)
@@ -50,7 +38,7 @@ def test_a_mission_is_written_the_same_again_and_states_how_well_things_are_know
 
 
 def test_flawless_missions_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    found = report(monkeypatch, tmp_path, end, quick=False, missions=30)
+    found = run_here(monkeypatch, tmp_path, inexact, end, quick=False, missions=30)
     assert found.failing == ()
     assert sum(row[3] for row in found.rows) == 30 * len(inexact.SIGMAS_CM)
 
@@ -65,11 +53,11 @@ def test_flawless_missions_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp
 def test_a_flaw_fails_its_claim(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, flaw: dict[str, Any], told: str
 ) -> None:
-    found = report(monkeypatch, tmp_path, lambda trial: end(trial, **flaw), quick=False, missions=30)
+    found = run_here(monkeypatch, tmp_path, inexact, lambda trial: end(trial, **flaw), quick=False, missions=30)
     assert any(told in claim for claim in found.failing)
 
 
 def test_the_small_version_drives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    found = report(monkeypatch, tmp_path, run_inexact_mission, quick=True)
+    found = run_here(monkeypatch, tmp_path, inexact, run_inexact_mission, quick=True)
     assert found.holds, found.text()
     assert sum(row[3] for row in found.rows) == inexact.QUICK_MISSIONS

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from experiments import trials
+from driven_here import run_here
 from experiments.differences import light
 from experiments.differences.light_trial import LightResult, LightTrial, run_light_mission, write_light_mission
 from sim.made_up.lights import LIGHT_KINDS, LightKind, draw_light
@@ -27,13 +27,8 @@ def end(trial: LightTrial, **other: Any) -> LightResult:
 def report(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, work: Callable[[LightTrial], LightResult], **how: Any
 ) -> Any:
-    def here(_: Any, jobs: Sequence[LightTrial], *__: Any) -> list[LightResult]:
-        return [work(job) for job in jobs]
-
-    monkeypatch.setattr(trials, "RUNS", tmp_path)
-    monkeypatch.setattr(light, "run_trials", here)
     monkeypatch.setattr(light, "draw_sheet", lambda path: path.touch())
-    return light.run(seed=0, **how)
+    return run_here(monkeypatch, tmp_path, light, work, **how)
 
 
 @pytest.mark.parametrize("kind", LIGHT_KINDS)

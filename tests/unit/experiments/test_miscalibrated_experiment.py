@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from experiments import trials
+from driven_here import run_here
 from experiments.differences import miscalibrated
 from experiments.differences.miscalibrated_trial import CameraResult, CameraTrial, run_camera_mission
 from sim.made_up.camera_missions import CASES, MAX_TURN_RAD, write_camera_mission
@@ -25,17 +24,6 @@ def end(trial: CameraTrial, **other: Any) -> CameraResult:
     return CameraResult(trial.case, trial.floor, **(values | other))
 
 
-def report(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, work: Callable[[CameraTrial], CameraResult], **how: Any
-) -> Any:
-    def here(_: Any, jobs: Sequence[CameraTrial], *__: Any) -> list[CameraResult]:
-        return [work(job) for job in jobs]
-
-    monkeypatch.setattr(trials, "RUNS", tmp_path)
-    monkeypatch.setattr(miscalibrated, "run_trials", here)
-    return miscalibrated.run(seed=0, **how)
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_a_mission_is_written_the_same_again_and_can_be_staged(tmp_path: Path, case: Any) -> None:
     path = write_camera_mission(tmp_path, 3, case)
@@ -49,7 +37,7 @@ def test_a_mission_is_written_the_same_again_and_can_be_staged(tmp_path: Path, c
 
 
 def test_flawless_missions_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    found = report(monkeypatch, tmp_path, end, quick=False)
+    found = run_here(monkeypatch, tmp_path, miscalibrated, end, quick=False)
     assert found.failing == ()
     assert sum(row[3] for row in found.rows) == 1_000
 
@@ -65,11 +53,11 @@ def test_flawless_missions_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp
 def test_a_flaw_fails_its_claim(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, flaw: dict[str, Any], told: str
 ) -> None:
-    found = report(monkeypatch, tmp_path, lambda trial: end(trial, **flaw), quick=False, missions=30)
+    found = run_here(monkeypatch, tmp_path, miscalibrated, lambda trial: end(trial, **flaw), quick=False, missions=30)
     assert any(told in claim for claim in found.failing)
 
 
 def test_the_small_version_drives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    found = report(monkeypatch, tmp_path, run_camera_mission, quick=True)
+    found = run_here(monkeypatch, tmp_path, miscalibrated, run_camera_mission, quick=True)
     assert found.holds, found.text()
     assert {row[0] for row in found.rows} == set(CASES)

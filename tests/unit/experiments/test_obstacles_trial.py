@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import experiments
-from experiments import trials
+from driven_here import run_here
 from experiments.differences import obstacles
 from experiments.differences.obstacles_trial import EMPTY, Trial, TrialEnd, make_trials, write_mission
 from harvey.errors import BadInput
@@ -25,15 +24,6 @@ def end(trial: Trial, **other: Any) -> TrialEnd:
     return TrialEnd(trial.row, trial.seed, trial.floor, **(values | other))
 
 
-def report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, work: Callable[[Trial], TrialEnd], **how: Any) -> Any:
-    def here(_: Any, jobs: Sequence[Trial], *__: Any) -> list[TrialEnd]:
-        return [work(job) for job in jobs]
-
-    monkeypatch.setattr(trials, "RUNS", tmp_path)
-    monkeypatch.setattr(obstacles, "run_trials", here)
-    return obstacles.run(seed=0, **how)
-
-
 def test_an_empty_floor_is_the_cluttered_one_without_its_things(tmp_path: Path) -> None:
     cluttered, empty = (load_scenario(write_mission(Trial("", 5, floor), tmp_path)) for floor in ("cluttered", EMPTY))
     assert cluttered.truth.extra and not empty.truth.extra
@@ -46,7 +36,7 @@ def test_in_each_tenth_mission_no_way_is_left() -> None:
 
 
 def test_flawless_missions_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    found = report(monkeypatch, tmp_path, end, quick=False)
+    found = run_here(monkeypatch, tmp_path, obstacles, end, quick=False)
     assert found.failing == () and found.rows[0][3] == 1_000
     assert [row["peer"] for row in found.record()["rows"] if row["peer"]] == ["25%; 48%"]
 
@@ -63,13 +53,13 @@ def test_flawless_missions_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp
 def test_a_flaw_fails_its_claim(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, flaw: dict[str, Any], told: str
 ) -> None:
-    found = report(monkeypatch, tmp_path, lambda trial: end(trial, **flaw), quick=False, missions=30)
+    found = run_here(monkeypatch, tmp_path, obstacles, lambda trial: end(trial, **flaw), quick=False, missions=30)
     assert any(told in claim for claim in found.failing)
     assert found.rows[0][3] == 30
 
 
 def test_the_small_version_drives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    found = report(monkeypatch, tmp_path, obstacles.run_trial, quick=True)
+    found = run_here(monkeypatch, tmp_path, obstacles, obstacles.run_trial, quick=True)
     assert found.rows[0] == ("missions", None, None, 2, 1, 1, 1)
     assert not [claim for claim in found.failing if "milestone" in claim]
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from experiments import trials
+from driven_here import run_here
 from experiments.differences import twins
 from experiments.differences.twins_trial import TwinResult, TwinTrial
 from sim.made_up.generated_floors import generated_floor
@@ -23,15 +22,6 @@ def end(trial: TwinTrial, **other: Any) -> TwinResult:
     flawless = TwinResult(trial.seed, trial.is_told_right, 8, "reached", "", 0.01, not trial.is_told_right, 0,
                           int(not trial.is_told_right), 0, 60.0, 5.0)
     return replace(flawless, **other)
-
-
-def report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, work: Callable[[TwinTrial], TwinResult], **how: Any) -> Any:
-    def here(_: Any, jobs: Sequence[TwinTrial], *__: Any) -> list[TwinResult]:
-        return [work(job) for job in jobs]
-
-    monkeypatch.setattr(trials, "RUNS", tmp_path)
-    monkeypatch.setattr(twins, "run_trials", here)
-    return twins.run(seed=0, **how)
 
 
 @pytest.mark.parametrize("is_told_right", [True, False])
@@ -56,7 +46,7 @@ def test_rooms_are_identical_but_for_a_turn() -> None:
 
 
 def test_flawless_missions_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    found = report(monkeypatch, tmp_path, end, quick=False)
+    found = run_here(monkeypatch, tmp_path, twins, end, quick=False)
     assert found.failing == ()
     assert sum(row[3] for row in found.rows) == twins.MISSIONS
     told_right = found.rows[0][3]
@@ -74,5 +64,5 @@ def test_a_flaw_fails_its_claim(
     def work(trial: TwinTrial) -> TwinResult:
         return end(trial, **flaw) if trial.is_told_right == told_right else end(trial)
 
-    found = report(monkeypatch, tmp_path, work, quick=False, missions=300)
+    found = run_here(monkeypatch, tmp_path, twins, work, quick=False, missions=300)
     assert any(claim in failing for failing in found.failing)

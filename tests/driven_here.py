@@ -1,0 +1,24 @@
+"""A campaign whose trials are done in this process, by work that is given: what it makes of their ends is tested."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from experiments import trials
+
+
+def run_here(
+    monkeypatch: pytest.MonkeyPatch, folder: Path, experiment: ModuleType, work: Callable[[Any], Any], **how: Any
+) -> Any:
+    """The report of an experiment whose trials end as ``work`` says; its results are kept in ``folder``."""
+    def here(_: Any, jobs: Sequence[Any], *__: Any) -> list[Any]:
+        return [work(job) for job in jobs]
+
+    monkeypatch.setattr(trials, "RUNS", folder)
+    monkeypatch.setattr(experiment, "run_trials", here)
+    return experiment.run(seed=0, **how)
