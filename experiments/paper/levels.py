@@ -7,17 +7,13 @@ further from its path; without the plan level it ends further off; a kidnapped r
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from experiments.report import Cell, Report, count_kinds
-from harvey.campaign.campaign import Task, run_tasks
-from harvey.campaign.progress import count_missions
+from experiments.trials import campaign_folder, run_trials
+from harvey.campaign.campaign import Task, run_task
+from harvey.runner.result import MissionResult
 from world_models.units import INCH_M
-
-if TYPE_CHECKING:
-    from harvey.runner.result import MissionResult
 
 MAIN, KIDNAP = SCENARIOS = ("lab-to-allens-office", "hallway-kidnap")
 LEVELS_OFF: Mapping[str, tuple[str, ...]] = {
@@ -35,7 +31,7 @@ SEEDS, QUICK_SEEDS = 20, 1
 COLUMNS = ("scenario", "levels", "reached", "<= 1 inch", "otherwise", "mean mm", "max mm", "max off path mm",
            "collisions", "false accepts", "replans", "relocated")
 
-Results = Mapping[tuple[str, str], Sequence["MissionResult"]]
+Results = Mapping[tuple[str, str], Sequence[MissionResult]]
 """Results by scenario and setting, one per seed."""
 
 
@@ -47,7 +43,8 @@ def run(quick: bool, seed: int) -> Report:
         for scenario in SCENARIOS for name, off in LEVELS_OFF.items() if not (quick and (scenario, name) in NOT_QUICK)
     }
     everything = [task for row in tasks.values() for task in row]
-    done = dict(count_missions(run_tasks(everything), len(everything), sys.stderr))
+    folder = campaign_folder("levels", seed, quick=quick)
+    done = dict(zip(everything, run_trials(run_task, everything, MissionResult, folder, "mission"), strict=True))
     results = {key: [done[task] for task in row] for key, row in tasks.items()}
     return Report(
         "Missions with levels of perceptual servoing switched off", COLUMNS,

@@ -28,7 +28,7 @@ from tqdm import tqdm
 from experiments.report import Report
 from experiments.robustness.malformed_buildings_text import GML, IFC
 from experiments.robustness.malformed_worlds_text import SMALL
-from harvey.campaign.worker_pool import map_over_workers
+from harvey.campaign.engine import map_values
 from world_models.building.checks import check_world
 from world_models.files.importers import BuildingError, import_building
 from world_models.files.toml.source import Source, WorldError
@@ -88,7 +88,7 @@ def _judge_files(files: int, chunk: int, seed: int) -> Iterator[FileResult]:
     parts = [range(first, min(first + chunk, files)) for first in range(0, files, chunk)]
     known: dict[int, list[FileResult]] = {}
     with tqdm(total=files, unit="file", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
-        for place, found in map_over_workers(partial(judge_files, seed=seed), parts):
+        for place, found in map_values(partial(judge_files, seed=seed), parts):
             known[place] = found
             bar.update(len(found))
     for place in range(len(parts)):

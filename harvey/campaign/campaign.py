@@ -1,17 +1,16 @@
-"""Missions by scenario, settings and seed: one at a time or several in worker processes, with the same results."""
+"""One mission by scenario, settings and seed, as a task that any process can run with the same result."""
 
 from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from blackboard.journal import Sink
-from harvey.campaign.worker_pool import map_over_workers
 from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory, prepare_directory
 
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
 Follow = Callable[["Tally"], Sink]
 """Makes the sink that shows what a tally counts; it is called after the tally."""
 
-WORKERS = 2
 MAX_SEEDS = 10_000
 
 
@@ -156,28 +154,31 @@ def make_room(out: Path, name: str, seed: int) -> Path:
     return path
 
 
-def _keep_or_resume(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence[Sink], live: bool) -> MissionResult:
-    """What an earlier campaign did of this mission. Raises BadInput where another mission is there."""
+def find_finished(task: Task, stage: Stage) -> MissionResult | None:
+    """The result of the task's run, if it has ended. Raises BadInput where another mission is there."""
+    if task.out is None or not (task.out / "run.json").exists():
+        return None
     from harvey.run_files.run_head import RunHead
     from harvey.runner.result import MissionResult
     from harvey.runner.resume import find_remains
-    from harvey.simulation.run import build_head, resume_mission
+    from harvey.simulation.run import build_head
 
+    run = RunDirectory(task.out)
     if not RunHead.read(run.path).is_like(build_head(stage, task.seed, task.body, task.agent_settings)):
         raise BadInput(f"{run.path}: expected a run of {task.label}, got one that began otherwise")
     remains, record = find_remains(run), run.read_result()
     if remains.outcome is None or record.get("outcome") != remains.outcome.kind:
-        return resume_mission(run, remains, sinks=sinks, live=live, stage=stage)
+        return None
     try:
         return MissionResult.of_record(record)
     except TypeError as error:
         raise BadInput(f"{run.result}: {error}") from None
 
 
-def run_tasks(tasks: Sequence[Task], workers: int = WORKERS) -> Iterator[tuple[Task, MissionResult]]:
-    """Run several missions; they come as they are done, in whatever order.
+def _keep_or_resume(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence[Sink], live: bool) -> MissionResult:
+    """What was done of this mission already. Raises BadInput where another mission is there."""
+    from harvey.runner.resume import find_remains
+    from harvey.simulation.run import resume_mission
 
-    A mission's result follows from its task alone, so that the number of workers changes nothing but the time.
-    """
-    for number, result in map_over_workers(run_task, tasks, workers):
-        yield tasks[number], result
+    found = find_finished(task, stage)
+    return found or resume_mission(run, find_remains(run), sinks=sinks, live=live, stage=stage)

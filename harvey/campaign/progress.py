@@ -10,6 +10,7 @@ from tqdm import tqdm
 
 from blackboard.journal import Decision, Sink
 from harvey.campaign.campaign import Follow, Task
+from harvey.campaign.case_work import Killed
 from harvey.campaign.summary import format_error
 from harvey.campaign.tally import Tally
 from world_models.words import count
@@ -92,13 +93,14 @@ def stages(total: int, out: TextIO) -> Iterator[Callable[[str], None]]:
 
 
 def count_missions(
-    done: Iterable[tuple[Task, MissionResult]], total: int, out: TextIO
-) -> Iterator[tuple[Task, MissionResult]]:
+    done: Iterable[tuple[Task, MissionResult | Killed]], total: int, out: TextIO
+) -> Iterator[tuple[Task, MissionResult | Killed]]:
     """Missions as they are done, with a bar on a terminal and a line for each elsewhere."""
     with tqdm(total=total, file=out, disable=not out.isatty(), unit="mission", leave=False) as bar:
         for number, (task, result) in enumerate(done, 1):
             if not out.isatty():
-                how = f"{result.outcome}, {format_error(result.error_m)}"
+                how = (result.text if isinstance(result, Killed)
+                       else f"{result.outcome}, {format_error(result.error_m)}")
                 print(f"{number} of {total}: {task.label}: {how}", file=out, flush=True)
             bar.update()
             yield task, result

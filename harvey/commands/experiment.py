@@ -7,6 +7,7 @@ from argparse import ArgumentParser, Namespace
 from textwrap import fill
 
 from experiments import EXPERIMENTS
+from harvey.campaign.workers import add_worker_arguments, choose_workers, parse_workers
 from harvey.commands.command import Command, whole
 
 
@@ -16,13 +17,15 @@ def _arguments(parser: ArgumentParser) -> None:
                         help="a small version, of seconds to two minutes; it claims only what it can show")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.add_argument("--seed", metavar="N", type=whole, default=0, help="of all random numbers (0)")
+    add_worker_arguments(parser)
     parser.add_argument("--missions", metavar="N", type=whole, help="how many, for the experiments that say so")
 
 
 def _run(args: Namespace) -> int:
     import experiments
 
-    report = experiments.run(args.name, quick=args.quick, seed=args.seed, missions=args.missions or None)
+    with choose_workers(parse_workers(args)):
+        report = experiments.run(args.name, quick=args.quick, seed=args.seed, missions=args.missions or None)
     print(json.dumps(report.record(), indent=2) if args.json else report.text())
     return 0 if report.holds else 1
 
@@ -33,6 +36,7 @@ COMMAND = Command(
         ("harvey experiment levels --quick", "what the three servo levels do"),
         ("harvey experiment render-speed", "the simulator's frames per second and edge accuracy"),
         ("harvey experiment obstacles --missions 200", "a fifth of its missions"),
+        ("harvey experiment missions --workers 4", "on four processors"),
         ("harvey experiment levels --json", "for further use"),
     ),
     _arguments, _run,

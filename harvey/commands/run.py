@@ -5,11 +5,16 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from harvey.campaign.campaign import Task, parse_pairs, parse_seeds, run_task, run_tasks
+from harvey.campaign.campaign import Task, parse_pairs, parse_seeds, run_task
+from harvey.campaign.workers import add_worker_arguments, choose_workers, parse_workers
 from harvey.commands.command import Command
 from harvey.errors import BadInput, Terminated
 from harvey.run_files.run_directory import RUNS, check_vacant
+
+if TYPE_CHECKING:
+    from harvey.campaign.missions import Keep
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -28,7 +33,12 @@ def _arguments(parser: ArgumentParser) -> None:
                         help="how the simulated body is reached: simulated, or over an emulated serial line as"
                              " serial:denning, serial:p2os or serial:create2 (simulated)")
     parser.add_argument("--go-on", action="store_true",
-                        help="keep the runs that are there already, and resume those that were cut off")
+                        help="keep the runs that are there already; one that was cut off is resumed, of several seeds"
+                             " it is driven anew, so that the results are as if nothing had been")
+    add_worker_arguments(parser)
+    parser.add_argument("--keep", choices=("all", "failures", "none"), default="all",
+                        help="of several seeds: whose run directories stay, all, those that do not reach the goal, or"
+                             " none; the results stay in any case (all)")
     parser.add_argument("--check", action="store_true", help="do not drive; list the milestones to come")
     parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
     parser.add_argument("--trace", action="store_true", help="print every cycle: changes, candidates, choice, effects")
@@ -37,6 +47,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     from harvey.simulation.serial_body import body_kind
 
+    workers = parse_workers(args)
     seeds, settings, body = parse_seeds(args.seed), parse_pairs(args.settings), body_kind(args.body)
     tasks = tuple(
         Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1), body, args.go_on) for seed in seeds)
@@ -45,10 +56,15 @@ def _run(args: Namespace) -> int:
             raise BadInput(f"--check: expected it without --{also[0].replace('_', '-')}, because nothing is driven")
         return _check(tasks[0])
     if len(tasks) == 1:
+        for name, value, usual in (("--keep", args.keep, "all"), ("--workers", args.workers, None),
+                                   ("--cluster", args.cluster, None)):
+            if value != usual:
+                raise BadInput(f"{name}: expected several seeds, as --seed 0..19, got one")
         return _one(tasks[0], args)
     if args.trace or args.live:
         raise BadInput(f"--{'trace' if args.trace else 'live'}: expected one seed, got {len(tasks)}")
-    return _several(tasks)
+    with choose_workers(workers):
+        return _several(tasks, args.keep)
 
 
 def _out(args: Namespace, seed: int, many: bool) -> Path:
@@ -93,19 +109,28 @@ def _one(task: Task, args: Namespace) -> int:
     return 0 if result.outcome == "reached" else 1
 
 
-def _several(tasks: tuple[Task, ...]) -> int:
+def _several(tasks: tuple[Task, ...], keep: Keep) -> int:
+    from harvey.campaign.missions import drive_missions
     from harvey.campaign.progress import count_missions
     from harvey.campaign.summary import format_results
+    from harvey.runner.result import MissionResult
 
-    tasks[0].stage()
+    folder = tasks[0].out.parent if tasks[0].out else RUNS
     try:
-        results = {task.seed: result for task, result in count_missions(run_tasks(tasks), len(tasks), sys.stderr)}
+        done = dict(count_missions(drive_missions(tasks, folder, keep), len(tasks), sys.stderr))
     except (KeyboardInterrupt, Terminated) as stop:
         stop.add_note("what was recorded is kept; the same command with --go-on goes on")
         raise
-    print(format_results([results[task.seed] for task in tasks]))
-    print(f"the runs are in {tasks[0].out.parent if tasks[0].out else RUNS}")
-    return 0 if all(r.outcome == "reached" for r in results.values()) else 1
+    results = [result for task in tasks if isinstance(result := done[task], MissionResult)]
+    if results:
+        print(format_results(results))
+    for task in tasks:
+        if not isinstance(lost := done[task], MissionResult):
+            print(f"seed {task.seed}: {lost.text}")
+    kept = {"all": "the runs are in", "failures": "the results, and the runs that did not reach the goal, are in",
+            "none": "the results are in"}
+    print(f"{kept[keep]} {folder}")
+    return 0 if len(results) == len(tasks) and all(r.outcome == "reached" for r in results) else 1
 
 
 COMMAND = Command(
@@ -114,6 +139,8 @@ COMMAND = Command(
         ("harvey run lab-to-allens-office", "Figure 17's mission"),
         ("harvey run lab-to-allens-office --seed 0..19", "twenty of them, and a table"),
         ("harvey run lab-to-allens-office --seed 0..19 --go-on", "those that are still to be done, after a crash"),
+        ("harvey run lab-to-allens-office --seed 0..999 --keep failures", "a thousand; only those that fail stay"),
+        ("harvey run lab-to-allens-office --seed 0..19 --cluster local:4", "on a Dask cluster of this machine"),
         ("harvey run lab-to-allens-office --check", "which milestones it will have, and how well each tells the place"),
         ("harvey run hallway-kidnap --seed 3 --trace", "print what each cycle sees, weighs and does"),
         ("harvey run shut-door", "told on the way that a door is shut ([[told]] in its file)"),

@@ -40,7 +40,7 @@ def test_results_come_in_the_order_of_the_trials_and_are_kept(tmp_path: Path) ->
 def test_a_campaign_that_was_broken_off_goes_on_where_it_was(tmp_path: Path) -> None:
     assert run_trials(square, NUMBERS[:2], Square, tmp_path) == FOUND[:2]
     kept = tmp_path / "results.jsonl"
-    kept.write_text(kept.read_text(encoding="utf-8") + '{"number": 3, "fou', encoding="utf-8")
+    kept.write_text(kept.read_text(encoding="utf-8") + '{"case": 3, "fou', encoding="utf-8")
     assert run_trials(square, NUMBERS, Square, tmp_path) == FOUND
     assert run_trials(spoilt, NUMBERS, Square, tmp_path) == FOUND
 
@@ -49,7 +49,7 @@ def test_a_campaign_that_was_broken_off_goes_on_where_it_was(tmp_path: Path) -> 
 def test_what_another_found_is_found_anew(tmp_path: Path, finder: dict[str, str]) -> None:
     run_trials(square, [], Square, tmp_path)
     here = json.loads((tmp_path / "results.jsonl").read_text(encoding="utf-8"))
-    lines = [here | finder, *({"number": n, "result": {"of": 0, "value": 0.0}} for n in range(4))]
+    lines = [here | finder, *({"case": n, "result": {"of": 0, "value": 0.0}} for n in range(4))]
     (tmp_path / "results.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
     assert run_trials(square, NUMBERS, Square, tmp_path) == FOUND
 

@@ -16,7 +16,9 @@ from typing import Any
 import pytest
 
 from harvey.arithmetic import arithmetic
-from harvey.campaign.campaign import Task, parse_pairs, parse_seeds, run_tasks
+from harvey.campaign.campaign import Task, parse_pairs, parse_seeds, run_task
+from harvey.campaign.engine import map_cases
+from harvey.campaign.workers import Workers
 from harvey.cli import main
 from harvey.errors import BadInput, Terminated
 from harvey.run_files.deciding_code import deciding_code
@@ -326,7 +328,7 @@ def test_several_seeds_make_a_table_and_workers_do_not_matter(run: Path, both: t
 def test_a_mistake_in_a_worker_comes_back(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(BadInput, match="servo"):
-        list(run_tasks([Task("bump", (("servo.acton", "off"),), 0, tmp_path)], workers=1))
+        list(map_cases(run_task, [Task("bump", (("servo.acton", "off"),), 0, tmp_path)], Workers(1)))
 
 
 STOPS = [(KeyboardInterrupt, 130, "interrupted"), (Terminated, 143, "terminated")]

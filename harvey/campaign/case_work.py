@@ -1,0 +1,68 @@
+"""Case work: what a worker does with one case, and what it sends back."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from harvey.arithmetic import arithmetic
+from harvey.campaign.origin import code_digest
+from harvey.errors import BadInput
+
+MOST_KILLS = 3
+"""So often may a worker end while it works on a case; then the case is given up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a worker found of a case.
+
+    Attributes:
+        value: what the work returned.
+        seconds: what it took.
+        worker: host and process.
+        code, arithmetic: with which program, and how it calculated.
+    """
+
+    value: Any
+    seconds: float
+    worker: str
+    code: str
+    arithmetic: str
+
+
+@dataclass(frozen=True, slots=True)
+class Killed:
+    """A case that was given up: each worker that had it ended before it answered.
+
+    Attributes:
+        kills: how many did.
+    """
+
+    kills: int
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return f"given up: the worker that had it was killed {self.kills} times, as when memory runs out"
+
+
+def answer_case(work: Callable[[Any], Any], case: Any) -> Answer:
+    """Work on a case, in a worker."""
+    began = time.perf_counter()
+    value = work(case)
+    seconds = time.perf_counter() - began
+    return Answer(value, seconds, f"{socket.gethostname()}:{os.getpid()}", code_digest(), arithmetic())
+
+
+def check_origin(answer: Answer) -> None:
+    """Refuse what another program found, or another kind of processor. Raises BadInput."""
+    for what, theirs, ours in (("code", answer.code, code_digest()),
+                               ("arithmetic", answer.arithmetic, arithmetic())):
+        if theirs != ours:
+            raise BadInput(f"worker {answer.worker}: expected the {what} of this machine ({ours}), got {theirs}: its"
+                           " results would differ; start workers with 'harvey campaign worker'")
