@@ -19,7 +19,7 @@ from sim.differences.leaf import build_leaf
 from sim.differences.table import TrueDoor
 from sim.made_up.generated_floors import Floor, generated_floor
 from sim.scenario import parse_scenario
-from sim.stage import Stage, build_stage
+from sim.stage import Stage, build_stage, move_ends
 from world_models.building.locales import Doorway
 from world_models.building.world import World
 from world_models.units import FOOT_M
@@ -74,13 +74,16 @@ def _write_on_floor(folder: Path, seed: int, floor_seed: int, case: DoorCase) ->
     if case == "stands open" and not 2 <= len(floor.world.doorways) < ROOMS:
         return None
     world, details = floor.write(folder)
+    stage: Stage | None = None
     for _ in range(MAX_DRAWS):
         text = (f'description = "A generated floor; doors: {case}."\nworld = "{world.name}"\n'
                 f'details = ["{details.name}"]\n{_draw_goal(floor, rng)}\n[start]\n'
                 f"heading_deg = {math.degrees(rng.uniform(-math.pi, math.pi)):.1f}\n"
                 "put_down_sigma_m = 0.02\nput_down_sigma_deg = 1.0\n")
         try:
-            drawn = _draw_doors(build_stage(parse_scenario(text, "doors", folder)), floor, case, rng)
+            scenario = parse_scenario(text, "doors", folder)
+            stage = build_stage(scenario) if stage is None else move_ends(stage, scenario)
+            drawn = _draw_doors(stage, floor, case, rng)
             if drawn is None:
                 continue
             build_stage(parse_scenario(text + drawn[1], "doors", folder))
