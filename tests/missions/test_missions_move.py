@@ -28,7 +28,7 @@ KIDNAP = """
 [[faults]]
 kind = "kidnap"
 in_locale = "hallway"
-after_ft = 12.0
+after_ft = 8.0
 distance_m = 0.8
 turn_deg = 15.0
 """
@@ -85,7 +85,7 @@ def test_a_run_that_is_cut_off_on_the_move_goes_on(run: RunDirectory, stage: Sta
 
 
 def test_who_is_carried_off_on_the_move_stops_at_once(tmp_path: Path) -> None:
-    farther = SCENARIO.replace("(11,4,0)", "(30,4,0)")  # it rolls only once it has seen the floor before it
+    farther = SCENARIO.replace("(11,4,0)", "(16,4,0)")  # it rolls only once it has seen the floor before it
     stage = build_stage(parse_scenario(farther + KIDNAP, "carried-off"))
     run = RunDirectory(tmp_path / "run")
     result = run_mission(stage, SEED, out=run.path)

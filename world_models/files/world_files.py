@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from os import PathLike
 from pathlib import Path
 
@@ -25,6 +26,8 @@ def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[st
                opened: Collection[str] = (), altered: Callable[[WorldSpec], WorldSpec] | None = None) -> World:
     """The world of a TOML file, or of a compiled one, which is read one locale at a time.
 
+    The last few worlds are kept: files with the same contents give the same object.
+
     Args:
         path: the world file.
         details: further files that add parts, finishes and things (no rooms or doors). A compiled world contains its
@@ -42,7 +45,26 @@ def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[st
         if altered is not None:
             raise WorldError(f"{path}: expected a TOML file where the description is altered, got a compiled world")
         return World(SqliteLocales(path, [Path(detail).stem for detail in details]))
-    return read_world(Source.read(path), [Source.read(Path(detail)) for detail in details], opened, altered)
+    files = (path, *map(Path, details))
+    if altered is not None:
+        return _read_files(files, opened, altered)
+    try:
+        digests = tuple(compute_digest(file) for file in files)
+    except (OSError, WorldError):
+        return _read_files(files, opened)  # which says what is wrong
+    return _read_once(files, digests, tuple(opened))
+
+
+@lru_cache(maxsize=4)
+def _read_once(files: tuple[Path, ...], digests: tuple[str, ...], opened: tuple[str, ...]) -> World:
+    """The world of files with these digests."""
+    return _read_files(files, opened)
+
+
+def _read_files(files: Sequence[Path], opened: Collection[str],
+                altered: Callable[[WorldSpec], WorldSpec] | None = None) -> World:
+    base, *details = [Source.read(file) for file in files]
+    return read_world(base, details, opened, altered)
 
 
 def fingerprint(path: str | PathLike[str]) -> str:

@@ -76,22 +76,28 @@ sys.exit(harvey.cli.main(["list"]))
     assert (done.returncode, done.stderr) == (130, "harvey: interrupted\n")
 
 
-@pytest.mark.parametrize("command", [["calibrate", "--camera"], ["drive", "--camera"]])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_pipe_into_which_nobody_writes_can_be_interrupted(
-    command: list[str], number: signal.Signals, tmp_path: Path
-) -> None:
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
+def test_a_pipe_into_which_nobody_writes_can_be_interrupted(tmp_path: Path) -> None:
+    """Each command by each signal; all are started before any is waited for."""
     world = ["--world", "research_center", "--goal", "(ptrans (hallway (4,4,0)) (hallway (9,4,0)))"]
-    argv = [*HARVEY, *command, str(pipe), *(world if command[0] == "drive" else []), "--out", str(tmp_path / "out")]
-    with subprocess.Popen(argv, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr is not None
-        time.sleep(6.0)
-        assert process.poll() is None
-        process.send_signal(number)
-        assert process.wait(timeout=20.0) == 128 + number
-        assert "Traceback" not in process.stderr.read()
+    waiting: list[tuple[signal.Signals, subprocess.Popen[str]]] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        for command, more in (("calibrate", []), ("drive", world)):
+            pipe, out = (tmp_path / f"{command}-{number}{end}" for end in ("", ".out"))
+            os.mkfifo(pipe)
+            argv = [*HARVEY, command, "--camera", str(pipe), *more, "--out", str(out)]
+            process = subprocess.Popen(argv, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            waiting.append((number, process))
+    time.sleep(8.0)
+    try:
+        for number, process in waiting:
+            assert process.poll() is None
+            process.send_signal(number)
+        for number, process in waiting:
+            _, told = process.communicate(timeout=20.0)
+            assert process.returncode == 128 + number and "Traceback" not in told
+    finally:
+        for _, process in waiting:
+            process.kill()
 
 
 @pytest.mark.parametrize("name", MARKS)

@@ -171,3 +171,23 @@ def test_questions_about_unknown_names_are_refused() -> None:
             ask("hall")
     with pytest.raises(ValueError, match=r"expected a point .* got shape \(4,\)"):
         world.locale_at([0, 0, 0, 0])
+
+
+def test_a_world_is_read_once_as_long_as_none_of_its_files_changes(tmp_path: Path) -> None:
+    """Neither the file itself, nor one that it includes, nor its details, nor the doors that are opened."""
+    world, parts, details = (tmp_path / name for name in ("cottage.toml", "parts.toml", "details.toml"))
+    world.write_text(HEAD + 'include = ["parts.toml"]\n' + KITCHEN)
+    parts.write_text('units = "feet"\n[finishes]\nbeige = { colour = [0.9, 0.8, 0.7] }\n')
+    details.write_text('units = "feet"\n[locales]\n')
+    known = load_world(world)
+    assert load_world(str(world)) is known
+    assert load_world(world, details=[details]) is not known
+    assert load_world(world, altered=lambda spec: spec) is not known
+    parts.write_text('units = "feet"\n[finishes]\nbeige = { colour = [0.1, 0.8, 0.7] }\n')
+    changed = load_world(world)
+    assert changed is not known
+    world.write_text(world.read_text().replace("[10, 8]", "[10, 9]"))
+    assert np.allclose(load_world(world).outline("kitchen")[2], [3.048, 2.7432])
+    world.write_text("name = ")
+    with pytest.raises(WorldError, match="expected TOML"):
+        load_world(world)
