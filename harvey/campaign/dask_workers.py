@@ -12,7 +12,7 @@ import logging
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from importlib.util import find_spec
@@ -27,7 +27,7 @@ AHEAD = 2
 COUNT_EVERY_S = 2.0
 """So often is asked how many workers there are."""
 CONNECT_S = 20.0
-CONFIG = {
+CONFIG: Mapping[str, object] = {
     "distributed.scheduler.allowed-failures": MOST_KILLS - 1,
     "distributed.scheduler.worker-saturation": 1.0,
     "distributed.worker.daemon": True,
@@ -100,7 +100,7 @@ def import_dask() -> Any:
 def _connect(distributed: Any, cluster: str) -> Iterator[Any]:
     """A client of the cluster. Raises BadInput."""
     config = import_module("dask").config
-    with config.set(CONFIG):
+    with config.set(dict(CONFIG)):
         if cluster.startswith("local:"):
             number = cluster.removeprefix("local:")
             if not (number.isascii() and number.isdecimal() and 0 < int(number) <= 4096):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from harvey.commands import (
     calibrate,
+    campaign,
     diff,
     drive,
     emulate,
@@ -29,5 +30,5 @@ from harvey.commands.command import Command
 COMMANDS: tuple[Command, ...] = (
     listing.COMMAND, run.COMMAND, view.COMMAND, story.COMMAND, why.COMMAND, replay.COMMAND, diff.COMMAND,
     report.COMMAND, export.COMMAND, resume.COMMAND, repair.COMMAND, world.COMMAND, settings.COMMAND,
-    experiment.COMMAND, drive.COMMAND, calibrate.COMMAND, emulate.COMMAND,
+    experiment.COMMAND, campaign.COMMAND, drive.COMMAND, calibrate.COMMAND, emulate.COMMAND,
 )

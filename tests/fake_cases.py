@@ -1,0 +1,64 @@
+"""Cases of a campaign that cost nothing and end their worker as often as they are told, in real processes."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from harvey.campaign.case_work import Killed
+from harvey.campaign.engine import Campaign, run_campaign
+from harvey.campaign.workers import Workers
+
+
+@dataclass(frozen=True, slots=True)
+class FakeCase:
+    """Ends its worker ``kills`` times by SIGKILL before it answers; ``tries`` is where it counts them."""
+
+    number: int
+    kills: int
+    tries: Path
+
+
+@dataclass(frozen=True, slots=True)
+class FakeResult:
+    """What follows from the case, and what was measured of the machine."""
+
+    square: float
+    worker: str
+    seconds: float
+
+
+def work_on(case: FakeCase) -> FakeResult:
+    made = len(list(case.tries.glob(f"{case.number}-*")))
+    if made < case.kills:
+        (case.tries / f"{case.number}-{made}").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return FakeResult(case.number * case.number / 3.0, "any", float(os.getpid()))
+
+
+def of_record(record: Mapping[str, Any]) -> FakeResult:
+    return FakeResult(**record)
+
+
+def fake_campaign(folder: Path, kills: Sequence[int]) -> Campaign[FakeCase, FakeResult]:
+    """One case for each; results in ``folder/results``."""
+    (folder / "tries").mkdir(parents=True, exist_ok=True)
+    cases = {number: FakeCase(number, kill, folder / "tries") for number, kill in enumerate(kills)}
+    return Campaign(work_on, cases, folder / "results", asdict, of_record)
+
+
+def be_client(folder: Path, kills: Sequence[int], workers: Workers, end_after: int | None) -> None:
+    """Run the campaign as a process of its own, and end by SIGKILL after so many results (None: never)."""
+    for number, _ in enumerate(run_campaign(fake_campaign(folder, kills), workers), 1):
+        if number == end_after:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+def run_here(folder: Path, kills: Sequence[int], workers: Workers) -> dict[int, float | int]:
+    """Run it in this process: the square of each case, or the kills after which it was given up."""
+    return {case: result.kills if isinstance(result, Killed) else result.square
+            for case, result in run_campaign(fake_campaign(folder, kills), workers)}
