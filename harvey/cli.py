@@ -50,9 +50,9 @@ class _PrintVersion(Action):
         parser.exit()
 
 
-def parser() -> ArgumentParser:
-    """The parser of all commands."""
-    from harvey.commands import COMMANDS
+def parser(name: str | None = None) -> ArgumentParser:
+    """The parser of all commands, or of the one of this name alone: the others need not be imported."""
+    from harvey.commands import find_commands
     from harvey.commands.command import add_parser
 
     top = ArgumentParser(
@@ -61,7 +61,7 @@ def parser() -> ArgumentParser:
     )
     top.add_argument("--version", action=_PrintVersion, nargs=0, help="print the version, and exit")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command in COMMANDS:
+    for command in find_commands(name):
         add_parser(commands, command).set_defaults(command=command)
     return top
 
@@ -84,7 +84,8 @@ def _run(argv: Sequence[str] | None) -> int:
 
 def _parse(argv: Sequence[str] | None) -> Namespace:
     """Raises SystemExit, as argparse does, after saying what is wrong."""
-    args, unknown = parser().parse_known_args(argv)
+    given = list(sys.argv[1:] if argv is None else argv)
+    args, unknown = parser(given[0] if given else None).parse_known_args(given)
     if unknown and not args.command.open_ended:
         args.parser.error(f"expected no {unknown[0]!r} here")
     return args

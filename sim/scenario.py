@@ -21,6 +21,7 @@ from sim.render.light.lighting import Lighting
 from sim.render.optics import check_lens
 from sim.render.rasterizer import sample_offsets
 from sim.render.sensor import SensorParameters
+from sim.scenario_names import SCENARIOS, list_scenarios
 from world_models.bounds import Bounds, check_bounds
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.line_numbers import Key
@@ -28,7 +29,6 @@ from world_models.files.toml.mission import ROOT, TABLES, Limits, Mission, Missi
 from world_models.files.toml.settings import MAX_NUMBER, read_settings, suggest_keys
 from world_models.files.toml.source import Source, WorldError
 
-SCENARIOS = ROOT / "sim" / "scenarios"
 MAX_DISTORTION = 1e4
 """Largest distortion coefficient: those of real lenses are about 1, of long ones some hundreds."""
 
@@ -132,11 +132,6 @@ class Scenario(Mission):
     def refused(self, key: Key, why: str) -> ScenarioError:
         """The error to raise where one of its values does not fit the building."""
         return ScenarioError(f"{self.source.place(key)}: {why}")
-
-
-def list_scenarios() -> tuple[str, ...]:
-    """The names of the scenarios that come with the project."""
-    return tuple(sorted(path.stem for path in SCENARIOS.glob("*.toml")))
 
 
 def load_scenario(path_or_name: str | Path) -> Scenario:

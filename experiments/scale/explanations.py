@@ -22,7 +22,7 @@ from harvey.campaign.campaign import Task, run_task
 from harvey.run_files.run_directory import RunDirectory
 from harvey.why.journal import JournalHistory
 from harvey.why.reach import GOAL, KINDS, MODEL, SENSOR, check
-from sim.scenario import list_scenarios
+from sim.scenario_names import list_scenarios
 
 MISSIONS = 100
 SHORT_CYCLES = "25"

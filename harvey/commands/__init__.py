@@ -1,34 +1,25 @@
 """The commands, one a module, in the order in which ``harvey --help`` lists them.
 
-They import what they need when they run, so that ``harvey --help`` answers at once.
+Only the one that is asked for is imported, and it imports what it needs when it runs.
 """
 
 from __future__ import annotations
 
-from harvey.commands import (
-    calibrate,
-    campaign,
-    diff,
-    drive,
-    emulate,
-    experiment,
-    export,
-    listing,
-    repair,
-    replay,
-    report,
-    resume,
-    run,
-    settings,
-    story,
-    view,
-    why,
-    world,
-)
+import importlib
+from collections.abc import Mapping
+
 from harvey.commands.command import Command
 
-COMMANDS: tuple[Command, ...] = (
-    listing.COMMAND, run.COMMAND, view.COMMAND, story.COMMAND, why.COMMAND, replay.COMMAND, diff.COMMAND,
-    report.COMMAND, export.COMMAND, resume.COMMAND, repair.COMMAND, world.COMMAND, settings.COMMAND,
-    experiment.COMMAND, campaign.COMMAND, drive.COMMAND, calibrate.COMMAND, emulate.COMMAND,
-)
+MODULES: Mapping[str, str] = {
+    "list": "listing",
+    **{name: name for name in (
+        "run", "view", "story", "why", "replay", "diff", "report", "export", "resume", "repair", "world", "settings",
+        "experiment", "campaign", "drive", "calibrate", "emulate")},
+}
+"""The module of each command."""
+
+
+def find_commands(name: str | None = None) -> tuple[Command, ...]:
+    """The command of this name alone; all of them where there is none of it."""
+    names = (name,) if name in MODULES else tuple(MODULES)
+    return tuple(importlib.import_module(f"{__name__}.{MODULES[one]}").COMMAND for one in names if one is not None)

@@ -14,11 +14,11 @@ def _arguments(_parser: ArgumentParser) -> None:
 
 def _run(_args: Namespace) -> int:
     import experiments
-    from sim.scenario import list_scenarios, load_scenario
+    from sim.scenario_names import describe_scenario, list_scenarios
 
     print("scenarios (harvey run NAME):")
     for name in list_scenarios():
-        print(_item(name, load_scenario(name).description))
+        print(_item(name, describe_scenario(name)))
     for folder, group in experiments.EXPERIMENTS.items():
         print(f"\nexperiments: {folder} (harvey experiment NAME):")
         for name, summary in sorted(group.items()):

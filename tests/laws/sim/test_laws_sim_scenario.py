@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.scenario import SCENARIOS, ScenarioError, list_scenarios, parse_scenario
+from sim.scenario import ScenarioError, parse_scenario
+from sim.scenario_names import SCENARIOS, list_scenarios
 
 TEXTS = [(SCENARIOS / f"{name}.toml").read_text(encoding="utf-8") for name in list_scenarios()]
 SCRAPS = st.sampled_from(["", "=", "[", "]", '"', "\n", "-", "1e400", "nan", "inf", "true", "[[faults]]", "heading_deg",

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from harvey.cli import main
-from harvey.commands import COMMANDS
+from harvey.commands import MODULES
 from harvey.commands.world import VERBS
 from harvey.run_files.run_directory import prepare_directory
 from sim.scenario import SCENARIOS
@@ -143,7 +143,7 @@ def test_a_building_in_an_unknown_format_is_refused(argv: list[str], capsys: pyt
     assert "expected a building file that ends in .ifc, .gml, .xml" in err
 
 
-@pytest.mark.parametrize("command", [command.name for command in COMMANDS])
+@pytest.mark.parametrize("command", MODULES)
 def test_every_command_teaches_by_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([command, "--help"]) == 0
     out = capsys.readouterr().out

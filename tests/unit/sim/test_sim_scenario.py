@@ -10,7 +10,8 @@ import pytest
 from sim.faults.displacement import Kidnap
 from sim.faults.lights_off import LightsOff
 from sim.render.sensor import SensorParameters, expose
-from sim.scenario import ScenarioError, list_scenarios, load_scenario, parse_scenario, with_settings
+from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings
+from sim.scenario_names import list_scenarios
 from world_models.entries.location import Place
 from world_models.ptrans import parse_ptrans
 

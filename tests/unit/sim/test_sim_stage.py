@@ -14,7 +14,8 @@ from sim.body.simulated_body import SimulatedBody
 from sim.faults.displacement import Bump, Kidnap
 from sim.render.projection import Pinhole, project_mesh
 from sim.render.rasterizer import find_visible_patches
-from sim.scenario import ScenarioError, list_scenarios, load_scenario, parse_scenario, with_settings
+from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings
+from sim.scenario_names import list_scenarios
 from sim.stage import Stage, build_stage
 from world_models.entries.body import MotorCommand
 from world_models.frames import Pose2
