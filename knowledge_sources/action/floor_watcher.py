@@ -67,17 +67,25 @@ class FloorWatcher(RobotKnowledgeSource):
                 if entry.value.belief == belief.id and entry.value.floor_m == floor_m]
         apart_m = self._settings.action.floor_view_distance_m
         earlier = [entry for entry in kept if _measure_way_m(entry.value, pose) >= apart_m]
+        lit = self._find_lit(view, frame.value.sim_time_s)
         seen, learnt = see_free_floor(
             robot.on_floor_of(locale), locale, pose, belief.value.covariance_world(robot.world), frame.value.jpeg,
             [Seen(view[e.value.frame].value.jpeg, _pose_of(e.value)) for e in earlier],
-            {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings)
-        yield Post(seen, (frame, belief, *earlier, *(known[name] for name in (locale,) if name in known)))
+            {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings,
+            None if lit is None else lit.value.light)
+        told = (*earlier, *(known[name] for name in (locale,) if name in known), *(() if lit is None else (lit,)))
+        yield Post(seen, (frame, belief, *told))
         for appearance in learnt:
             old, because = known.get(appearance.locale), (frame, belief, *earlier)
             yield Post(appearance, because) if old is None else Revise(old, appearance, (*because, old))
         if not kept or _measure_way_m(kept[0].value, pose) >= apart_m:
             yield Post(FloorView(frame.id, belief.id, pose.x_m, pose.y_m, pose.heading_rad, floor_m,
                                  frame.value.sim_time_s), (frame, belief))
+
+    def _find_lit(self, view: View, now_s: float) -> Entry[FreeFloor] | None:
+        """The last picture of which the light is known, if it was taken shortly before."""
+        since_s = now_s - self._settings.floor.max_light_age_s
+        return view.latest(FreeFloor, lambda f: f.light is not None and f.seen_s >= since_s)
 
     def _is_near_last(self, view: View, belief: Hypothesis) -> bool:
         """Whether the floor was looked at from about here: on the move each picture shows hardly more than the last.

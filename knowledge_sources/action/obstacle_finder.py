@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -37,7 +38,6 @@ from knowledge_sources.questions import (
     current_leg,
     find_belief,
     find_building,
-    find_contact,
     find_frames,
     find_robot,
     is_in_doubt,
@@ -48,6 +48,7 @@ from knowledge_sources.settings.action import ActionSettings
 from world_models.building.building import Building
 from world_models.building.locales import Doorway
 from world_models.building.things import EXTRA_KIND
+from world_models.entries.body import MotorCommand
 from world_models.entries.floor import FloorThing, FreeFloor
 from world_models.entries.locale_frame import FrameChange, LocaleFrame
 from world_models.entries.location import Hypothesis, Place
@@ -81,7 +82,7 @@ class ObstacleFinder(RobotKnowledgeSource):
 
     level = Level.ACTION
     watches = (
-        Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),
+        Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in ("milestone", "relocalization")),
         Watch(FreeFloor, (Posted,)),
         Watch(Leg, (Revised,), lambda leg: leg.status == "halted"),
     )
@@ -94,8 +95,8 @@ class ObstacleFinder(RobotKnowledgeSource):
             return 0.95 if trigger.entry.value.things or view.latest(Obstacle, _may_be_there) else None
         if isinstance(trigger.entry.value, Leg):
             return 0.95 if any(True for _ in self._find_halting(view, trigger.entry)) else None
-        contact, most_rad = _find_new_contact(view), self._settings.action.max_touch_sigma_rad
-        return 0.95 if contact is not None and contact.value.sigma_rad <= most_rad else None
+        touch, most_rad = _find_new_touch(view), self._settings.action.max_touch_sigma_rad
+        return 0.95 if touch is not None and touch.contact.value.sigma_rad <= most_rad else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         if isinstance(trigger.entry.value, FreeFloor):
@@ -103,24 +104,25 @@ class ObstacleFinder(RobotKnowledgeSource):
         elif isinstance(trigger.entry.value, Leg):
             drafts = list(self._find_halting(view, trigger.entry))
         else:
-            contact = _find_new_contact(view)
-            drafts = [] if contact is None else list(self._weigh_contact(view, contact, trigger.entry))
+            touch = _find_new_touch(view)
+            drafts = [] if touch is None else list(self._weigh_touch(view, touch, trigger.entry))
         yield from self._write(view, drafts)
 
     # -- touch ---------------------------------------------------------------------------------------------------------
 
-    def _weigh_contact(self, view: View, contact: Entry[Contact], belief: Entry[Hypothesis]) -> Iterator[_Draft]:
+    def _weigh_touch(self, view: View, touch: _Touch, belief: Entry[Hypothesis]) -> Iterator[_Draft]:
         robot, locale, s = find_robot(view), belief.value.locale, self._settings.action
+        contact = touch.contact
         pose, c = belief.value.world_from_robot(robot.world), contact.value
         sigma_m = math.hypot(belief.value.sigma_m, robot.radius_m * math.hypot(belief.value.sigma_rad, c.sigma_rad))
-        ahead = pose.heading_rad + c.direction_rad
+        ahead = pose.heading_rad - touch.turned_rad + c.direction_rad
         out, across = np.array([math.cos(ahead), math.sin(ahead)]), np.array([-math.sin(ahead), math.cos(ahead)])
         touched = np.array(pose.position) + robot.radius_m * out
         reach_m = s.touch_margin_m + 3.0 * belief.value.sigma_m
         known = _find_touched(view, touched, reach_m + 3.0 * sigma_m)
         if known is not None:
             yield _Draft(known, self._touch_again(robot.world, known.value, touched, out, across, c.when_s),
-                         [contact, belief])
+                         [*touch.because, belief])
             return
         if find_nearest(robot.world, locale, pose.position)[0] <= robot.radius_m + reach_m:
             return
@@ -130,7 +132,7 @@ class ObstacleFinder(RobotKnowledgeSource):
             _name_next(view, locale), locale, footprint, sigma_m, at.x_m, at.y_m, s.obstacle_width_m,
             certainty=s.max_obstacle_certainty, seen_s=c.when_s, looked_s=c.when_s, touched_s=c.when_s, by="touch",
             evidence=c.sentence())
-        yield _Draft(None, found, [contact, belief])
+        yield _Draft(None, found, [*touch.because, belief])
 
     def _touch_again(
         self, world: Building, known: Obstacle, touched: Floats, out: Floats, across: Floats, when_s: float
@@ -163,7 +165,8 @@ class ObstacleFinder(RobotKnowledgeSource):
             rest, whole = [e for e in known.values() if e.id not in drafts], s.max_hull_part
             if f.sense == "ranges":  # an echo tells how far a thing is, not where in its cone: any in it may be heard
                 rest, whole = [e for e in rest if _may_be_there(e.value)], math.inf
-            entry = _find_same(rest, shape, thing.sigma_m, whole)
+            entry = self._find_before(rest, core, (f.x_m, f.y_m)) if thing.is_cut else None
+            entry = entry or _find_same(rest, shape, thing.sigma_m, whole)
             if entry is not None:
                 new = self._see_again(view, entry, thing, shape, free, scan)
                 if new is not None:
@@ -196,6 +199,26 @@ class ObstacleFinder(RobotKnowledgeSource):
         for entry in view.where(Obstacle, lambda o: o.status == "suspected"):
             if build_polygon(entry.value.footprint).intersects(ahead):
                 yield _Draft(entry, replace(entry.value, status="there"), [entry, leg])
+
+    def _find_before(
+        self, known: Iterable[Entry[Obstacle]], seen: shapely.Geometry, eye: tuple[float, float]
+    ) -> Entry[Obstacle] | None:
+        """The obstacle that a sight without feet is one of: known well, nearer than the picture's border, and in most
+        of its directions, where its top may be wider than its feet.
+        """
+        s, at = self._settings, np.array(eye)
+        reach_m = float(np.linalg.norm(shapely.get_coordinates(seen) - at, axis=1).max())
+        best: tuple[float, Entry[Obstacle]] | None = None
+        for entry in known:
+            wide = build_polygon(entry.value.footprint).buffer(s.plan.overhang_m)
+            if not entry.value.is_there or entry.value.sigma_m > s.action.vague_sigma_m:
+                continue
+            if wide.distance(shapely.Point(at)) > reach_m:
+                continue
+            part = _measure_common_directions(wide, seen, at)
+            if part >= s.action.min_common_directions and (best is None or part > best[0]):
+                best = part, entry
+        return None if best is None else best[1]
 
     def _find_way_ahead(self, view: View, leg: Leg) -> shapely.Geometry:
         """What the robot will sweep next on its leg."""
@@ -384,13 +407,35 @@ def _combine(certainty: float, odds: float) -> float:
     return product / (1.0 + product)
 
 
-def _find_new_contact(view: View) -> Entry[Contact] | None:
-    """The contact in the last motion, if no obstacle rests on it yet: the robot stands as it touched."""
-    last = last_motion(view)
-    contact = None if last is None else find_contact(view, last.id)
-    if contact is None or any(o.value.touched_s == contact.value.when_s for o in view.all(Obstacle)):
+class _Touch(NamedTuple):
+    """A contact, and what the robot has turned since.
+
+    Attributes:
+        because: the contact and the turns.
+    """
+
+    contact: Entry[Contact]
+    turned_rad: float
+    because: tuple[Entry[Any], ...]
+
+
+def _find_new_touch(view: View) -> _Touch | None:
+    """The newest contact, if no obstacle rests on it yet and the robot stands where it touched: it has only turned."""
+    contact, last = view.latest(Contact), last_motion(view)
+    if contact is None or last is None or any(o.value.touched_s == contact.value.when_s for o in view.all(Obstacle)):
         return None
-    return contact
+    turned_rad, because = 0.0, list[Entry[Any]]([contact])
+    if last.id != contact.because[0].id:
+        for command in view.newest_first(MotorCommand):
+            if command.id == contact.because[0].id:
+                break
+            if command.value.move_m != 0.0:
+                return None
+            turned_rad += command.value.turn_rad
+            because.append(command)
+        else:
+            return None
+    return _Touch(contact, turned_rad, tuple(because))
 
 
 def _find_touched(view: View, touched: Floats, reach_m: float) -> Entry[Obstacle] | None:

@@ -64,6 +64,8 @@ class FloorSettings:
     max_tint: float = setting(
         0.12, "1", "Largest difference from the floor's colour, in its parts of red and blue, in a tinted picture.",
         "engineering judgement")
+    max_light_age_s: float = setting(
+        20.0, "s", "The light of a picture tells that of the next ones for so long.", "engineering judgement")
     max_samples: float = setting(
         2000.0, "count", "Past pixels of a floor weigh at most as much as this many.", "engineering judgement")
 

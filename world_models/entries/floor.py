@@ -17,6 +17,8 @@ LAST_VIEWS = 12
 """The same of the pictures that later ones are compared with: the robot has driven over what the oldest show."""
 
 Point = tuple[float, float]
+Light = tuple[float, float, float]
+"""By how much a picture's looks differ from the model's: logarithm of the brightness, parts of red and blue."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,7 @@ class FreeFloor:
         sigma_m: (n,) standard deviations of ``far_m``.
         things: what ends it and is not in the model.
         seen_s: when, by the body's clock.
+        light: of the picture; None where the floor's looks are not known in it.
     """
 
     sense: FloorSense
@@ -72,6 +75,7 @@ class FreeFloor:
     sigma_m: tuple[float, ...]
     things: tuple[FloorThing, ...]
     seen_s: float
+    light: Light | None = None
 
     def sentence(self) -> str:
         far = [far for near, far in zip(self.near_m, self.far_m, strict=True) if far > near]

@@ -29,7 +29,7 @@ from knowledge_sources.methods.floor.things import Region, find_footprint, find_
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.floor import FloorSettings
 from world_models.camera import Camera
-from world_models.entries.floor import FloorAppearance, FloorEnd, FloorThing, FreeFloor
+from world_models.entries.floor import FloorAppearance, FloorEnd, FloorThing, FreeFloor, Light
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
@@ -59,6 +59,7 @@ def see_free_floor(
     appearances: Mapping[str, FloorAppearance],
     seen_s: float,
     settings: Settings = DEFAULT,
+    last_light: Light | None = None,
 ) -> tuple[FreeFloor, tuple[FloorAppearance, ...]]:
     """How far the floor is free in each direction, what ends it, and what the floor looks like as learnt from it.
 
@@ -69,6 +70,7 @@ def see_free_floor(
         earlier: pictures from before, the newest first: for parallax, and to learn from where it has driven since.
         appearances: what is known of the floors' looks, by locale.
         seen_s: when it was taken.
+        last_light: that of a picture shortly before; None: of none.
 
     Raises:
         ValueError: it is not a picture.
@@ -87,7 +89,7 @@ def see_free_floor(
         robot, pose, grid, floor_m, s.max_rolled_over_m, margin_px, 2.0 * sigma_m * robot.camera.fx)
     picture = read_reduced(jpeg, robot.lens, robot.camera)
     known = appearances.get(locale)
-    unlike, tells = find_unlike(picture[grid.top:], model, known, s)
+    unlike, tells, light = find_unlike(picture[grid.top:], model, known, s, last_light)
     regions = find_regions(unlike, tells, grid, s) if s.use_appearance else ()
     built = [(region, _build_thing(region, grid, robot, pose, covariance, picture, earlier, s)) for region in regions]
     things = [(region, *thing) for region, thing in built if thing is not None]
@@ -97,7 +99,7 @@ def see_free_floor(
         sense="camera", locale=locale, x_m=round(eye.x_m, 4), y_m=round(eye.y_m, 4),
         bearings_rad=tuple(round(math.remainder(pose.heading_rad + b, math.tau), 5) for b in scan.bearings_rad),
         near_m=scan.near_m, far_m=scan.far_m, ends=scan.ends, sigma_m=scan.sigma_m,
-        things=tuple(thing for _, thing, _ in things), seen_s=seen_s), learnt
+        things=tuple(thing for _, thing, _ in things), seen_s=seen_s, light=light), learnt
 
 
 @lru_cache(maxsize=16)
@@ -117,9 +119,11 @@ def read_reduced(jpeg: bytes, lens: Camera, pinhole: Camera) -> NDArray[np.uint8
 
 
 def find_unlike(
-    picture: NDArray[np.uint8], model: ModelFloor, known: FloorAppearance | None, settings: FloorSettings
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which pixels (rows, columns) do not look like the floor that the model has there, and where that tells anything.
+    picture: NDArray[np.uint8], model: ModelFloor, known: FloorAppearance | None, settings: FloorSettings,
+    last_light: Light | None = None,
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Light | None]:
+    """Which pixels (rows, columns) do not look like the floor that the model has there, where that tells anything, and
+    the light of the picture; None where it is not known.
 
     The floor with most pixels tells how bright the picture is; a floor of which little is seen is compared by that.
     """
@@ -134,7 +138,11 @@ def find_unlike(
         by_model = compute_looks(255.0 * model.colours[kind])
         if shift is None:
             guesses = [(compute_looks(np.array(known.mean)), True)] if known and known.samples > 0.0 else []
-            fitted = _fit_most(looks, here, [*guesses, (by_model, False)], settings)
+            if last_light is None:
+                guesses += [(by_model, False)]
+            else:
+                guesses += [(by_model + last_light, True), (by_model + last_light, False)]
+            fitted = _fit_most(looks, here, guesses, settings, may_be_tinted=last_light is None)
             if fitted is None:
                 continue
             mean, covariance = fitted
@@ -147,22 +155,26 @@ def find_unlike(
                 expected, 4.0 * default_covariance(settings))
         unlike |= here & ~find_floor_in_shade(looks, here, mean, covariance, settings)
         tells |= here
-    return unlike, tells
+    light = None if shift is None else (float(shift[0]), float(shift[1]), float(shift[2]))
+    return unlike, tells, light
 
 
 def _fit_most(
-    looks: Floats, here: NDArray[np.bool_], guesses: Sequence[tuple[Floats, bool]], settings: FloorSettings
+    looks: Floats, here: NDArray[np.bool_], guesses: Sequence[tuple[Floats, bool]], settings: FloorSettings, *,
+    may_be_tinted: bool
 ) -> tuple[Floats, Floats] | None:
     """Mean and covariance of the looks of the floor ``here``, by the first of the guesses (as ``expected`` and
     ``is_learnt`` of :func:`fit_looks`) that some of it agrees with; None where its looks are not known.
 
-    Where hardly any of it agrees, the camera's white balance may be another than it was: what most of it looks like
-    then is the floor, if it has about the floor's hue.
+    Where hardly any of it agrees, the camera's white balance may differ from the model's: what most of it looks like
+    then is the floor, if it has about the floor's hue. That is so only where no picture was taken shortly before: white
+    balance follows the light little by little, and what fills the picture all at once is a thing.
     """
     found = [fit_looks(looks[here], expected, is_learnt, settings) for expected, is_learnt in guesses]
     fits = [(fit, settings.min_floor_share) for fit in found]
-    fits += [(fit_looks(looks[here], expected, False, settings, settings.max_tint), settings.min_tinted_share)
-             for expected, _ in guesses]
+    if may_be_tinted:
+        fits += [(fit_looks(looks[here], expected, False, settings, settings.max_tint), settings.min_tinted_share)
+                 for expected, _ in guesses]
     for fit, share in fits:
         if fit is not None and find_floor_in_shade(looks, here, *fit, settings).sum() >= share * here.sum():
             return fit

@@ -58,7 +58,7 @@ def test_a_tinted_picture_has_floor_and_a_thing_on_it(red: float, blue: float, g
     picture = np.clip(shaded(np.full(SHAPE, gain)) * (red, 1.0, blue), 0.0, 255.0)
     picture[40:60, 70:95] = np.clip(picture[40:60, 70:95] * (0.45, 0.3, 0.3), 0.0, 255.0)
     model = ModelFloor(np.zeros(SHAPE, np.int64), FLOOR[None] / 255.0, np.ones(SHAPE, bool))
-    unlike, tells = find_unlike(picture.astype(np.uint8), model, None, S)
+    unlike, tells, _ = find_unlike(picture.astype(np.uint8), model, None, S)
     if gain * 110.0 * max(red, 1.0, blue) < 250.0 and tells.any():
         assert unlike[43:57, 73:92].mean() > 0.95
         assert unlike[:38].mean() < 0.02
@@ -84,7 +84,7 @@ def views(gloss: float, thing: bool) -> tuple[NDArray[np.float32], NDArray[np.fl
     grid = build_floor_grid(CAMERA, MOUNT, 1.0, 9.0)
     assert grid is not None
     model = ModelFloor(np.zeros(grid.shape, np.int64), np.array([(0.4, 0.39, 0.37)]), np.ones(grid.shape, bool))
-    unlike, _ = find_unlike(pictures[0][grid.top :], model, None, S)
+    unlike, _, _ = find_unlike(pictures[0][grid.top :], model, None, S)
     grey = [picture.astype(np.float32) @ GREY for picture in pictures]
     return grey[0], grey[1], unlike, before.inverse() @ now
 
