@@ -18,7 +18,7 @@ from experiments.trials import RESULTS, campaign_folder, run_trials
 from sim.made_up.door_missions import CASES, DoorCase
 from world_models.words import listed
 
-MISSIONS, QUICK_MISSIONS = 1_000, 7
+MISSIONS, QUICK_MISSIONS = 1_000, 4
 FIRST_SEED, SEEDS_APART = 1_000_000, 10_000
 """Seeds below 500,000 are for development: constants were chosen on some of them."""
 PARTS: Mapping[DoorCase, float] = {
@@ -30,6 +30,7 @@ MIN_OTHER_WAY, MIN_BLOCKED = 0.99, 1.0
 HARMLESS: tuple[DoorCase, ...] = ("opens", "shuts", "stands open", "extra door", "as filed")
 NOT_CLAIMED: tuple[DoorCase, ...] = ("ajar",)
 """A leaf that stands into a room is for those who see what is in the way; it is only counted here."""
+NOT_QUICK: tuple[DoorCase, ...] = (*NOT_CLAIMED, "opens", "stands open", "extra door")
 WORST_SHOWN = 6
 COLUMNS = ("doors", "paper", "peer", "missions", "as it should end", "proves at least", "door found", "false states",
            "false accepts", "contacts", "relocated", "robot's mean s", "mean CPU s")
@@ -39,7 +40,7 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
     """Drive each case's share of so many missions, of seeds 1,000,000 + 10,000 ``seed`` + 0, 1, ...."""
     number = missions or (QUICK_MISSIONS if quick else MISSIONS)
     first = FIRST_SEED + SEEDS_APART * seed
-    cases = [case for case in CASES if not (quick and case in NOT_CLAIMED)]
+    cases = [case for case in CASES if not (quick and case in NOT_QUICK)]
     trials = [DoorTrial(case, first + k) for case in cases for k in range(1 if quick else _count(case, number))]
     folder = campaign_folder(f"doors-{missions}" if missions else "doors", seed, quick=quick)
     ends = run_trials(run_door_mission, trials, DoorResult, folder, "mission")
@@ -95,9 +96,10 @@ def _claims(found: Mapping[DoorCase, Sequence[DoorResult]]) -> Iterator[tuple[st
         right = sum(map(is_right, ends))
         yield (f"{case}: at least {least:.0%} {what}: {right} of {len(ends)}, so at least"
                f" {at_least(right, len(ends)):.1%}", right >= least * len(ends))
-    harmless = [e for case in HARMLESS for e in found[case]]
+    cases = [case for case in HARMLESS if case in found]
+    harmless = [e for case in cases for e in found[case]]
     right = sum(map(is_right, harmless))
-    yield (f"{listed(list(HARMLESS), 9)}: harms nothing: {right} of {len(harmless)} reach, so at least"
+    yield (f"{listed(cases, 9)}: harms nothing: {right} of {len(harmless)} reach, so at least"
            f" {at_least(right, len(harmless)):.1%}", right >= MIN_OTHER_WAY * len(harmless))
     filed = found["as filed"]
     wrong = sum(bool(e.false_states) for e in filed)

@@ -17,7 +17,7 @@ from experiments.trials import RESULTS, campaign_folder, run_trials
 from sim.made_up.camera_missions import CASES, CameraCase
 from world_models.camera import CAMERA_UNKNOWNS
 
-MISSIONS, QUICK_MISSIONS = 1_000, 4
+MISSIONS, QUICK_MISSIONS = 1_000, 2
 FIRST_SEED, SEEDS_APART = 100_000, 10_000
 """Seeds below 1,000 are for development: constants were chosen on some of them."""
 PARTS: Mapping[CameraCase, float] = {"as told": 0.2, "miscalibrated": 0.5, "knocked": 0.3}
