@@ -129,6 +129,7 @@ def find_unlike(
     """
     looks = compute_looks(cv2.GaussianBlur(np.asarray(picture), (3, 3), 0.6).astype(np.float32))
     unlike, tells = np.zeros(model.kinds.shape, bool), np.zeros(model.kinds.shape, bool)
+    light: Light | None = None
     shift: Floats | None = None  # of this picture's looks from the model's: its exposure, and a tint where it has one
     kinds, counts = np.unique(model.kinds[model.is_plain], return_counts=True)
     for kind in kinds[np.argsort(-counts, kind="stable")]:
@@ -147,6 +148,7 @@ def find_unlike(
                 continue
             mean, covariance = fitted
             shift = mean - by_model
+            light = (float(shift[0]), float(shift[1]), float(shift[2]))
             if np.abs(shift[1:]).max() <= settings.max_chroma_error:
                 shift[1:] = 0.0
         else:
@@ -155,7 +157,6 @@ def find_unlike(
                 expected, 4.0 * default_covariance(settings))
         unlike |= here & ~find_floor_in_shade(looks, here, mean, covariance, settings)
         tells |= here
-    light = None if shift is None else (float(shift[0]), float(shift[1]), float(shift[2]))
     return unlike, tells, light
 
 

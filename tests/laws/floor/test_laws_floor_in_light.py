@@ -64,6 +64,32 @@ def test_a_tinted_picture_has_floor_and_a_thing_on_it(red: float, blue: float, g
         assert unlike[:38].mean() < 0.02
 
 
+@settings(deadline=None, max_examples=20)
+@given(st.integers(95, 140), st.floats(0.35, 0.6), st.floats(0.35, 0.6))
+def test_a_thing_that_fills_the_picture_at_once_is_not_the_floor_in_other_light(
+    width: int, red: float, blue: float
+) -> None:
+    model = ModelFloor(np.zeros(SHAPE, np.int64), FLOOR[None] / 255.0, np.ones(SHAPE, bool))
+    picture = shaded(np.ones(SHAPE))
+    _, _, light = find_unlike(picture.astype(np.uint8), model, None, S)
+    assert light is not None and np.allclose(light, 0.0, atol=0.1)
+    picture[:, :width] = np.clip(picture[:, :width] * (red, 0.8, blue), 0.0, 255.0)
+    unlike, _, _ = find_unlike(picture.astype(np.uint8), model, None, S, light)
+    assert unlike[:, : width - 3].mean() > 0.95
+    assert unlike[:, width + 3 :].mean() < 0.02
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.floats(0.8, 1.25), st.floats(0.8, 1.25))
+def test_white_balance_that_changes_little_by_little_is_followed(red: float, blue: float) -> None:
+    model = ModelFloor(np.zeros(SHAPE, np.int64), FLOOR[None] / 255.0, np.ones(SHAPE, bool))
+    light = None
+    for part in np.linspace(0.0, 1.0, 12):
+        gains = (red**part, 1.0, blue**part)
+        unlike, tells, light = find_unlike((shaded(np.ones(SHAPE)) * gains).astype(np.uint8), model, None, S, light)
+        assert tells.all() and unlike.mean() < 0.02
+
+
 def views(gloss: float, thing: bool) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], Pose2]:
     """Grey pictures now and before, reduced, what is unlike floor now, and the pose now in that before."""
     faces = [f for f in box_faces((0, 0, 0), (9, 4, 2.6), "room", inside=True, texture="plain", texture_scale_m=1e6,

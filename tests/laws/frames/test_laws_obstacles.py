@@ -7,10 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from blackboard.board import Blackboard
 from blackboard.change import Change, Posted
-from blackboard.effect import Effect, Post
+from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from harvey.simulation.run import build_robot_model
@@ -19,10 +22,12 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.building.world import World
+from world_models.entries.body import MotorCommand
 from world_models.entries.floor import FloorThing, FreeFloor
 from world_models.entries.locale_frame import FRAME_OF, LocaleFrame
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.obstacle import Obstacle
+from world_models.entries.touch import Contact
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_building import FrameBuilding
 from world_models.frame_store import FrameStore
@@ -72,6 +77,24 @@ class Hall:
         effects: list[Effect] = list(self.source.act(self.board.view, posted))
         return self.board.apply(effects, author=self.source.name, cycle=self.cycle)
 
+    def touch(self, direction_rad: float, *, turns: tuple[float, ...], basis: str) -> None:
+        """Something is touched ahead in the hall; then the robot turns, and its place is found to be as believed."""
+        (asked,) = self._apply(Post(MotorCommand(0.0, 0.5)))
+        self._apply(Post(Contact("bumper", direction_rad, 0.15, 3.0), (asked.entry,)))
+        for turn_rad in turns:
+            self._apply(Post(MotorCommand(turn_rad, 0.0)))
+        belief = self.board.view.latest(Hypothesis)
+        assert belief is not None
+        pose = Pose2(2.0, 1.2, sum(turns))
+        known = Hypothesis(HALL, pose, diagonal(0.01, 0.005), basis)
+        (found,) = self._apply(Revise(belief, known, (belief,)))
+        if self.source.rate(self.board.view, found) is not None:
+            self._apply(*self.source.act(self.board.view, found))
+
+    def _apply(self, *effects: Effect) -> tuple[Change, ...]:
+        self.cycle += 1
+        return self.board.apply(effects, author="test", cycle=self.cycle)
+
     @property
     def obstacles(self) -> list[Obstacle]:
         return [entry.value for entry in self.board.view.all(Obstacle)]
@@ -91,6 +114,45 @@ def carton(p_thing: float = 0.97, *, by_m: float = 0.0, height_m: float = 0.4) -
 @pytest.fixture
 def hall(world: World) -> Hall:
     return Hall(world)
+
+
+@given(st.floats(-1.0, 1.0), st.lists(st.floats(-0.6, 0.6), max_size=3),
+       st.sampled_from(["milestone", "relocalization"]))
+@settings(max_examples=15, deadline=None)
+def test_what_was_touched_is_where_it_was_touched_however_the_robot_has_turned_since(
+    world: World, direction_rad: float, turns: list[float], basis: str
+) -> None:
+    hall = Hall(world)
+    hall.touch(direction_rad, turns=tuple(turns), basis=basis)
+    (found,) = hall.obstacles
+    radius_m = hall.robot.radius_m
+    touched = HERE.position + radius_m * np.array([math.cos(direction_rad), math.sin(direction_rad)])
+    assert found.by == "touch" and found.is_there
+    assert shapely.Polygon(found.footprint).distance(shapely.Point(touched)) < 0.01
+
+
+def test_a_move_after_the_touch_leaves_it_open_what_was_touched(hall: Hall) -> None:
+    (asked,) = hall._apply(Post(MotorCommand(0.0, 0.5)))
+    hall._apply(Post(Contact("bumper", 0.0, 0.15, 3.0), (asked.entry,)), Post(MotorCommand(0.0, 0.2)))
+    belief = hall.board.view.latest(Hypothesis)
+    assert belief is not None
+    (found,) = hall._apply(Revise(belief, replace(belief.value, basis="milestone"), (belief,)))
+    assert hall.source.rate(hall.board.view, found) is None
+
+
+@pytest.mark.parametrize(("aside_rad", "obstacles"), [(0.0, 1), (0.8, 2)])
+def test_a_sight_without_feet_before_what_is_known_is_not_another_thing(
+    hall: Hall, aside_rad: float, obstacles: int
+) -> None:
+    hall.see(carton(), seen_s=1.0)
+    (known,) = hall.obstacles
+    turn = np.array([[math.cos(aside_rad), -math.sin(aside_rad)], [math.sin(aside_rad), math.cos(aside_rad)]])
+    near = np.array([(1.3, -0.15), (1.9, -0.15), (1.9, 0.15), (1.3, 0.15)]) @ turn.T + HERE.position
+    cut = FloorThing(tuple((float(x), float(y)) for x, y in near), 0.15, 0.5, math.inf, 0.97,
+                     (200.0, 400.0, 260.0, 510.0), "unlike the floor", is_cut=True)
+    hall.see(cut, seen_s=3.0, ahead_m=0.05)
+    assert len(hall.obstacles) == obstacles
+    assert hall.obstacles[0].footprint == known.footprint
 
 
 def test_one_sure_picture_makes_an_obstacle_and_says_which_pixels(hall: Hall) -> None:
