@@ -138,7 +138,7 @@ def heard_until_believed(base: HandMadePioneer, driver: P2osBase) -> int:
 def test_a_jump_is_doubted_until_there_was_time_for_it_or_it_is_told_three_times(
     step: tuple[int, int, int], statuses: int
 ) -> None:
-    """0.1 m and 1 m/s; 0.3 rad and 2 rad/s: in 0.1 s at most 0.2 m or 0.5 rad (326 units); in 0.2 s 0.3 m or 0.7 rad."""
+    """0.1 m and 1 m/s; 0.3 rad and 2 rad/s: in 0.1 s at most 0.2 m or 0.5 rad (326 units), in 0.2 s 0.3 m, 0.7 rad."""
     base = Dictated(500, 500, 0)
     driver = connect(base)
     base.step(*step)
