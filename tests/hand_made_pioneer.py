@@ -53,13 +53,15 @@ class HandMadePioneer:
 
     def read(self, timeout_s: float) -> bytes:
         ends_ms = self.time_ms + round(1000.0 * timeout_s)
-        if not self._out:
-            tick_ms = (self.time_ms // TICK_MS + 1) * TICK_MS
-            self.time_ms = min(tick_ms, ends_ms)
-            if tick_ms <= ends_ms and self.is_open:
+        while not self._out and (tick_ms := (self.time_ms // TICK_MS + 1) * TICK_MS) <= ends_ms:
+            self.time_ms = tick_ms
+            if self.is_open:
                 self._tick()
+            if self.is_silent:
+                self._out = b""
+        self.time_ms = self.time_ms if self._out else ends_ms
         out, self._out = self._out, b""
-        return b"" if self.is_silent else out
+        return out
 
     def reopen(self) -> None:
         """Nothing was closed."""

@@ -235,7 +235,7 @@ class Create2Base(Driver):
         if now_s - self._heard_s > PATIENCE_S:
             self._halt()
             raise self._fault("silent", f"nothing heard for {PATIENCE_S:g} s" + self._noise(), stopped=True)
-        if now_s - agreed_s > DISAGREES_S:
+        if self._heard_s - agreed_s > DISAGREES_S:  # by what it reports; that it reports nothing is another fault
             self._give_up("nonsense", "it does not take over the wheel speeds that it is told")
 
     def _read(self, timeout_s: float) -> Iterator[Report]:
