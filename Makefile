@@ -36,9 +36,9 @@ test: $(VENV)/.ready-to-test
 	@echo "== import contracts" && $(BIN)/lint-imports
 	@echo "== pytest" && $(BIN)/pytest -n 2
 
-# Minutes to hours; not in CI. Rooms and equivalent mutants: tests/mutants.toml.
+# Minutes to hours; not in CI. Rooms and equivalent mutants: tests/mutation/rooms.toml.
 mutants: $(VENV)/.ready-to-test
-	@$(BIN)/python tests/mutants.py $(ROOM) --sample $(SAMPLE) --seed $(SEED) --python $(BIN)/python
+	@$(BIN)/python tests/mutation/mutants.py $(ROOM) --sample $(SAMPLE) --seed $(SEED) --python $(BIN)/python
 
 environment: $(VENV)/.ready-to-test
 
