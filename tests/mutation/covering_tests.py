@@ -16,6 +16,8 @@ from pathlib import Path
 from coverage import CoverageData
 
 DURATION = re.compile(r"^\s*([0-9.]+)s (?:setup|call|teardown)\s+(\S.*?)\s*$", re.MULTILINE)
+COMPILED = re.compile("jit|compiled")
+"""The decorators of what numba compiles."""
 PASSED = re.compile(r"^PASSED (\S.*?)\s*$", re.MULTILINE)
 
 
@@ -118,7 +120,8 @@ class _Statements(ast.NodeVisitor):
         self._compiled = 0
 
     def visit(self, node: ast.AST) -> None:
-        compiled = isinstance(node, ast.FunctionDef) and any("jit" in ast.unparse(d) for d in node.decorator_list)
+        names = node.decorator_list if isinstance(node, ast.FunctionDef) else []
+        compiled = any(COMPILED.search(ast.unparse(name)) for name in names)
         self._compiled += compiled
         if isinstance(node, ast.stmt):
             body = getattr(node, "body", None)
