@@ -26,7 +26,7 @@ some = settings(max_examples=40, deadline=None)
 def test_any_part_of_a_motion_that_is_missing(heading: float, turn_rad: float, move_m: float, seed: int) -> None:
     """Any part of the MOVE along the heading and, independently of it, any part of the TURN."""
     rng = np.random.default_rng(seed)
-    ahead, turned = rng.uniform(0.0, move_m, DRAWS), rng.uniform(0.0, turn_rad, DRAWS)
+    ahead, turned = move_m * rng.random(DRAWS), turn_rad * rng.random(DRAWS)
     found = _compute_partial_covariance(Pose2(1.0, -2.0, heading), turn_rad, move_m)
     cells = np.stack([ahead * math.cos(heading), ahead * math.sin(heading), turned])
     drawn = cells @ cells.T / DRAWS

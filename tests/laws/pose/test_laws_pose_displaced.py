@@ -52,7 +52,8 @@ def test_the_fit_is_the_minimum_of_its_loss(seed: int, is_pose_known: bool) -> N
     covariance = None if is_pose_known else np.diag([0.02, 0.02, 0.002]) ** 2
     free = 0 if covariance is None else 3
     away = np.zeros(3) if covariance is None else rng.multivariate_normal(np.zeros(3), covariance)
-    segments = project(errors.displace(lines, rng.uniform(-1.5, 1.5, 3)), away) + rng.normal(0.0, 0.2, (len(lines), 2, 2))
+    segments = project(errors.displace(lines, rng.uniform(-1.5, 1.5, 3)), away)
+    segments += rng.normal(0.0, 0.2, segments.shape)
     found = fit_displacements(
         lines, errors, segments, CAMERA, MOUNT, Pose2(0.0, 0.0, 0.0), covariance, settings=PATIENT)
     width = min(PATIENT.displaced_widths_px)
