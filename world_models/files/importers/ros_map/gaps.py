@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
 from itertools import pairwise
 
 import numpy as np
@@ -31,6 +32,9 @@ MIN_STUB_M, MIN_STUB_SHARE = 0.25, 0.3
 """Length of wall beside a gap with floor on both of its faces: at least this, and this share of the gap's width."""
 MIN_TALLER = 1.35
 """The floor on both sides of a slanting gap has this many times its clearance."""
+
+MIN_SLANT = 0.25
+"""Rise of a slanting gap over its run along the nearer axis: 14 degrees."""
 
 HALL_RADII_M = (2.5, 1.75)
 """A hall holds a circle of such a radius; a corridor is narrower by MAX_MOUTH_SHARE and longer than wide."""
@@ -172,8 +176,7 @@ def _close_slanting(cut: Mask, cell_m: float) -> list[Gap]:
     seeds, count = ndimage.label(tops, np.ones((3, 3)))
     if count < 2:
         return []
-    depth = np.asarray(np.clip(1.0 - smooth / distance.max(), 0.0, 1.0) * 65000, dtype=np.uint16)
-    basins = ndimage.watershed_ift(depth, np.where(cut, seeds, -1).astype(np.int32))
+    basins = _flood(distance, seeds)
     tallest = np.asarray(ndimage.maximum(distance, seeds, np.arange(count + 1)))
     joined = list(range(count + 1))
 
@@ -191,7 +194,7 @@ def _close_slanting(cut: Mask, cell_m: float) -> list[Gap]:
         width_m = 2 * clear * cell_m
         if MIN_DOOR_M <= width_m <= MAX_DOOR_M and min(tallest[one], tallest[other]) >= MIN_TALLER * clear:
             gap = _cross(distance, nearest, row, column)
-            if gap is not None and gap.width * cell_m <= 1.2 * MAX_DOOR_M:
+            if gap is not None and gap.width * cell_m <= 1.2 * MAX_DOOR_M and _is_slanting(gap):
                 gaps.append(gap)
                 for r, c in _line(gap):
                     cut[r, c] = False
@@ -205,7 +208,8 @@ def _close_mouths(cut: Mask, radius: float) -> list[Gap]:
     core = ndimage.distance_transform_edt(cut) > radius
     if not core.any():
         return []
-    hall = cut & (ndimage.distance_transform_edt(~core) <= radius + ROUGH_CELLS)
+    near = cut & (ndimage.distance_transform_edt(~core) <= radius + ROUGH_CELLS)
+    hall = ndimage.binary_propagation(core, mask=near)  # what is near through a thin wall is another room
     rest, count = ndimage.label(cut & ~hall)
     areas = np.bincount(rest.ravel(), minlength=count + 1)
     beside = ndimage.binary_dilation(hall) & (rest > 0)
@@ -238,6 +242,27 @@ def _along(cells: NDArray[np.int64]) -> tuple[Floats, Floats]:
     centred = cells - cells.mean(axis=0)
     axis = np.linalg.svd(centred, full_matrices=False)[2][0]
     return centred @ axis, -(centred @ axis)
+
+
+def _is_slanting(gap: Gap) -> bool:
+    """Whether a gap runs along none of the axes: those that do are found as blocks, or are none of a wall."""
+    rise, run = sorted((abs(gap.end[0] - gap.start[0]), abs(gap.end[1] - gap.start[1])))
+    return rise > MIN_SLANT * run
+
+
+def _flood(distance: NDArray[np.float64], seeds: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(rows, columns) the basin of each free cell: seeds grow into what is widest first (F. Meyer's watershed)."""
+    wide = distance.shape[1] + 2
+    heights, basins = np.pad(distance, 1).ravel().tolist(), np.pad(seeds, 1).ravel().tolist()
+    ahead = [(-heights[at], at) for at, basin in enumerate(basins) if basin]
+    heapify(ahead)
+    while ahead:
+        _, at = heappop(ahead)
+        for beside in (at - wide, at - 1, at + 1, at + wide):
+            if heights[beside] > 0.0 and not basins[beside]:
+                basins[beside] = basins[at]
+                heappush(ahead, (-heights[beside], beside))
+    return np.array(basins, np.int32).reshape(-1, wide)[1:-1, 1:-1]
 
 
 def _find_saddles(basins: NDArray[np.int32], distance: NDArray[np.float64],
