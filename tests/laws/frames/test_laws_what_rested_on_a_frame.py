@@ -21,7 +21,8 @@ LANDMARKS = (*THINGS, "study/table-1/top")
 changes = st.lists(st.builds(
     FrameChange, st.sampled_from(("gone", "removed", "shut")), st.sampled_from(THINGS), st.just("test")), max_size=2)
 milestones = st.lists(st.tuples(
-    st.just("verified") | st.sampled_from(get_args(MilestoneStatus)), st.sampled_from((None, "before", "between", "after", "other")),
+    st.just("verified") | st.sampled_from(get_args(MilestoneStatus)),
+    st.sampled_from((None, "before", "between", "after", "other")),
     st.lists(st.sampled_from(LANDMARKS), max_size=1), st.sampled_from((0, 1))), min_size=1, max_size=3)
 """Status, what of a frame it rests on, its landmarks, and its number in the sketch."""
 
