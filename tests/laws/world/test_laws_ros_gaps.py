@@ -242,7 +242,8 @@ def test_no_doorway_is_in_a_wall_without_one(wall: int) -> None:
 
 def make(turn: float, origin: tuple[float, float, float], resolution_m: float = 0.05) -> Grid:
     c, s = math.cos(turn), math.sin(turn)
-    return Grid(np.zeros((2, 2), np.int8), resolution_m, turn, np.array([[c, -s], [s, c]]), np.array([7.0, -3.0]), 90, origin)
+    matrix, offset = np.array([[c, -s], [s, c]]), np.array([7.0, -3.0])
+    return Grid(np.zeros((2, 2), np.int8), resolution_m, turn, matrix, offset, 90, origin)
 
 
 @settings(max_examples=60)
