@@ -57,3 +57,6 @@ def test_a_model_moved_within_the_window_is_found_where_it_is(seed: int, u: floa
     cell_px = 2.0 * TUNING.hough_window_px / (TUNING.hough_cells - 1)
     assert np.abs(np.array(best.shift_px) - shift).max() <= 2.0 * cell_px
     assert abs(best.turn_rad - turn) <= 1.5 * TUNING.hough_step_rad
+    normals = build_line_table(moved, np.zeros(2)).normals
+    is_within = np.abs(normals @ shift) <= TUNING.hough_window_px
+    assert best.votes >= 0.6 * np.sum(2.0 * half[is_within])
