@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from harvey.hardware.drivers.cameras import capture as captures
 from harvey.hardware.drivers.cameras.capture import CameraFault, Picture, is_file, open_in_time, picture_of, prepare
 from harvey.hardware.drivers.cameras.newest_picture import Health, Newest, _Pace
-from harvey.hardware.drivers.cameras.video_camera import VideoCamera
+from harvey.hardware.drivers.cameras.video_camera import VideoCamera, _Video
 from harvey.hardware.drivers.cameras.video_file import write_video
 
 MAIN = threading.main_thread()
@@ -329,3 +329,24 @@ def test_a_written_video_has_the_rate_and_the_count_that_are_told(tmp_path: Path
     assert video.get(cv2.CAP_PROP_FPS) == rate_hz and video.get(cv2.CAP_PROP_FRAME_COUNT) == 3
     with pytest.raises(ValueError, match=r"got one that is not whole as number 1"):
         write_video(path, [jpeg(9), b"x"])
+
+
+def test_a_video_tells_which_picture_is_not_whole_and_where_it_ends(tmp_path: Path) -> None:
+    capture = Bench.__new__(Bench)  # no thread: a file is read picture by picture
+    images = iter([jpeg(9), b"", jpeg(99)])
+    capture.stream_s, capture.was_retrieved, capture.retrieved = 2.5, 0, None
+
+    def grab() -> bool:
+        capture.retrieved = next(images, "end")
+        return capture.retrieved != "end"
+
+    capture.grab = grab  # type: ignore[method-assign]
+    video = _Video(capture, "film.avi")
+    picture, taken_s = video.picture(0.0, 1.0)
+    assert (picture.jpeg, taken_s) == (jpeg(9), 2.5)
+    with pytest.raises(CameraFault, match=r"dropped: picture 1 of film\.avi is not whole"):
+        video.picture(0.0, 1.0)
+    assert video.picture(0.0, 1.0)[0].jpeg == jpeg(99)
+    with pytest.raises(CameraFault, match=r"unplugged: film\.avi ends after 3 pictures"):
+        video.picture(0.0, 1.0)
+    assert video.health == Health(3, 1, None, 0.0, "")
