@@ -199,11 +199,14 @@ def _name_fate(result: WorkResult, name: str, diff: str, told: str) -> str:
 
 def _is_equivalent(name: str, diff: str) -> bool:
     """Whether a difference is in the list of those that no test can notice."""
-    gone = [line[1:].strip() for line in diff.splitlines() if line.startswith("-") and not line.startswith("---")]
-    return any(
-        known["at"].partition(": ")[0] == name and any(known["at"].partition(": ")[2] in line for line in gone)
-        for known in TABLE.get("equivalents", ())
-    )
+    lines = [line for line in diff.splitlines() if not line.startswith(("---", "+++"))]
+    gone, new = ([line[1:].strip() for line in lines if line.startswith(sign)] for sign in "-+")
+    for known in TABLE.get("equivalents", ()):
+        file, _, part = known["at"].partition(": ")
+        is_there = file == name and any(part in line for line in gone)
+        if is_there and any(known.get("becomes", "") in line for line in new):
+            return True
+    return False
 
 
 if __name__ == "__main__":
