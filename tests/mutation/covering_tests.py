@@ -1,7 +1,8 @@
 """Which tests run a line: only they can notice a fault in it. Measured once by pytest-cov, with each test's name.
 
-What numba compiles is not seen by the measurement: for a line of a compiled function, all tests that run a line of its
-file, or of a file that imports it, are asked. A test that fails without any mutant is never asked.
+What numba compiles is not seen by the measurement, nor what runs in a process of its own, as the reading of IFC: for a
+line of a compiled function, or of a file of which nothing was seen, all tests that run a line of its file, or of a file
+that imports it, are asked. A test that fails without any mutant is never asked.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ def measure_coverage(tree: Path, home: Path, python: Path, packages: Sequence[st
         "no:cacheprovider",
         "--durations=0",
         "--durations-min=0",
-        "-rp",
+        "-rpfE",
         "--tb=no",
         "--cov",
         f"--cov-config={settings}",
@@ -87,7 +88,8 @@ class CoveringTests:
         by_line = self._data.contexts_by_lineno(file)
         statements = _find_statements(ast.parse(source.read_text("utf-8")), set(lines))
         tests = self._get_tests(name for line in statements.lines for name in by_line.get(line, ()))
-        if not tests and statements.is_compiled:
+        of_file = self._get_tests(name for found in by_line.values() for name in found)
+        if not tests and (statements.is_compiled or not of_file):
             tests = self._get_tests(
                 name
                 for user in {file, *users}
@@ -95,7 +97,7 @@ class CoveringTests:
                 for name in found
             )
         elif not tests and any(line in by_line for line in statements.lines):
-            tests = self._get_tests(name for found in by_line.values() for name in found)
+            tests = of_file
         ordered = sorted(tests, key=lambda name: (not name.startswith(tuple(room)), self._durations_s[name], name))
         chosen: list[str] = []
         left_s = limit_s
