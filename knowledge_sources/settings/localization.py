@@ -75,6 +75,9 @@ class LocalizationSettings:
     turn_step_rad: float = setting(math.radians(1.5), "rad", "Step of the search for an uncertain turn.", _KIDNAP)
     turn_search_sigmas: float = setting(
         2.5, "1", "Reach of the search for an uncertain turn, in standard deviations.", _JUDGED)
+    max_view_surprise: float = setting(
+        11.3, "1", "Largest squared normalized error of a view by the others, with which they still agree; three"
+        " unknowns, 99 %.", _JUDGED)
 
     # Log likelihood of a pose
     detection_rate: float = setting(

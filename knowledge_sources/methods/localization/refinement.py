@@ -1,17 +1,17 @@
-"""Refine a rough pose with several views: iterated closest lines, and one Kalman update for each view."""
+"""Refine a rough pose with several views: iterated closest lines, and a Kalman filter over all motions."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Ints
-from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.methods.localization.views import CameraView, find_lever, join_covariances
 from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from knowledge_sources.settings import DEFAULT, Settings
@@ -20,22 +20,101 @@ from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 
+@dataclass(slots=True, eq=False)
+class _State:
+    """What is estimated together: the robot's pose now, and where it was at each view.
+
+    Attributes:
+        pose: now, world.
+        motions: now_from_then of each view.
+        covariance: (3 + 3n, 3 + 3n) over (x, y, heading) of the pose and then of each motion.
+    """
+
+    pose: Pose2
+    motions: list[Pose2]
+    covariance: Floats
+
+    def predict(self, k: int) -> tuple[Pose2, Floats]:
+        """The pose at view ``k``, world, and its Jacobian (3, 3 + 3n) by the state."""
+        then, jacobian = self.pose @ self.motions[k], np.zeros((3, len(self.covariance)))
+        jacobian[:, :3] = find_lever(self.pose, then)
+        jacobian[:, 3 + 3 * k:6 + 3 * k] = _build_rotation(self.pose.heading_rad)
+        return then, jacobian
+
+    def update(self, jacobian: Floats, off: Floats, prior: Floats, posterior: Floats) -> None:
+        """Correct the whole by what a view tells of its own pose: off (3,) from the prior, and its covariances."""
+        gain = np.linalg.solve(prior, jacobian @ self.covariance).T
+        moved, reduced = gain @ off, self.covariance - gain @ (prior - posterior) @ gain.T
+        self.covariance = 0.5 * (reduced + reduced.T)
+        self.pose = _add(self.pose, moved[:3])
+        self.motions = [_add(m, moved[3 + 3 * k:6 + 3 * k]) for k, m in enumerate(self.motions)]
+
+
 def refine_pose(
     robot: RobotModel, views: Sequence[CameraView], pose: Pose2, settings: Settings = DEFAULT
 ) -> tuple[Pose2, Floats]:
     """Refine a rough pose of the robot now, by all views together; returns the pose and its covariance (3, 3).
 
-    Views with a known turn come first, and of these the view in which most model lines are visible: once the pose is
-    known from it, clutter in the others, or a wrong turn, does no harm.
+    A Kalman filter over the pose and all motions between the views: what one view tells of a motion holds for every
+    view before it, and what is driven once is uncertain once. Views with a known turn come first, and of these the
+    view in which most model lines are visible: once the pose is known from it, clutter in the others, or a wrong turn,
+    does no harm. Where the views contradict one another, the covariance grows by Birge's ratio.
     """
     tuning = settings.localization
-    sigma_m, sigma_rad = tuning.candidate_sigma_m, tuning.candidate_sigma_rad
-    covariance = np.diag([sigma_m**2, sigma_m**2, sigma_rad**2])
     visible = [len(predict_lines(robot, view.pose_then(pose), settings.verification)) for view in views]
-    order = sorted(zip(visible, views, strict=True), key=lambda pair: (_is_turn_uncertain(pair[1], tuning), -pair[0]))
-    for _, view in order:
-        pose, covariance = _update(robot, view, pose, covariance, settings)
-    return pose, covariance
+    order = sorted(range(len(views)), key=lambda k: (_is_turn_uncertain(views[k], tuning), -visible[k]))
+    state = _start(views, pose, order[0], tuning)
+    surprises = []
+    for k in order:
+        then, jacobian = state.predict(k)
+        prior = np.asarray(jacobian @ state.covariance @ jacobian.T)
+        uncertain = _is_turn_uncertain(views[k], tuning)
+        start = _search_turn(robot, views[k], then, settings) if uncertain else then
+        solved, posterior = _solve(robot, views[k], then, prior, start, settings)
+        if posterior is prior:
+            continue
+        turned = wrap_angle(solved.heading_rad - then.heading_rad)
+        off = np.array([solved.x_m - then.x_m, solved.y_m - then.y_m, turned])
+        surprises.append(float(off @ np.linalg.pinv(prior - posterior, rcond=1e-9, hermitian=True) @ off))
+        state.update(jacobian, off, prior, posterior)
+    return state.pose, state.covariance[:3, :3] * _compute_birge_ratio(surprises[1:], tuning)
+
+
+def _start(views: Sequence[CameraView], pose: Pose2, first: int, settings: LocalizationSettings) -> _State:
+    """The state before any view: a candidate's covariance is of the pose at the view that shows most, ``first``."""
+    motions = [view.now_from_then for view in views]
+    sigma_m, sigma_rad = settings.candidate_sigma_m, settings.candidate_sigma_rad
+    back = find_lever(pose @ motions[first], pose)  # of the pose now by the pose at that view
+    turn = _build_rotation(pose.heading_rad)
+    size = 3 + 3 * len(views)
+    source = np.zeros((size, size))  # of the errors of the pose at that view, and of the motions
+    source[:3, :3] = np.diag([sigma_m**2, sigma_m**2, sigma_rad**2])
+    source[3:, 3:] = join_covariances(views)
+    jacobian = np.eye(size)
+    jacobian[:3, :3] = back
+    jacobian[:3, 3 + 3 * first:6 + 3 * first] = -back @ turn
+    return _State(pose, motions, np.asarray(jacobian @ source @ jacobian.T))
+
+
+def _compute_birge_ratio(surprises: Sequence[float], settings: LocalizationSettings) -> float:
+    """By what the covariance grows where one view contradicts what the others tell: chi square by freedom (Birge).
+
+    Args:
+        surprises: squared normalized error of each view after the first, three unknowns each.
+    """
+    if not surprises or max(surprises) <= settings.max_view_surprise:
+        return 1.0
+    return max(1.0, math.fsum(surprises) / (3.0 * len(surprises)))
+
+
+def _build_rotation(heading_rad: float) -> Floats:
+    """(3, 3) of (x, y, heading)."""
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _add(pose: Pose2, off: Floats) -> Pose2:
+    return Pose2(pose.x_m + float(off[0]), pose.y_m + float(off[1]), wrap_angle(pose.heading_rad + float(off[2])))
 
 
 def refine_view_motions(
@@ -48,9 +127,11 @@ def refine_view_motions(
     out = []
     for view in views:
         if _is_turn_uncertain(view, settings.localization):
-            prior, _ = _predict_covariance(pose, covariance, view)
-            start = _search_turn(robot, view, pose, settings)
-            then, _ = _solve(robot, view, view.pose_then(pose), prior, start, settings)
+            before = view.pose_then(pose)
+            lever, turn = find_lever(pose, before), _build_rotation(pose.heading_rad)
+            prior = np.asarray(lever @ covariance @ lever.T + turn @ view.covariance @ turn.T)
+            start = _search_turn(robot, view, before, settings)
+            then, _ = _solve(robot, view, before, prior, start, settings)
             view = replace(view, now_from_then=pose.inverse() @ then)
         out.append(view)
     return tuple(out)
@@ -60,42 +141,15 @@ def _is_turn_uncertain(view: CameraView, settings: LocalizationSettings) -> bool
     return bool(view.covariance[2, 2] > settings.known_turn_rad**2)
 
 
-def _search_turn(robot: RobotModel, view: CameraView, pose: Pose2, settings: Settings) -> Pose2:
+def _search_turn(robot: RobotModel, view: CameraView, then: Pose2, settings: Settings) -> Pose2:
     """Of the headings that a view may have had, the one with most pairs of segment and line, then the nearest."""
     tuning, step = settings.localization, settings.localization.turn_step_rad
     most = int(tuning.turn_search_sigmas * math.sqrt(float(view.covariance[2, 2])) / step)
     turns = sorted((k * step for k in range(-most, most + 1)), key=abs)
-    tried = [view.pose_then(pose) @ Pose2(0.0, 0.0, turn) for turn in turns]
+    tried = [then @ Pose2(0.0, 0.0, turn) for turn in turns]
     predicted = [predict_lines(robot, then, settings.verification).segments_px for then in tried]
     pairs = [_pair(lines, view.segments_px, tuning.coarse_gate_px, tuning) for lines in predicted]
     return tried[int(np.argmax([len(p) for p in pairs]))]
-
-
-def _update(
-    robot: RobotModel, view: CameraView, pose: Pose2, covariance: Floats, settings: Settings
-) -> tuple[Pose2, Floats]:
-    """Kalman update of the pose now by one view.
-
-    The covariance of the motion since then keeps its share of the correction (Schmidt-Kalman).
-    """
-    then = view.pose_then(pose)
-    prior, lever = _predict_covariance(pose, covariance, view)
-    uncertain = _is_turn_uncertain(view, settings.localization)
-    start = _search_turn(robot, view, pose, settings) if uncertain else then
-    solved, posterior = _solve(robot, view, then, prior, start, settings)
-    gain = np.linalg.solve(prior, lever @ covariance).T
-    off = gain @ (solved.x_m - then.x_m, solved.y_m - then.y_m, wrap_angle(solved.heading_rad - then.heading_rad))
-    now = Pose2(pose.x_m + float(off[0]), pose.y_m + float(off[1]), wrap_angle(pose.heading_rad + float(off[2])))
-    return now, np.asarray(covariance - gain @ (prior - posterior) @ gain.T)
-
-
-def _predict_covariance(pose: Pose2, covariance: Floats, view: CameraView) -> tuple[Floats, Floats]:
-    """(3, 3) covariance of the robot's pose at a view, world, and its Jacobian (3, 3) by the pose now."""
-    then, lever, turn = view.pose_then(pose), np.eye(3), np.eye(3)
-    lever[0, 2], lever[1, 2] = -(then.y_m - pose.y_m), then.x_m - pose.x_m
-    c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    turn[:2, :2] = ((c, -s), (s, c))
-    return lever @ covariance @ lever.T + turn @ view.covariance @ turn.T, lever
 
 
 def _solve(

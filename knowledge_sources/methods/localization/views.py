@@ -41,8 +41,31 @@ def propagate_pose(now_from_then: Pose2, covariance: Floats, step: Pose2, step_c
     c, s = math.cos(step.heading_rad), math.sin(step.heading_rad)
     turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     lever = np.eye(3)
-    lever[0, 2], lever[1, 2] = after.y_m, -after.x_m  # an error in the step's heading moves the earlier position
+    lever[0, 2], lever[1, 2] = -after.y_m, after.x_m  # an error in the step's heading moves the earlier position
     return after, np.asarray(turn @ covariance @ turn.T + lever @ turn @ step_covariance @ turn.T @ lever.T)
+
+
+def join_covariances(views: Sequence[CameraView]) -> Floats:
+    """Join the covariances of all views' motions, (3n, 3n) over (x, y, heading) of each, in the robot's frame now.
+
+    Views share what was driven after the later one of them: an error of it moves both. Where a view's covariance is
+    smaller than that (its turn was measured), the least is added that makes the whole a covariance.
+    """
+    size, joint = len(views), np.zeros((3 * len(views), 3 * len(views)))
+    for k, later in enumerate(views):
+        joint[3 * k:3 * k + 3, 3 * k:3 * k + 3] = later.covariance
+        for i in range(k):
+            shared = find_lever(later.now_from_then, views[i].now_from_then) @ later.covariance
+            joint[3 * i:3 * i + 3, 3 * k:3 * k + 3], joint[3 * k:3 * k + 3, 3 * i:3 * i + 3] = shared, shared.T
+    values, axes = np.linalg.eigh(joint) if size else (np.zeros(0), joint)
+    return np.asarray(axes * np.maximum(values, 0.0) @ axes.T)
+
+
+def find_lever(here: Pose2, there: Pose2) -> Floats:
+    """Jacobian (3, 3) of a pose by one that it is fixed to: an error of that one's heading moves it aside."""
+    lever = np.eye(3)
+    lever[0, 2], lever[1, 2] = here.y_m - there.y_m, there.x_m - here.x_m
+    return lever
 
 
 def align_headings(
@@ -90,7 +113,9 @@ def _correct_turn(view: CameraView, later: CameraView, now_from_later: Pose2, mo
 
 
 def _limit_turn_variance(covariance: Floats, variance: float) -> Floats:
-    """The covariance (3, 3) after the turn was measured with a variance, without correlations of turn and position."""
-    out = np.zeros((3, 3))
-    out[:2, :2], out[2, 2] = covariance[:2, :2], min(float(covariance[2, 2]), variance)
-    return out
+    """The covariance (3, 3) after the turn was measured with a variance: what is correlated with it is known better."""
+    known = float(covariance[2, 2])
+    if known <= variance:
+        return covariance
+    gain = covariance[:, 2] / known
+    return np.asarray(covariance - np.outer(gain, gain) * (known - variance))
