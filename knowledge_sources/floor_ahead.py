@@ -214,9 +214,14 @@ def _find_put_down(view: View, robot: RobotModel, goal: Goal, settings: ActionSe
     """Round where the robot was put down: by the first picture, if it is still on the board, else by what was said."""
     first = view.get(f"{FreeFloor.__name__}-1")
     start = goal.origin.in_world(robot.world)
-    if first is None or math.dist((first.value.x_m, first.value.y_m), start.position) > settings.max_driven_gap_m:
+    if first is None or not first.value.bearings_rad:
         return FreeDisc((start.x_m, start.y_m, settings.put_down_free_m), () if first is None else (first,))
-    return FreeDisc((first.value.x_m, first.value.y_m, settings.put_down_free_m), (first,))
+    eye, ahead = first.value, first.value.bearings_rad[len(first.value.bearings_rad) // 2]
+    before_m = robot.mount.forward_m if eye.sense == "camera" else 0.0  # the robot's axis is that far behind its camera
+    x_m, y_m = eye.x_m - before_m * math.cos(ahead), eye.y_m - before_m * math.sin(ahead)
+    if math.dist((x_m, y_m), start.position) > settings.max_driven_gap_m:
+        return FreeDisc((start.x_m, start.y_m, settings.put_down_free_m), (first,))
+    return FreeDisc((x_m, y_m, settings.put_down_free_m), (first,))
 
 
 def limit_move(unseen: Sweep, move_m: float, settings: ActionSettings) -> Caution:

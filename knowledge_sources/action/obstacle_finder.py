@@ -170,7 +170,7 @@ class ObstacleFinder(RobotKnowledgeSource):
             if entry is not None:
                 new = self._see_again(view, entry, thing, shape, free, scan)
                 if new is not None:
-                    drafts[entry.id] = _Draft(entry, _with_core(new, core), [scan])
+                    drafts[entry.id] = _Draft(entry, _with_core(new, _keep_touched(entry.value, core)), [scan])
                 continue
             again = [build_polygon(draft.new.footprint) for draft in drafts.values()]
             if any(shapely.intersection(polygon, shape).area > 0.5 * shape.area for polygon in again):
@@ -387,6 +387,13 @@ def _with_core(obstacle: Obstacle, seen: shapely.Geometry) -> Obstacle:
     core = shapely.intersection(footprint, seen)
     is_less = 0.0 < core.area < 0.9 * footprint.area
     return replace(obstacle, core=list_corners(core) if is_less else ())
+
+
+def _keep_touched(known: Obstacle, seen: shapely.Geometry) -> shapely.Geometry:
+    """What was seen of a known obstacle, with what it took when it was touched: no picture takes that back."""
+    if known.touched_s is None:
+        return seen
+    return shapely.union(seen, build_polygon(known.core or known.footprint))
 
 
 def _largest_part(shape: shapely.Geometry) -> shapely.Geometry:

@@ -18,6 +18,7 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from harvey.simulation.run import build_robot_model
 from knowledge_sources.action.obstacle_finder import ObstacleFinder
+from knowledge_sources.floor_ahead import list_free_discs
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
@@ -25,8 +26,9 @@ from world_models.building.world import World
 from world_models.entries.body import MotorCommand
 from world_models.entries.floor import FloorThing, FreeFloor
 from world_models.entries.locale_frame import FRAME_OF, LocaleFrame
-from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.obstacle import Obstacle
+from world_models.entries.task import Goal
 from world_models.entries.touch import Contact
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_building import FrameBuilding
@@ -252,3 +254,37 @@ def test_the_numbers_fit_together() -> None:
     assert s.min_thing_certainty < s.min_obstacle_certainty < s.max_obstacle_certainty
     odds = s.max_obstacle_certainty / (1.0 - s.max_obstacle_certainty) * s.free_floor_odds**2
     assert odds < s.min_gone_certainty / (1.0 - s.min_gone_certainty)  # two pictures are enough
+
+
+@given(st.floats(-0.6, 0.6))
+@settings(max_examples=10, deadline=None)
+def test_what_was_touched_stays_in_the_way_though_a_sight_without_feet_shows_less(
+    world: World, direction_rad: float
+) -> None:
+    hall = Hall(world)
+    hall.touch(direction_rad, turns=(), basis="milestone")
+    (touched,) = hall.obstacles
+    x, y = shapely.Polygon(touched.footprint).centroid.coords[0]
+    part = tuple((x + dx, y + dy) for dx, dy in ((0.0, -0.05), (0.2, -0.05), (0.2, 0.05), (0.0, 0.05)))
+    cut = FloorThing(part, 0.15, 0.5, math.inf, 0.97, (200.0, 400.0, 260.0, 510.0), "unlike the floor", is_cut=True)
+    hall.see(cut, seen_s=6.0, ahead_m=0.05)
+    (known,) = hall.obstacles
+    kept = shapely.Polygon(known.core or known.footprint)
+    assert kept.area >= 0.9 * shapely.intersection(shapely.Polygon(touched.footprint),
+                                                  shapely.Polygon(known.footprint)).area
+
+
+@pytest.mark.parametrize("heading_rad", [0.0, 1.2, -2.5])
+def test_the_floor_that_is_free_as_it_was_put_down_is_round_the_robot_and_not_round_its_camera(
+    hall: Hall, heading_rad: float
+) -> None:
+    eye = HERE @ Pose2(0.0, 0.0, heading_rad) @ Pose2(hall.robot.mount.forward_m, 0.0, 0.0)
+    bearings = tuple((heading_rad + np.linspace(-0.5, 0.5, 41)).tolist())
+    scan = FreeFloor("camera", HALL, eye.x_m, eye.y_m, bearings, (1.5,) * 41, (3.0,) * 41, ("sight",) * 41,
+                     (0.02,) * 41, (), 0.5)
+    at = Place.of_world(hall.robot.world, HALL, HERE.x_m + 0.03, HERE.y_m)
+    hall._apply(Post(scan), Post(Goal(at, at)))
+    discs = list_free_discs(hall.board.view, hall.robot, HERE, hall.board.view.all(FreeFloor), DEFAULT.action)
+    x_m, y_m, radius_m = discs[-1].circle
+    assert radius_m == DEFAULT.action.put_down_free_m
+    assert hall.robot.mount.forward_m > 0.05 and math.dist((x_m, y_m), HERE.position) < 1e-6
