@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from blackboard.effect import Effect, Post, Retract, Revise, to_say
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.methods.localization.far_views import choose_far_action
 from knowledge_sources.methods.localization.global_localization import (
     Candidate,
     LocalizationResult,
@@ -21,6 +22,8 @@ from knowledge_sources.methods.localization.global_localization import (
     localize,
     make_alias_test,
 )
+from knowledge_sources.methods.localization.hypotheses import make_view_predictor
+from knowledge_sources.methods.localization.next_view import SensingAction
 from knowledge_sources.methods.localization.obstructions import update_obstruction
 from knowledge_sources.methods.localization.place_odds import ToldPlace, compute_prior, weigh_told
 from knowledge_sources.methods.localization.views import CameraView, propagate_pose
@@ -44,6 +47,7 @@ from world_models.entries.percepts import Glimpse, Panorama, Segments
 from world_models.entries.task import Certificate, Goal, PlanSketch
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
+from world_models.robot import RobotModel
 
 
 class Relocalizer(RobotKnowledgeSource):
@@ -111,7 +115,8 @@ class Relocalizer(RobotKnowledgeSource):
         here = belief.value.world_from_robot(building)
         told = ToldPlace(here, belief.value.covariance_world(building),
                          _find_prior(view, tuning))
-        seen_result = localize(looking, looks, rooms, self._settings, (belief.value.locale, here))
+        followed = _list_moved_candidates(view, before, robot.actuator, building)
+        seen_result = localize(looking, looks, rooms, self._settings, (belief.value.locale, here), followed)
         is_last = len(glimpses) >= self._settings.goal.max_probes
         if is_last:
             seen_result = replace(seen_result, next_action=None)
@@ -120,9 +125,13 @@ class Relocalizer(RobotKnowledgeSource):
         odds = _odds_used(view, seen_result, result, told)
         if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
             result = _prefer_reachable(building, result, belief.value.locale)
+        far = self._find_far_action(looking, result, glimpses, rooms)
+        if far is not None:
+            result, is_last = replace(result, status=LocalizationStatus.PROBE, next_action=far), False
         for old in view.where(Hypothesis, lambda h: h.status == "candidate"):
             yield Retract(old, (segments,))
-        panorama = Panorama(glimpses, _describe(result) if odds is None else odds.sentence())
+        said = _describe(result, is_far=far is not None) if odds is None else odds.sentence()
+        panorama = Panorama(glimpses, said)
         seen = Post(panorama, because) if before is None else Revise(before, panorama, (*because, before))
         yield seen
         if result.status is LocalizationStatus.FOUND:
@@ -138,6 +147,20 @@ class Relocalizer(RobotKnowledgeSource):
             s, action = self._settings.action, result.next_action  # while lost, no floor is known to be free
             slowly = s.creep_speed_m_per_s if s.keeps_to_seen_floor and action.move_m > 0.0 else None
             yield Post(MotorCommand(action.turn_rad, action.move_m, slowly), (segments, lost, seen))
+
+    def _find_far_action(
+        self, robot: RobotModel, result: LocalizationResult, glimpses: Sequence[Glimpse], rooms: Sequence[str]
+    ) -> SensingAction | None:
+        """The first leg of the way to a view that tells places apart that look alike from wherever it has looked."""
+        s, looks = self._settings, len(glimpses)
+        is_stuck = result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None
+        accepted = sum(c.is_accepted for c in result.candidates)
+        if result.status is LocalizationStatus.FOUND or accepted < 2 or looks >= s.goal.max_far_probes:
+            return None
+        if looks < s.localization.min_views or not (is_stuck or looks >= s.localization.max_searched_views):
+            return None
+        hypotheses, looked = [c.hypothesis for c in result.candidates], [g.now_from_then for g in glimpses]
+        return choose_far_action(robot, hypotheses, looked, rooms, make_view_predictor(robot, s), s)
 
     def _list_rooms(self, view: View, belief: Hypothesis) -> list[str]:
         """The rooms of the floor, the nearest to the last belief first; other floors are not searched."""
@@ -242,7 +265,20 @@ def _has_just_ridden(view: View) -> bool:
                        and s.subgoals[s.at - 1].is_ride) is not None
 
 
-def _describe(result: LocalizationResult) -> str:
+def _list_moved_candidates(
+    view: View, before: Entry[Panorama] | None, actuator: ActuatorModel, building: FrameBuilding
+) -> list[tuple[str, Pose2]]:
+    """Room and pose of the candidates of the last look, as the robot has moved since."""
+    out = []
+    for entry in () if before is None else view.where(Hypothesis, lambda h: h.status == "candidate"):
+        pose = entry.value.world_from_robot(building)
+        for report in view.since(MotionReport, entry.cycle):
+            pose = pose @ actuator.predict_motion(report.value.turn_rad, report.value.move_m)
+        out.append((entry.value.locale, pose))
+    return out
+
+
+def _describe(result: LocalizationResult, *, is_far: bool) -> str:
     places = " or ".join(f"{c.room} ({c.weight:.0%})" for c in result.candidates)
     if result.status is LocalizationStatus.FOUND:
         return f"it is {places}, which stands alone"
@@ -252,6 +288,8 @@ def _describe(result: LocalizationResult) -> str:
         return f"perhaps {places}; nothing new could be seen from here"
     move = f" and a move of {result.next_action.move_m:.1f} m" if result.next_action.move_m else ""
     probe = f"a turn by {math.degrees(result.next_action.turn_rad):.0f} degrees{move}"
+    if is_far:
+        return f"perhaps {places}, which look alike from here; on the way to a view that tells: {probe}"
     return f"perhaps {places}; {probe} tells most" if places else f"no place bears it out; {probe} shows something new"
 
 

@@ -15,6 +15,9 @@ class GoalSettings:
     max_probes: int = setting(
         8, "count", "So many looks are taken when lost; then the robot says that it does not know.",
         "engineering judgement")
+    max_far_probes: int = setting(
+        20, "count", "So many looks are taken where places look alike, and it can drive to a view that tells them"
+        " apart.", "engineering judgement")
     max_rooms: int = setting(
         80, "count", "Most rooms that are searched, the nearest to the last belief first.", "engineering judgement")
     max_floor_difference_m: float = setting(

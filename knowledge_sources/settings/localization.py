@@ -149,6 +149,19 @@ class LocalizationSettings:
     min_new_view_rad: float = setting(
         math.radians(30.0), "rad", "Angle from earlier views from which a view at the same position is new.", _JUDGED)
 
+    # Driving to a view that tells places apart
+    clear_difference: float = setting(
+        2.0, "1", "Times as many lines as are needed, by which one or two views alone tell places apart.", _JUDGED)
+    max_searched_views: int = setting(
+        4, "count", "Views after which places are followed, and no longer searched for, while two are accepted.",
+        _JUDGED)
+    far_reach_m: float = setting(12.0, "m", "How far away a view that tells places apart is looked for.", _JUDGED)
+    far_step_m: float = setting(1.0, "m", "Grid of the positions of such views.", _JUDGED)
+    far_leg_m: float = setting(1.2, "m", "Longest move on the way there; then another look is taken.", _JUDGED)
+    far_arrived_m: float = setting(0.15, "m", "Distance from such a position from which the robot only turns.", _JUDGED)
+    far_coarse_m: float = setting(0.03, "m", "To this the free floor's outline is simplified.", _JUDGED)
+    far_hypotheses: int = setting(3, "count", "Most places, the likeliest, that a far view is to tell apart.", _JUDGED)
+
     # Aliases of a pose: where the room repeats itself, and where the picture fits as well
     max_size_difference_m: float = setting(0.1, "m", "Difference in the sides of rooms that may be alike.", _JUDGED)
     alias_line_length_px: float = setting(30.0, "px", "Length that counts as one line of a margin.", _JUDGED)

@@ -5,7 +5,7 @@ Candidates are refined, weighed against each other, and compared with the places
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
@@ -97,38 +97,73 @@ class RefinedPose(NamedTuple):
 
 def localize(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT,
-    guess: tuple[str, Pose2] | None = None,
+    guess: tuple[str, Pose2] | None = None, followed: Sequence[tuple[str, Pose2]] = (),
 ) -> LocalizationResult:
     """Find the robot in these rooms by its views, the last of which was taken from where it is now.
 
     Args:
         guess: a room and a pose that are always tried: of many places that look alike only some are.
+        followed: the candidates of the last localization, moved as the robot moved since: they are tried too.
     """
     aligned = align_headings(views, robot.camera, robot.mount.camera_from_robot, settings)
-    candidates = find_candidates(robot, aligned, rooms, settings, guess)
+    candidates = find_candidates(robot, aligned, rooms, settings, guess, followed)
     return decide(robot, candidates, [view.now_from_then for view in aligned], settings)
 
 
 def find_candidates(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT,
-    guess: tuple[str, Pose2] | None = None,
+    guess: tuple[str, Pose2] | None = None, followed: Sequence[tuple[str, Pose2]] = (),
 ) -> tuple[Candidate, ...]:
     """Find the places in these rooms that explain all views (with aligned headings), the likeliest first.
 
-    A place to which ``guess`` leads is tried first, and kept if it is not refuted. If one accepted place is left, its
-    aliases on the whole floor are weighed too.
+    A place to which ``guess`` leads is tried first, and kept if it is not refuted. After many views places are followed
+    and not searched for, while two of them are accepted. If one accepted place is left, its aliases on the whole floor
+    are weighed too.
     """
-    look_alike = make_alias_test(robot, [view.now_from_then for view in views], settings)
-    refined = [] if guess is None else [RefinedPose(guess[0], *refine_pose(robot, views, guess[1], settings))]
-    refined += [pose for pose in _find_refined(robot, views, rooms, settings) if all(
-        are_distinct(pose.world_from_robot, other.world_from_robot, settings.localization) for other in refined)]
-    found = [_build_candidate(robot, views, pose, settings) for pose in refined]
-    kept = rank_candidates(found, look_alike, settings, found[0] if guess is not None else None)
+    look_alike, tuning = make_alias_test(robot, [view.now_from_then for view in views], settings), settings.localization
+    found = _build_distinct(robot, views, [] if guess is None else [guess], [], settings)
+    first = found[0] if found else None
+    known = []
+    if len(views) > tuning.max_searched_views:
+        known = _build_distinct(robot, views, followed, found, settings)
+    if sum(c.is_accepted for c in (*found, *known)) >= 2:
+        return rank_candidates([*found, *known], look_alike, settings, first)
+    for pose in _find_refined(robot, views, rooms, settings):
+        if all(are_distinct(pose.world_from_robot, c.world_from_robot, tuning) for c in found):
+            found.append(_build_candidate(robot, views, pose, settings))
+    known = known or _build_distinct(robot, views, followed, found, settings)
+    found += [c for c in known
+              if all(are_distinct(c.world_from_robot, other.world_from_robot, tuning) for other in found)]
+    kept = rank_candidates(found, look_alike, settings, first)
     if len(kept) != 1 or not kept[0].is_accepted:
         return kept
     aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, settings)
     beside = [_build_candidate(robot, views, pose, settings) for pose in aliases]
+    repeated = _list_repetitions(robot, kept[0], rooms, settings)
+    beside += _build_distinct(robot, views, repeated, [*kept, *beside], settings)
     return rank_candidates([*kept, *beside], look_alike, settings, kept[0])
+
+
+def _build_distinct(
+    robot: RobotModel, views: Sequence[CameraView], rough: Iterable[tuple[str, Pose2]], known: Sequence[Candidate],
+    settings: Settings,
+) -> list[Candidate]:
+    """Candidates from rough poses in rooms, refined, that are none of those that are known, each once."""
+    found: list[Candidate] = []
+    for room, pose in rough:
+        refined = RefinedPose(room, *refine_pose(robot, views, pose, settings))
+        if all(are_distinct(refined.world_from_robot, c.world_from_robot, settings.localization)
+               for c in (*known, *found)):
+            found.append(_build_candidate(robot, views, refined, settings))
+    return found
+
+
+def _list_repetitions(
+    robot: RobotModel, candidate: Candidate, rooms: Sequence[str], settings: Settings
+) -> Iterator[tuple[str, Pose2]]:
+    """Where the plan repeats the candidate's place; what is in the rooms may differ, which the pictures tell."""
+    room = _find_room(robot, rooms[0], candidate.world_from_robot)
+    return find_repetitions(robot.world, room, candidate.world_from_robot, rooms, settings.localization)
 
 
 def find_aliases(

@@ -53,15 +53,28 @@ def compute_view_difference(one: Floats, other: Floats, settings: Settings = DEF
     return math.fsum(_count_missing(a, b, settings) for a, b in ((one, other), (other, one)))
 
 
-def are_distinguishable(ones: Sequence[Floats], others: Sequence[Floats], settings: Settings = DEFAULT) -> bool:
-    """Whether the views from one pose, taken together, differ clearly from those from another.
+def are_distinguishable(
+    ones: Sequence[Floats], others: Sequence[Floats], settings: Settings = DEFAULT, *, clearly: float = 1.0
+) -> bool:
+    """Whether the views from one pose differ from those from another: all of them together, or one or two clearly.
 
-    A few lines always differ: those just long, near or clear enough to be predicted from one pose only.
+    A few lines always differ: those just long, near or clear enough to be predicted from one pose only. Of many views
+    that are alike and one that is not, all together are alike; so the one or two that differ most count by themselves.
+
+    Args:
+        clearly: by how many times as much as is needed they are to differ.
     """
+    differ = [compute_view_difference(one, other, settings) for one, other in zip(ones, others, strict=True)]
+    lines = [len(one) + len(other) for one, other in zip(ones, others, strict=True)]
+    most = sorted(range(len(differ)), key=lambda k: -differ[k])
+    clear = settings.localization.clear_difference
+    return _is_difference(differ, lines, clearly, settings) or any(
+        _is_difference([differ[k] for k in most[:n]], [lines[k] for k in most[:n]], clear, settings) for n in (1, 2))
+
+
+def _is_difference(differ: Sequence[float], lines: Sequence[int], clearly: float, settings: Settings) -> bool:
     tuning = settings.localization
-    lines = sum(len(view) for view in (*ones, *others))
-    differ = math.fsum(compute_view_difference(one, other, settings) for one, other in zip(ones, others, strict=True))
-    return differ >= max(tuning.min_different_lines, tuning.min_different_fraction * lines)
+    return math.fsum(differ) >= clearly * max(tuning.min_different_lines, tuning.min_different_fraction * sum(lines))
 
 
 def _count_missing(one: Floats, other: Floats, settings: Settings) -> float:

@@ -101,7 +101,7 @@ def find_shortest_route(
     inner = [_find_nearest_free(free, p, floor) for p in ends]
     if any(p is None for p in inner):
         return None
-    nodes = np.array([*(p for p in inner if p is not None), *_find_bends(free)])
+    nodes = np.array([*(p for p in inner if p is not None), *find_bends(free)])
     slack = free.buffer(SLACK_M)
     shapely.prepare(slack)
     graph: nx.Graph = nx.Graph()
@@ -160,7 +160,7 @@ def _find_nearest_free(free: shapely.Geometry, point: Floats, floor: Callable[[]
     return next((np.asarray(p) for p in candidates if is_clear(open_floor, point, p)), None)
 
 
-def _find_bends(free: shapely.Geometry) -> Floats:
+def find_bends(free: shapely.Geometry) -> Floats:
     """(n, 2) the vertices about which a shortest route may bend: the reflex corners of the free space."""
     found = [np.zeros((0, 2))]
     for part in shapely.get_parts(free):

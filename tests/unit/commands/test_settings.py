@@ -153,8 +153,8 @@ EXCEPTIONS = {
         "verification/view_quality.py: EPSILON_INFORMATION",
     ),
     "the size of a cache, on which no result depends": (
-        "localization/visibility_map.py: MAX_MAPS", "motion/routes.py: MAX_FREE_SPACES",
-        "motion/subgoals.py: MAX_FREE_PASSAGES",
+        "localization/far_views.py: MAX_FLOORS", "localization/visibility_map.py: MAX_MAPS",
+        "motion/routes.py: MAX_FREE_SPACES", "motion/subgoals.py: MAX_FREE_PASSAGES",
         "tracking/template_tracking.py: MAX_TEMPLATES", "verification/predicted_colors.py: MAX_PACKETS",
     ),
     "of methods that are new: those of them that somebody may want to tune become settings": (
