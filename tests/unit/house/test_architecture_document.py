@@ -20,7 +20,7 @@ from world_models.files.world_files import read_world
 
 ROOT = Path(__file__).parents[3]
 DOCUMENTS = ("README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md", "tests/README.md",
-             *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")))
+             *sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md")))
 ROOMS = ("blackboard", "world_models", "knowledge_sources", "sim", "logs", "harvey", "experiments")
 NOT_OF_ONE_FOLDER = ("__init__.py",)
 """Named as what any folder has."""

@@ -1,0 +1,25 @@
+"""How Sphinx builds the documentation: ``sphinx-build -W docs build/site``."""
+
+import os
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+os.environ["COLUMNS"] = "100"  # argparse wraps usage lines to the terminal; the pages are the same everywhere
+
+project = "Harvey"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "docs.tools.site.pages"]
+exclude_patterns = ["tools"]
+highlight_language = "none"
+
+html_theme = "furo"
+html_title = "Harvey"
+html_copy_source = False
+
+myst_enable_extensions = ["deflist"]
+myst_heading_anchors = 4
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+napoleon_use_ivar = True
