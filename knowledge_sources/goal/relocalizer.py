@@ -117,7 +117,8 @@ class Relocalizer(RobotKnowledgeSource):
                          _find_prior(view, tuning))
         followed = _list_moved_candidates(view, before, robot.actuator, building)
         seen_result = localize(looking, looks, rooms, self._settings, (belief.value.locale, here), followed)
-        is_last = len(glimpses) >= self._settings.goal.max_probes
+        goal = self._settings.goal
+        is_last = len(glimpses) >= (goal.max_far_probes if seen_result.candidates else goal.max_probes)
         if is_last:
             seen_result = replace(seen_result, next_action=None)
         look_alike = make_alias_test(looking, [g.now_from_then for g in glimpses], self._settings)

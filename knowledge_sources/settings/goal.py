@@ -13,10 +13,10 @@ class GoalSettings:
 
     # Relocalizer
     max_probes: int = setting(
-        8, "count", "So many looks are taken when lost; then the robot says that it does not know.",
+        8, "count", "So many looks are taken when lost and no place fits; then the robot says that it does not know.",
         "engineering judgement")
     max_far_probes: int = setting(
-        20, "count", "So many looks are taken where places look alike, and it can drive to a view that tells them"
+        20, "count", "So many looks are taken when lost and places fit: it turns, and drives to views that tell them"
         " apart.", "engineering judgement")
     max_rooms: int = setting(
         80, "count", "Most rooms that are searched, the nearest to the last belief first.", "engineering judgement")

@@ -127,21 +127,21 @@ def find_candidates(
     if len(views) > tuning.max_searched_views:
         known = _build_distinct(robot, views, followed, found, settings)
     if sum(c.is_accepted for c in (*found, *known)) >= 2:
-        return rank_candidates([*found, *known], look_alike, settings, first)
+        return rank_candidates([*found, *known], look_alike, len(views), settings, first)
     for pose in _find_refined(robot, views, rooms, settings):
         if all(are_distinct(pose.world_from_robot, c.world_from_robot, tuning) for c in found):
             found.append(_build_candidate(robot, views, pose, settings))
     known = known or _build_distinct(robot, views, followed, found, settings)
     found += [c for c in known
               if all(are_distinct(c.world_from_robot, other.world_from_robot, tuning) for other in found)]
-    kept = rank_candidates(found, look_alike, settings, first)
+    kept = rank_candidates(found, look_alike, len(views), settings, first)
     if len(kept) != 1 or not kept[0].is_accepted:
         return kept
     aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, settings)
     beside = [_build_candidate(robot, views, pose, settings) for pose in aliases]
     repeated = _list_repetitions(robot, kept[0], rooms, settings)
     beside += _build_distinct(robot, views, repeated, [*kept, *beside], settings)
-    return rank_candidates([*kept, *beside], look_alike, settings, kept[0])
+    return rank_candidates([*kept, *beside], look_alike, len(views), settings, kept[0])
 
 
 def _build_distinct(
@@ -201,19 +201,23 @@ def make_alias_test(robot: RobotModel, looked: Sequence[Pose2], settings: Settin
 
 
 def rank_candidates(
-    found: Sequence[Candidate], look_alike: LookAlike, settings: Settings = DEFAULT, first: Candidate | None = None
+    found: Sequence[Candidate], look_alike: LookAlike, looks: int, settings: Settings = DEFAULT,
+    first: Candidate | None = None,
 ) -> tuple[Candidate, ...]:
     """Keep the likely candidates that the likeliest does not refute, with their weights, the likeliest first.
 
-    The likeliest refutes a candidate by the log likelihood ratio (Bayes factor), but never one that would look the
-    same: chance may have made it much less likely. Where too many are left, ``first`` is none that is left out.
+    The likeliest refutes a candidate by the log likelihood ratio (Bayes factor). One that would look the same by the
+    model, chance may have made much less likely: it is refuted only by a ratio beyond the noise of all ``looks``, as if
+    all of it pointed one way. Where too many are left, ``first`` is none that is left out.
     """
     tuning = settings.localization
+    noise = tuning.alike_log_noise * looks
     order = sorted((c for c in found if c.likelihood.log_likelihood >= tuning.min_log_likelihood),
                    key=lambda c: -c.likelihood.log_likelihood)
     kept = [c for c in order
             if c.likelihood.log_likelihood >= order[0].likelihood.log_likelihood - tuning.refuting_log_ratio
-            or look_alike(order[0].world_from_robot, c.world_from_robot)]
+            or (c.likelihood.log_likelihood >= order[0].likelihood.log_likelihood - tuning.refuting_log_ratio - noise
+                and look_alike(order[0].world_from_robot, c.world_from_robot))]
     if first in kept[tuning.max_hypotheses:]:
         kept[tuning.max_hypotheses - 1] = first
     kept = kept[:tuning.max_hypotheses]

@@ -95,15 +95,18 @@ def test_each_part_of_the_evidence_must_be_enough() -> None:
 
 
 def test_unlikely_places_are_dropped_and_refuted_ones_unless_they_look_alike() -> None:
-    def rank(*logs: float, alike: bool = False) -> list[float]:
+    def rank(*logs: float, alike: bool = False, looks: int = 1) -> list[float]:
         found = [place(2.0 + k, log) for k, log in enumerate(logs)]
-        return [c.likelihood.log_likelihood for c in rank_candidates(found, lambda one, other: alike)]
+        return [c.likelihood.log_likelihood for c in rank_candidates(found, lambda one, other: alike, looks)]
 
     low = S.min_log_likelihood
     assert rank(low + SMALL) == [low + SMALL] and rank(low - SMALL) == []
     near, far = 50.0 - S.refuting_log_ratio + SMALL, 50.0 - S.refuting_log_ratio - SMALL
     assert rank(50.0, near) == [50.0, near] and rank(50.0, far) == [50.0]
-    assert rank(50.0, far, alike=True) in ([50.0, far], [50.0, far][:1 + (far >= low)])
+    for looks in (1, 2, 7):  # of places that look alike the noise of every look may have pointed one way
+        bound = 50.0 - S.refuting_log_ratio - looks * S.alike_log_noise
+        assert rank(50.0, bound + SMALL, alike=True, looks=looks) == [50.0, bound + SMALL]
+        assert rank(50.0, bound - SMALL, alike=True, looks=looks) == [50.0]
     many = [50.0 - SMALL * k for k in range(S.max_hypotheses + 3)]
     assert rank(*many) == many[:S.max_hypotheses]
 
