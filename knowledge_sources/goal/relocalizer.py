@@ -155,7 +155,7 @@ class Relocalizer(RobotKnowledgeSource):
         """The first leg of the way to a view that tells places apart that look alike from wherever it has looked."""
         s, looks = self._settings, len(glimpses)
         is_stuck = result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None
-        accepted = sum(c.is_accepted for c in result.candidates)
+        accepted = sum(bool(c.is_accepted) for c in result.candidates)
         if result.status is LocalizationStatus.FOUND or accepted < 2 or looks >= s.goal.max_far_probes:
             return None
         if looks < s.localization.min_views or not (is_stuck or looks >= s.localization.max_searched_views):

@@ -126,7 +126,7 @@ def find_candidates(
     known = []
     if len(views) > tuning.max_searched_views:
         known = _build_distinct(robot, views, followed, found, settings)
-    if sum(c.is_accepted for c in (*found, *known)) >= 2:
+    if sum(bool(c.is_accepted) for c in (*found, *known)) >= 2:
         return rank_candidates([*found, *known], look_alike, len(views), settings, first)
     for pose in _find_refined(robot, views, rooms, settings):
         if all(are_distinct(pose.world_from_robot, c.world_from_robot, tuning) for c in found):

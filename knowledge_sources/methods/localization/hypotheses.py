@@ -74,7 +74,8 @@ def are_distinguishable(
 
 def _is_difference(differ: Sequence[float], lines: Sequence[int], clearly: float, settings: Settings) -> bool:
     tuning = settings.localization
-    return math.fsum(differ) >= clearly * max(tuning.min_different_lines, tuning.min_different_fraction * math.fsum(lines))
+    least = max(tuning.min_different_lines, tuning.min_different_fraction * math.fsum(lines))
+    return math.fsum(differ) >= clearly * least
 
 
 def _count_missing(one: Floats, other: Floats, settings: Settings) -> float:
