@@ -39,7 +39,16 @@ class ScenarioError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class CameraSettings:
-    """The camera and its mounting. Distortion: none, or OpenCV's coefficients k1, k2, p1, p2[, k3]."""
+    """The camera and its mounting.
+
+    Attributes:
+        width_px, height_px: of a picture.
+        field_of_view_rad: across its width, without distortion.
+        mount_height_m: of the optical centre above the floor.
+        mount_forward_m: of the optical centre before the robot's axis.
+        mount_tilt_rad: of the optical axis, downward.
+        distortion: none, or OpenCV's coefficients k1, k2, p1, p2[, k3].
+    """
 
     width_px: int = 512
     height_px: int = 512
@@ -74,7 +83,11 @@ class CameraSettings:
 
 @dataclass(frozen=True, slots=True)
 class Render:
-    """Settings of the renderer: samples per pixel (1, 4, 8 or 16)."""
+    """Settings of the renderer.
+
+    Attributes:
+        samples: per pixel: 1, 4, 8 or 16.
+    """
 
     samples: int = 8
 
@@ -84,7 +97,12 @@ class Render:
 
 @dataclass(frozen=True, slots=True)
 class ScenarioLimits(Limits):
-    """When to give up, by the truth as well."""
+    """When to give up, by the truth as well.
+
+    Attributes:
+        max_path_m: length of the true path.
+        max_collisions: more of them end the run.
+    """
 
     max_path_m: float = 150.0
     max_collisions: int = 3

@@ -62,12 +62,12 @@ def to_record(row: Row) -> dict[str, Any]:
 def format_rows(rows: Sequence[Row], width: int) -> Iterator[str]:
     """One table for each room, as wide as said: name, value with unit, meaning, source."""
     for number, (room, group) in enumerate(groupby(rows, key=lambda row: row.room)):
-        yield f"{chr(10) * (number > 0)}{room}: {_about(room)}"
+        yield f"{chr(10) * (number > 0)}{room}: {describe_room(room)}"
         yield ""
         yield from _format_room(list(group), width)
 
 
-def _about(room: str) -> str:
+def describe_room(room: str) -> str:
     """What a room's numbers are for, as its dataclass says."""
     from harvey.robot_settings import ROOMS
     from knowledge_sources.settings import DEFAULT

@@ -61,7 +61,11 @@ class EyeSettings:
 
 @dataclass(frozen=True, slots=True)
 class RangeSettings:
-    """Whether the base's range sensors are read with each picture: sonars, or the light bumper of a Create 2."""
+    """The base's range sensors.
+
+    Attributes:
+        read: whether they are read with each picture: sonars, or the light bumper of a Create 2.
+    """
 
     read: bool = False
 

@@ -13,6 +13,17 @@ from pathlib import Path
 
 from sphinx.application import Sphinx
 
+from docs.tools.site.command_line import describe_commands
+from docs.tools.site.journal import describe_kinds
+from docs.tools.site.mission_files import (
+    describe_faults,
+    describe_hardware_tables,
+    describe_scenario_tables,
+    describe_shared_tables,
+)
+from docs.tools.site.setting_tables import describe_settings
+from docs.tools.site.world_files import describe_world_keys
+
 ROOT = Path(__file__).parents[3]
 DOCS = ROOT / "docs"
 PAGES: Mapping[str, str] = {
@@ -23,7 +34,11 @@ PAGES: Mapping[str, str] = {
     "tests/README.md": "project/tests.md",
 }
 """The page of each document that is kept outside ``docs/``."""
-GENERATORS: Mapping[str, Callable[[], str]] = {}
+GENERATORS: Mapping[str, Callable[[], str]] = {
+    "commands": describe_commands, "settings": describe_settings, "kinds": describe_kinds,
+    "shared-tables": describe_shared_tables, "hardware-tables": describe_hardware_tables,
+    "scenario-tables": describe_scenario_tables, "faults": describe_faults, "world-keys": describe_world_keys,
+}
 """What makes Markdown from the code, by the name that pages use."""
 MARKER = re.compile(r"^<!-- (generate|document): (\S+) -->$", re.MULTILINE)
 LINK = re.compile(r"\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]*)?\)")

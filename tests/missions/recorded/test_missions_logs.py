@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 
 import pytest
+from jsonschema import Draft202012Validator
 
+from docs.tools.site.journal import SCHEMA
 from harvey.run_files.run_directory import RunDirectory
 from harvey.simulation.run import run_mission
 from logs.journal_file import read_journal
@@ -40,6 +42,23 @@ def test_every_field_of_every_decision_is_in_the_recording(run: RunDirectory) ->
         assert kept.keys() == drawn.keys()
         for field, value in kept.items():
             assert drawn[field] == value, f"cycle {kept['cycle']}: {field}"
+
+
+def test_every_line_of_the_journal_is_as_the_schema_says(run: RunDirectory) -> None:
+    validator = Draft202012Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
+    faults = [fault for record in read_journal(run.journal) for fault in validator.iter_errors(record)]
+    assert [fault.message[:300] for fault in faults] == []
+
+
+def test_a_line_of_the_journal_without_one_field_of_a_value_is_not(run: RunDirectory) -> None:
+    validator = Draft202012Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
+    record = next(record for record in read_journal(run.journal) if record["made"])
+    fields = record["made"][0]["value"]
+    for name in [*fields]:
+        kept = fields.pop(name)
+        assert not validator.is_valid(record), name
+        fields[name] = kept
+    assert validator.is_valid(record)
 
 
 def test_every_picture_is_in_the_recording(run: RunDirectory) -> None:

@@ -41,7 +41,12 @@ MIN_SIGMA = 0.005
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """How the robot is put down: heading in the first locale's frame, and standard deviations of the placing."""
+    """How the robot is put down.
+
+    Attributes:
+        heading_rad: in the first locale's frame, counter-clockwise from its x axis.
+        put_down_sigma_m, put_down_sigma_rad: standard deviations of the placing, along each axis and of the heading.
+    """
 
     heading_rad: float = 0.0
     put_down_sigma_m: float = 0.0
@@ -54,7 +59,11 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """The heading wanted at the goal, in the last locale's frame; NaN for any."""
+    """How the robot is to stand at the goal.
+
+    Attributes:
+        heading_rad: in the last locale's frame; NaN for any.
+    """
 
     heading_rad: float = math.nan
 
@@ -107,7 +116,13 @@ class Telling:
 
 @dataclass(frozen=True, slots=True)
 class Servo:
-    """Which levels of perceptual servoing (Figure 2) are on."""
+    """Which levels of perceptual servoing (Figure 2) are on.
+
+    Attributes:
+        action: landmarks tracked from picture to picture correct each increment of a move.
+        plan: milestones are looked at, and correct the pose estimate.
+        goal: a robot that is lost finds itself again.
+    """
 
     action: bool = True
     plan: bool = True
@@ -116,14 +131,23 @@ class Servo:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Whether legs are driven without stopping at each increment: corrected on the move, thirty times a second."""
+    """How legs are driven.
+
+    Attributes:
+        continuous: without stopping at each increment: corrected on the move, thirty times a second.
+    """
 
     continuous: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """When to give up."""
+    """When to give up.
+
+    Attributes:
+        max_time_s: by the time of the run.
+        max_cycles: of the blackboard.
+    """
 
     max_time_s: float = 3600.0
     max_cycles: int = 20000
