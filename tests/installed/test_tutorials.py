@@ -1,0 +1,72 @@
+"""The tutorials can be followed: their files are written, and their commands run, in order, as a reader would.
+
+A command whose line ends with a comment needs what the reader has (hardware, a file of his own, minutes): it is parsed.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from elsewhere import ROOT
+from harvey.cli import parser
+
+PAGES = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+FILE = re.compile(r"^```\{code-block\} \w+\n:caption: (\S+)\n\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+PLUGIN = "pip install ./examples/plugin"
+
+
+def blocks_of(page: Path) -> list[tuple[str, str]]:
+    """Language and text of each block that is not a file."""
+    return BLOCK.findall(FILE.sub("", page.read_text(encoding="utf-8")))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the reader works: with the files of all pages."""
+    here = tmp_path_factory.mktemp("reader")
+    for page in PAGES:
+        for name, text in FILE.findall(page.read_text(encoding="utf-8")):
+            assert not (here / name).exists(), f"{name} is given twice"
+            (here / name).write_text(text, encoding="utf-8")
+    return here
+
+
+def follow(line: str, folder: Path) -> None:
+    if line == PLUGIN:
+        package = ROOT / "examples" / "plugin"
+        line = f"python -m pip install --quiet --no-deps --no-build-isolation --target site {package}"
+    elif line.startswith("harvey "):
+        line = f"python -m harvey.cli {line.removeprefix('harvey ')}"
+    program, *words = shlex.split(line)
+    assert program == "python", f"expected a command of harvey, python, or {PLUGIN}, got {line}"
+    path = os.pathsep.join(map(str, (ROOT, folder / "site")))
+    done = subprocess.run([sys.executable, *words], cwd=folder, env={**os.environ, "PYTHONPATH": path},
+                          capture_output=True, text=True, timeout=900)
+    assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+    assert done.stdout or line.startswith(("python photograph.py", "python -m pip")), f"{line} says nothing"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_tutorial_can_be_followed(page: Path, folder: Path) -> None:
+    commands = [line for _, block in blocks_of(page) for line in block.splitlines()]
+    assert commands
+    for line in commands:
+        command, _, needs = line.partition("  #")
+        if needs:
+            assert parser().parse_args(shlex.split(command)[1:]), line
+        else:
+            follow(line, folder)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_tutorial_has_no_block_of_another_kind(page: Path) -> None:
+    """Every block is a file or commands, so that none is left out above."""
+    assert {language for language, _ in blocks_of(page)} == {""}
