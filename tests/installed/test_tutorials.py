@@ -17,6 +17,8 @@ import pytest
 from elsewhere import ROOT
 from harvey.cli import parser
 
+FAQ = ROOT / "docs" / "background" / "faq.md"
+ASKED = re.compile(r"^```console\n\$ (harvey [^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 PAGES = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 FILE = re.compile(r"^```\{code-block\} \w+\n:caption: (\S+)\n\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -39,7 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return here
 
 
-def follow(line: str, folder: Path) -> None:
+def run_line(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
     if line == PLUGIN:
         package = ROOT / "examples" / "plugin"
         line = f"python -m pip install --quiet --no-deps --no-build-isolation --target site {package}"
@@ -48,8 +50,12 @@ def follow(line: str, folder: Path) -> None:
     program, *words = shlex.split(line)
     assert program == "python", f"expected a command of harvey, python, or {PLUGIN}, got {line}"
     path = os.pathsep.join(map(str, (ROOT, folder / "site")))
-    done = subprocess.run([sys.executable, *words], cwd=folder, env={**os.environ, "PYTHONPATH": path},
+    return subprocess.run([sys.executable, *words], cwd=folder, env={**os.environ, "PYTHONPATH": path},
                           capture_output=True, text=True, timeout=900)
+
+
+def follow(line: str, folder: Path) -> None:
+    done = run_line(line, folder)
     assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
     assert done.stdout or line.startswith(("python photograph.py", "python -m pip")), f"{line} says nothing"
 
@@ -70,3 +76,18 @@ def test_a_tutorial_can_be_followed(page: Path, folder: Path) -> None:
 def test_a_tutorial_has_no_block_of_another_kind(page: Path) -> None:
     """Every block is a file or commands, so that none is left out above."""
     assert {language for language, _ in blocks_of(page)} == {""}
+
+
+def test_the_errors_of_the_questions_are_what_is_printed(folder: Path) -> None:
+    """The reader has the files of the tutorials, with the mistakes that the names tell."""
+    cottage, mission = ((folder / name).read_text(encoding="utf-8") for name in ("cottage.toml", "to-the-parlour.toml"))
+    (folder / "wide.toml").write_text(cottage.replace("along = 1.8, open", "along = 9.0, open"), encoding="utf-8")
+    (folder / "typo.toml").write_text(mission.replace("heading_deg", "heading"), encoding="utf-8")
+    (folder / "broken.toml").write_text("broken = [\n", encoding="utf-8")
+    (folder / "empty").mkdir()
+    asked = ASKED.findall(FAQ.read_text(encoding="utf-8"))
+    assert len(asked) > 10
+    for line, said in asked:
+        done = run_line(line, folder)
+        printed = [one for one in (done.stdout + done.stderr).splitlines() if not one.endswith("setting the stage")]
+        assert (printed, done.returncode) == (said.splitlines(), 2), line

@@ -23,9 +23,17 @@ from docs.tools.site.mission_files import (
 )
 from docs.tools.site.setting_tables import describe_settings
 from docs.tools.site.world_files import describe_world_keys
+from world_models import frames
 
 ROOT = Path(__file__).parents[3]
 DOCS = ROOT / "docs"
+
+
+def describe_frames() -> str:
+    """What the module of coordinate frames says of them."""
+    return f"```text\n{(frames.__doc__ or '').strip()}\n```"
+
+
 PAGES: Mapping[str, str] = {
     "README.md": "project/readme.md",
     "ARCHITECTURE.md": "project/architecture.md",
@@ -38,6 +46,7 @@ GENERATORS: Mapping[str, Callable[[], str]] = {
     "commands": describe_commands, "settings": describe_settings, "kinds": describe_kinds,
     "shared-tables": describe_shared_tables, "hardware-tables": describe_hardware_tables,
     "scenario-tables": describe_scenario_tables, "faults": describe_faults, "world-keys": describe_world_keys,
+    "frames": describe_frames,
 }
 """What makes Markdown from the code, by the name that pages use."""
 MARKER = re.compile(r"^<!-- (generate|document): (\S+) -->$", re.MULTILINE)
