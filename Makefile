@@ -22,7 +22,7 @@ help:
 	@echo "make run          prepare everything, then drive: harvey run $(SCENARIO)"
 	@echo "make test         ruff, mypy, import contracts, pytest; installs every extra, and says what was skipped and why"
 	@echo "make mutants      mutation testing of ROOM=$(ROOM), SAMPLE=$(SAMPLE); goes on where it stopped, and reports"
-	@echo "make site         build the documentation site: build/site/index.html"
+	@echo "make site         build the documentation site, build/site/index.html, and the man page, build/man/harvey.1"
 	@echo "make environment  only prepare $(VENV), for running and for testing"
 	@echo "make lock         write requirements.lock and requirements-dev.lock anew from pyproject.toml"
 	@echo "make clean        remove environments and caches; recordings in runs/ stay"
@@ -66,6 +66,7 @@ $(VENV)/.ready-to-test: requirements-dev.lock $(VENV)/.ready-to-run
 
 site: $(VENV)/.ready-to-test
 	@$(BIN)/sphinx-build -W -q docs build/site && echo "build/site/index.html"
+	@$(BIN)/sphinx-build -W -q -b man docs build/man && echo "build/man/harvey.1: man -l build/man/harvey.1"
 
 lock:
 	@$(PYTHON) -m venv $(LOCK)

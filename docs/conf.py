@@ -23,3 +23,6 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 napoleon_use_ivar = True
+
+man_pages = [("reference/command-line", "harvey", "model-directed mobile robot navigation", [], 1)]
+man_make_section_directory = False

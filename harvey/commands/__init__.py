@@ -14,7 +14,7 @@ MODULES: Mapping[str, str] = {
     "list": "listing",
     **{name: name for name in (
         "run", "view", "story", "why", "replay", "diff", "report", "export", "resume", "repair", "world", "settings",
-        "experiment", "campaign", "drive", "calibrate", "emulate")},
+        "experiment", "campaign", "drive", "calibrate", "emulate", "completion")},
 }
 """The module of each command."""
 

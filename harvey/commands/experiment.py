@@ -12,7 +12,7 @@ from harvey.commands.command import Command, whole
 
 
 def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("name", metavar="NAME", help="which one; harvey list names them")
+    parser.add_argument("experiment", metavar="NAME", help="which one; harvey list names them")
     parser.add_argument("--quick", action="store_true",
                         help="a small version, of seconds to two minutes; it claims only what it can show")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
@@ -25,7 +25,7 @@ def _run(args: Namespace) -> int:
     import experiments
 
     with choose_workers(parse_workers(args)):
-        report = experiments.run(args.name, quick=args.quick, seed=args.seed, missions=args.missions or None)
+        report = experiments.run(args.experiment, quick=args.quick, seed=args.seed, missions=args.missions or None)
     print(json.dumps(report.record(), indent=2) if args.json else report.text())
     return 0 if report.holds else 1
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -12,6 +13,7 @@ from urllib.parse import unquote, urldefrag
 import pytest
 
 from elsewhere import ROOT
+from harvey.commands import MODULES
 
 for extra in ("sphinx", "myst_parser", "furo"):
     pytest.importorskip(extra, reason=f"expected the extra 'docs' (pip install '.[docs]'), got no {extra}")
@@ -79,6 +81,17 @@ def test_nothing_is_loaded_from_elsewhere(pages: Mapping[Path, PageReader]) -> N
 def test_every_document_of_the_repository_has_its_page(site: Path) -> None:
     documents = [path.relative_to(ROOT / "docs") for path in (ROOT / "docs").rglob("*.md")]
     assert [str(path) for path in documents if not (site / path.with_suffix(".html")).is_file()] == []
+
+
+def test_the_man_page_has_every_command_and_is_sound(tmp_path: Path) -> None:
+    done = sphinx("man", ROOT / "docs", tmp_path)
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "harvey.1").read_text(encoding="utf-8")
+    assert [name for name in MODULES if f".SH HARVEY {name.upper()}\n" not in text] == []
+    if shutil.which("groff"):
+        formatter = ["groff", "-man", "-Tutf8", tmp_path / "harvey.1"]
+        drawn = subprocess.run(formatter, capture_output=True, text=True, check=False)
+        assert (drawn.returncode, drawn.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("link", ["[a page](nowhere.md)", "[a heading](start.md#nowhere)"])
