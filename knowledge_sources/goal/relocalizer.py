@@ -54,10 +54,11 @@ class Relocalizer(RobotKnowledgeSource):
     """Keeps every place of the floor that agrees with its pictures, and takes more until one place is left.
 
     The next picture is taken after the turn or short safe move by which the candidates' views are expected to differ
-    most. Once the place is known, a new top-level goal leads from there to the old destination (§2). Of places that
-    look alike, the one where it was told to be, or was tracked to, is believed if it is likely enough by these odds
-    and by the pictures. Otherwise the robot stays lost and the candidates stay on the board: it never guesses. What is
-    at the same place in its pictures while it turns is an obstruction, and is ignored.
+    most; among places that look alike from here, the robot drives to a view that tells them apart, over floor that is
+    free in all of them. Once the place is known, a new top-level goal leads from there to the old destination (§2). Of
+    places that look alike, the one where it was told to be, or was tracked to, is believed if it is likely enough by
+    these odds and by the pictures. Otherwise the robot stays lost and the candidates stay on the board: it never
+    guesses. What is at the same place in its pictures while it turns is an obstruction, and is ignored.
     """
 
     level = Level.GOAL
