@@ -14,6 +14,7 @@ from blackboard.effect import Effect, Post, Retract, Revise, to_say
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.camera_knowledge import find_camera
 from knowledge_sources.methods.localization.far_views import choose_far_action
 from knowledge_sources.methods.localization.global_localization import (
     Candidate,
@@ -44,6 +45,7 @@ from world_models.entries.body import Look, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis, HypothesisStatus, Place, PlaceOdds, TwinOdds, covariance_tuple
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import Glimpse, Panorama, Segments
+from world_models.entries.robot import CameraState
 from world_models.entries.task import Certificate, Goal, PlanSketch
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
@@ -68,7 +70,7 @@ class Relocalizer(RobotKnowledgeSource):
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "odometry"),
         Watch(Segments, (Posted,), lambda s: s.milestone == ""),
     )
-    writes = (Look, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama, Obstruction, PlaceOdds)
+    writes = (Look, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama, Obstruction, PlaceOdds, CameraState)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         lost = open_discrepancy(view, Level.GOAL)
@@ -112,12 +114,16 @@ class Relocalizer(RobotKnowledgeSource):
         if obstruction is not None:
             because = (segments, lost, hidden if change is None else change)
         building, rooms = find_building(view), self._list_rooms(view, belief.value)
-        looking = robot.with_obstruction(obstruction).on_floor_of(belief.value.locale)
+        locale = belief.value.locale
         here = belief.value.world_from_robot(building)
         told = ToldPlace(here, belief.value.covariance_world(building),
                          _find_prior(view, tuning))
         followed = _list_moved_candidates(view, before, robot.actuator, building)
-        seen_result = localize(looking, looks, rooms, self._settings, (belief.value.locale, here), followed)
+        tried = []
+        for camera in self._list_cameras(view):
+            by = find_robot(view, camera).with_obstruction(obstruction).on_floor_of(locale)
+            tried.append((localize(by, looks, rooms, self._settings, (locale, here), followed), by, camera))
+        seen_result, looking, camera = max(tried, key=lambda one: _measure_fit(one[0]))  # of equals the first
         goal = self._settings.goal
         is_last = len(glimpses) >= (goal.max_far_probes if seen_result.candidates else goal.max_probes)
         if is_last:
@@ -126,7 +132,7 @@ class Relocalizer(RobotKnowledgeSource):
         result = weigh_told(seen_result, told, look_alike, len(looks), tuning)
         odds = _odds_used(view, seen_result, result, told)
         if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
-            result = _prefer_reachable(building, result, belief.value.locale)
+            result = _prefer_reachable(building, result, locale)
         far = self._find_far_action(looking, result, glimpses, rooms)
         if far is not None:
             result, is_last = replace(result, status=LocalizationStatus.PROBE, next_action=far), False
@@ -141,6 +147,9 @@ class Relocalizer(RobotKnowledgeSource):
             if odds is not None:
                 why = (seen, Post(odds, (seen, belief)))
                 yield why[1]
+            learnt = view.latest(CameraState)
+            if learnt is not None and learnt.value != camera:
+                yield Revise(learnt, camera, (seen, learnt))
             yield from self._adopt(view, (segments, *why), lost, belief, result.candidates[0])
             return
         for c in result.candidates:
@@ -149,6 +158,14 @@ class Relocalizer(RobotKnowledgeSource):
             s, action = self._settings.action, result.next_action  # while lost, no floor is known to be free
             slowly = s.creep_speed_m_per_s if s.keeps_to_seen_floor and action.move_m > 0.0 else None
             yield Post(MotorCommand(action.turn_rad, action.move_m, slowly), (segments, lost, seen))
+
+    def _list_cameras(self, view: View) -> tuple[CameraState, ...]:
+        """The camera as it was learnt; also as it was told, where few pictures taught otherwise: if the place was not
+        where it was believed, they made the camera fit the wrong place.
+        """
+        camera = find_camera(view)
+        is_sure = camera.told_lens is None or len(camera.counted) > self._settings.localization.max_doubted_pictures
+        return (camera,) if is_sure else (camera, camera.as_told())
 
     def _find_far_action(
         self, robot: RobotModel, result: LocalizationResult, glimpses: Sequence[Glimpse], rooms: Sequence[str]
@@ -203,6 +220,11 @@ class Relocalizer(RobotKnowledgeSource):
         pose = candidate.world_from_robot
         origin = Place.of_world(building, candidate.room, pose.x_m, pose.y_m)
         yield Post(Goal(origin, goal.value.destination), (here, abandon))
+
+
+def _measure_fit(result: LocalizationResult) -> float:
+    """The log likelihood of the best place."""
+    return max((c.likelihood.log_likelihood for c in result.candidates), default=-math.inf)
 
 
 def _find_prior(view: View, settings: LocalizationSettings) -> float:

@@ -59,6 +59,8 @@ class LocalizationSettings:
     fine_climb_m: float = setting(0.05, "m", "Step of the second round of hill climbing.", _JUDGED)
     fine_climb_rad: float = setting(math.radians(0.5), "rad", "Step of the second round of hill climbing.", _JUDGED)
     min_relative_score: float = setting(0.6, "1", "Smallest score of a candidate, as a part of the best.", _KIDNAP)
+    max_views_of_search: int = setting(
+        8, "count", "Most views, the last, by which the floor is searched; what is found is refined by all.", _JUDGED)
     max_candidates: int = setting(14, "count", "Most candidates of a floor that are refined.", _KIDNAP)
 
     # Refinement
@@ -123,6 +125,9 @@ class LocalizationSettings:
     refuting_log_ratio: float = setting(
         8.0, "1", "Log likelihood ratio (Bayes factor) by which a better hypothesis refutes a distinct one.", _KIDNAP)
     max_hypotheses: int = setting(6, "count", "Most hypotheses that are kept.", _JUDGED)
+
+    max_doubted_pictures: int = setting(
+        3, "count", "A camera that so few pictures taught is tried as told too, when the robot is lost.", _JUDGED)
 
     # Telling hypotheses apart, and the next view
     same_line_px: float = setting(

@@ -26,6 +26,7 @@ class CameraState:
             of it, of the focal length; 0 where nobody has stated any. sigma_roll_rad, sigma_yaw_rad: the same.
         covariance: (7, 7) over :data:`~world_models.camera.CAMERA_UNKNOWNS`, once it is learnt from milestones, or ().
         counted: the poses (x [m], y [m], heading [rad], world) of the pictures by which it was learnt, the newest last.
+        told_lens, told_mount: both as they were told, once they were learnt otherwise.
     """
 
     lens: Camera
@@ -38,11 +39,19 @@ class CameraState:
     sigma_yaw_rad: float = 0.0
     covariance: tuple[tuple[float, ...], ...] = ()
     counted: tuple[tuple[float, ...], ...] = ()
+    told_lens: Camera | None = None
+    told_mount: CameraMount | None = None
 
     def moved(self, step: Sequence[float]) -> CameraState:
         """The state with its camera after a step (7,) of :data:`~world_models.camera.CAMERA_UNKNOWNS`."""
         lens, mount = move_camera(self.lens, self.mount, step)
-        return replace(self, lens=lens, mount=mount)
+        return replace(self, lens=lens, mount=mount, told_lens=self.told_lens or self.lens,
+                       told_mount=self.told_mount or self.mount)
+
+    def as_told(self) -> CameraState:
+        """The state before anything was learnt."""
+        return replace(self, lens=self.told_lens or self.lens, mount=self.told_mount or self.mount, covariance=(),
+                       counted=(), told_lens=None, told_mount=None)
 
     @cached_property
     def pinhole(self) -> Camera:

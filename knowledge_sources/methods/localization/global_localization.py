@@ -246,9 +246,10 @@ def decide(
 def _find_refined(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings
 ) -> list[RefinedPose]:
-    """The best candidates, refined, each once."""
+    """The best candidates by the last views, refined by all, each once."""
     tuning, found = settings.localization, list[RefinedPose]()
-    for candidate in find_pose_candidates(robot, views, rooms, tuning.max_candidates, settings):
+    last = views[-tuning.max_views_of_search:]
+    for candidate in find_pose_candidates(robot, last, rooms, tuning.max_candidates, settings):
         pose, covariance = refine_pose(robot, views, candidate.world_from_robot, settings)
         if all(are_distinct(pose, other.world_from_robot, tuning) for other in found):
             found.append(RefinedPose(candidate.room, pose, covariance))

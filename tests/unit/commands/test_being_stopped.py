@@ -76,6 +76,16 @@ sys.exit(harvey.cli.main(["list"]))
     assert (done.returncode, done.stderr) == (130, "harvey: interrupted\n")
 
 
+def wait_until_idle(processes: list[subprocess.Popen[str]]) -> None:
+    """Wait until processes have loaded all that they need, and then use no processor for two seconds."""
+    used: list[list[str]] = []
+    for _ in range(120):
+        time.sleep(0.5)
+        used.append([Path(f"/proc/{p.pid}/stat").read_text().rsplit(")", 1)[1].split()[11] for p in processes])
+        if len(used) > 8 and all(before == used[-1] for before in used[-5:]) and all(int(t) >= 20 for t in used[-1]):
+            return
+
+
 def test_a_pipe_into_which_nobody_writes_can_be_interrupted(tmp_path: Path) -> None:
     """Each command by each signal; all are started before any is waited for."""
     world = ["--world", "research_center", "--goal", "(ptrans (hallway (4,4,0)) (hallway (9,4,0)))"]
@@ -87,8 +97,8 @@ def test_a_pipe_into_which_nobody_writes_can_be_interrupted(tmp_path: Path) -> N
             argv = [*HARVEY, command, "--camera", str(pipe), *more, "--out", str(out)]
             process = subprocess.Popen(argv, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
             waiting.append((number, process))
-    time.sleep(8.0)
     try:
+        wait_until_idle([process for _, process in waiting])
         for number, process in waiting:
             assert process.poll() is None
             process.send_signal(number)
