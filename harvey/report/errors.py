@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from io import StringIO
 from typing import Any
 
+from harvey.report.drawing import drawing, svg
 from harvey.story.truth import TrueError
 
 LEAST_M = 1e-4
 """What is less is drawn as this: the axis is logarithmic."""
-METADATA = ("Date", "Creator", "Format", "Type")
-"""Is left out: the same run gives the same bytes."""
-GREY = "#808080"
-"""Of text and frame: to be read on light and on dark."""
 
 
 def draw_errors(
     beliefs: Sequence[Mapping[str, Any]], errors: Sequence[TrueError], lost: Iterable[tuple[int, int]]
 ) -> str:
     """The place's standard deviation and, where it is known, its true error [m], as SVG. ``lost``: cycles from, to."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    with rc_context({"svg.hashsalt": "harvey", "svg.fonttype": "none", "text.color": GREY, "axes.labelcolor": GREY,
-                     "xtick.color": GREY, "ytick.color": GREY, "axes.edgecolor": GREY}):
-        figure = Figure(figsize=(9.0, 2.8))
+    with drawing(9.0, 2.8) as figure:
         axes = figure.add_axes((0.08, 0.18, 0.9, 0.76))
         axes.set_yscale("log")
         for since, until in lost:
@@ -39,7 +30,4 @@ def draw_errors(
         axes.set_ylabel("place [m]")
         axes.grid(alpha=0.3)
         axes.legend(loc="upper right", frameon=False, fontsize="small")
-        out = StringIO()
-        figure.savefig(out, format="svg", transparent=True, metadata=dict.fromkeys(METADATA))
-    text = out.getvalue()
-    return text[text.index("<svg"):]
+        return svg(figure)

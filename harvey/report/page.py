@@ -48,13 +48,14 @@ def build_page(run: RunDirectory, history: History) -> str:
     }
     title = run_name(run)
     parts = {
-        "title": escape(title), "style": _read("page.css"), "script": _read("page.js"), "data": embedded(contents),
+        "title": escape(title), "style": read_part("page.css"), "script": read_part("page.js"),
+        "data": embedded(contents),
         "opening": _opening(story), "plans": "\n".join(plan["svg"] for plan in plans),
         "errors": draw_errors(beliefs, errors, lost_spans(story, history)) if beliefs else "",
         "sections": "\n".join(_sections(story)), "milestones": "\n".join(_milestones(story)),
         "last": str(history.cycles[-1]),
     }
-    return fill_in(_read("page.html"), parts)
+    return fill_in(read_part("page.html"), parts)
 
 
 def fill_in(frame: str, parts: Mapping[str, str]) -> str:
@@ -96,13 +97,14 @@ def _known(run: RunDirectory) -> tuple[World | None, Camera | None, bool]:
         return None, None, False
 
 
-def _read(name: str) -> str:
+def read_part(name: str) -> str:
+    """A part of the page as it stands beside this file."""
     return (files("harvey.report") / name).read_text(encoding="utf-8")
 
 
 def _opening(story: RunStory) -> str:
     first, *rest = story.opening
-    return f"<p><strong>{escape(first)}</strong></p>\n<pre>{escape(chr(10).join(rest))}</pre>"
+    return f"<p><strong>{escape(first)}</strong></p>\n<pre tabindex=\"0\">{escape(chr(10).join(rest))}</pre>"
 
 
 def _sections(story: RunStory) -> Iterator[str]:

@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from blackboard.change import Posted
 from blackboard.journal import Decision
 from logs.turning_points import TurningPoint, TurningPointFinder
 from world_models.camera_lessons import CameraLesson, find_camera_lessons
-from world_models.entries.body import Frame, MotionReport
+from world_models.entries.body import Frame, Look, MotionReport
 from world_models.entries.locale_frame import FrameRequest
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot import CameraState
@@ -18,6 +19,8 @@ from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch
 
 PARTS = ("contacts", "turning_points", "camera")
 """What of a result is a list of parts with names."""
+PROBE = "probe"
+"""The purpose of a picture that is to tell where the robot is."""
 UNFINISHED = "unfinished"
 """The outcome in ``result.json`` of a run that has none yet."""
 
@@ -56,6 +59,7 @@ class MissionResult:
         turning_points: what changed the course of the run, as the robot itself knew it.
         camera: what has turned out to be otherwise about the camera than the robot was told.
         amiss: which of the scenario's faults did not happen, or not as they were asked for, in words.
+        probes: pictures that it asked for to find out where it is; None in the results of older versions.
     """
 
     scenario: str
@@ -81,6 +85,7 @@ class MissionResult:
     turning_points: Sequence[TurningPoint] = ()
     waits: int = 0
     camera: Sequence[CameraLesson] = ()
+    probes: int | None = None
 
     @property
     def cycles(self) -> int:
@@ -117,6 +122,7 @@ class RunCounts:
 
     def __init__(self) -> None:
         self.decisions = self.waits = self.replans = self.relocalizations = self.sketches = self.frames = 0
+        self.probes = 0
         self.milestones = {"verified": 0, "refuted": 0, "not_testable": 0}
         self.path_m = self.time_s = 0.0
         self.turning_points: list[TurningPoint] = []
@@ -142,6 +148,8 @@ class RunCounts:
                 self.camera = value
             if isinstance(value, Milestone) and value.status.replace(" ", "_") in self.milestones:
                 self.milestones[value.status.replace(" ", "_")] += 1
+            elif isinstance(value, Look):
+                self.probes += value.purpose == PROBE and isinstance(change, Posted)
             elif isinstance(value, PlanSketch):
                 self.sketches += revision == 0
                 self.replans += value.adjustments > 0 and value.verified and change.entry.author == "sketcher"
@@ -165,4 +173,5 @@ class RunCounts:
             milestones={**self.milestones, "false_accepts": None}, replans=self.replans,
             relocalizations=self.relocalizations, sketches=self.sketches, collisions=None, max_cross_track_m=None,
             turning_points=tuple(self.turning_points), waits=self.waits, camera=self.camera_lessons(),
+            probes=self.probes,
         )

@@ -1,0 +1,108 @@
+"""The report of several missions: a table, distributions and links to the runs' own reports in one HTML file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from html import escape
+from pathlib import Path
+from urllib.parse import quote
+
+from harvey.campaign.compare import rate_interval
+from harvey.report.page import fill_in, read_part
+from harvey.report.several.distributions import draw_distributions
+from harvey.report.several.fields import Field, count_outcomes, read_fields
+from harvey.report.several.missions import Mission
+
+OWN = "{}-runs"
+"""The folder beside a page of that name in which the runs' own reports are."""
+HEAD_BYTES = 4096
+"""The title of a report stands within so many."""
+
+
+def build_page(missions: Sequence[Mission], title: str, out: Path) -> str:
+    """The whole file; ``out``: where it will be, as the links to the runs' own reports lead from there."""
+    columns, same = read_fields([mission.result for mission in missions])
+    links = [find_report(mission, out) for mission in missions]
+    parts = {
+        "title": escape(title), "style": read_part("page.css"), "script": read_part("several/page.js"),
+        "opening": _opening(len(missions), sum(link is not None for link in links)),
+        "outcomes": "\n".join(_outcomes(columns, len(missions))),
+        "same": "".join(f"<p>{escape(label)}, of all: {escape(text)}</p>\n" for label, text in same.items()),
+        "plots": "\n".join(f"<figure>{svg}<figcaption>{escape(words)}</figcaption></figure>"
+                           for svg, words in draw_distributions(columns)) or "<p>No number of them differs.</p>",
+        "filters": "\n".join(_filters(columns)),
+        "heads": "".join(_head(label) for label in ("mission", *(column.label for column in columns))),
+        "rows": "\n".join(f"<tr>{_name(mission, link)}{''.join(_cells(columns, number))}</tr>"
+                          for number, (mission, link) in enumerate(zip(missions, links, strict=True))),
+    }
+    return fill_in(read_part("several/page.html"), parts)
+
+
+def report_path(mission: Mission, out: Path) -> Path:
+    """Where the own report of a mission belongs beside the page: the same for the same name."""
+    name = quote(mission.name.replace(", ", "-").replace(" ", "-"), safe="")
+    return out.parent / OWN.format(out.stem) / f"{name}.html"
+
+
+def find_report(mission: Mission, out: Path) -> str | None:
+    """The link to a run's own report, beside the page or by the name that ``harvey report`` gives; None without one."""
+    places = [report_path(mission, out)]
+    if mission.run is not None:
+        places.append(out.parent / f"{mission.run.path.resolve().name}.html")
+    for place in places:
+        if place != out and _is_report_of(mission, place):
+            return quote(place.relative_to(out.parent).as_posix())
+    return None
+
+
+def _is_report_of(mission: Mission, place: Path) -> bool:
+    try:
+        with place.open("rb") as file:
+            return f"<title>{escape(mission.name)}</title>".encode() in file.read(HEAD_BYTES)
+    except OSError:
+        return False
+
+
+def _opening(missions: int, linked: int) -> str:
+    more = " A mission's name leads to its own report." if linked == missions else (
+        f" {linked} of them have a report of their own, to which their names lead." if linked else "")
+    return f"<p>{missions} missions.{more}</p>"
+
+
+def _outcomes(columns: Sequence[Field], missions: int) -> Iterator[str]:
+    for outcome, number in count_outcomes(columns):
+        low, high = (100.0 * bound for bound in rate_interval(number, missions))
+        yield (f'<tr><th scope="row">{escape(outcome)}</th><td>{number}</td><td>{100.0 * number / missions:.1f}</td>'
+               f"<td>{low:.1f} to {high:.1f}</td></tr>")
+
+
+def _filters(columns: Sequence[Field]) -> Iterator[str]:
+    """A choice for each column of few texts."""
+    for number, column in enumerate(columns, start=1):
+        if column.kinds:
+            options = "".join(f'<option value="{escape(kind)}">{escape(kind)} ({often})</option>'
+                              for kind, often in column.kinds.items())
+            yield (f'<label>{escape(column.label)} <select data-column="{number}"><option value="">all</option>'
+                   f"{options}</select></label>")
+
+
+def _head(label: str) -> str:
+    return f'<th scope="col"><button type="button">{escape(label)}</button></th>'
+
+
+def _name(mission: Mission, link: str | None) -> str:
+    name = escape(mission.name)
+    return f'<th scope="row">{name if link is None else f"""<a href="{escape(link)}">{name}</a>"""}</th>'
+
+
+def _cells(columns: Sequence[Field], number: int) -> Iterator[str]:
+    for column in columns:
+        value = column.values[number]
+        if not column.is_number:
+            yield f"<td>{escape(column.cell(number))}</td>"
+        elif isinstance(value, float):
+            exact = value if math.isfinite(value) else f"{'-' * (value < 0.0)}Infinity"
+            yield f'<td data-value="{exact}" class="number">{column.cell(number)}</td>'
+        else:
+            yield '<td data-value=""></td>'
