@@ -1,7 +1,7 @@
 """Levels of perceptual servoing (Figure 2): missions with each level switched off.
 
 Tested are claims of §2 and §5: with all levels every mission arrives; without the action level the robot strays
-further from its path; without the plan level it ends further off; a kidnapped robot needs the goal level.
+further from its path; without the plan level farther still; a kidnapped robot needs the goal level.
 """
 
 from __future__ import annotations
