@@ -13,9 +13,10 @@ from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
+from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.motion.footprints import MIN_SIDE_M, build_polygon, list_corners
 from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
-from knowledge_sources.questions import ACTIVE_SKETCH, find_belief, find_building, find_frames, find_robot
+from knowledge_sources.questions import ACTIVE_SKETCH, active_goal, find_belief, find_building, find_frames, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle
@@ -38,7 +39,7 @@ class Sketcher(RobotKnowledgeSource):
         Watch(PlanSketch, (Revised,), lambda sketch: sketch.status == "done"),
         Watch(PlanSketch, (Revised,), lambda sketch: sketch.status == "superseded" and not sketch.path),
     )
-    writes = (PlanSketch, Goal, Outcome)
+    writes = (PlanSketch, Goal, Outcome, Discrepancy)
 
     def rate(self, view: View, trigger: Change) -> float | None:
         value = trigger.entry.value
@@ -173,10 +174,17 @@ class Sketcher(RobotKnowledgeSource):
     def _adjust(
         self, view: View, milestone: Entry[Milestone], sketch: Entry[PlanSketch], belief: Entry[Hypothesis]
     ) -> Iterable[Effect]:
-        """Plan-level servoing: repeat the subgoal from where the robot turned out to be (§6)."""
+        """Plan-level servoing: repeat the subgoal from where the robot turned out to be (§6).
+
+        Where that is in vain for the first goal, the robot may be elsewhere: the goal level looks.
+        """
         s = sketch.value
         if s.adjustments >= self._settings.plan.max_adjustments:
-            yield Post(Outcome("blocked", f"{sketch.id} was adjusted {s.adjustments} times in vain"), (milestone,))
+            in_vain, goal = f"{sketch.id} was adjusted {s.adjustments} times in vain", active_goal(view)
+            if goal is not None and goal.id == f"{Goal.__name__}-1":
+                yield Post(Discrepancy(Level.GOAL, in_vain, None, (0.0, 0.0), "px"), (milestone, goal))
+            else:
+                yield Post(Outcome("blocked", in_vain), (milestone,))
             return
         k = s.at - 1
         building = find_building(view)

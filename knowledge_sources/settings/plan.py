@@ -58,7 +58,7 @@ class PlanSettings:
     goal_heading_tolerance_rad: float = setting(
         0.02, "rad", "Tolerance of a heading that the goal states.", "engineering judgement")
     max_adjustments: int = setting(
-        8, "count", "So often a sketch is adjusted at one milestone; then it is blocked.", "engineering judgement")
+        8, "count", "So often a sketch is adjusted at one milestone; then that was in vain.", "engineering judgement")
 
     # Escalator
     max_checks_per_subgoal: int = setting(
