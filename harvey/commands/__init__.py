@@ -13,8 +13,8 @@ from harvey.commands.command import Command
 MODULES: Mapping[str, str] = {
     "list": "listing",
     **{name: name for name in (
-        "run", "view", "story", "why", "replay", "diff", "report", "export", "resume", "repair", "world", "settings",
-        "experiment", "campaign", "drive", "calibrate", "emulate", "completion")},
+        "run", "serve", "view", "story", "why", "replay", "diff", "report", "export", "resume", "repair", "world",
+        "settings", "experiment", "campaign", "drive", "calibrate", "emulate", "completion")},
 }
 """The module of each command."""
 

@@ -44,7 +44,7 @@ def beliefs(history: History, world: World | None) -> Iterator[dict[str, Any]]:
     for record in _hypotheses(history) if world is not None else ():
         value = value_of(record, Hypothesis)
         if world is not None and value.is_held:
-            yield {"cycle": record.cycle, "ref": record.ref, "locale": value.locale, **_placed(value, world)}
+            yield {"cycle": record.cycle, "ref": record.ref, "locale": value.locale, **placed(value, world)}
 
 
 def candidates(history: History, world: World | None) -> Iterator[dict[str, Any]]:
@@ -57,14 +57,14 @@ def candidates(history: History, world: World | None) -> Iterator[dict[str, Any]
         ends = (history.entry(f"{id}.{int(revision) + 1}"), history.retraction(record.ref))
         yield {"cycle": record.cycle, "until": min((end.cycle for end in ends if end is not None), default=None),
                "ref": record.ref, "locale": value.locale, "weight": value.weight, "place": value.place(),
-               "evidence": value.evidence, **_placed(value, world)}
+               "evidence": value.evidence, **placed(value, world)}
 
 
 def _hypotheses(history: History) -> Sequence[EntryRecord]:
     return [record for record in history.of_kind("Hypothesis") if record.change != "Retracted"]
 
 
-def _placed(value: Hypothesis, world: World) -> dict[str, float]:
+def placed(value: Hypothesis, world: World) -> dict[str, float]:
     """Pose [m, rad] and one-sigma ellipse [m; angle of its longer axis, rad] in the world frame."""
     pose = value.world_from_robot(world)
     variances, axes = np.linalg.eigh(value.covariance_world(world)[:2, :2])

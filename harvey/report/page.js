@@ -1,22 +1,7 @@
-"use strict";
 // The page of a run: everything that it shows stands in the element "data"; nothing is fetched.
 const run = JSON.parse(document.getElementById("data").textContent);
-const SVG = "http://www.w3.org/2000/svg";
 const NEAR = 12; // so many decisions are listed before and after the one that is shown
 const scrubber = document.getElementById("cycle");
-
-function element(name, attributes = {}, text = "") {
-  const made = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.textContent = text;
-  return made;
-}
-
-function drawn(name, attributes) {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return made;
-}
 
 /** The last of some items whose cycle, which grows, is not after this; undefined where there is none. */
 function last(items, cycle, at = (item) => item.cycle) {
@@ -30,23 +15,8 @@ function last(items, cycle, at = (item) => item.cycle) {
   return items[low - 1];
 }
 
-function metres(length) {
-  return length > 0.1 ? `${length.toFixed(2)} m` : `${(1000 * length).toFixed(1)} mm`;
-}
-
 function reference(ref) {
   return element("button", { type: "button", "data-entry": ref }, ref);
-}
-
-/** Where a point of the world is on a plan, as a transformation. */
-function there(plan, x, y, angle) {
-  const degrees = (-angle * 180) / Math.PI;
-  return `translate(${plan.scale * (x - plan.left)} ${plan.scale * (plan.top - y)}) rotate(${degrees})`;
-}
-
-function ellipse(plan, one) {
-  const [long, short] = [one.sigma, one.sigma_short].map((sigma) => Math.max(1, 3 * sigma * plan.scale));
-  return { rx: long, ry: short };
 }
 
 function showPlan(cycle) {
@@ -63,16 +33,9 @@ function showPlan(cycle) {
     blue.style.display = here ? "" : "none";
     if (here && truth !== undefined) green.setAttribute("transform", there(plan, truth[1], truth[2], truth[3]));
     if (here) {
-      blue.setAttribute("transform", there(plan, belief.x, belief.y, belief.heading));
-      const round = blue.querySelector("ellipse");
-      round.setAttribute("transform", `rotate(${((belief.heading - belief.along) * 180) / Math.PI})`);
-      for (const [key, value] of Object.entries(ellipse(plan, belief))) round.setAttribute(key, value);
+      placeBelief(plan, blue, belief);
     }
-    const marks = lost.filter((one) => plan.rooms.includes(one.locale)).map((one) => {
-      const mark = drawn("g", { transform: there(plan, one.x, one.y, one.heading), opacity: 0.3 + 0.7 * one.weight });
-      mark.append(drawn("ellipse", { ...ellipse(plan, one), rx: 14, ry: 14 }), drawn("path", { d: "M 22 0 L -8 8 L -8 -8 Z" }));
-      return mark;
-    });
+    const marks = lost.filter((one) => plan.rooms.includes(one.locale)).map((one) => candidateMark(plan, one));
     svg.querySelector(".candidates").replaceChildren(...marks);
   });
   showBelief(cycle, belief);

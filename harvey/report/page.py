@@ -48,7 +48,7 @@ def build_page(run: RunDirectory, history: History) -> str:
     }
     title = run_name(run)
     parts = {
-        "title": escape(title), "style": read_part("page.css"), "script": read_part("page.js"),
+        "title": escape(title), "style": read_part("page.css"), "script": read_part("draw.js") + read_part("page.js"),
         "data": embedded(contents),
         "opening": _opening(story), "plans": "\n".join(plan["svg"] for plan in plans),
         "errors": draw_errors(beliefs, errors, lost_spans(story, history)) if beliefs else "",

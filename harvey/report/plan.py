@@ -33,6 +33,11 @@ def draw_plans(
     return [_draw(storey, beliefs, track) for storey in storeys]
 
 
+def draw_blank_plans(world: World) -> list[dict[str, Any]]:
+    """A drawing for every storey, as by :func:`draw_plans`, without paths."""
+    return [_draw(storey, (), ()) for storey in draw_storeys(world)]
+
+
 def _draw(
     storey: Storey, beliefs: Sequence[Mapping[str, Any]], track: Sequence[tuple[int, float, float, float]]
 ) -> dict[str, Any]:

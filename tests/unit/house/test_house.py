@@ -109,6 +109,8 @@ def test_what_computes_or_moves_knows_entries_but_no_board(package: str) -> None
         ("rerun", ("logs",)),
         ("cv2", ("knowledge_sources.methods", "harvey.hardware.drivers", "sim")),
         ("serial", ("harvey.hardware.drivers", "sim")),
+        ("starlette", ("harvey.serve",)),
+        ("uvicorn", ("harvey.serve",)),
         ("random", ()),
         ("pickle", ()),
         ("marshal", ()),

@@ -1,0 +1,93 @@
+"""``harvey serve``: drive a mission in the simulator, and show it on a page in the browser meanwhile."""
+
+from __future__ import annotations
+
+import math
+import secrets
+import sys
+from argparse import ArgumentParser, Namespace
+from importlib.util import find_spec
+from pathlib import Path
+
+from harvey.campaign.campaign import Task, make_room, parse_pairs, parse_seeds
+from harvey.commands.command import Command
+from harvey.errors import BadInput
+from harvey.run_files.run_directory import RUNS, check_vacant
+
+PORT = 8750
+
+
+def _arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("scenario", metavar="SCENARIO", help="a name from harvey list, or a TOML file")
+    parser.add_argument("--port", metavar="N", type=int, default=PORT, help=f"0 for any that is free ({PORT})")
+    parser.add_argument("--host", metavar="ADDRESS", default="127.0.0.1",
+                        help="the address of this machine on which it listens; with another than 127.0.0.1 whoever"
+                             " reaches it may watch (127.0.0.1)")
+    parser.add_argument("--seed", metavar="N", default="0", help="seed of all random numbers (0)")
+    parser.add_argument("--speed", metavar="X", type=float, default=1.0,
+                        help="how many times as fast as the robot's own time it may go; 0: as fast as it computes (1)")
+    parser.add_argument("--paused", action="store_true", help="begin paused, so that a page can be opened first")
+    parser.add_argument("--out", metavar="DIR", help="directory for the run's files (runs/SCENARIO-SEED)")
+    parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
+                        help="change a setting, as harvey run does; may be repeated")
+
+
+def _run(args: Namespace) -> int:
+    if not (math.isfinite(args.speed) and args.speed >= 0.0):
+        raise BadInput(f"--speed: expected a number that is not below 0, got {args.speed}")
+    if any(find_spec(name) is None for name in ("starlette", "uvicorn")):
+        raise BadInput("expected Starlette and uvicorn to be installed: pip install 'harvey[serve]'")
+    seeds = parse_seeds(args.seed)
+    if len(seeds) > 1:
+        raise BadInput(f"--seed: expected one seed, got {len(seeds)}")
+    wanted = Path(args.out) if args.out else RUNS / f"{Path(args.scenario).stem}-{seeds[0]}"
+    task = Task(args.scenario, parse_pairs(args.settings), seeds[0], check_vacant(wanted))
+    task.load()  # what is wrong with it is said first
+    return _serve(task, args, wanted)
+
+
+def _serve(task: Task, args: Namespace, wanted: Path) -> int:
+    from harvey.campaign.summary import format_result
+    from harvey.serve.app import LOCAL_HOSTS, build_app
+    from harvey.serve.gate import Gate, GatedBody
+    from harvey.serve.live_state import LiveState
+    from harvey.serve.server import bind, serving
+    from harvey.simulation.run import build_head, run_mission
+    from harvey.story.story import first_lines
+
+    listening = bind(args.host, args.port)
+    stage = task.stage()
+    head = build_head(stage, task.seed, task.body, task.agent_settings)
+    world = head.load_world()
+    gate, live, token = Gate(args.speed), LiveState(world, head.model(world).lens), secrets.token_urlsafe()
+    if args.paused:
+        gate.order("pause")
+    app = build_app(live, gate, world, title=f"{stage.scenario.name}, seed {task.seed}", token=token,
+                    hosts=(*LOCAL_HOSTS, args.host))
+    address = f"http://{args.host}:{listening.getsockname()[1]}/"
+    out = make_room(wanted, stage.scenario.name, task.seed)
+    with serving(app, listening):
+        print(f"to watch, pause and stop: {address}#{token}\nonly to watch:            {address}", flush=True)
+        if args.host not in LOCAL_HOSTS:
+            print(f"whoever reaches {args.host} may watch; the line is not encrypted", file=sys.stderr, flush=True)
+        result = run_mission(stage, task.seed, out=out, sinks=(live,), head=head,
+                             around=lambda body, _is_replayed: GatedBody(body, gate))
+        live.end(f"{result.outcome}: {result.reason}; harvey report {out} tells all of it")
+    print(format_result(result, out, first_lines(out)))
+    return 0 if result.outcome == "reached" else 1
+
+
+COMMAND = Command(
+    "serve", "drive a mission in the simulator, and show it on a page meanwhile",
+    (
+        ("harvey serve lab-to-allens-office", "prints the page's address; open it in a browser"),
+        ("harvey serve hallway-kidnap --seed 3 --paused", "waits until somebody presses Resume"),
+        ("harvey serve lab-to-allens-office --speed 4 --port 0", "four times as fast, on any free port"),
+    ),
+    _arguments, _run,
+    "The page shows the camera's picture, the plan with the belief and its ellipse, candidates, milestones and the\n"
+    "last decisions with what they rest on. Who has the first address, with the token, can pause, resume and stop;\n"
+    "who has the second can only watch. A stop ends the run as the stop key of a robot does: its files are whole.\n"
+    "Needs the extra 'serve'. Goals in words and hardware are not served.\n"
+    "Exit code 0: the goal was reached; 1: it was not, or the run was stopped; 2: the input cannot be used.",
+)

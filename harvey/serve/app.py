@@ -1,0 +1,153 @@
+"""The live page's web application: everybody who reaches it may watch; only who has the token may pause or stop."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager
+from html import escape
+from importlib.resources import files
+from typing import Any, get_args
+
+from starlette.applications import Starlette
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.routing import Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from harvey.report.page import embedded, fill_in
+from harvey.report.plan import draw_blank_plans
+from harvey.serve.gate import Gate, Order
+from harvey.serve.live_state import LiveState
+from world_models.building.world import World
+
+PERIOD_S = 0.1
+"""A watcher is told at most once in this time."""
+LOCAL_HOSTS = ("127.0.0.1", "localhost")
+HEADERS: Mapping[str, str] = {
+    "content-security-policy": "default-src 'none'; img-src data:; style-src 'self' 'unsafe-inline'; script-src 'self';"
+                               " connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+    "x-content-type-options": "nosniff", "referrer-policy": "no-referrer", "cache-control": "no-store",
+}
+"""Of every answer: nothing is fetched from elsewhere, and no other page can frame this one."""
+
+
+class Board:
+    """The newest message, for all watchers. A watcher that is slow misses messages; nobody keeps them for it."""
+
+    def __init__(self, live: LiveState, gate: Gate) -> None:
+        self._live, self._gate = live, gate
+        self._message, self._state, self._number = "", "", 0
+        self._changed = asyncio.Condition()
+
+    async def renew(self) -> None:
+        """Make a message whenever something is new, until cancelled."""
+        while True:
+            state = self._gate.state
+            if self._live.take() or state != self._state:
+                self._state = state
+                self._message = f"data: {self._live.message(state)}\n\n"
+                self._number += 1
+                async with self._changed:
+                    self._changed.notify_all()
+            await asyncio.sleep(PERIOD_S)
+
+    async def messages(self) -> AsyncIterator[str]:
+        """The newest message, then each that is newer when the last was sent; ends with the run."""
+        told = 0
+        while True:
+            async with self._changed:
+                while self._number == told:
+                    await self._changed.wait()
+            told = self._number
+            yield self._message
+            if self._live.ended:
+                return
+
+
+class Guard:
+    """Refuses requests that another site's page makes, and marks every answer."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def marked(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                MutableHeaders(scope=message).update(HEADERS)
+            await send(message)
+
+        if scope["type"] == "http":
+            headers = Headers(scope=scope)
+            own = f"http://{headers.get('host', '')}"
+            if any(origin != own for origin in headers.getlist("origin")):
+                await PlainTextResponse("expected a request of this page, got one of another origin\n", 403)(
+                    scope, receive, marked)
+                return
+        await self._app(scope, receive, marked)
+
+
+def build_app(
+    live: LiveState, gate: Gate, world: World, *, title: str, token: str, hosts: Sequence[str] = LOCAL_HOSTS,
+) -> Starlette:
+    """The application.
+
+    Args:
+        token: what an order must be given with, as ``Authorization: Bearer TOKEN``.
+        hosts: names under which it answers; a request for any other is refused (DNS rebinding).
+    """
+    boards: list[Board] = []
+    page = _build_page(world, title)
+
+    @asynccontextmanager
+    async def lifespan(_app: Starlette) -> AsyncIterator[None]:
+        boards.append(Board(live, gate))
+        renewing = asyncio.create_task(boards[-1].renew())
+        try:
+            yield
+        finally:
+            renewing.cancel()
+
+    async def show(_request: Request) -> Response:
+        return HTMLResponse(page)
+
+    async def script(_request: Request) -> Response:
+        return Response(_read("report", "draw.js") + _read("serve", "live.js"), media_type="text/javascript")
+
+    async def style(_request: Request) -> Response:
+        return Response(_read("report", "page.css"), media_type="text/css")
+
+    async def events(_request: Request) -> Response:
+        return StreamingResponse(boards[-1].messages(), media_type="text/event-stream")
+
+    async def order(request: Request) -> Response:
+        given = request.headers.get("authorization", "")
+        if not secrets.compare_digest(given.encode(), f"Bearer {token}".encode()):
+            return PlainTextResponse("expected the token that was printed at the start\n", 403)
+        wanted: Order = request.path_params["order"]
+        if wanted not in get_args(Order):
+            return PlainTextResponse(f"expected one of {', '.join(get_args(Order))}\n", 404)
+        gate.order(wanted)
+        return PlainTextResponse(f"{gate.state}\n")
+
+    return Starlette(
+        routes=[Route("/", show), Route("/live.js", script), Route("/page.css", style), Route("/events", events),
+                Route("/orders/{order}", order, methods=["POST"])],
+        middleware=[Middleware(Guard),
+                    Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts), www_redirect=False)],
+        lifespan=lifespan)
+
+
+def _build_page(world: World, title: str) -> str:
+    plans = draw_blank_plans(world)
+    known: list[dict[str, Any]] = [{key: value for key, value in plan.items() if key != "svg"} for plan in plans]
+    return fill_in(_read("serve", "live.html"), {
+        "title": escape(title), "plans": "\n".join(plan["svg"] for plan in plans), "data": embedded({"plans": known})})
+
+
+def _read(package: str, name: str) -> str:
+    return (files(f"harvey.{package}") / name).read_text(encoding="utf-8")

@@ -1,0 +1,125 @@
+"""Gate: before each request to the body it waits while the run is paused, and refuses once it is stopped."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Literal
+
+from harvey.runner.ports import Body
+from world_models.entries.body import (
+    STOP_KEY,
+    BodyFault,
+    Course,
+    Frame,
+    MotionReport,
+    MotorCommand,
+    Ride,
+    RideReport,
+)
+from world_models.entries.touch import Contact, Ranges
+
+Order = Literal["pause", "resume", "stop"]
+WHY = "stopped from the page"
+
+
+class Gate:
+    """What people may do to a run; any thread may call it, and no call waits.
+
+    Args:
+        speed: how many times as fast as the body's own time the run may go; 0 for as fast as it computes.
+    """
+
+    def __init__(self, speed: float = 0.0) -> None:
+        self.speed = speed
+        self._open, self._stopped = threading.Event(), threading.Event()
+        self._open.set()
+
+    @property
+    def state(self) -> str:
+        """Running, paused or stopping."""
+        return "stopping" if self._stopped.is_set() else "running" if self._open.is_set() else "paused"
+
+    def order(self, order: Order) -> None:
+        """Pause, resume, or stop for good; a run that is stopped does not go on."""
+        if order == "pause":
+            self._open.clear()
+            return
+        if order == "stop":
+            self._stopped.set()
+        self._open.set()
+
+    def hold(self) -> bool:
+        """Wait while it is paused, on the run's thread; whether it may go on then."""
+        self._open.wait()
+        return not self._stopped.is_set()
+
+    def rest(self, duration_s: float) -> None:
+        """Wait on the run's thread; a stop ends it."""
+        self._stopped.wait(max(0.0, duration_s))
+
+
+class GatedBody:
+    """A body behind a gate. It asks nothing else of the body and changes no answer: the decisions stay the same.
+
+    A stop reaches the board as the stop key of a robot does (:data:`~world_models.entries.body.STOP_KEY`).
+    """
+
+    def __init__(self, body: Body, gate: Gate) -> None:
+        self._body, self._gate = body, gate
+        self._asked_s, self._body_s = time.monotonic(), 0.0
+
+    def execute(self, command: MotorCommand, /) -> MotionReport | BodyFault:
+        if not self._gate.hold():
+            return self._refuse()
+        found = self._body.execute(command)
+        self._pace(found.when_s if isinstance(found, BodyFault) else found.sim_time_s)
+        return found
+
+    def steer(self, course: Course, /) -> tuple[MotionReport, Frame] | BodyFault:
+        if not self._gate.hold():
+            return self._refuse()
+        found = self._body.steer(course)
+        self._pace(found.when_s if isinstance(found, BodyFault) else found[1].sim_time_s)
+        return found
+
+    def look(self, purpose: str, /) -> Frame | BodyFault:
+        if not self._gate.hold():
+            return self._refuse()
+        found = self._body.look(purpose)
+        self._pace(found.when_s if isinstance(found, BodyFault) else found.sim_time_s)
+        return found
+
+    def ride(self, ride: Ride, /) -> RideReport | BodyFault:
+        return self._body.ride(ride) if self._gate.hold() else self._refuse()
+
+    def wait(self, duration_s: float, /) -> float:
+        self._gate.hold()
+        now_s = self._body.wait(duration_s)
+        self._pace(now_s)
+        return now_s
+
+    def claim(self) -> MotionReport | BodyFault:
+        return self._body.claim()
+
+    def take_contact(self) -> Contact | None:
+        return self._body.take_contact()
+
+    def ranges(self) -> Ranges | None:
+        return self._body.ranges()
+
+    def stop(self) -> None:
+        self._body.stop()
+
+    def _refuse(self) -> BodyFault:
+        """The robot stands, and says who wanted it to."""
+        now_s = self._body.wait(0.0)
+        self._body.stop()
+        return BodyFault("user", STOP_KEY, WHY, "", now_s)
+
+    def _pace(self, body_s: float) -> None:
+        """Let as much time pass here as passed for the body since it answered last [s]."""
+        if self._gate.speed > 0.0:
+            took_s = time.monotonic() - self._asked_s
+            self._gate.rest((body_s - self._body_s) / self._gate.speed - took_s)
+        self._asked_s, self._body_s = time.monotonic(), body_s

@@ -1,0 +1,83 @@
+// The live page: each message of /events holds all that is shown, so a message that is missed is not missed for long.
+const plans = JSON.parse(document.getElementById("data").textContent).plans;
+const token = location.hash.slice(1);
+const source = new EventSource("/events");
+
+function byId(id) {
+  return document.getElementById(id);
+}
+
+function showPlans(belief, candidates) {
+  document.querySelectorAll("#plans svg").forEach((svg, number) => {
+    const plan = plans[number];
+    const here = belief !== null && plan.rooms.includes(belief.locale);
+    svg.style.display = here || (belief === null && number === 0) ? "" : "none";
+    const mark = svg.querySelector(".mark.believed");
+    mark.toggleAttribute("hidden", !here);
+    if (here) placeBelief(plan, mark, belief);
+    const marks = candidates.filter((one) => plan.rooms.includes(one.locale)).map((one) => candidateMark(plan, one));
+    svg.querySelector(".candidates").replaceChildren(...marks);
+  });
+}
+
+function showPicture(picture) {
+  if (picture === null) return;
+  const [width, height] = picture.size;
+  const svg = byId("picture");
+  svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  svg.replaceChildren(drawn("image", { width, height, href: `data:image/jpeg;base64,${picture.jpeg}` }));
+  for (const kind of ["found", "agreed"]) {
+    for (const [x1, y1, x2, y2] of picture[kind] ?? []) svg.append(drawn("line", { x1, y1, x2, y2, class: kind }));
+  }
+  byId("picture-name").textContent = picture.ref;
+}
+
+function cells(...texts) {
+  const row = element("tr");
+  row.append(...texts.map((text) => element("td", {}, text)));
+  return row;
+}
+
+function decisionRow(one) {
+  const row = cells(String(one.cycle), one.level, one.who, one.trigger, one.refused);
+  for (const made of one.made) {
+    const because = made.because.length > 0 ? ` (because of ${made.because.join(", ")})` : "";
+    row.lastElementChild.append(element("div", {}, made.says + because));
+  }
+  return row;
+}
+
+source.addEventListener("message", (event) => {
+  const run = JSON.parse(event.data);
+  byId("state").textContent = run.ended ? `ended, ${run.ended}` : run.state;
+  byId("cycle").textContent = run.cycle;
+  byId("time").textContent = run.time_s === null ? "0.0" : run.time_s.toFixed(1);
+  showPlans(run.belief, run.candidates);
+  showPicture(run.picture);
+  byId("belief").textContent = run.belief === null ? "It has no belief yet." : `${run.belief.ref}: ${run.belief.says}`;
+  byId("candidates").replaceChildren(...run.candidates.map((one) =>
+    element("li", {}, `may stand at ${one.place}, weight ${one.weight.toFixed(2)}; ${one.evidence}`)));
+  document.querySelector("#milestones tbody").replaceChildren(...run.milestones.map((one) => {
+    const row = cells(`${one.id}: ${one.what}`, one.status);
+    row.lastElementChild.className = one.status.replace(" ", "-");
+    return row;
+  }).reverse());
+  document.querySelector("#decisions tbody").replaceChildren(...run.decisions.map(decisionRow).reverse());
+  if (run.ended) {
+    source.close();
+    byId("orders").hidden = true;
+  }
+});
+source.addEventListener("error", () => {
+  if (source.readyState !== EventSource.CLOSED) byId("state").textContent = "the line is lost";
+});
+
+byId("orders").hidden = token === "";
+byId("only-watching").hidden = token !== "";
+document.addEventListener("click", async (event) => {
+  const order = event.target.closest("button")?.dataset.order;
+  if (order === undefined) return;
+  const asked = { method: "POST", headers: { Authorization: `Bearer ${token}` } };
+  const answer = await fetch(`/orders/${order}`, asked).then((got) => got.text(), () => "nobody answered");
+  byId("answer").textContent = answer.trim();
+});

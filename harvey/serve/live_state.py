@@ -1,0 +1,154 @@
+"""What the live page shows: made from decisions on the server's thread, so that the run only hands them over."""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from blackboard.change import Change, Retracted
+from blackboard.entry import Entry
+from blackboard.journal import Decision
+from harvey.report.data import placed
+from harvey.report.pictures import Lenses, shrink
+from harvey.why.links import words
+from world_models import words as plain_words
+from world_models.building.world import World
+from world_models.camera import Camera
+from world_models.entries.body import Frame
+from world_models.entries.location import Hypothesis
+from world_models.entries.percepts import LineMatch, PoseFix, Segments
+from world_models.entries.task import Milestone
+
+DECISIONS, MILESTONES = 12, 12
+"""So many of the last are shown."""
+
+
+class LiveState:
+    """Follows a run; a sink of it.
+
+    Calling it hands a decision over and never waits. Everything else belongs to one other thread, the server's. What is
+    kept does not grow with the run, but for what that thread has not taken yet.
+    """
+
+    def __init__(self, world: World, camera: Camera) -> None:
+        self._world, self._lenses = world, Lenses(camera)
+        self._new: SimpleQueue[Decision | str] = SimpleQueue()
+        self._decisions: deque[Decision] = deque(maxlen=DECISIONS)
+        self._milestones: dict[str, Milestone] = {}
+        self._believed: dict[str, Hypothesis] = {}
+        self._belief: tuple[str, Hypothesis] | None = None
+        self._picture: dict[str, Any] | None = None
+        self._frame: Entry[Frame] | None = None
+        self._segments: Entry[Segments] | None = None
+        self._match: Entry[LineMatch] | None = None
+        self._lines: dict[str, Any] = {}
+        self.ended = ""
+
+    def __call__(self, decision: Decision) -> None:
+        """The run's thread hands a decision over."""
+        self._new.put(decision)
+
+    def end(self, how: str) -> None:
+        """The run's thread says that there will be no more, and how it ended."""
+        self._new.put(how)
+
+    def take(self) -> bool:
+        """Take what was handed over; whether there was anything."""
+        taken = False
+        while True:
+            try:
+                new = self._new.get_nowait()
+            except Empty:
+                return taken
+            taken = True
+            if isinstance(new, str):
+                self.ended = new
+                continue
+            self._decisions.append(new)
+            for change in (*new.observed, *new.made):
+                self._follow(change)
+
+    def message(self, state: str) -> str:
+        """All that is shown, as JSON in one line; ``state`` is the gate's."""
+        belief = None
+        if self._belief is not None:
+            ref, held = self._belief
+            belief = {"ref": ref, "locale": held.locale, "says": held.sentence(), **placed(held, self._world)}
+        candidates = [
+            {"id": id, "locale": one.locale, "place": one.place(), "weight": one.weight, "evidence": one.evidence,
+             **placed(one, self._world)}
+            for id, one in self._believed.items() if one.status == "candidate"]
+        contents = {
+            "state": "ended" if self.ended else state, "ended": self.ended,
+            "cycle": self._decisions[-1].cycle if self._decisions else 0,
+            "time_s": None if self._frame is None else self._frame.value.sim_time_s,
+            "belief": belief, "candidates": candidates, "picture": self._draw_picture(),
+            "milestones": [{"id": id, "what": one.what, "status": one.status}
+                           for id, one in self._milestones.items()],
+            "decisions": [_row(decision) for decision in self._decisions],
+        }
+        return json.dumps(contents, separators=(",", ":"))
+
+    def _follow(self, change: Change) -> None:
+        entry, value = change.entry, change.entry.value
+        if isinstance(value, Hypothesis):
+            self._believed.pop(entry.id, None)
+            if not isinstance(change, Retracted):
+                if value.is_held:
+                    self._belief = str(entry.ref), value
+                elif value.status == "candidate":
+                    self._believed[entry.id] = value
+        elif isinstance(change, Retracted):
+            return
+        elif isinstance(value, Milestone):
+            self._milestones.pop(entry.id, None)
+            self._milestones[entry.id] = value
+            while len(self._milestones) > MILESTONES:
+                del self._milestones[next(iter(self._milestones))]
+        elif isinstance(value, Frame):
+            self._frame = entry
+            self._lines = {}
+        elif isinstance(value, Segments):
+            self._segments = entry
+            if self._shows(value.frame):
+                self._lines = {"found": self._lenses.place(value.segments_px)}
+        elif isinstance(value, LineMatch):
+            self._match = entry
+        elif isinstance(value, PoseFix):
+            self._agree(value)
+
+    def _agree(self, fix: PoseFix) -> None:
+        match, seen = self._match, self._segments
+        if (match is not None and seen is not None and fix.match == match.id and match.value.segments == seen.id
+                and self._shows(seen.value.frame)):
+            self._lines["agreed"] = self._lenses.place(match.value.segments_px[fix.inliers])
+
+    def _shows(self, frame: str) -> bool:
+        return self._frame is not None and self._frame.id == frame
+
+    def _draw_picture(self) -> dict[str, Any] | None:
+        if self._frame is None:
+            return None
+        ref = str(self._frame.ref)
+        if self._picture is None or self._picture["ref"] != ref:
+            data, size = shrink(self._frame.value.jpeg)
+            self._picture = {"ref": ref, "jpeg": data, "size": size}
+        return {**self._picture, **self._lines}
+
+
+def _row(decision: Decision) -> dict[str, Any]:
+    chosen = decision.chosen
+    return {
+        "cycle": decision.cycle, "level": str(decision.focus), "refused": decision.refused.strip().split("\n")[-1],
+        "who": "" if chosen is None else words(chosen.source.name),
+        "trigger": "" if chosen is None else _says(chosen.trigger),
+        "made": [{"says": _says(change), "because": [str(ref) for ref in change.because or change.entry.because]}
+                 for change in (*decision.observed, *decision.made)],
+    }
+
+
+def _says(change: Change) -> str:
+    gone = "; no longer believed" if isinstance(change, Retracted) else ""
+    return f"{change.entry.ref}: {plain_words.sentence(change.entry.value)}{gone}"

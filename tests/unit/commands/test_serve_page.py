@@ -1,0 +1,192 @@
+"""``harvey serve``: who may watch, who may pause and stop, and what a hostile request can do."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+pytest.importorskip("starlette", reason="the extra 'serve' is not installed")
+from starlette.testclient import TestClient
+
+from harvey.cli import main
+from harvey.errors import BadInput
+from harvey.serve.app import build_app
+from harvey.serve.gate import Gate, GatedBody
+from harvey.serve.live_state import LiveState
+from harvey.serve.server import bind
+from scripted_turns import decisions
+from world_models.camera import Camera
+from world_models.entries.body import STOP_KEY, BodyFault, MotionReport
+from world_models.files.world_files import load_world
+
+FLAT = Path(__file__).parents[3] / "docs" / "flat" / "flat.toml"
+TOKEN = "the-token"
+BASE = "http://127.0.0.1"
+BEARER = {"Authorization": f"Bearer {TOKEN}"}
+
+
+class Page:
+    """An ended run, so that its events end too; the gate would still take orders."""
+
+    def __init__(self) -> None:
+        world = load_world(FLAT)
+        self.gate = Gate()
+        self.live = LiveState(world, Camera(512.0, 512.0, 256.0, 256.0, 512, 512))
+        for decision in decisions():
+            self.live(decision)
+        self.live.end("reached: it is there")
+        self.app = build_app(self.live, self.gate, world, title="<b>a run</b>", token=TOKEN)
+
+
+@pytest.fixture(scope="module")
+def page() -> Page:
+    return Page()
+
+
+@pytest.fixture(scope="module")
+def client(page: Page) -> Iterator[TestClient]:
+    with TestClient(page.app, base_url=BASE) as made:
+        yield made
+
+
+def test_who_has_the_token_pauses_resumes_and_stops() -> None:
+    page = Page()
+    with TestClient(page.app, base_url=BASE) as client:
+        for order, state in (("pause", "paused"), ("resume", "running"), ("pause", "paused"), ("stop", "stopping")):
+            answer = client.post(f"/orders/{order}", headers={**BEARER, "Origin": BASE})
+            assert (answer.status_code, answer.text, page.gate.state) == (200, f"{state}\n", state)
+
+
+@pytest.mark.parametrize("given_token", [None, "", "Bearer", "Bearer ", TOKEN, f"Bearer {TOKEN}x", f"bearer {TOKEN}",
+                                         f"Bearer {TOKEN[:-1]}"])
+@pytest.mark.parametrize("order", ["pause", "resume", "stop"])
+def test_without_the_token_nothing_happens(page: Page, client: TestClient, given_token: str | None, order: str) -> None:
+    headers = {} if given_token is None else {"Authorization": given_token}
+    assert client.post(f"/orders/{order}?token={TOKEN}", headers=headers).status_code == 403
+    assert page.gate.state == "running"
+
+
+@pytest.mark.parametrize("headers", [
+    {"Origin": "http://evil.example"}, {"Origin": "null"}, {"Origin": "https://127.0.0.1"},
+    {"Origin": "http://127.0.0.1:1"}, {"Host": "evil.example"}, {"Host": "127.0.0.1.evil.example"}, {"Host": ""},
+    {"Host": "evil.example", "Origin": "http://evil.example"}])
+def test_another_site_is_refused_even_with_the_token(page: Page, client: TestClient, headers: dict[str, str]) -> None:
+    assert client.post("/orders/pause", headers={**BEARER, **headers}).status_code in (400, 403)
+    assert client.get("/", headers=headers).status_code in (400, 403)
+    assert page.gate.state == "running"
+
+
+def test_an_order_is_no_link(page: Page, client: TestClient) -> None:
+    assert client.get("/orders/pause", headers=BEARER).status_code == 405
+    assert client.post("/orders/drive", headers=BEARER).status_code == 404
+    assert page.gate.state == "running"
+
+
+def test_the_page_holds_no_token_and_asks_nobody_else(client: TestClient) -> None:
+    for path in ("/", "/live.js", "/page.css"):
+        answer = client.get(path)
+        assert answer.status_code == 200 and TOKEN not in answer.text
+        assert "default-src 'none'" in answer.headers["content-security-policy"]
+        assert "frame-ancestors 'none'" in answer.headers["content-security-policy"]
+    text = client.get("/").text
+    assert "&lt;b&gt;a run" in text and "<b>a run" not in text and 'class="believed mark"' in text
+
+
+def test_a_watcher_is_told_what_was_decided_last_and_how_it_ended(client: TestClient) -> None:
+    answer = client.get("/events")
+    assert answer.headers["content-type"].startswith("text/event-stream")
+    told: dict[str, Any] = json.loads(answer.text.removeprefix("data: "))
+    assert (told["state"], told["ended"]) == ("ended", "reached: it is there")
+    made = list(decisions())
+    assert [row["cycle"] for row in told["decisions"]] == [one.cycle for one in made][-12:]
+    last = [str(change.entry.ref) for change in (*made[-1].observed, *made[-1].made)]
+    assert [one["says"].split(":")[0] for one in told["decisions"][-1]["made"]] == last
+
+
+LATIN = st.text(st.characters(min_codepoint=33, max_codepoint=126), max_size=40)
+PATHS = LATIN | st.sampled_from(
+    ["orders/stop", "orders/pause", "orders/../orders/stop", "events", "%00", "..%2f..%2fetc/passwd", "live.js"])
+NAMES = st.sampled_from(["Authorization", "Origin", "Host", "Content-Length", "Cookie", "X-Forwarded-Host",
+                         "X-HTTP-Method-Override", "Accept"])
+
+
+@given(st.sampled_from(["GET", "POST", "PUT", "DELETE", "OPTIONS", "HEAD", "TRACE"]), PATHS,
+       st.dictionaries(NAMES, LATIN.map(str.strip)), st.binary(max_size=200))
+def test_hostile_requests_harm_nothing(
+    page: Page, client: TestClient, method: str, path: str, headers: dict[str, str], body: bytes
+) -> None:
+    target = f"{BASE}/{path.replace('?', '').replace('#', '').replace(':', '')}"
+    answer = client.request(method, target, headers=headers, content=body, follow_redirects=False)
+    assert answer.status_code < 500
+    assert page.gate.state == "running"
+
+
+class CountingBody:
+    """A body that only counts what it is asked to do."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def execute(self, _command: Any) -> MotionReport:
+        self.asked.append("execute")
+        return MotionReport(0.0, 0.0, 0.0, 1.0)
+
+    def wait(self, _duration_s: float) -> float:
+        return 2.0
+
+    def stop(self) -> None:
+        self.asked.append("stop")
+
+
+def test_a_paused_body_moves_when_it_is_resumed_and_not_before() -> None:
+    body, gate = CountingBody(), Gate()
+    gate.order("pause")
+    gated: Any = GatedBody(body, gate)  # type: ignore[arg-type]
+    mover = threading.Thread(target=gated.execute, args=(None,), daemon=True)
+    mover.start()
+    mover.join(0.05)
+    assert mover.is_alive() and body.asked == []
+    gate.order("resume")
+    mover.join()
+    assert body.asked == ["execute"]
+
+
+@pytest.mark.parametrize("orders", [("stop",), ("pause", "stop"), ("stop", "resume"), ("stop", "pause", "resume")])
+def test_a_stopped_body_moves_no_more(orders: tuple[Any, ...]) -> None:
+    body, gate = CountingBody(), Gate()
+    for order in orders:
+        gate.order(order)
+    gated: Any = GatedBody(body, gate)  # type: ignore[arg-type]
+    fault = gated.execute(None)
+    assert isinstance(fault, BodyFault) and (fault.what, fault.when_s) == (STOP_KEY, 2.0)
+    assert body.asked == ["stop"]
+
+
+@pytest.mark.parametrize(("host", "port", "wanted"), [
+    ("0.0.0.0", 0, "one address of this machine"), ("evil.example", 0, "an IPv4 address"),
+    ("127.0.0.1", 65536, "65535"), ("127.0.0.1", -1, "from 0 to"), ("192.0.2.1", 0, "that are free on this machine")])
+def test_what_cannot_be_listened_on_is_said(host: str, port: int, wanted: str) -> None:
+    with pytest.raises(BadInput, match=wanted):
+        bind(host, port)
+
+
+def test_a_port_is_used_once() -> None:
+    with bind("127.0.0.1", 0) as first, pytest.raises(BadInput, match="that are free"):
+        bind("127.0.0.1", first.getsockname()[1])
+
+
+@pytest.mark.parametrize(("words", "wanted"), [
+    (("--speed", "-1"), "--speed: expected a number that is not below 0"), (("--speed", "nan"), "--speed: expected"),
+    (("--seed", "0..3"), "--seed: expected one seed, got 4"), (("--host", "*"), "--host: expected an IPv4 address")])
+def test_bad_words_are_refused_in_a_sentence(
+    words: tuple[str, ...], wanted: str, capsys: pytest.CaptureFixture[str], tmp_path: Any
+) -> None:
+    assert main(["serve", "forty-foot-hallway", "--out", str(tmp_path / "run"), *words]) == 2
+    assert wanted in capsys.readouterr().err and not (tmp_path / "run").exists()
