@@ -61,6 +61,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "agenda": "Activations per second with 10 to 100,000 pending",
         "explanations": "Missions of every scenario, explained and replayed",
         "frame-budget": "Time of perception per frame",
+        "questions": "Questions after runs: harvey why against deciding again",
         "recorder": "Time and size of the recording",
         "render-speed": "Simulated camera: frame rate and edge accuracy",
         "world-size": "The same mission in worlds of 12 to 100,000 locales",
