@@ -6,7 +6,7 @@ when, and what something rested on. An answer is right if deciding that cycle ag
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from harvey.campaign.campaign import Task, run_task
 from harvey.run_files.run_directory import RunDirectory
 from sim.made_up.short_missions import HALLWAY, OFFICE, fault
 
-MISSIONS = {
+MISSIONS: Mapping[str, str] = {
     "office": OFFICE,
     "hallway": HALLWAY,
     "bump": HALLWAY + fault("bump", "hallway", 7.0, left_m=0.3, turn_deg=10.0),
@@ -58,7 +58,7 @@ class Interview:
 def run(quick: bool, seed: int) -> Report:
     """Drive and ask; quick: one mission across an office."""
     folder = campaign_folder("questions", seed, quick=quick)
-    missions = {"office": OFFICE} if quick else MISSIONS
+    missions: Mapping[str, str] = {"office": OFFICE} if quick else MISSIONS
     for name, text in missions.items():
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
     each = QUICK_QUESTIONS if quick else EACH
