@@ -1,41 +1,69 @@
-"""``harvey view``: open the recording of a run, or an overview of several."""
+"""``harvey view``: open the recording of a run, or an overview of several; or write one of its pictures."""
 
 from __future__ import annotations
 
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from argparse import ArgumentParser, Namespace
+from contextlib import suppress
 from pathlib import Path
 
-from harvey.commands.command import Command
+from harvey.commands.command import Command, whole
 from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory, find_directory, open_run
 
 OVERVIEW = "overview.rrd"
+LOOPBACK = ("--bind", "127.0.0.1")
+"""The viewer listens on this machine only; by itself it listens on every interface."""
 
 
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("runs", metavar="RUN", nargs="+",
                         help="a run directory; several, or a directory of them, make an overview of one row a run")
     parser.add_argument("--save", metavar="FILE",
-                        help=f"write the overview there and do not open it (else {OVERVIEW} beside the runs)")
+                        help=f"write the overview there and do not open it (else {OVERVIEW} beside the runs); "
+                             "with --picture: the name of the file")
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--web", action="store_true",
+                     help="in a browser; the viewer serves it on this machine only, until Ctrl-C")
+    how.add_argument("--picture", metavar="AT", type=whole,
+                     help="write the camera picture that was seen last in cycle AT, as PNG, and open nothing")
 
 
 def _run(args: Namespace) -> int:
-    if len(args.runs) == 1 and not _is_campaign(find_directory(args.runs[0])):
+    is_one = len(args.runs) == 1 and not _is_campaign(find_directory(args.runs[0]))
+    if args.picture is not None:
+        if not is_one:
+            raise BadInput("--picture: expected one run, got several")
+        return _write_picture(open_run(args.runs[0]), args.picture, args.save)
+    if is_one:
         if args.save:
             raise BadInput("--save: expected several runs, or a directory of them, got one run")
-        return _open(_whole(open_run(args.runs[0], "recording.rrd")))
+        return _open(_whole(open_run(args.runs[0], "recording.rrd")), args.web)
     runs = [run for text in args.runs for run in _runs(text)]
     overview = Path(args.save) if args.save else _beside(runs)
     _write(runs, overview)
     if args.save:
         print(f"{len(runs)} runs in {overview}; open it with: rerun {overview}")
         return 0
-    return _open(overview)
+    return _open(overview, args.web)
+
+
+def _write_picture(run: RunDirectory, cycle: int, name: str | None) -> int:
+    from harvey.export.picture import find_picture, write_picture
+
+    out = Path(name or f"{run.path.resolve().name}-{cycle}.png")
+    if out.suffix != ".png":
+        raise BadInput(f"--save: expected a name that ends in .png, got {str(out)!r}")
+    record = find_picture(run, cycle)
+    width, height = write_picture(run, record, out)
+    print(f"{out}: {record.id}, seen in cycle {record.cycle}, taken at {record.value['sim_time_s']:.1f} s; "
+          f"{width} x {height} px")
+    return 0
 
 
 def _whole(run: RunDirectory) -> Path:
@@ -81,12 +109,25 @@ def _write(runs: list[RunDirectory], overview: Path) -> None:
         print(f"only its result is shown: {line}", file=sys.stderr)
 
 
-def _open(recording: Path) -> int:
+def _open(recording: Path, in_browser: bool) -> int:
+    if in_browser:
+        how = "--web-viewer" if _has_screen() else "--serve-web"  # the latter opens no browser, but says the address
+        return _wait_for([_viewer(), str(recording), how, *LOOPBACK, "--port", "0", "--web-viewer-port", "0"])
     if not _has_screen():
         print(f"no screen here to open a window on; the recording is {recording.resolve()}\n"
               f"open it where there is one, with: rerun {recording}", file=sys.stderr)
         return 1
-    return subprocess.run([_viewer(), str(recording)], check=False).returncode
+    return _wait_for([_viewer(), str(recording), *LOOPBACK])
+
+
+def _wait_for(viewer: list[str]) -> int:
+    """Run the viewer until it ends, or harvey does: its launcher leaves the viewer itself behind when only it ends."""
+    with subprocess.Popen(viewer, process_group=0) as running:
+        try:
+            return running.wait()
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(running.pid, signal.SIGKILL)  # it has nothing to save, and may not heed less
 
 
 def _has_screen() -> bool:
@@ -108,6 +149,8 @@ COMMAND = Command(
         ("harvey view runs/lab-to-allens-office-0", "building, camera, plan, knowledge sources and why"),
         ("harvey view runs/lab-to-allens-office", "all runs of a campaign, one row each"),
         ("harvey view runs/bump-0 runs/hallway-kidnap-0 --save both.rrd", "two runs side by side, kept in a file"),
+        ("harvey view runs/bump-0 --web", "in a browser"),
+        ("harvey view runs/bump-0 --picture 88", "what the camera saw in cycle 88: bump-0-88.png"),
     ),
     _arguments, _run,
 )
