@@ -12,8 +12,9 @@ function showPlans(belief, candidates) {
     const plan = plans[number];
     const here = belief !== null && plan.rooms.includes(belief.locale);
     svg.style.display = here || (belief === null && number === 0) ? "" : "none";
+    svg.querySelector(".mark.true").style.display = "none"; // nobody tells the page the truth
     const mark = svg.querySelector(".mark.believed");
-    mark.toggleAttribute("hidden", !here);
+    mark.style.display = here ? "" : "none";
     if (here) placeBelief(plan, mark, belief);
     const marks = candidates.filter((one) => plan.rooms.includes(one.locale)).map((one) => candidateMark(plan, one));
     svg.querySelector(".candidates").replaceChildren(...marks);
@@ -72,6 +73,7 @@ source.addEventListener("error", () => {
   if (source.readyState !== EventSource.CLOSED) byId("state").textContent = "the line is lost";
 });
 
+showPlans(null, []);
 byId("orders").hidden = token === "";
 byId("only-watching").hidden = token !== "";
 document.addEventListener("click", async (event) => {
