@@ -30,15 +30,19 @@ def blocks_of(page: Path) -> list[tuple[str, str]]:
     return BLOCK.findall(FILE.sub("", page.read_text(encoding="utf-8")))
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the reader works: with the files of all pages."""
-    here = tmp_path_factory.mktemp("reader")
+def write_files(here: Path) -> Path:
+    """The files of all pages, in an empty folder."""
     for page in PAGES:
         for name, text in FILE.findall(page.read_text(encoding="utf-8")):
             assert not (here / name).exists(), f"{name} is given twice"
             (here / name).write_text(text, encoding="utf-8")
     return here
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the reader works, from page to page."""
+    return write_files(tmp_path_factory.mktemp("reader"))
 
 
 def run_line(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -57,7 +61,7 @@ def run_line(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
 def follow(line: str, folder: Path) -> None:
     done = run_line(line, folder)
     assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
-    assert done.stdout or line.startswith(("python photograph.py", "python -m pip")), f"{line} says nothing"
+    assert done.stdout or line.startswith(("python photograph.py", PLUGIN)), f"{line} says nothing"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
@@ -78,8 +82,9 @@ def test_a_tutorial_has_no_block_of_another_kind(page: Path) -> None:
     assert {language for language, _ in blocks_of(page)} == {""}
 
 
-def test_the_errors_of_the_questions_are_what_is_printed(folder: Path) -> None:
-    """The reader has the files of the tutorials, with the mistakes that the names tell."""
+def test_the_errors_of_the_questions_are_what_is_printed(tmp_path: Path) -> None:
+    """The reader has the files of the tutorials, with the mistakes that the names tell, and no run yet."""
+    folder = write_files(tmp_path)
     cottage, mission = ((folder / name).read_text(encoding="utf-8") for name in ("cottage.toml", "to-the-parlour.toml"))
     (folder / "wide.toml").write_text(cottage.replace("along = 1.8, open", "along = 9.0, open"), encoding="utf-8")
     (folder / "typo.toml").write_text(mission.replace("heading_deg", "heading"), encoding="utf-8")
