@@ -25,6 +25,7 @@ from knowledge_sources.action.motor import Motor
 from knowledge_sources.action.obstacle_finder import ObstacleFinder
 from knowledge_sources.action.path_follower import PathFollower
 from knowledge_sources.action.range_watcher import RangeWatcher
+from knowledge_sources.action.redirector import Redirector
 from knowledge_sources.action.withdrawer import Withdrawer
 from knowledge_sources.action.yaw_calibrator import YawCalibrator
 from knowledge_sources.goal.interpreter import Interpreter
@@ -70,6 +71,7 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     TwinWatcher,
     FaultHandler,
     ModelReviser,
+    Redirector,
     FloorWatcher,
     RangeWatcher,
     ObstacleFinder,

@@ -19,7 +19,7 @@ from world_models.entries.door_state import DoorState
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch, Resumed
-from world_models.entries.told import Told
+from world_models.entries.told import Redirection, Told
 from world_models.entries.touch import Contact
 
 TOLD = ("refuted", "not testable", "lost", "found", "fault", "contact", "door", "thing", "resumed", "told")
@@ -136,6 +136,8 @@ def turning_points(
         yield TurningPoint(cycle, "resumed", f"after cycle {value.after_cycle}, where the run was cut off")
     elif isinstance(value, Told) and value.answer:
         yield TurningPoint(cycle, "told", f"{value.what} is {value.state}; {value.answer}")
+    elif isinstance(value, Redirection) and value.answer:
+        yield TurningPoint(cycle, "told", f"to go elsewhere: {value.text}; {value.answer}")
     elif isinstance(value, Outcome):
         yield TurningPoint(cycle, "the end", f"{value.kind}: {value.reason}")
 

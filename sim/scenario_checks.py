@@ -14,6 +14,7 @@ from sim.scenario import Scenario
 from world_models.building.geometry.faces import Face
 from world_models.building.geometry.outlines import inside_polygon
 from world_models.building.world import World
+from world_models.commands import parse_destination
 from world_models.entries.location import Place
 from world_models.files.toml.settings import suggest_keys
 from world_models.units import FOOT_M
@@ -22,9 +23,10 @@ MAX_OUTSIDE_M = 0.15
 """A thing on a wall may reach this far out of its locale's outline [m]."""
 
 
-def find_named_locales(scenario: Scenario) -> list[str]:
-    """The locales that a scenario's faults name."""
-    return [name for fault in scenario.faults for _, name in _locale_keys(fault)]
+def find_named_locales(scenario: Scenario, world: World) -> list[str]:
+    """The locales that a scenario's faults name, and those where it is asked to go on the way."""
+    asked = [parse_destination(telling.goal, world).locale for telling in scenario.told if telling.goal]
+    return [*(name for fault in scenario.faults for _, name in _locale_keys(fault)), *asked]
 
 
 def _locale_keys(fault: Fault) -> list[tuple[str, str]]:
@@ -44,7 +46,7 @@ def check_names(scenario: Scenario, world: World) -> None:
                 raise scenario.refused(("faults", i, key), f"expected {near}, got {name!r}")
     for i, telling in enumerate(scenario.told):
         if why := telling.find_fault(world):
-            raise scenario.refused(("told", i, "what"), why)
+            raise scenario.refused(("told", i, "goal" if telling.goal else "what"), why)
     if not scenario.rides:
         return
     rides = {link.name: link.between for link in world.links if link.kind == "elevator"}

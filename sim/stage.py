@@ -28,6 +28,7 @@ from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.commands import parse_command
 from world_models.entries.location import Place
+from world_models.files.toml.mission import Arrival
 from world_models.files.world_files import WorldError
 from world_models.frames import Pose2
 
@@ -48,6 +49,7 @@ class Stage:
         start_world, goal_world: intended poses at start and goal, in the world frame.
         put_down_world: where it is put down, before the errors of putting it down: at the start, as a rule.
         goal_floor_m: height of the goal's floor [m].
+        part: the locale that contains all that was built; elsewhere the camera sees nothing.
     """
 
     scenario: Scenario
@@ -57,6 +59,7 @@ class Stage:
     goal_world: Pose2
     put_down_world: Pose2
     goal_floor_m: float = 0.0
+    part: str = ""
 
     def body(self, seed: int) -> SimulatedBody:
         """A new body, put down at the start, for a run with this seed."""
@@ -76,6 +79,12 @@ class Stage:
         up_m = self.world.floor_m(there) - self.goal_floor_m if there in self.world.locales else 0.0
         return replace(found, position_error_m=math.hypot(found.position_error_m, up_m)) if up_m else found
 
+    def going_to(self, place: Place) -> Stage:
+        """The same for a robot that was asked on its way to go elsewhere, and may arrive at any heading."""
+        return replace(self, scenario=replace(self.scenario, arrival=Arrival()),
+                       goal_world=replace(place, heading_rad=0.0).in_world(self.world),
+                       goal_floor_m=self.world.floor_m(place.locale))
+
 
 def build_stage(scenario: Scenario) -> Stage:
     """Load a scenario's world and build what its runs share.
@@ -88,7 +97,7 @@ def build_stage(scenario: Scenario) -> Stage:
     check_names(scenario, world)
     start, goal = _ends(scenario, world)
     down = _put_down(scenario, world, start)
-    named = (down.locale, *find_named_locales(scenario), *find_changed_locales(scenario, world))
+    named = (down.locale, *find_named_locales(scenario, world), *find_changed_locales(scenario, world))
     around = _around(world, (start.locale, goal.locale, *named))
     faces = move_scenario_things(scenario, world, world.faces_within(around))
     changes = find_changes(scenario, world, around, faces)
@@ -101,7 +110,8 @@ def build_stage(scenario: Scenario) -> Stage:
     heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
     start_world = replace(start, heading_rad=scenario.start.heading_rad).in_world(world)
     goal_world = replace(goal, heading_rad=heading).in_world(world)
-    return Stage(scenario, world, building, start_world, goal_world, down.in_world(world), world.floor_m(goal.locale))
+    return Stage(scenario, world, building, start_world, goal_world, down.in_world(world), world.floor_m(goal.locale),
+                 around)
 
 
 def move_ends(stage: Stage, scenario: Scenario) -> Stage:

@@ -16,7 +16,7 @@ from world_models.building.geometry.outlines import distance_to_border, inside_p
 from world_models.building.memory_locales import words_of
 from world_models.building.world import World
 from world_models.entries.location import Place
-from world_models.ptrans import parse_ptrans
+from world_models.ptrans import parse_place, parse_ptrans
 
 GO = re.compile(r"\s*(?:please\s+)?(?:go|drive|move|(?:bring|take|carry)\s+(?:this|it))"
                 r"(?:\s+from\s+(?P<origin>.+?))?\s+to\s+(?P<destination>.+?)\s*[.!]?\s*", re.IGNORECASE)
@@ -61,6 +61,46 @@ def read_places(
 def parse_command(text: str, world: World) -> tuple[Place, Place]:
     """Origin and destination of a command in a world that is known whole. Raises ValueError."""
     return read_places(text, world, lambda phrases: [find_room(words, world) for words in phrases])
+
+
+def check_destination(text: str) -> None:
+    """Raises ValueError for a text that is no destination in any world."""
+    if text.lstrip().startswith("("):
+        parse_place(text)
+    else:
+        _parse_destination(text)
+
+
+def read_destination(text: str, building: Building, find_rooms: Callable[[tuple[str, ...]], Sequence[str]]) -> Place:
+    """The place where a robot that is on its way is to go instead: "Go to the library", "library", or a place in feet.
+
+    Raises:
+        ValueError: as :func:`read_places` does.
+    """
+    if text.lstrip().startswith("("):
+        place = parse_place(text)
+        building.locale(place.locale)
+        return place
+    (room,) = find_rooms((_parse_destination(text),))
+    return find_open_point(building, room)
+
+
+def parse_destination(text: str, world: World) -> Place:
+    """The same in a world that is known whole. Raises ValueError."""
+    return read_destination(text, world, lambda phrases: [find_room(words, world) for words in phrases])
+
+
+def _parse_destination(text: str) -> str:
+    """The words for the room. Raises ValueError."""
+    match = GO.fullmatch(text)
+    if match is None and FETCH.fullmatch(text):
+        raise ValueError(f"expected a room to go to, got {text!r}: to fetch takes an arm, which this robot has not")
+    if match is not None and match["origin"] is not None:
+        raise ValueError(f"expected 'Go to ROOM', as the robot goes from where it is, got {text!r}")
+    words = match["destination"] if match is not None else text.strip(" .!")
+    if not words_of(words) - STOP_WORDS:
+        raise ValueError(f"expected a room, as in 'Go to the library', got {text!r}")
+    return words
 
 
 def _parse_ends(text: str) -> tuple[str, str]:

@@ -10,6 +10,7 @@ from world_models.units import FOOT_M
 MAX_COORDINATE_FT = 1e6
 _NUMBER = r"\s*([-+]?\d+(?:\.\d*)?)\s*"
 _PLACE = rf"\(\s*([\w'-]+)\s+\({_NUMBER},{_NUMBER},{_NUMBER}\)\s*\)"
+_DESTINATION = re.compile(rf"\s*{_PLACE}\s*")
 _GOAL = re.compile(rf"\s*\(\s*ptrans\s+{_PLACE}\s*{_PLACE}\s*\)\s*")
 
 
@@ -24,6 +25,15 @@ def parse_ptrans(text: str) -> tuple[Place, Place]:
         raise ValueError(f"expected a goal like (ptrans (locale (x,y,z)) (locale (x,y,z))), got {text!r}")
     a, ax, ay, az, b, bx, by, bz = match.groups()
     return _place(a, ax, ay, az), _place(b, bx, by, bz)
+
+
+def parse_place(text: str) -> Place:
+    """One place, as ``(library (6,10,0))``. Raises ValueError as :func:`parse_ptrans` does."""
+    match = _DESTINATION.fullmatch(text)
+    if match is None:
+        raise ValueError(f"expected a place like (library (6,10,0)), got {text!r}")
+    locale, x, y, z = match.groups()
+    return _place(locale, x, y, z)
 
 
 def _place(locale: str, x: str, y: str, z: str) -> Place:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from blackboard.journal import Decision
 from logs.turning_points import TurningPoint, TurningPointFinder
 from world_models.entries.location import Hypothesis
-from world_models.entries.task import Milestone
+from world_models.entries.task import Goal, Milestone
 
 if TYPE_CHECKING:
     from sim.stage import Stage
@@ -40,5 +40,7 @@ class Tally:
             value = change.entry.value
             if isinstance(value, Milestone):
                 self.verified += value.status == "verified"
+            elif isinstance(value, Goal) and value.is_active:
+                self._goal = value.destination.in_world(self._world)
             elif isinstance(value, Hypothesis) and value.is_held:
                 self.to_go_m = value.world_from_robot(self._world).distance_to(self._goal)

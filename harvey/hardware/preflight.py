@@ -149,7 +149,7 @@ class Preflight:
             yield Check("goal", str(error), "name one room for each end: harvey world show")
             return
         for fault in filter(None, (telling.find_fault(world) for telling in self._mission.told)):
-            yield Check("told", fault, "name a door or a thing of the world: harvey world show")
+            yield Check("told", fault, "name a door, a thing or a room of the world: harvey world show")
         lost = [p for p in (origin, destination) if not _is_inside(world, p)]
         if lost:
             todo = "feet, in the locale's own frame: harvey world show"

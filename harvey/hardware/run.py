@@ -19,25 +19,39 @@ from harvey.hardware.stop_key import stop_key
 from harvey.run_files.run_directory import RunDirectory
 from harvey.run_files.run_head import HARDWARE, RunHead
 from harvey.run_files.run_recorder import Extent, RunRecorder
+from harvey.runner.ports import Body
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import Remains, continue_run
 from harvey.runner.run import Run
+from harvey.runner.teller import Tell, tell_nothing
 from world_models.robot import RobotModel
+
+Around = Callable[[HardwareBody, Callable[[], None]], Body]
+"""Puts something between the agent and the body; the second argument is to be called often while it lets it wait."""
+
+
+def unchanged(body: HardwareBody, _tick: Callable[[], None]) -> Body:
+    """Nothing between the agent and the body."""
+    return body
 
 
 def drive(
     mission: HardwareMission, robot: RobotModel, base: Base, camera: VideoCamera, clock: Callable[[], float], *,
     out: Path, sinks: Sequence[Sink] = (), live: bool = False, settings: Pairs = (),
+    around: Around = unchanged, tell: Tell = tell_nothing,
 ) -> MissionResult:
     """Drive to the outcome; however it ends, the base is told to stop, and what was recorded is kept.
 
-    ``settings`` are those of the agent.
+    Args:
+        settings: those of the agent.
+        around: puts something between the agent and the body.
+        tell: called before each cycle, to put on the board what somebody says meanwhile.
     """
     head = RunHead.of(HARDWARE, mission.name, 0, mission.world, robot, mission.servo, mission.command,
                       scenario=mission.source.data, folder=str(mission.folder.resolve()), constants=settings)
     files = RunDirectory(out)
     eye = Watching(camera, clock, mission.camera.rate_hz)
-    with _hardware_run(mission, head, base, eye, clock, files, sinks, live) as run:
+    with _hardware_run(mission, head, base, eye, clock, files, sinks, live, around=around, tell=tell) as run:
         return run.drive(files)
 
 
@@ -62,7 +76,8 @@ def resume(
 @contextmanager
 def _hardware_run(
     mission: HardwareMission, head: RunHead, base: Base, eye: Eye, clock: Callable[[], float], files: RunDirectory,
-    sinks: Sequence[Sink], live: bool, whole: Extent | None = None,
+    sinks: Sequence[Sink], live: bool, whole: Extent | None = None, *, around: Around = unchanged,
+    tell: Tell = tell_nothing,
 ) -> Iterator[Run]:
     """A run whose body can be stopped by a key, and whose base hears a heartbeat; closes the base."""
     body = HardwareBody(base, eye, clock=clock, ranges=mission.ranges.read)
@@ -70,7 +85,7 @@ def _hardware_run(
         agent = build_agent(head)
         with stop_key(body.stop_for_good), Heartbeat(base) as heartbeat:
             recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, whole=whole)
-            yield Run(head, agent, body, recorder, limits=mission.limits, clock=clock, sinks=sinks, told=mission.told,
-                      before_cycle=heartbeat.tick)
+            yield Run(head, agent, around(body, heartbeat.tick), recorder, limits=mission.limits, clock=clock,
+                      sinks=sinks, told=mission.told, tell=tell, before_cycle=heartbeat.tick)
     finally:
         base.close()

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, replace
-from functools import partial
 
 from blackboard.change import Change
 from blackboard.effect import Post
@@ -19,6 +18,7 @@ from harvey.agent import Agent, build_agent
 from harvey.campaign.campaign import make_room
 from harvey.hidden_segments import check_segments
 from harvey.replay.as_recorded import AsRecorded
+from harvey.replay.retelling import Retelling
 from harvey.run_files.observations import effect_of
 from harvey.run_files.records import DecisionRecord, EntryRecord, as_line, decision_of, read_records
 from harvey.run_files.run_directory import RunDirectory
@@ -29,6 +29,7 @@ from harvey.runner.replay import Live, ignore, open_originals
 from harvey.runner.result import UNFINISHED, MissionResult
 from harvey.runner.resume import RESUME
 from harvey.runner.run import Over, run_to_outcome
+from harvey.runner.teller import PAGE, USER
 from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.simulation.run import SimulatedRun, rebuild_stage
 from world_models.entries.task import Outcome
@@ -99,16 +100,23 @@ def what_if(
         make_room(out.path, head.name, head.seed)
     recorder = RunRecorder(out, head, agent.world, agent.robot)
     if head.kind != SIMULATOR:
-        ports = (WorldPort(agent.store),)
+        ports, told = (WorldPort(agent.store),), Retelling(player.records, (USER, PAGE), player.originals)
         scheduler = agent.scheduler(ports=ports, sinks=(*recorder.sinks, player.compare))
         try:
-            outcome = player.play(scheduler, agent, head, recorder, before=partial(agent.what_if, scheduler))
+            outcome = player.play(scheduler, agent, head, recorder, before=lambda: _ask(scheduler, agent, told))
             return player.answer(outcome, None)
         finally:
             recorder.close()
-    with SimulatedRun(rebuild_stage(head), head, agent, recorder, (player.compare,)) as simulated:
+    told = Retelling(player.records, (PAGE,), player.originals)
+    with SimulatedRun(rebuild_stage(head), head, agent, recorder, (player.compare,), tell=told.tell) as simulated:
         result = simulated.drive(out, lambda: _run_changed(simulated, agent, player, go_on))
     return player.answer(Outcome(result.outcome, result.reason), result)
+
+
+def _ask(scheduler: Scheduler, agent: Agent, told: Retelling) -> None:
+    """What comes before each cycle of a run on hardware that is decided again."""
+    agent.what_if(scheduler)
+    told.tell(scheduler)
 
 
 def _run_changed(run: SimulatedRun, agent: Agent, player: _Player, go_on: bool) -> Outcome:

@@ -21,7 +21,7 @@ from harvey.run_files.run_head import RunHead
 from harvey.run_files.run_recorder import RunRecorder
 from harvey.runner.ports import Body, BodyPort
 from harvey.runner.result import UNFINISHED, MissionResult, RunCounts
-from harvey.runner.teller import Teller
+from harvey.runner.teller import Tell, Teller, tell_nothing
 from harvey.runner.world_port import WorldPort, tell_robot
 from logs.disk import CannotWriteError
 from logs.errors import RecordingError
@@ -66,7 +66,7 @@ class Run:
     def __init__(
         self, head: RunHead, agent: Agent, body: Body, recorder: RunRecorder, *, limits: Limits,
         clock: Callable[[], float], referee: Referee | None = None, sinks: Sequence[Sink] = (),
-        told: Sequence[Telling] = (), before_cycle: Callable[[], None] = lambda: None,
+        told: Sequence[Telling] = (), tell: Tell = tell_nothing, before_cycle: Callable[[], None] = lambda: None,
     ) -> None:
         """Put a run together.
 
@@ -74,13 +74,14 @@ class Run:
             limits: when to give up; clock: the body's time, by which that is judged [s].
             referee: who knows the truth; None on hardware.
             sinks: called with every decision.
-            told: what somebody tells it on the way.
+            told: what somebody tells it on the way, by the mission's file; tell: what comes while it runs.
             before_cycle: called before each cycle.
         """
         self._began_s, self._robot, self.store = time.perf_counter(), agent.robot, agent.store
         self.head, self.body, self.recorder = head, body, recorder
         self._limits, self._clock, self._referee = limits, clock, referee
-        self._teller, self._what_if, self._before = Teller(told, clock), agent.what_if, before_cycle
+        self._teller, self._tell = Teller(told, clock), tell
+        self._what_if, self._before = agent.what_if, before_cycle
         self.port = BodyPort(body)
         self.recorded_port = recorder.record_port(self.port)
         self.ports = self.recorded_port, recorder.record_port(WorldPort(agent.store))
@@ -105,6 +106,7 @@ class Run:
         if not self.recorder.replaying:
             self._what_if(self.scheduler)
             self._teller.tell(self.scheduler)
+            self._tell(self.scheduler)
 
     def over(self, scheduler: Scheduler) -> str | None:
         """Why it has to end now, if it has."""

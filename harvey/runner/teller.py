@@ -1,15 +1,23 @@
-"""Teller: what somebody tells the robot of the building on the way, at its time (``[[told]]`` of a mission's file)."""
+"""Teller: what somebody tells the robot on the way: ``[[told]]`` of a mission's file, or what a live page hears."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from queue import Empty, SimpleQueue
 
 from blackboard.effect import Post
 from blackboard.scheduler import Scheduler
-from world_models.entries.told import Told
+from world_models.entries.told import Redirection, Told
 from world_models.files.toml.mission import Telling
 
-USER = "user"
+USER, PAGE = "user", "live page"
+"""Who tells: the mission's file, or somebody while the run goes on."""
+Tell = Callable[[Scheduler], None]
+"""Called before each cycle of a run; puts on the board what somebody tells the robot."""
+
+
+def tell_nothing(_scheduler: Scheduler) -> None:
+    """Nobody tells anything."""
 
 
 class Teller:
@@ -21,7 +29,32 @@ class Teller:
 
     def tell(self, scheduler: Scheduler) -> None:
         """Tell what is due and was not told yet."""
-        for telling in self._told[len(scheduler.view.all(Told)):]:
+        for telling in self._told[_count_told(scheduler):]:
             if telling.at_s > self._clock():
                 return
             scheduler.tell([Post(telling.entry)], USER)
+
+
+class LiveTeller:
+    """Tells what people say while the run goes on; any thread may hand it over."""
+
+    def __init__(self) -> None:
+        self._said: SimpleQueue[Redirection] = SimpleQueue()
+
+    def hear(self, text: str) -> None:
+        """Somebody asks the robot to go elsewhere."""
+        self._said.put(Redirection(text, PAGE))
+
+    def tell(self, scheduler: Scheduler) -> None:
+        """On the run's thread: tell what was handed over."""
+        while True:
+            try:
+                said = self._said.get_nowait()
+            except Empty:
+                return
+            scheduler.tell([Post(said)], PAGE)
+
+
+def _count_told(scheduler: Scheduler) -> int:
+    """How much of a mission's file the board was told."""
+    return len(scheduler.view.all(Told)) + len(scheduler.view.where(Redirection, lambda asked: asked.by == USER))

@@ -13,7 +13,8 @@ from sim.truth import cross_track_m
 from world_models.building.world import World
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import PoseFix
-from world_models.entries.task import Certificate, Leg
+from world_models.entries.task import Certificate, Goal, Leg
+from world_models.entries.told import Redirection
 from world_models.frames import Pose2, wrap_angle
 
 MAX_TRUE_ERROR_M = 0.15
@@ -38,9 +39,12 @@ class Referee:
     def __call__(self, decision: Decision) -> None:
         self._follow()
         self._note_contacts(decision.cycle)
+        is_redirected = any(isinstance(change.entry.value, Redirection) for change in decision.made)
         for change in decision.made:
             value = change.entry.value
-            if isinstance(value, Leg):
+            if is_redirected and isinstance(value, Goal) and value.is_active:
+                self._stage = self._stage.going_to(value.destination)
+            elif isinstance(value, Leg):
                 self._leg = value if value.status == "moving" else None
             elif isinstance(value, PoseFix):
                 self._fix = value.world_from_robot

@@ -17,6 +17,7 @@ from harvey.runner.ports import Body
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import Remains, continue_run
 from harvey.runner.run import Run
+from harvey.runner.teller import Tell, tell_nothing
 from harvey.simulation.body_replay import BodyReplay
 from harvey.simulation.contacts import ContactWatch
 from harvey.simulation.referee import Referee
@@ -51,6 +52,7 @@ def run_mission(
     head: RunHead | None = None,
     body: str = IN_PROCESS,
     around: Around = unchanged,
+    tell: Tell = tell_nothing,
 ) -> MissionResult:
     """Run a scenario's mission to its outcome.
 
@@ -62,12 +64,13 @@ def run_mission(
         head: how the run begins, if otherwise than the scenario says.
         body: how the body is reached (:func:`harvey.simulation.serial_body.open_body`), where ``head`` does not say it.
         around: puts something between the agent and the body.
+        tell: called before each cycle, to put on the board what somebody says meanwhile.
     """
     head = head or build_head(stage, seed, body)
     files = None if out is None else RunDirectory(out)
     agent = build_agent(head, sources)
     recorder = RunRecorder(files, head, agent.world, agent.robot, live=live)
-    with SimulatedRun(stage, head, agent, recorder, sinks, around) as run:
+    with SimulatedRun(stage, head, agent, recorder, sinks, around, tell) as run:
         return run.drive(files)
 
 
@@ -131,7 +134,7 @@ class SimulatedRun(Run):
 
     def __init__(
         self, stage: Stage, head: RunHead, agent: Agent, recorder: RunRecorder, sinks: Sequence[Sink] = (),
-        around: Around = unchanged,
+        around: Around = unchanged, tell: Tell = tell_nothing,
     ) -> None:
         self.simulated_body = body = stage.body(head.seed)
         self._drawn: tuple[tuple[Face, ...], tuple[Face, ...]] = (), ()
@@ -140,7 +143,7 @@ class SimulatedRun(Run):
         super().__init__(
             head, agent, reached, recorder, limits=stage.scenario.limits, clock=lambda: body.truth.time_s,
             referee=Referee(agent.world, stage, body), sinks=sinks,
-            told=stage.scenario.told, before_cycle=self._draw_truth)
+            told=stage.scenario.told, tell=tell, before_cycle=self._draw_truth)
         self.body_replay = BodyReplay(self.port, body, head.seed, stage.scenario.actuator)
 
     def _draw_truth(self) -> None:

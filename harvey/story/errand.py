@@ -11,7 +11,7 @@ from harvey.why.sentences import sentence, value_of
 from world_models.entries.task import PlanSketch
 from world_models.words import count, listed
 
-WHAT_CHANGES = ("DoorState", "Obstacle", "Contact", "Told")
+WHAT_CHANGES = ("DoorState", "Obstacle", "Contact", "Told", "Redirection")
 """What changes the knowledge of a locale."""
 
 
@@ -21,7 +21,7 @@ def tell_errand(history: History) -> Section:
         "What it was to do",
         tuple(
             sentence_of(history, f"{_capital(sentence(record))}.", record)
-            for record in history.of_kind("Command", "Told")
+            for record in history.of_kind("Command", "Told", "Redirection")
             if record.observed
         ),
     )
@@ -64,7 +64,8 @@ def _cause(history: History, ref: str) -> str:
     if record is None:
         return ""
     if record.type == "Goal":
-        return "there was a new goal"
+        asked = nearest(history, record, ("Redirection",))
+        return "there was a new goal" if asked is None else f"it {sentence(asked).partition(';')[0]}"
     if record.type == "LocaleFrame":  # the changes of a frame are many; what made the last of them is told
         record = nearest(history, record, WHAT_CHANGES) or record
     return sentence(record).partition(";")[0]

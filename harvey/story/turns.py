@@ -23,7 +23,7 @@ from world_models.words import count
 
 MARKS = ("escalated", "relocalization")
 """A turning point has one of these words in its line of the journal, or is of one of these kinds."""
-TOLD_KINDS = ("BodyFault", "Contact", "DoorState", "Obstacle", "Resumed", "Told")
+TOLD_KINDS = ("BodyFault", "Contact", "DoorState", "Obstacle", "Resumed", "Told", "Redirection")
 KINDS = (*TOLD_KINDS, "Goal", "PlanSketch", "Certificate", "Outcome")
 NOT_VERIFIED = ("refuted", "not testable")
 WIDTH = 120

@@ -194,7 +194,7 @@ def goal(value: Goal) -> str:
     if value.status == "reached":
         return f"The goal was reached: {way}."
     if value.status == "abandoned":
-        return f"The goal was given up for a new one, from where it turned out to be: {way}."
+        return f"The goal was given up for a new one: {way}."
     return f"All of it serves the goal: {way}."
 
 

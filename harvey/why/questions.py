@@ -29,7 +29,7 @@ MOST_STORIES = 6
 """So many things, stops or doors are told of, the newest."""
 MOST_SIGHTS = 4
 """So many revisions of a thing are told of, the newest."""
-CHANGED = ("Obstacle", "LocaleFrame", "DoorState", "Contact", "Told")
+CHANGED = ("Obstacle", "LocaleFrame", "DoorState", "Contact", "Told", "Redirection")
 """What a plan may be withdrawn for, the most telling first."""
 
 

@@ -12,7 +12,7 @@ from harvey.why.history import History
 GOAL, MODEL, SENSOR = "goal", "model", "sensor"
 KINDS = (GOAL, MODEL, SENSOR)
 """What an explanation may end in: what was asked for, what is known of building and robot, what the camera saw."""
-KNOWN = frozenset({"LocaleFrame", "CameraState", "Wheels", "Footprint", "Told"})
+KNOWN = frozenset({"LocaleFrame", "CameraState", "Wheels", "Footprint", "Told", "Redirection"})
 """The kinds of entries that are a part of the model, and what the robot is told of it."""
 Kind = Callable[[EntryRecord], str | None]
 

@@ -107,7 +107,7 @@ def headline(record: EntryRecord) -> str:
     said = sentence(record)
     if record.type in ("MotorCommand", "Course"):
         return f"Harvey was told to {said}."
-    if record.type == "Told":
+    if record.type in ("Told", "Redirection"):
         return _describe_telling(record)
     if record.type == "Look":
         return f"A picture was taken {vocabulary.purpose(value_of(record, Look).purpose)}."
@@ -302,6 +302,7 @@ SAY: Mapping[str, Callable[[History, EntryRecord], str]] = {
     "PlanSketch": lambda _, r: facts.plan(value_of(r, PlanSketch)),
     "Goal": lambda _, r: facts.goal(value_of(r, Goal)),
     "Told": lambda _, r: _describe_telling(r),
+    "Redirection": lambda _, r: _describe_telling(r),
     "Command": lambda _, r: f"The user asked for it: {value_of(r, Command).text}.",
 }
 LABELS: Mapping[str, str] = {
@@ -313,6 +314,7 @@ LABELS: Mapping[str, str] = {
     "Resumed": "resumed", "Drift": "wheels", "Travel": "wheels", "LocaleFrame": "known", "FrameRequest": "asked",
     "CameraState": "camera",
     "Wheels": "wheels", "Footprint": "body", "Contact": "touched", "Ranges": "ranges", "Told": "told",
+    "Redirection": "told",
     "FreeFloor": "floor", "FloorView": "floor", "FloorAppearance": "floor", "Obstacle": "in the way",
     "DoorState": "door",
 }
@@ -333,7 +335,7 @@ FOLLOW: Mapping[str, tuple[str, ...]] = {
     "Tracks": ("Frame", "Hypothesis"),
     "Hypothesis": ("BodyFault",),
     "Discrepancy": ("Discrepancy", "BodyFault", "Contact", "Certificate", "Hypothesis", "MotionReport"),
-    "Goal": ("PlanSketch", "Hypothesis"),
+    "Goal": ("Redirection", "PlanSketch", "Hypothesis"),
     "PlanSketch": ("Milestone", "Leg", "PlanSketch", "Hypothesis"),
     "Look": ("Milestone", "Discrepancy", "Segments", "Hypothesis"),
     "Frame": ("Look", "Course"),

@@ -41,8 +41,8 @@ OF_TRUTH = Truth | SimulatedBody | Stage | TrueBuilding | Lasting | TrueCamera |
 """What belongs to the simulator."""
 NAMES = [source.__module__.rpartition(".")[2] for source in KNOWLEDGE_SOURCES]
 NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "fault_handler", "path_follower",
-              "elevator_rider", "obstruction_finder", "model_reviser", "withdrawer", "obstacle_finder", "door_watcher",
-              "door_doubter", "range_watcher", "floor_watcher", "camera_calibrator",
+              "elevator_rider", "obstruction_finder", "model_reviser", "redirector", "withdrawer", "obstacle_finder",
+              "door_watcher", "door_doubter", "range_watcher", "floor_watcher", "camera_calibrator",
               "yaw_calibrator", "twin_watcher"}
 """Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
 the move, ride in elevators, find what is before the camera or in the way, take up what somebody tells, or learn of the

@@ -3,7 +3,7 @@
 ``locale_frame``: what is known of the building, one locale at a time, and the requests that bring it. ``robot``: what
 the robot knows of its camera, wheels and footprint. ``body``: requests to the robot's body and its answers. ``touch``:
 contacts and ranges. ``task``: command, goal, plan sketch, leg, milestone, certificate, outcome. ``percepts``: tracks,
-segments, matches, pose fixes. ``told``: what somebody says of the building. ``location``: pose hypotheses.
+segments, matches, pose fixes. ``told``: what somebody says on the way. ``location``: pose hypotheses.
 ``obstruction``: what stands before the camera. ``obstacle``: what stands in the way. ``floor``: free
 floor, and what floors look like. ``door_state``: which doors are seen open or shut. ``travel``: the way since a known
 place. ``kinds``: all of them.

@@ -1,4 +1,4 @@
-"""What somebody tells the robot of the building: a door is shut, a thing is gone."""
+"""What somebody tells the robot on its way: a door is shut, a thing is gone, go elsewhere."""
 
 from __future__ import annotations
 
@@ -28,3 +28,22 @@ class Told:
 
     def sentence(self) -> str:
         return f"was told that {self.what} is {self.state}" + f"; {self.answer}" * bool(self.answer)
+
+
+@observation()
+@dataclass(frozen=True, slots=True)
+class Redirection:
+    """Somebody asks the robot, on its way, to go elsewhere.
+
+    Attributes:
+        text: where to: "Go to the library", "library", or ``(library (6,10,0))``, feet in the locale's frame.
+        by: who asks: "user" where the mission's file says so, "live page" while the run goes on.
+        answer: what became of it, in words; "" until it was taken up.
+    """
+
+    text: str
+    by: str = "user"
+    answer: str = ""
+
+    def sentence(self) -> str:
+        return f"was asked to go elsewhere: {self.text}" + f"; {self.answer}" * bool(self.answer)

@@ -117,7 +117,7 @@ def test_what_a_knowledge_source_writes_from_outside_is_an_observation_or_a_requ
     """Nobody on the board makes up what a port alone can know; it may close a fault, correct a frame, learn of the
     camera, take up what was told.
     """
-    only_revised = {"BodyFault", "CameraState", "LocaleFrame", "Told"}
+    only_revised = {"BodyFault", "CameraState", "LocaleFrame", "Told", "Redirection"}
     sources = knowledge_sources()
     written = {kind for source in sources for kind in source.writes}
     posted_by_ports = {kind for kind in ALL if kind_of(kind).role is Role.OBSERVATION}

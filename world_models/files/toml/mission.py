@@ -14,10 +14,10 @@ from typing import Any, get_args, get_type_hints
 
 from world_models.bounds import Bounds, check_bounds
 from world_models.building.world import World
-from world_models.commands import check_command
+from world_models.commands import check_command, check_destination, parse_destination
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command
-from world_models.entries.told import DOOR_STATES, Told, ToldState
+from world_models.entries.told import DOOR_STATES, Redirection, Told, ToldState
 from world_models.files.compiled.schema import SUFFIXES
 from world_models.files.toml.includes import WORLDS
 from world_models.files.toml.settings import (
@@ -78,33 +78,48 @@ class Arrival:
 
 @dataclass(frozen=True, slots=True)
 class Telling:
-    """What somebody tells the robot of the building on the way: one of the file's ``[[told]]``.
+    """What somebody tells the robot on the way, of the building or to go elsewhere: one of the file's ``[[told]]``.
 
     Attributes:
         at_s: when, by the time of the run.
         what: name of a door or thing, as ``library-door`` or ``allens-office/desk``.
         state: shut or open (a door), gone or there (a thing).
+        goal: where to go instead, as "Go to the library"; then ``what`` and ``state`` are left out.
     """
 
     at_s: float = 0.0
     what: str = ""
     state: str = ""
+    goal: str = ""
 
     def __post_init__(self) -> None:
         check_bounds(self, {"at_s": Bounds(0.0, MAX_NUMBER)})
+        if self.goal:
+            if self.what or self.state:
+                raise ValueError("expected either goal, or what and state, got both")
+            check_destination(self.goal)
+            return
         if not self.what:
             raise ValueError("expected what = the name of a door or thing, got none")
         if self.state not in get_args(ToldState):
             raise ValueError(f"expected state = one of {', '.join(get_args(ToldState))}, got {self.state!r}")
 
     @property
-    def entry(self) -> Told:
+    def entry(self) -> Told | Redirection:
         """What comes to the board."""
+        if self.goal:
+            return Redirection(self.goal)
         state: ToldState = next(state for state in get_args(ToldState) if state == self.state)
         return Told(self.what, state)
 
     def find_fault(self, world: World) -> str:
-        """What is wrong where a world has no such door or thing, in words; "" where it has."""
+        """What is wrong where a world has no such door, thing or room, in words; "" where it has."""
+        if self.goal:
+            try:
+                parse_destination(self.goal, world)
+            except ValueError as error:
+                return str(error)
+            return ""
         if self.state in DOOR_STATES:
             kind, known = "an open door", [doorway.name for doorway in world.doorways]
         else:
@@ -171,7 +186,7 @@ class Mission:
         name: the file's, without its ending.
         world: the world file that the robot believes in.
         goal: in words, or in conceptual-dependency form with coordinates in feet.
-        told: what the robot is told of the building on the way.
+        told: what the robot is told on the way.
         folder: where the file is; file names in it are relative to it.
         source: the file, with the settings that replaced some of its values.
     """

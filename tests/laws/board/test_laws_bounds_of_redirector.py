@@ -1,0 +1,91 @@
+"""The redirector on each kind of board: with a goal and without, lost or not, while a milestone waits or not."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pytest
+
+from blackboard.board import Blackboard
+from blackboard.change import Change
+from blackboard.effect import Effect, Post, Revise
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from harvey.simulation.run import build_robot_model
+from knowledge_sources.action.redirector import Redirector
+from knowledge_sources.settings import DEFAULT
+from sim.scenario import load_scenario
+from world_models.entries.location import Hypothesis, Place, diagonal
+from world_models.entries.task import Goal, Milestone
+from world_models.entries.told import Redirection
+from world_models.files.world_files import WORLDS, load_world
+from world_models.frame_store import FrameStore
+from world_models.frames import Pose2
+
+HALL = "north-hall"
+BELIEVED = Pose2(2.5, 1.2, 0.3)
+TO = Place("archive", 3.048, 1.524)
+ASKED = "(archive (10,5,0))"
+
+
+def decide(text: str, *, goal: str = "active", is_lost: bool = False, is_waiting: bool = False) -> list[Effect] | None:
+    """What the redirector does when it is asked; None where it does not act."""
+    world, board = load_world(WORLDS / "two_ways.toml"), Blackboard()
+    store, robot = FrameStore(world), build_robot_model(load_scenario("shut-door"), world)
+    cycle = 0
+
+    def apply(*effects: Effect) -> tuple[Change, ...]:
+        nonlocal cycle
+        cycle += 1
+        return board.apply(effects, author="test", cycle=cycle)
+
+    apply(*map(Post, robot.entries()), *(Post(store.frame(name)) for name in ("", HALL, "archive")),
+          Post(Hypothesis(HALL, BELIEVED, diagonal(0.01, 0.005), "milestone")))
+    if goal:
+        apply(Post(Goal(Place(HALL, 1.0, 1.0), Place(HALL, 4.0, 1.2, 0.5), goal)))
+    if is_waiting:
+        apply(Post(Milestone("PlanSketch-1", 1, "the end", 0.0)))
+    if is_lost:
+        apply(Post(Discrepancy(Level.GOAL, "it fits nowhere", None, (0.0, 0.0), "px")))
+    (asked,) = apply(Post(Redirection(text)))
+    source = Redirector(DEFAULT)
+    rating = source.rate(board.view, asked)
+    effects = list(source.act(board.view, asked))
+    assert (rating is None) == (not effects)
+    return effects if rating is not None else None
+
+
+def summary(effects: list[Effect] | None) -> list[tuple[str, str]]:
+    return [(type(effect.value).__name__, getattr(effect.value, "status", ""))
+            for effect in effects or () if isinstance(effect, Post | Revise)]
+
+
+@pytest.mark.parametrize("goal", ["", "reached", "abandoned"])
+def test_without_a_goal_there_is_nothing_to_replace(goal: str) -> None:
+    assert decide(ASKED, goal=goal) is None
+
+
+@pytest.mark.parametrize(("is_lost", "is_waiting"), list(product((False, True), repeat=2)))
+def test_with_a_goal_there_is_one_active_goal_and_it_is_the_one_asked_for(is_lost: bool, is_waiting: bool) -> None:
+    effects = decide(ASKED, is_lost=is_lost, is_waiting=is_waiting)
+    assert effects is not None
+    goals = [effect.value for effect in effects if isinstance(effect, Post | Revise) and isinstance(effect.value, Goal)]
+    (active,) = [goal for goal in goals if goal.is_active]
+    found = active.destination
+    assert (found.locale, found.x_m, found.y_m) == (TO.locale, pytest.approx(TO.x_m), pytest.approx(TO.y_m))
+    assert found.heading_rad is None  # the heading asked for at the old goal is not that of the new
+    if is_lost:  # where from is not known: the old goal is kept, with another destination
+        assert summary(effects) == [("Redirection", ""), ("Goal", "active")]
+        assert active.origin == Place(HALL, 1.0, 1.0)
+    else:
+        withdrawn = [("Milestone", "withdrawn")] if is_waiting else []
+        assert summary(effects) == [("Redirection", ""), *withdrawn, ("Goal", "abandoned"), ("Goal", "active")]
+        assert active.origin == Place(HALL, BELIEVED.x_m, BELIEVED.y_m)
+
+
+@pytest.mark.parametrize("text", ["(archive (10,5,1))", "(archive 10)", "Go from here to there"])
+def test_what_cannot_be_changes_nothing_but_its_answer(text: str) -> None:
+    effects = decide(text, is_waiting=True)
+    assert summary(effects) == [("Redirection", "")] and effects is not None
+    (effect,) = effects
+    assert isinstance(effect, Revise) and effect.value.answer.startswith("which cannot be: ")
