@@ -7,10 +7,12 @@ import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harvey.commands.command import Command
+from harvey.commands.serve import PORT, check_installed
 from harvey.errors import BadInput
 from harvey.run_files.run_directory import RUNS, check_vacant
 
@@ -19,7 +21,9 @@ if TYPE_CHECKING:
     from harvey.agent_settings import Pairs
     from harvey.hardware.mission import HardwareMission
     from harvey.hardware.preflight import Check, Preflight
+    from harvey.runner.ports import Body
     from harvey.runner.result import MissionResult
+    from world_models.robot import RobotModel
 
 OPTIONS: Mapping[str, tuple[str, str, str]] = {
     "world": ("world", "FILE", "the building: a world file, or the name of one that comes with Harvey"),
@@ -42,6 +46,8 @@ def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--dry-run", action="store_true", help="check everything, move nothing")
     parser.add_argument("--out", metavar="DIR", help="where the run is kept (runs/MISSION-drive)")
     parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
+    parser.add_argument("--serve", metavar="PORT", type=int, nargs="?", const=PORT,
+                        help=f"show it on a page of 127.0.0.1, which can also send, pause and stop it ({PORT})")
 
 
 def _run(args: Namespace) -> int:
@@ -52,6 +58,8 @@ def _run(args: Namespace) -> int:
     from harvey.hardware.preflight import Preflight
     from harvey.what_if import WhatIf
 
+    if args.serve is not None:
+        check_installed()
     settings, numbers = split_settings(dict(parse_pairs(args.settings)), FORMAT.keys())
     mission = _mission(args, settings)
     out = check_vacant(Path(args.out) if args.out else RUNS / f"{mission.name}-drive")
@@ -66,7 +74,7 @@ def _run(args: Namespace) -> int:
         if args.dry_run:
             print("\neverything is ready; nothing was moved")
             return 0
-        return _drive(mission, dry, clock, make_room(out, mission.name, 0), args.live, numbers)
+        return _drive(mission, dry, clock, make_room(out, mission.name, 0), args, numbers)
 
 
 def run_checks(dry: Preflight) -> bool:
@@ -100,17 +108,41 @@ def _print_check(check: Check) -> None:
 
 
 def _drive(
-    mission: HardwareMission, dry: Preflight, clock: Callable[[], float], out: Path, live: bool, numbers: Pairs
+    mission: HardwareMission, dry: Preflight, clock: Callable[[], float], out: Path, args: Namespace, numbers: Pairs
 ) -> int:
     from harvey.hardware.run import drive
 
     if dry.robot is None or dry.base is None or dry.camera is None:
         raise BadInput("expected a world, a base and a camera, and one of them is lacking")
-    tell_how_to_stop()
-    result = drive(mission, dry.robot, dry.base, dry.camera, clock, out=out, sinks=[follow], live=live,
-                   settings=numbers)
+    start = partial(drive, mission, dry.robot, dry.base, dry.camera, clock, out=out, live=args.live, settings=numbers)
+    if args.serve is None:
+        tell_how_to_stop()
+        result = start(sinks=[follow])
+    else:
+        result = _drive_served(start, mission, dry.robot, args.serve)
     print(summary(result, out))
     return 0 if result.outcome == "reached" else 1
+
+
+def _drive_served(start: Callable[..., MissionResult], mission: HardwareMission, robot: RobotModel, port: int
+                  ) -> MissionResult:
+    """Drive, and show it on a page, which may pause and stop it."""
+    from harvey.hardware.body import HardwareBody
+    from harvey.run_files.run_head import load_known_world
+    from harvey.serve.gate import Gate
+    from harvey.serve.page import open_page
+    from harvey.serve.server import bind
+
+    gate, world = Gate(), load_known_world(mission.world)
+    with open_page(bind("127.0.0.1", port), world, robot.lens, mission.name, gate=gate) as page:
+        def guard(body: HardwareBody, tick: Callable[[], None]) -> Body:
+            gate.on_stop = body.stop_for_good
+            return page.guard(body, tick)
+
+        tell_how_to_stop()
+        result = start(sinks=[follow, page.live], around=guard, tell=page.teller.tell)
+        page.live.end(f"{result.outcome}: {result.reason}")
+    return result
 
 
 def tell_how_to_stop() -> None:
@@ -152,6 +184,7 @@ COMMAND = Command(
         ("harvey drive mission.toml --dry-run", "check world, plan, base, camera and disk; nothing moves"),
         ("harvey drive mission.toml", "the same checks, then the mission"),
         ("harvey drive mission.toml --base denning:/dev/pts/7", "on an emulated base: harvey emulate tells its port"),
+        ("harvey drive mission.toml --serve", "the same, with a page to watch, send, pause and stop it"),
         ("harvey drive mission.toml --camera http://127.0.0.1:8090/stream.mjpg", "with another camera"),
     ),
     _arguments, _run,

@@ -1,10 +1,9 @@
-"""``harvey serve``: drive a mission in the simulator, and show it on a page in the browser meanwhile."""
+"""``harvey serve``: drive a mission in the simulator and show it on a page in the browser, or show one that goes on."""
 
 from __future__ import annotations
 
 import math
-import secrets
-import sys
+import time
 from argparse import ArgumentParser, Namespace
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,7 +17,8 @@ PORT = 8750
 
 
 def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("scenario", metavar="SCENARIO", help="a name from harvey list, or a TOML file")
+    parser.add_argument("scenario", metavar="SCENARIO|RUN", help="a name from harvey list, or a TOML file, to drive;"
+                        " or the folder of a run that another command is driving, to watch")
     parser.add_argument("--port", metavar="N", type=int, default=PORT, help=f"0 for any that is free ({PORT})")
     parser.add_argument("--host", metavar="ADDRESS", default="127.0.0.1",
                         help="the address of this machine on which it listens; with another than 127.0.0.1 whoever"
@@ -32,11 +32,18 @@ def _arguments(parser: ArgumentParser) -> None:
                         help="change a setting, as harvey run does; may be repeated")
 
 
+def check_installed() -> None:
+    """Raises BadInput where what the page needs is not installed."""
+    if any(find_spec(name) is None for name in ("starlette", "uvicorn")):
+        raise BadInput("expected Starlette and uvicorn to be installed: pip install 'harvey[serve]'")
+
+
 def _run(args: Namespace) -> int:
     if not (math.isfinite(args.speed) and args.speed >= 0.0):
         raise BadInput(f"--speed: expected a number that is not below 0, got {args.speed}")
-    if any(find_spec(name) is None for name in ("starlette", "uvicorn")):
-        raise BadInput("expected Starlette and uvicorn to be installed: pip install 'harvey[serve]'")
+    check_installed()
+    if Path(args.scenario).is_dir():
+        return _follow(Path(args.scenario), args)
     seeds = parse_seeds(args.seed)
     if len(seeds) > 1:
         raise BadInput(f"--seed: expected one seed, got {len(seeds)}")
@@ -48,46 +55,60 @@ def _run(args: Namespace) -> int:
 
 def _serve(task: Task, args: Namespace, wanted: Path) -> int:
     from harvey.campaign.summary import format_result
-    from harvey.serve.app import LOCAL_HOSTS, build_app
-    from harvey.serve.gate import Gate, GatedBody
-    from harvey.serve.live_state import LiveState
-    from harvey.serve.server import bind, serving
+    from harvey.serve.gate import Gate
+    from harvey.serve.page import open_page
+    from harvey.serve.server import bind
     from harvey.simulation.run import build_head, run_mission
     from harvey.story.story import first_lines
 
     listening = bind(args.host, args.port)
     stage = task.stage()
     head = build_head(stage, task.seed, task.body, task.agent_settings)
-    world = head.load_world()
-    gate, live, token = Gate(args.speed), LiveState(world, head.model(world).lens), secrets.token_urlsafe()
+    world, gate = head.load_world(), Gate(args.speed)
     if args.paused:
         gate.order("pause")
-    app = build_app(live, gate, world, title=f"{stage.scenario.name}, seed {task.seed}", token=token,
-                    hosts=(*LOCAL_HOSTS, args.host))
-    address = f"http://{args.host}:{listening.getsockname()[1]}/"
     out = make_room(wanted, stage.scenario.name, task.seed)
-    with serving(app, listening):
-        print(f"to watch, pause and stop: {address}#{token}\nonly to watch:            {address}", flush=True)
-        if args.host not in LOCAL_HOSTS:
-            print(f"whoever reaches {args.host} may watch; the line is not encrypted", file=sys.stderr, flush=True)
-        result = run_mission(stage, task.seed, out=out, sinks=(live,), head=head,
-                             around=lambda body, _is_replayed: GatedBody(body, gate))
-        live.end(f"{result.outcome}: {result.reason}; harvey report {out} tells all of it")
+    title = f"{stage.scenario.name}, seed {task.seed}"
+    with open_page(listening, world, head.model(world).lens, title, gate=gate, part=stage.part) as page:
+        result = run_mission(stage, task.seed, out=out, sinks=(page.live,), head=head, tell=page.teller.tell,
+                             around=lambda body, _is_replayed: page.guard(body))
+        page.live.end(f"{result.outcome}: {result.reason}; harvey report {out} tells all of it")
     print(format_result(result, out, first_lines(out)))
     return 0 if result.outcome == "reached" else 1
 
 
+def _follow(path: Path, args: Namespace) -> int:
+    from harvey.run_files.run_directory import RunDirectory
+    from harvey.run_files.run_head import RunHead
+    from harvey.serve.follow import Follower, how_it_ended
+    from harvey.serve.page import open_page
+    from harvey.serve.server import bind
+
+    run = RunDirectory(path)
+    head = RunHead.read(run.path)
+    if ended := how_it_ended(run):
+        raise BadInput(f"{path}: expected a run that goes on, got one that has ended ({ended}): harvey report {path}")
+    world = head.load_world()
+    listening = bind(args.host, args.port)
+    with open_page(listening, world, head.model(world).lens, f"{head.name}, seed {head.seed}") as page:
+        ended = Follower(run, page.live).follow(time.sleep)
+    print(ended)
+    return 0 if ended.startswith("reached") else 1
+
+
 COMMAND = Command(
-    "serve", "drive a mission in the simulator, and show it on a page meanwhile",
+    "serve", "drive a mission in the simulator, and show it on a page meanwhile; or show a run that goes on",
     (
         ("harvey serve lab-to-allens-office", "prints the page's address; open it in a browser"),
         ("harvey serve hallway-kidnap --seed 3 --paused", "waits until somebody presses Resume"),
         ("harvey serve lab-to-allens-office --speed 4 --port 0", "four times as fast, on any free port"),
+        ("harvey serve runs/mission-drive", "only watch a run that harvey drive or harvey run is driving"),
     ),
     _arguments, _run,
     "The page shows the camera's picture, the plan with the belief and its ellipse, candidates, milestones and the\n"
-    "last decisions with what they rest on. Who has the first address, with the token, can pause, resume and stop;\n"
-    "who has the second can only watch. A stop ends the run as the stop key of a robot does: its files are whole.\n"
-    "Needs the extra 'serve'. Goals in words and hardware are not served.\n"
+    "last decisions with what they rest on. Who has the first address, with the token, can also send the robot\n"
+    "elsewhere ('Go to the library'), pause, resume and stop; who has the second can only watch. A stop ends the run\n"
+    "as the stop key of a robot does: its files are whole. harvey drive --serve does the same for a robot.\n"
+    "Needs the extra 'serve'.\n"
     "Exit code 0: the goal was reached; 1: it was not, or the run was stopped; 2: the input cannot be used.",
 )

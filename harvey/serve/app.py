@@ -1,10 +1,10 @@
-"""The live page's web application: everybody who reaches it may watch; only who has the token may pause or stop."""
+"""The live page's web application: everybody who reaches it may watch; only who has the token may order anything."""
 
 from __future__ import annotations
 
 import asyncio
 import secrets
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from html import escape
 from importlib.resources import files
@@ -34,6 +34,16 @@ HEADERS: Mapping[str, str] = {
     "x-content-type-options": "nosniff", "referrer-policy": "no-referrer", "cache-control": "no-store",
 }
 """Of every answer: nothing is fetched from elsewhere, and no other page can frame this one."""
+
+
+NO_TOKEN = "expected the token that was printed at the start\n"
+MOST_WORDS = 200
+"""A goal has at most so many bytes."""
+
+
+def refuse_goal(_text: str) -> None:
+    """Raises ValueError: nobody can be sent elsewhere."""
+    raise ValueError("expected a run that takes another goal, got one that does not")
 
 
 class Board:
@@ -92,12 +102,14 @@ class Guard:
 
 
 def build_app(
-    live: LiveState, gate: Gate, world: World, *, title: str, token: str, hosts: Sequence[str] = LOCAL_HOSTS,
+    live: LiveState, gate: Gate, world: World, *, title: str, token: str = "", ask: Callable[[str], None] = refuse_goal,
+    hosts: Sequence[str] = LOCAL_HOSTS,
 ) -> Starlette:
     """The application.
 
     Args:
-        token: what an order must be given with, as ``Authorization: Bearer TOKEN``.
+        token: what an order must be given with, as ``Authorization: Bearer TOKEN``; "": there are no orders.
+        ask: sends the robot elsewhere, in words; raises ValueError where it cannot be.
         hosts: names under which it answers; a request for any other is refused (DNS rebinding).
     """
     boards: list[Board] = []
@@ -124,22 +136,52 @@ def build_app(
     async def events(_request: Request) -> Response:
         return StreamingResponse(boards[-1].messages(), media_type="text/event-stream")
 
-    async def order(request: Request) -> Response:
+    def is_allowed(request: Request) -> bool:
         given = request.headers.get("authorization", "")
-        if not secrets.compare_digest(given.encode(), f"Bearer {token}".encode()):
-            return PlainTextResponse("expected the token that was printed at the start\n", 403)
+        return secrets.compare_digest(given.encode(), f"Bearer {token}".encode())
+
+    def order(request: Request) -> Response:  # on a thread of its own: a stop waits until the base has heard it
+        if not is_allowed(request):
+            return PlainTextResponse(NO_TOKEN, 403)
         wanted: Order = request.path_params["order"]
         if wanted not in get_args(Order):
             return PlainTextResponse(f"expected one of {', '.join(get_args(Order))}\n", 404)
         gate.order(wanted)
         return PlainTextResponse(f"{gate.state}\n")
 
+    async def go(request: Request) -> Response:
+        if not is_allowed(request):
+            return PlainTextResponse(NO_TOKEN, 403)
+        try:
+            text = await _read_words(request)
+            ask(text)
+        except ValueError as error:
+            return PlainTextResponse(f"{error}\n", 400)
+        return PlainTextResponse(f"asked to go: {text}\n")
+
+    orders = [Route("/orders/{order}", order, methods=["POST"]), Route("/goal", go, methods=["POST"])] if token else []
     return Starlette(
         routes=[Route("/", show), Route("/live.js", script), Route("/page.css", style), Route("/events", events),
-                Route("/orders/{order}", order, methods=["POST"])],
+                *orders],
         middleware=[Middleware(Guard),
                     Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts), www_redirect=False)],
         lifespan=lifespan)
+
+
+async def _read_words(request: Request) -> str:
+    """The words of a goal. Raises ValueError."""
+    body = b""
+    async for part in request.stream():
+        body += part
+        if len(body) > MOST_WORDS:
+            raise ValueError(f"expected at most {MOST_WORDS} bytes, as 'Go to the library', got more")
+    try:
+        words = body.decode("utf-8").strip()
+    except UnicodeDecodeError:
+        raise ValueError("expected words in UTF-8, as 'Go to the library', got other bytes") from None
+    if not words.isprintable():
+        raise ValueError("expected words in one line, as 'Go to the library', got control characters")
+    return words
 
 
 def _build_page(world: World, title: str) -> str:

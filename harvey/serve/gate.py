@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from typing import Literal
 
 from harvey.runner.ports import Body
@@ -21,6 +22,12 @@ from world_models.entries.touch import Contact, Ranges
 
 Order = Literal["pause", "resume", "stop"]
 WHY = "stopped from the page"
+TICK_S = 0.2
+"""While the run is paused, its heartbeat is called at this period [s]."""
+
+
+def do_nothing(_why: str = "") -> None:
+    """For who needs no call."""
 
 
 class Gate:
@@ -28,10 +35,14 @@ class Gate:
 
     Args:
         speed: how many times as fast as the body's own time the run may go; 0 for as fast as it computes.
+
+    Attributes:
+        on_stop: called with the reason, from the thread of who stops it; a body that moves by itself is told so.
     """
 
     def __init__(self, speed: float = 0.0) -> None:
         self.speed = speed
+        self.on_stop: Callable[[str], None] = do_nothing
         self._open, self._stopped = threading.Event(), threading.Event()
         self._open.set()
 
@@ -47,11 +58,13 @@ class Gate:
             return
         if order == "stop":
             self._stopped.set()
+            self.on_stop(WHY)
         self._open.set()
 
-    def hold(self) -> bool:
-        """Wait while it is paused, on the run's thread; whether it may go on then."""
-        self._open.wait()
+    def hold(self, tick: Callable[[], None]) -> bool:
+        """Wait while it is paused, on the run's thread; whether it may go on then. ``tick`` is called meanwhile."""
+        while not self._open.wait(TICK_S):
+            tick()
         return not self._stopped.is_set()
 
     def rest(self, duration_s: float) -> None:
@@ -63,38 +76,41 @@ class GatedBody:
     """A body behind a gate. It asks nothing else of the body and changes no answer: the decisions stay the same.
 
     A stop reaches the board as the stop key of a robot does (:data:`~world_models.entries.body.STOP_KEY`).
+
+    Args:
+        tick: called while the run is paused, so that it does not seem to hang.
     """
 
-    def __init__(self, body: Body, gate: Gate) -> None:
-        self._body, self._gate = body, gate
+    def __init__(self, body: Body, gate: Gate, tick: Callable[[], None] = do_nothing) -> None:
+        self._body, self._gate, self._tick = body, gate, tick
         self._asked_s, self._body_s = time.monotonic(), 0.0
 
     def execute(self, command: MotorCommand, /) -> MotionReport | BodyFault:
-        if not self._gate.hold():
+        if not self._gate.hold(self._tick):
             return self._refuse()
         found = self._body.execute(command)
         self._pace(found.when_s if isinstance(found, BodyFault) else found.sim_time_s)
         return found
 
     def steer(self, course: Course, /) -> tuple[MotionReport, Frame] | BodyFault:
-        if not self._gate.hold():
+        if not self._gate.hold(self._tick):
             return self._refuse()
         found = self._body.steer(course)
         self._pace(found.when_s if isinstance(found, BodyFault) else found[1].sim_time_s)
         return found
 
     def look(self, purpose: str, /) -> Frame | BodyFault:
-        if not self._gate.hold():
+        if not self._gate.hold(self._tick):
             return self._refuse()
         found = self._body.look(purpose)
         self._pace(found.when_s if isinstance(found, BodyFault) else found.sim_time_s)
         return found
 
     def ride(self, ride: Ride, /) -> RideReport | BodyFault:
-        return self._body.ride(ride) if self._gate.hold() else self._refuse()
+        return self._body.ride(ride) if self._gate.hold(self._tick) else self._refuse()
 
     def wait(self, duration_s: float, /) -> float:
-        self._gate.hold()
+        self._gate.hold(self._tick)
         now_s = self._body.wait(duration_s)
         self._pace(now_s)
         return now_s

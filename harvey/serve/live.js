@@ -67,19 +67,28 @@ source.addEventListener("message", (event) => {
   if (run.ended) {
     source.close();
     byId("orders").hidden = true;
+    byId("go").hidden = true;
   }
 });
 source.addEventListener("error", () => {
   if (source.readyState !== EventSource.CLOSED) byId("state").textContent = "the line is lost";
 });
 
+async function post(path, body, answer) {
+  const asked = { method: "POST", headers: { Authorization: `Bearer ${token}` }, body };
+  const said = await fetch(path, asked).then((got) => got.text(), () => "nobody answered");
+  byId(answer).textContent = said.trim();
+}
+
 showPlans(null, []);
 byId("orders").hidden = token === "";
+byId("go").hidden = token === "";
 byId("only-watching").hidden = token !== "";
-document.addEventListener("click", async (event) => {
-  const order = event.target.closest("button")?.dataset.order;
-  if (order === undefined) return;
-  const asked = { method: "POST", headers: { Authorization: `Bearer ${token}` } };
-  const answer = await fetch(`/orders/${order}`, asked).then((got) => got.text(), () => "nobody answered");
-  byId("answer").textContent = answer.trim();
+document.addEventListener("click", (event) => {
+  const order = event.target.closest("button[data-order]")?.dataset.order;
+  if (order !== undefined) post(`/orders/${order}`, null, "answer");
+});
+byId("go").addEventListener("submit", (event) => {
+  event.preventDefault();
+  post("/goal", byId("goal").value, "goal-answer");
 });

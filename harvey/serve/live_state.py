@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import deque
 from queue import Empty, SimpleQueue
-from typing import Any
+from typing import Any, NamedTuple
 
 from blackboard.change import Change, Retracted
 from blackboard.entry import Entry
@@ -25,6 +25,22 @@ DECISIONS, MILESTONES = 12, 12
 """So many of the last are shown."""
 
 
+class Shown(NamedTuple):
+    """A decision as far as it is shown.
+
+    Attributes:
+        trigger: the change that woke who was chosen, or the name of its entry.
+        changes: what was observed and what was made.
+    """
+
+    cycle: int
+    level: str
+    who: str
+    trigger: Change | str
+    refused: str
+    changes: tuple[Change, ...]
+
+
 class LiveState:
     """Follows a run; a sink of it.
 
@@ -34,8 +50,8 @@ class LiveState:
 
     def __init__(self, world: World, camera: Camera) -> None:
         self._world, self._lenses = world, Lenses(camera)
-        self._new: SimpleQueue[Decision | str] = SimpleQueue()
-        self._decisions: deque[Decision] = deque(maxlen=DECISIONS)
+        self._new: SimpleQueue[Decision | Shown | str] = SimpleQueue()
+        self._decisions: deque[Shown] = deque(maxlen=DECISIONS)
         self._milestones: dict[str, Milestone] = {}
         self._believed: dict[str, Hypothesis] = {}
         self._belief: tuple[str, Hypothesis] | None = None
@@ -49,6 +65,10 @@ class LiveState:
     def __call__(self, decision: Decision) -> None:
         """The run's thread hands a decision over."""
         self._new.put(decision)
+
+    def show(self, shown: Shown) -> None:
+        """The same for a run that is only read."""
+        self._new.put(shown)
 
     def end(self, how: str) -> None:
         """The run's thread says that there will be no more, and how it ended."""
@@ -66,8 +86,9 @@ class LiveState:
             if isinstance(new, str):
                 self.ended = new
                 continue
-            self._decisions.append(new)
-            for change in (*new.observed, *new.made):
+            shown = new if isinstance(new, Shown) else _shown(new)
+            self._decisions.append(shown)
+            for change in shown.changes:
                 self._follow(change)
 
     def message(self, state: str) -> str:
@@ -138,14 +159,19 @@ class LiveState:
         return {**self._picture, **self._lines}
 
 
-def _row(decision: Decision) -> dict[str, Any]:
+def _shown(decision: Decision) -> Shown:
     chosen = decision.chosen
+    return Shown(
+        decision.cycle, str(decision.focus), "" if chosen is None else words(chosen.source.name),
+        "" if chosen is None else chosen.trigger, decision.refused, (*decision.observed, *decision.made))
+
+
+def _row(shown: Shown) -> dict[str, Any]:
     return {
-        "cycle": decision.cycle, "level": str(decision.focus), "refused": decision.refused.strip().split("\n")[-1],
-        "who": "" if chosen is None else words(chosen.source.name),
-        "trigger": "" if chosen is None else _says(chosen.trigger),
+        "cycle": shown.cycle, "level": shown.level, "refused": shown.refused.strip().split("\n")[-1],
+        "who": shown.who, "trigger": shown.trigger if isinstance(shown.trigger, str) else _says(shown.trigger),
         "made": [{"says": _says(change), "because": [str(ref) for ref in change.because or change.entry.because]}
-                 for change in (*decision.observed, *decision.made)],
+                 for change in shown.changes],
     }
 
 

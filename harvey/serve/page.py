@@ -1,0 +1,79 @@
+"""A run's live page: what it shows, who may order what, and how it is put between a run and its body."""
+
+from __future__ import annotations
+
+import secrets
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from socket import socket
+
+from harvey.runner.ports import Body
+from harvey.runner.teller import LiveTeller
+from harvey.serve.app import LOCAL_HOSTS, build_app, refuse_goal
+from harvey.serve.gate import Gate, GatedBody, do_nothing
+from harvey.serve.live_state import LiveState
+from harvey.serve.server import serving
+from world_models.building.world import World
+from world_models.camera import Camera
+from world_models.commands import parse_destination
+
+
+@dataclass(frozen=True)
+class LivePage:
+    """The page of one run.
+
+    Attributes:
+        live: a sink of the run.
+        gate: before its body.
+        teller: tells it to go elsewhere.
+        world: the building.
+        part: the locale outside which nothing was built; "" for none.
+    """
+
+    live: LiveState
+    gate: Gate
+    teller: LiveTeller
+    world: World
+    part: str = ""
+
+    def guard(self, body: Body, tick: Callable[[], None] = do_nothing) -> Body:
+        """The body behind the gate; ``tick`` is called while the run is paused."""
+        return GatedBody(body, self.gate, tick)
+
+    def ask(self, text: str) -> None:
+        """Send the robot elsewhere, in words. Raises ValueError where it is ended or there is no such place."""
+        if self.live.ended:
+            raise ValueError("expected a run that goes on, got one that has ended")
+        place = parse_destination(text, self.world)
+        if self.part and self.part not in self.world.path_of(place.locale):
+            raise ValueError(f"expected a room in {self.part}, as only that is simulated here, got {place.locale}")
+        if self.world.locale_at(place.in_world(self.world).position) is None:
+            raise ValueError(f"expected a place within a room, in feet of its own frame, got {text!r}")
+        self.teller.hear(text)
+
+
+@contextmanager
+def open_page(
+    listening: socket, world: World, camera: Camera, title: str, *, gate: Gate | None = None, part: str = "",
+) -> Iterator[LivePage]:
+    """Serve the page of a run for a while, and print its addresses.
+
+    Args:
+        listening: as :func:`harvey.serve.server.bind` gives it.
+        gate: of the run; None: the page only shows it.
+        part: as of :class:`LivePage`.
+    """
+    page = LivePage(LiveState(world, camera), gate or Gate(), LiveTeller(), world, part)
+    token = "" if gate is None else secrets.token_urlsafe()
+    host, port = listening.getsockname()
+    app = build_app(page.live, page.gate, world, title=title, token=token, hosts=(*LOCAL_HOSTS, host),
+                    ask=refuse_goal if gate is None else page.ask)
+    with serving(app, listening):
+        if token:
+            print(f"to watch, send, pause and stop: http://{host}:{port}/#{token}")
+        print(f"only to watch:                  http://{host}:{port}/", flush=True)
+        if host not in LOCAL_HOSTS:
+            print(f"whoever reaches {host} may watch; the line is not encrypted", file=sys.stderr, flush=True)
+        yield page
