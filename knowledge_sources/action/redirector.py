@@ -23,21 +23,25 @@ class Redirector(RobotKnowledgeSource):
 
     A milestone that waits to be judged is withdrawn; the sketcher supersedes the sketches of the old goal. A robot that
     is lost keeps its goal, with the new destination, until it knows from where to go. What cannot be understood is
-    answered, and the robot goes on as before. It acts at once, before the next increment.
+    answered, and the robot goes on as before. It acts at once, before the next increment; where there is no goal yet,
+    when there is one. Of what was asked meanwhile the last counts.
     """
 
     level = Level.ACTION
-    watches = (Watch(Redirection, (Posted,)),)
+    watches = (Watch(Redirection, (Posted,)), Watch(Goal, (Posted,), lambda goal: goal.is_active))
     writes = (Redirection, Goal, Milestone)
 
     def rate(self, view: View, trigger: Change) -> float | None:
-        return 1.0 if active_goal(view) is not None and find_belief(view) is not None else None
+        is_ready = active_goal(view) is not None and find_belief(view) is not None
+        return 1.0 if is_ready and _list_unanswered(view) else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        asked: Entry[Redirection] = trigger.entry
         goal, belief, building = active_goal(view), find_belief(view), find_building(view)
         if goal is None or belief is None:
             return
+        *overtaken, asked = _list_unanswered(view)
+        for earlier in overtaken:
+            yield Revise(earlier, replace(earlier.value, answer="but was asked again since"), (earlier, asked))
         try:
             destination = read_destination(asked.value.text, building, building.find_rooms)
         except ValueError as error:
@@ -54,3 +58,8 @@ class Redirector(RobotKnowledgeSource):
         yield Revise(goal, replace(goal.value, status="abandoned"), (asked, goal))
         here = belief.value.locale_from_robot
         yield Post(Goal(Place(belief.value.locale, here.x_m, here.y_m), destination), (asked, goal, belief))
+
+
+def _list_unanswered(view: View) -> tuple[Entry[Redirection], ...]:
+    """What was asked and not taken up yet, in the order in which it was."""
+    return view.where(Redirection, lambda asked: not asked.answer)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import threading
 import time
+import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -106,6 +108,35 @@ def test_dry_run_then_a_mission_in_which_line_and_camera_fail_and_come_back(
     assert result["final_error_m"] is None and result["collisions"] is None
     assert main(["replay", str(tmp_path / "run")]) == 0
     assert main(["why", str(tmp_path / "run")]) == 0
+
+
+def test_from_its_page_a_robot_is_sent_elsewhere_paused_and_resumed(tmp_path: Path) -> None:
+    pytest.importorskip("uvicorn", reason="the extra 'serve' is not installed")
+    with emulated(tmp_path) as robot:
+        driving = subprocess.Popen([sys.executable, "-m", "harvey.cli", "drive", *robot.options, "--serve", "0"],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        try:
+            assert driving.stdout is not None
+            address = next(found for line in driving.stdout if (found := re.search(r"(http://\S+/)#(\S+)", line)))
+
+            def order(path: str, words: bytes = b"") -> str:
+                asked = urllib.request.Request(
+                    address[1] + path, words, {"Authorization": f"Bearer {address[2]}"}, method="POST")
+                with urllib.request.urlopen(asked) as answer:
+                    return str(answer.read().decode())
+
+            assert order("orders/pause") == "paused\n"
+            with urllib.request.urlopen(f"{address[1]}events") as events:
+                assert any(b'"state":"paused"' in line for line in events)
+            assert order("goal", b"(hallway (7,4,0))") == "asked to go: (hallway (7,4,0))\n"
+            assert order("orders/resume") == "running\n"
+            driving.communicate()
+        finally:
+            driving.kill()
+            driving.wait()
+        assert driving.returncode == 0
+        there = robot.body.truth
+    assert abs(there.world_from_robot.x_m - 7 * 0.3048) < INCH_M and there.collisions == 0
 
 
 def test_whoever_wants_it_to_stop_is_heeded_at_once(tmp_path: Path) -> None:

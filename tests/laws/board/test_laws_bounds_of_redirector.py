@@ -28,7 +28,7 @@ TO = Place("archive", 3.048, 1.524)
 ASKED = "(archive (10,5,0))"
 
 
-def decide(text: str, *, goal: str = "active", is_lost: bool = False, is_waiting: bool = False) -> list[Effect] | None:
+def decide(*texts: str, goal: str = "active", is_lost: bool = False, is_waiting: bool = False) -> list[Effect] | None:
     """What the redirector does when it is asked; None where it does not act."""
     world, board = load_world(WORLDS / "two_ways.toml"), Blackboard()
     store, robot = FrameStore(world), build_robot_model(load_scenario("shut-door"), world)
@@ -47,7 +47,7 @@ def decide(text: str, *, goal: str = "active", is_lost: bool = False, is_waiting
         apply(Post(Milestone("PlanSketch-1", 1, "the end", 0.0)))
     if is_lost:
         apply(Post(Discrepancy(Level.GOAL, "it fits nowhere", None, (0.0, 0.0), "px")))
-    (asked,) = apply(Post(Redirection(text)))
+    asked = [apply(Post(Redirection(text)))[0] for text in texts][-1]
     source = Redirector(DEFAULT)
     rating = source.rate(board.view, asked)
     effects = list(source.act(board.view, asked))
@@ -89,3 +89,12 @@ def test_what_cannot_be_changes_nothing_but_its_answer(text: str) -> None:
     assert summary(effects) == [("Redirection", "")] and effects is not None
     (effect,) = effects
     assert isinstance(effect, Revise) and effect.value.answer.startswith("which cannot be: ")
+
+
+def test_of_several_that_were_asked_before_it_could_act_the_last_counts() -> None:
+    effects = decide("(north-hall (3,3,0))", "(archive 10)", ASKED)
+    assert effects is not None
+    *answered, _, new = effects
+    assert [effect.value.answer.partition(" (")[0] for effect in answered if isinstance(effect, Revise)] == [
+        "but was asked again since", "but was asked again since", "and goes to archive"]
+    assert isinstance(new, Post) and new.value.destination.locale == "archive"

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
-import subprocess
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -20,36 +18,8 @@ from harvey.cli import main
 from harvey.report.several.fields import read_fields
 from scripted_turns import decisions
 
-CHROMIUM = shutil.which("chromium")
 HOSTILE = "</script><b>lost</b> \u2028 {{rows}}"
 NUMBERS = st.none() | st.integers() | st.floats() | st.booleans() | st.text(max_size=60)
-CLICKS = """
-window.addEventListener("load", () => {
-  const told = {};
-  const names = () => rows.filter((row) => !row.hidden).map((row) => row.cells[0].textContent);
-  const order = () => [...table.tBodies[0].rows].map((row) => row.cells[0].textContent);
-  const column = heads.findIndex((head) => head.textContent === "final error mm");
-  const click = () => { heads[column].querySelector("button").click(); return order(); };
-  told.up = click();
-  told.aria = heads[column].getAttribute("aria-sort");
-  told.down = click();
-  told.byName = (heads[0].querySelector("button").click(), order());
-  const choose = (control, value) => {
-    control.value = value;
-    control.dispatchEvent(new Event("input", { bubbles: true }));
-    return [names(), document.getElementById("shown").value];
-  };
-  told.lost = choose(filters[0], "lost");
-  told.both = choose(wanted, "seed 3");
-  choose(filters[0], "");
-  told.all = choose(wanted, "");
-  told.width = [document.documentElement.scrollWidth, window.innerWidth];
-  const result = document.createElement("pre");
-  result.id = "told";
-  result.textContent = JSON.stringify(told);
-  document.body.append(result);
-});
-"""
 
 
 def result(seed: int, **otherwise: Any) -> dict[str, Any]:
@@ -169,28 +139,3 @@ def test_what_cannot_be_reported_is_one_error(
     error = capsys.readouterr().err
     assert said in error and len(error.splitlines()) == 1 and not [*tmp_path.glob("*.html")]
 
-
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium here: apt-get install chromium")
-def test_in_a_browser_it_sorts_and_filters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    results = [result(seed) for seed in range(12)]
-    results[4]["final_error_m"] = None
-    write_campaign(tmp_path / "stroll", results)
-    assert main(["report", "stroll"]) == 0
-    file = tmp_path / "stroll.html"
-    page = file.read_text(encoding="utf-8")
-    file.write_text(page.replace("</body>", f"<script>{CLICKS}</script></body>"), encoding="utf-8")
-    done = subprocess.run(
-        [str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}",
-         "--window-size=500,900", "--enable-logging=stderr", "--virtual-time-budget=20000", "--dump-dom",
-         file.as_uri()], capture_output=True, text=True, timeout=300)
-    found = re.search(r'<pre id="told">(.*?)</pre>', done.stdout, re.DOTALL)
-    assert "CONSOLE" not in done.stderr and found is not None, done.stderr[-2000:]
-    told = json.loads(unescape(found[1]))
-    names = [f"stroll, seed {seed}" for seed in range(12)]
-    up = [names[n] for n in sorted((n for n in range(12) if n != 4), key=lambda n: results[n]["final_error_m"])]
-    assert told["up"] == [*up, names[4]] and told["aria"] == "ascending" and told["down"] == [*up[::-1], names[4]]
-    assert told["byName"] == names  # seed 10 after seed 9
-    assert told["lost"] == [[names[n] for n in (0, 3, 6, 9)], "4 of 12 shown"]
-    assert told["both"] == [[names[3]], "1 of 12 shown"] and told["all"][1] == "12 of 12 shown"
-    assert told["width"][0] <= told["width"][1]  # on a telephone only the table scrolls sideways

@@ -17,9 +17,11 @@ from starlette.testclient import TestClient
 
 from harvey.cli import main
 from harvey.errors import BadInput
-from harvey.serve.app import build_app
-from harvey.serve.gate import Gate, GatedBody
+from harvey.runner.teller import LiveTeller
+from harvey.serve.app import MOST_WORDS, build_app
+from harvey.serve.gate import WHY, Gate, GatedBody
 from harvey.serve.live_state import LiveState
+from harvey.serve.page import LivePage
 from harvey.serve.server import bind
 from scripted_turns import decisions
 from world_models.camera import Camera
@@ -42,7 +44,8 @@ class Page:
         for decision in decisions():
             self.live(decision)
         self.live.end("reached: it is there")
-        self.app = build_app(self.live, self.gate, world, title="<b>a run</b>", token=TOKEN)
+        self.asked: list[str] = []
+        self.app = build_app(self.live, self.gate, world, title="<b>a run</b>", token=TOKEN, ask=self.asked.append)
 
 
 @pytest.fixture(scope="module")
@@ -110,9 +113,56 @@ def test_a_watcher_is_told_what_was_decided_last_and_how_it_ended(client: TestCl
     assert [one["says"].split(":")[0] for one in told["decisions"][-1]["made"]] == last
 
 
+def test_who_has_the_token_sends_it_elsewhere(page: Page, client: TestClient) -> None:
+    for words, told in (("Go to the kitchen", "Go to the kitchen"), (" the \u00d6fen ", "the \u00d6fen")):
+        answer = client.post("/goal", headers=BEARER, content=words.encode())
+        assert (answer.status_code, answer.text) == (200, f"asked to go: {told}\n") and page.asked.pop() == told
+
+
+@pytest.mark.parametrize(("words", "wanted"), [
+    (b"\xff\xfe", "UTF-8"), (b"x" * (MOST_WORDS + 1), f"at most {MOST_WORDS} bytes"), (b"a\x00b", "control characters"),
+    (b"a\nb", "in one line")])
+def test_what_are_no_words_is_refused(page: Page, client: TestClient, words: bytes, wanted: str) -> None:
+    answer = client.post("/goal", headers=BEARER, content=words)
+    assert answer.status_code == 400 and wanted in answer.text and page.asked == []
+
+
+@pytest.mark.parametrize("headers", [{}, {"Authorization": "Bearer "}, {**BEARER, "Origin": "http://evil.example"}])
+def test_without_the_token_it_is_sent_nowhere(page: Page, client: TestClient, headers: dict[str, str]) -> None:
+    assert client.post("/goal", headers=headers, content=b"Go to the kitchen").status_code == 403
+    assert page.asked == []
+
+
+def test_a_page_without_a_token_takes_no_order_at_all() -> None:
+    page = Page()
+    app = build_app(page.live, page.gate, load_world(FLAT), title="a run")
+    with TestClient(app, base_url=BASE) as client:
+        for path in ("/orders/stop", "/goal"):
+            assert client.post(path, headers={"Authorization": "Bearer "}, content=b"kitchen").status_code == 404
+        assert client.get("/").status_code == 200
+    assert page.gate.state == "running"
+
+
+@pytest.mark.parametrize(("text", "part", "wanted"), [
+    ("Go to the attic", "", "no room of"), ("Go from the kitchen to the hall", "", "as the robot goes from where it"),
+    ("the kitchen", "hall", "expected a room in hall"), ("(kitchen (900,1,0))", "", "expected a place within a room")])
+def test_where_it_cannot_go_it_is_not_sent(text: str, part: str, wanted: str) -> None:
+    page = Page()
+    teller = LiveTeller()
+    live = LivePage(LiveState(load_world(FLAT), Camera(512.0, 512.0, 256.0, 256.0, 512, 512)), page.gate, teller,
+                    load_world(FLAT), part)
+    with pytest.raises(ValueError, match=wanted):
+        live.ask(text)
+    ended = LivePage(page.live, page.gate, teller, load_world(FLAT))
+    page.live.take()
+    with pytest.raises(ValueError, match="one that has ended"):
+        ended.ask("the kitchen")
+
+
 LATIN = st.text(st.characters(min_codepoint=33, max_codepoint=126), max_size=40)
 PATHS = LATIN | st.sampled_from(
-    ["orders/stop", "orders/pause", "orders/../orders/stop", "events", "%00", "..%2f..%2fetc/passwd", "live.js"])
+    ["orders/stop", "orders/pause", "goal", "orders/../orders/stop", "events", "%00", "..%2f..%2fetc/passwd",
+     "live.js"])
 NAMES = st.sampled_from(["Authorization", "Origin", "Host", "Content-Length", "Cookie", "X-Forwarded-Host",
                          "X-HTTP-Method-Override", "Accept"])
 
@@ -125,7 +175,7 @@ def test_hostile_requests_harm_nothing(
     target = f"{BASE}/{path.replace('?', '').replace('#', '').replace(':', '')}"
     answer = client.request(method, target, headers=headers, content=body, follow_redirects=False)
     assert answer.status_code < 500
-    assert page.gate.state == "running"
+    assert page.gate.state == "running" and page.asked == []
 
 
 class CountingBody:
@@ -166,6 +216,22 @@ def test_a_stopped_body_moves_no_more(orders: tuple[Any, ...]) -> None:
     gated: Any = GatedBody(body, gate)  # type: ignore[arg-type]
     fault = gated.execute(None)
     assert isinstance(fault, BodyFault) and (fault.what, fault.when_s) == (STOP_KEY, 2.0)
+    assert body.asked == ["stop"]
+
+
+def test_a_body_that_moves_by_itself_is_told_to_stop_before_the_answer_and_its_run_seems_never_to_hang() -> None:
+    body, gate = CountingBody(), Gate()
+    heard: list[str] = []
+    gate.on_stop = heard.append
+    ticked = threading.Event()
+    gate.order("pause")
+    gated: Any = GatedBody(body, gate, ticked.set)  # type: ignore[arg-type]
+    mover = threading.Thread(target=gated.execute, args=(None,), daemon=True)
+    mover.start()
+    assert ticked.wait(60.0) and body.asked == []
+    gate.order("stop")
+    assert heard == [WHY]
+    mover.join()
     assert body.asked == ["stop"]
 
 

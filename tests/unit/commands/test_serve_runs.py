@@ -18,7 +18,9 @@ pytest.importorskip("uvicorn", reason="the extra 'serve' is not installed")
 
 from harvey.campaign.campaign import Task
 from harvey.cli import main
+from harvey.run_files.run_directory import RunDirectory
 from harvey.serve.app import build_app
+from harvey.serve.follow import Follower
 from harvey.serve.gate import Gate, GatedBody
 from harvey.serve.live_state import LiveState
 from harvey.serve.server import bind, serving
@@ -97,3 +99,42 @@ def test_a_stop_ends_the_run_with_exit_code_1_and_whole_files(tmp_path: Path) ->
     assert json.loads((out / "result.json").read_text())["outcome"] == "stopped"
     assert main(["replay", str(out)]) == 0
     assert (out / "recording.rrd").stat().st_size > 0
+
+
+def test_a_run_that_another_command_drives_is_shown_from_its_files(tmp_path: Path) -> None:
+    """What the page shows is what the run's own page would have shown, decision by decision, torn lines included."""
+    task = Task("forty-foot-hallway", SHORT, 0)
+    stage = task.stage()
+    head = build_head(stage, 0)
+    world = head.load_world()
+    own = LiveState(world, head.model(world).lens)
+    run_mission(stage, 0, out=tmp_path / "whole", sinks=(own,), head=head)
+    whole, growing = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "growing")
+    growing.path.mkdir()
+    (growing.path / "camera.mjpeg").write_bytes(whole.camera.read_bytes())
+    followed = LiveState(world, head.model(world).lens)
+    follower = Follower(growing, followed)
+    follower.read_on()
+    assert not followed.take()
+    journal = whole.journal.read_bytes()
+    for end in (len(journal) // 3, 2 * len(journal) // 3, len(journal)):
+        growing.journal.write_bytes(journal[:end])
+        follower.read_on()
+    (growing.path / "result.json").write_bytes(whole.result.read_bytes())
+    assert follower.follow(lambda _s: pytest.fail("it has ended")).startswith("failed: not there after ")
+    own.end(followed.ended or "failed")
+    assert own.take() and followed.take()
+    shown, told = (json.loads(one.message("running")) for one in (own, followed))
+    for one in (shown, told):
+        one.pop("ended")
+        for row in one["decisions"]:
+            row["trigger"] = row["trigger"].partition(":")[0]
+    assert told == shown and len(told["decisions"]) == 12 and told["picture"] is not None
+
+
+def test_a_run_that_has_ended_is_not_followed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run_mission(Task("forty-foot-hallway", SHORT, 0).stage(), 0, out=tmp_path / "run")
+    assert main(["serve", str(tmp_path / "run"), "--port", "0"]) == 2
+    assert "expected a run that goes on, got one that has ended (failed: " in capsys.readouterr().err
+    (tmp_path / "empty").mkdir()
+    assert main(["serve", str(tmp_path / "empty"), "--port", "0"]) == 2
