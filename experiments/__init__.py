@@ -64,6 +64,8 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "questions": "Questions after runs: harvey why against deciding again",
         "recorder": "Time and size of the recording",
         "render-speed": "Simulated camera: frame rate and edge accuracy",
+        "reports": "Reports in a browser: size, first view, barriers",
+        "watchers": "The live page: what 50 watchers cost, hostile requests",
         "world-size": "The same mission in worlds of 12 to 100,000 locales",
     },
 }
