@@ -16,13 +16,14 @@ COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help run test mutants environment site lock clean
+.PHONY: help run test mutants environment site course lock clean
 
 help:
 	@echo "make run          prepare everything, then drive: harvey run $(SCENARIO)"
 	@echo "make test         ruff, mypy, import contracts, pytest; installs every extra, and says what was skipped and why"
 	@echo "make mutants      mutation testing of ROOM=$(ROOM), SAMPLE=$(SAMPLE); goes on where it stopped, and reports"
 	@echo "make site         build the documentation site, build/site/index.html, and the man page, build/man/harvey.1"
+	@echo "make course       execute the notebooks of the course: build/course"
 	@echo "make environment  only prepare $(VENV), for running and for testing"
 	@echo "make lock         write requirements.lock and requirements-dev.lock anew from pyproject.toml"
 	@echo "make clean        remove environments and caches; recordings in runs/ stay"
@@ -67,6 +68,9 @@ $(VENV)/.ready-to-test: requirements-dev.lock $(VENV)/.ready-to-run
 site: $(VENV)/.ready-to-test
 	@$(BIN)/sphinx-build -W -q docs build/site && echo "build/site/index.html"
 	@$(BIN)/sphinx-build -W -q -b man docs build/man && echo "build/man/harvey.1: man -l build/man/harvey.1"
+
+course: $(VENV)/.ready-to-test
+	@$(BIN)/python -m docs.tools.course build/course
 
 lock:
 	@$(PYTHON) -m venv $(LOCK)

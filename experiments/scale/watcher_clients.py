@@ -88,7 +88,8 @@ def make_request(rng: np.random.Generator) -> bytes:
         headers += ["Authorization: Bearer a-token", "Origin: http://evil.example"]
     if not any(line.startswith(("Content-Length", "Transfer-Encoding")) for line in headers):
         headers.append(f"Content-Length: {len(BODIES[body])}")
-    return "\r\n".join([f"{METHODS[method]} {PATHS[path]} HTTP/1.1", *headers, "Connection: close", "", ""]).encode() + BODIES[body]
+    lines = [f"{METHODS[method]} {PATHS[path]} HTTP/1.1", *headers, "Connection: close", "", ""]
+    return "\r\n".join(lines).encode() + BODIES[body]
 
 
 async def ask(port: int, request: bytes) -> str:
