@@ -95,7 +95,7 @@ class ActuatorModel:
         skitter = self.skitter_m * min(1.0, abs(turn_rad) / (math.pi / 2)) + 0.0005
         bent = np.array([0.0, 0.5 * gone * gone, gone]) * self.curvature_sigma_per_m
         turned = np.array([0.0, gone, 1.0]) * math.sqrt(turn_var)
-        along = np.array([self.reach_sigma * move_m + 0.0005, 0.0, 0.0])
+        along = np.array([self.reach_sigma * abs(move_m) + 0.0005, 0.0, 0.0])
         local = np.outer(bent, bent) + np.outer(turned, turned) + np.outer(along, along)
         c, s = math.cos(turn_rad), math.sin(turn_rad)
         rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -111,11 +111,13 @@ class ActuatorModel:
         """Pose and covariance (3, 3) after one reported part of a continuous motion, in the frame they are given in.
 
         The errors of the parts of one increment are fully correlated and add up to :meth:`motion_covariance` of the
-        whole: the variance of each part is the increment's, times its share of the distance.
+        whole: the variance of each part is the increment's, times its share of the distance, forwards or backwards.
+        A part without distance is a turn on the spot.
         """
         gone = self.reach * move_m
-        after = pose @ arc(gone, curvature_per_m + (turn_rad / gone if gone > 0.0 else 0.0))
-        share = self.increment_m * gone
+        on_the_spot = abs(gone) < 1e-9
+        after = pose @ (Pose2(gone, 0.0, turn_rad) if on_the_spot else arc(gone, curvature_per_m + turn_rad / gone))
+        share = self.increment_m * abs(gone)
         along, turned = self.reach_sigma**2 * share, self.curvature_sigma_per_m**2 * share
         turned += (self.turn_sigma * turn_rad) ** 2
         own = np.diag([along, turned * gone**2 / 4.0, turned]) + np.diag([1e-9, 1e-9, 1e-9])
