@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import lomax, norm
 
-from knowledge_sources.methods.matching.hough import build_line_table, find_hough_peaks
+from knowledge_sources.methods.matching.hough import _suppress_non_maxima, build_line_table, find_hough_peaks
 from knowledge_sources.methods.matching.objective import build_likelihood_terms
 from knowledge_sources.settings import DEFAULT
 
@@ -60,3 +60,25 @@ def test_a_model_moved_within_the_window_is_found_where_it_is(seed: int, u: floa
     normals = build_line_table(moved, np.zeros(2)).normals
     is_within = np.abs(normals @ shift) <= TUNING.hough_window_px
     assert best.votes >= 0.6 * np.sum(2.0 * half[is_within])
+
+
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 6), is_even=st.booleans())
+@settings(max_examples=25, deadline=None)
+def test_peaks_are_the_highest_cells_that_are_apart(seed: int, count: int, is_even: bool) -> None:
+    """Against all cells sorted; of equal cells the one of the smaller motion comes first."""
+    turns, axis, window_px, window_rad = np.linspace(-0.3, 0.3, 9), np.linspace(-40.0, 40.0, 9), 40.0, 0.3
+    rng = np.random.default_rng(seed)
+    scores = rng.integers(0, 3, (9, 9, 9)).astype(float) if is_even else rng.uniform(0.0, 100.0, (9, 9, 9))
+    motions = (np.abs(turns)[:, None, None] / window_rad
+               + np.hypot(axis[None, :, None], axis[None, None, :]) / window_px)
+    ranks = scores - 1e-6 * motions
+    found = _suppress_non_maxima(scores, turns, axis, count, window_px, window_rad)
+    taken: list[np.ndarray] = []
+    for cell in found:
+        apart = np.ones(scores.shape, bool)
+        for t, v, u in taken:
+            apart[max(t - 2, 0) : t + 3, max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3] = False
+        assert apart[tuple(cell)]
+        assert ranks[tuple(cell)] == np.max(ranks[apart])
+        taken.append(cell)
+    assert len(found) == count
