@@ -186,6 +186,11 @@ def test_the_mouth_of_a_corridor_into_a_hall(
         assert gap.middle[0] == pytest.approx(80.0, abs=2.0)
         assert gap.middle[1] == pytest.approx(80.0 + radius_m / cell_m, abs=14.0)
         assert gap.depth == 1.0
+        between = np.linspace(gap.start, gap.end, 2001)
+        on_floor = np.mean([floor[tuple(cell)] for cell in np.rint(between).astype(int)])
+        assert not floor[gap.start] and not floor[gap.end]
+        assert gap.width == pytest.approx(on_floor * np.hypot(*np.subtract(gap.end, gap.start)), abs=0.5)
+        assert gap.middle == pytest.approx(between.mean(axis=0))
 
 
 @pytest.mark.parametrize(("side", "is_thing"), [(10, True), (11, False)])
