@@ -64,6 +64,14 @@ def follow(line: str, folder: Path) -> None:
     assert done.stdout or line.startswith(("python photograph.py", PLUGIN)), f"{line} says nothing"
 
 
+def test_the_python_of_the_first_page_runs(tmp_path: Path) -> None:
+    blocks = [text for language, text in blocks_of(ROOT / "docs" / "start.md") if language == "python"]
+    assert blocks
+    (tmp_path / "start.py").write_text("\n".join(blocks), encoding="utf-8")
+    done = run_line("python start.py", tmp_path)
+    assert done.returncode == 0 and done.stdout.startswith("reached 0.0"), done.stderr
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_a_tutorial_can_be_followed(page: Path, folder: Path) -> None:
     commands = [line for _, block in blocks_of(page) for line in block.splitlines()]

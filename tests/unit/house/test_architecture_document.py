@@ -27,7 +27,6 @@ NOT_OF_ONE_FOLDER = ("__init__.py",)
 MOST_BYTES = 400_000
 SHEET_BYTES = 1_500_000
 """Of a sheet of ten pictures."""
-README = (ROOT / "README.md").read_text(encoding="utf-8")
 ARCHITECTURE = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
 COMMAND = re.compile(r"^(?:\.venv/bin/)?harvey ([^#\n]+)|`harvey ([^`]+)`", re.MULTILINE)
 
@@ -43,13 +42,14 @@ def test_every_command_is_understood_with_all_its_options(document: str) -> None
 
 
 def test_every_toml_example_is_a_scenario_or_a_world_without_faults() -> None:
-    examples = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+    text = (ROOT / "docs/missions.md").read_text(encoding="utf-8")
+    examples = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     scenarios = [text for text in examples if "goal" in tomllib.loads(text)]
     worlds = [text for text in examples if text not in scenarios]
     assert scenarios
     assert worlds
     assert all(parse_scenario(text).world.is_file() for text in scenarios)
-    assert [fault for text in worlds for fault in check_world(read_world(Source.parse(text, "README.md"), []))] == []
+    assert [fault for text in worlds for fault in check_world(read_world(Source.parse(text, "missions.md"), []))] == []
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
