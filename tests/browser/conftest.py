@@ -20,7 +20,7 @@ def is_complaint(said: Any) -> bool:
     return said.type in ("error", "warning") and "status of 400" not in said.text
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     driver_api = pytest.importorskip("playwright.sync_api", reason="the extra 'browser' is not installed")
     if CHROMIUM is None:
