@@ -13,6 +13,8 @@ from browser_pages import TELEPHONE
 CHROMIUM = shutil.which("chromium")
 
 Open = Callable[..., Any]
+PATIENCE_MS = 300_000
+"""A page waits so long for what is to come: a first mission compiles for minutes."""
 
 
 def is_complaint(said: Any) -> bool:
@@ -40,6 +42,7 @@ def open_page(browser: Any) -> Iterator[Open]:
     def open_it(address: str, **options: Any) -> Any:
         contexts.append(browser.new_context(**options))
         page = contexts[-1].new_page()
+        page.set_default_timeout(PATIENCE_MS)
         page.on("console", lambda said: wrong.append(said.text) if is_complaint(said) else None)
         page.on("pageerror", lambda error: wrong.append(str(error)))
         page.goto(address)
