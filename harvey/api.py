@@ -42,6 +42,7 @@ from harvey.simulation.run import build_head, run_mission
 from harvey.why.journal import JournalHistory
 from harvey.why.model.element import stories_of
 from harvey.why.model.world_file import WorldFile
+from harvey.why.sentences import knowing
 from harvey.why.story import Story, lines_of
 from knowledge_sources.settings import Settings
 from logs.reader import read_true_track
@@ -251,12 +252,14 @@ class RecordedRun:
         Raises:
             BadInput: the run has none of that name; near ones are listed.
         """
-        return "\n\n".join("\n".join(lines_of(one)) for one in self.stories(what))
+        with knowing(self._kinds):
+            return "\n\n".join("\n".join(lines_of(one)) for one in self.stories(what))
 
     def stories(self, what: str | int | None = None) -> Sequence[Story]:
         """The same as data: headline, decision and reasons with the entries that say so."""
         history = JournalHistory(self._files.journal)
-        return list(stories_of(history, what, WorldFile(self._files)))
+        with knowing(self._kinds):
+            return list(stories_of(history, what, WorldFile(self._files)))
 
     def replay(self) -> int | None:
         """Decide it again from what it observed: the first cycle that is decided otherwise, or None where none is.

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TypeVar
 
 from blackboard.change import Quiescence
@@ -18,10 +21,25 @@ OWN = Registry((*KINDS, Discrepancy, Quiescence))
 """The kinds that come with the project: no knowledge source needs to be loaded to read them."""
 
 
+_GIVEN: ContextVar[Registry] = ContextVar("given", default=OWN)
+
+
+@contextmanager
+def knowing(kinds: Registry) -> Iterator[None]:
+    """For a while, also the kinds that the calling program brought."""
+    before = _GIVEN.set(kinds)
+    try:
+        yield
+    finally:
+        _GIVEN.reset(before)
+
+
 def kinds_for(record: EntryRecord) -> Registry:
     """The kinds that are known here; those of other packages are loaded only for an entry that needs them."""
     if record.type in OWN:
         return OWN
+    if record.type in (given := _GIVEN.get()):
+        return given
     from harvey.wiring import load_kinds
 
     return load_kinds()

@@ -84,6 +84,11 @@ def test_a_tutorial_can_be_followed(page: Path, folder: Path) -> None:
             follow(line, folder)
 
 
+def test_an_entry_of_a_kind_of_ones_own_is_told_by_its_own_sentence(tmp_path: Path) -> None:
+    done = run_line("python count_milestones.py", write_files(tmp_path))
+    assert "Milestones verified so far: " in done.stdout and "[Progress-1." in done.stdout
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_a_tutorial_has_no_block_of_another_kind(page: Path) -> None:
     """Every block is a file or commands, so that none is left out above."""

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 from blackboard.journal import decision_line
+from docs.tools.look import look
+from docs.tools.moments import moments_of
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
@@ -24,6 +26,7 @@ from harvey.story.truth import error_at, read_errors
 from harvey.story.turns import read_turning_points
 from harvey.why.history import MemoryHistory
 from harvey.why.journal import JournalHistory
+from logs.errors import RecordingError
 from logs.reader import read_series
 from logs.recording.paths import POSITION
 from sim.made_up.short_missions import OFFICE, fault
@@ -74,6 +77,19 @@ def history(told: tuple[str, Path]) -> JournalHistory:
 @pytest.fixture(scope="module")
 def story(told: tuple[str, Path], history: JournalHistory) -> RunStory:
     return tell_run(RunDirectory(told[1]), history)
+
+
+def test_no_view_of_its_recording_reports_anything(told: tuple[str, Path], tmp_path: Path) -> None:
+    """A real viewer without a window draws each run at its turning points."""
+    recording = told[1] / "recording.rrd"
+    cycles = [moment.cycle for moment in moments_of(recording, 2)]
+    assert cycles
+    try:
+        complaints = look(recording, tmp_path / "pictures", cycles)
+    except RecordingError as error:
+        pytest.skip(f"no headless viewer here: {error}")
+    assert complaints == []
+    assert {path.name for path in (tmp_path / "pictures").iterdir()} == {f"cycle-{cycle}.png" for cycle in cycles}
 
 
 def test_it_tells_how_the_run_went(told: tuple[str, Path], story: RunStory) -> None:
