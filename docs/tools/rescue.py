@@ -40,6 +40,7 @@ def draw(run: Path, out: Path) -> None:
         page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT}, color_scheme="light", bypass_csp=True)
         page.goto(file.as_uri())
         page.add_style_tag(content=STYLE)
+        page.wait_for_function("run !== undefined")
         turns = page.evaluate("run.turns.map((turn) => [turn.kind, turn.cycle, turn.text])")
         lost = next(cycle for kind, cycle, _ in turns if kind == "lost")
         found = next(cycle for kind, cycle, _ in turns if kind == "found" and cycle >= lost)

@@ -1,7 +1,14 @@
 // The page of a run: everything that it shows stands in the element "data"; nothing is fetched.
-const run = JSON.parse(document.getElementById("data").textContent);
+let run;
 const NEAR = 12; // so many decisions are listed before and after the one that is shown
 const scrubber = document.getElementById("cycle");
+
+/** What stands in the element "data": JSON as gzip in base 64. */
+async function unpack() {
+  const bytes = Uint8Array.from(atob(document.getElementById("data").textContent), (one) => one.charCodeAt(0));
+  const text = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(text).json();
+}
 
 /** The last of some items whose cycle, which grows, is not after this; undefined where there is none. */
 function last(items, cycle, at = (item) => item.cycle) {
@@ -74,7 +81,7 @@ function showPicture(cycle) {
   }
   const [width, height] = picture.size;
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  svg.append(drawn("image", { width, height, href: `data:image/jpeg;base64,${picture.jpeg}` }));
+  svg.append(drawn("image", { width, height, href: `data:image/webp;base64,${picture.webp}` }));
   for (const kind of ["found", "expected", "agreed"]) {
     for (const [x1, y1, x2, y2] of picture[kind] ?? []) svg.append(drawn("line", { x1, y1, x2, y2, class: kind }));
   }
@@ -124,6 +131,7 @@ function reasons(ref, open) {
 
 let wanted = 0;
 function show(cycle) {
+  if (run === undefined) return; // is being unpacked
   const now = Math.min(Math.max(1, cycle), run.cycles.length);
   scrubber.value = now;
   document.getElementById("cycle-shown").value = now;
@@ -146,7 +154,10 @@ document.addEventListener("click", (event) => {
     why.scrollIntoView({ block: "nearest" });
   }
 });
-document.getElementById("turns").append(...run.turns.flatMap((turn) => [
-  element("button", { type: "button", "data-cycle": turn.cycle, title: turn.text }, `${turn.cycle} ${turn.kind}`), " "]));
-const first = run.turns.find((turn) => turn.kind === "lost") ?? run.turns[0];
-show(first === undefined ? run.cycles.length : first.cycle);
+unpack().then((data) => {
+  run = data;
+  document.getElementById("turns").append(...run.turns.flatMap((turn) => [
+    element("button", { type: "button", "data-cycle": turn.cycle, title: turn.text }, `${turn.cycle} ${turn.kind}`), " "]));
+  const first = run.turns.find((turn) => turn.kind === "lost") ?? run.turns[0];
+  show(first === undefined ? run.cycles.length : first.cycle);
+});

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -49,7 +51,7 @@ def build_page(run: RunDirectory, history: History) -> str:
     title = run_name(run)
     parts = {
         "title": escape(title), "style": read_part("page.css"), "script": read_part("draw.js") + read_part("page.js"),
-        "data": embedded(contents),
+        "data": packed(contents),
         "opening": _opening(story), "plans": "\n".join(plan["svg"] for plan in plans),
         "errors": draw_errors(beliefs, errors, lost_spans(story, history)) if beliefs else "",
         "sections": "\n".join(_sections(story)), "milestones": "\n".join(_milestones(story)),
@@ -72,6 +74,12 @@ def embedded(contents: Any) -> str:
     """JSON that can stand in a script element: no text of it ends that, or begins a comment."""
     text = json.dumps(contents, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def packed(contents: Any) -> str:
+    """JSON as gzip in base 64, which the page unpacks: sentences and lines take an eighth of their size."""
+    text = json.dumps(contents, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
 
 
 def lost_spans(story: RunStory, history: History) -> Iterator[tuple[int, int]]:

@@ -6,7 +6,7 @@ import base64
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -49,8 +49,8 @@ def read_pictures(
         number = record.value.get("number")
         if number not in pictures:
             raise BadInput(f"{record.ref}: expected picture {number!r} among those of the run, got none")
-        data, size = shrink(pictures[number])
-        yield {"cycle": record.cycle, "ref": record.ref, "jpeg": data, "size": size, **lines.get(record.id, {})}
+        data, size = shrink(pictures[number], "WEBP")
+        yield {"cycle": record.cycle, "ref": record.ref, "webp": data, "size": size, **lines.get(record.id, {})}
 
 
 def _chosen(frames: Sequence[EntryRecord], lines: Mapping[str, Any]) -> Sequence[EntryRecord]:
@@ -61,8 +61,11 @@ def _chosen(frames: Sequence[EntryRecord], lines: Mapping[str, Any]) -> Sequence
     return [record for record in frames if record.id in lines or record.ref in kept]
 
 
-def shrink(jpeg: bytes) -> tuple[str, tuple[int, int]]:
-    """A picture as a smaller JPEG in base 64, and its size before. Raises BadInput where it is none."""
+def shrink(jpeg: bytes, kind: Literal["JPEG", "WEBP"] = "JPEG") -> tuple[str, tuple[int, int]]:
+    """A picture as a smaller one in base 64, and its size before. Raises BadInput where it is none.
+
+    WebP takes half the bytes of JPEG, and twice the time.
+    """
     from PIL import Image, UnidentifiedImageError
 
     try:
@@ -71,7 +74,7 @@ def shrink(jpeg: bytes) -> tuple[str, tuple[int, int]]:
         picture.draft("RGB", (WIDTH_PX, WIDTH_PX))
         picture.thumbnail((WIDTH_PX, WIDTH_PX))
         out = BytesIO()
-        picture.convert("RGB").save(out, "JPEG", quality=QUALITY, optimize=True)
+        picture.convert("RGB").save(out, kind, quality=QUALITY, optimize=True)
     except (UnidentifiedImageError, OSError) as error:
         raise BadInput(f"expected a picture of the camera as JPEG, got: {error}") from None
     return base64.b64encode(out.getvalue()).decode("ascii"), size

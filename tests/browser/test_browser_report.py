@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +13,7 @@ from harvey.campaign.campaign import Task, run_task
 from harvey.report.page import build_page
 from harvey.run_files.run_directory import RunDirectory
 from harvey.why.journal import JournalHistory
+from report_contents import read_contents
 from sim.made_up.short_missions import OFFICE, fault
 
 
@@ -32,9 +31,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def data(report: Path) -> Any:
-    found = re.search(r'<script id="data" type="application/json">(.*?)</script>', report.read_text(), re.DOTALL)
-    assert found is not None
-    return json.loads(found[1])
+    return read_contents(report.read_text())
 
 
 def test_a_turning_point_leads_to_its_cycle(report: Path, data: Any, open_page: Callable[..., Any]) -> None:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -14,6 +12,7 @@ from harvey.campaign.campaign import Task, run_task
 from harvey.report.page import build_page
 from harvey.run_files.run_directory import RunDirectory
 from harvey.why.journal import JournalHistory
+from report_contents import read_contents
 from sim.made_up.short_missions import OFFICE, fault
 
 
@@ -31,12 +30,6 @@ def page(run: RunDirectory) -> str:
     return build_page(run, JournalHistory(run.journal))
 
 
-def contents(page: str) -> Any:
-    found = re.search(r'<script id="data" type="application/json">(.*?)</script>', page, re.DOTALL)
-    assert found is not None
-    return json.loads(found[1])
-
-
 def test_it_asks_the_network_for_nothing(page: str) -> None:
     assert set(re.findall(r"https?://[^\"' <)]+", page)) <= {
         "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
@@ -45,7 +38,7 @@ def test_it_asks_the_network_for_nothing(page: str) -> None:
 
 
 def test_it_holds_the_run(page: str, run: RunDirectory) -> None:
-    history, data = JournalHistory(run.journal), contents(page)
+    history, data = JournalHistory(run.journal), read_contents(page)
     assert [one["cycle"] for one in data["cycles"]] == list(history.cycles)
     assert data["entries"].keys() == set(history.refs)
     assert all(set(entry["because"]) <= data["entries"].keys() for entry in data["entries"].values())
@@ -64,6 +57,6 @@ def test_without_the_recording_it_tells_no_truth(run: RunDirectory, tmp_path: Pa
     shutil.copytree(run.path, tmp_path / "run")
     bare = RunDirectory(tmp_path / "run")
     bare.recording.unlink()
-    data = contents(build_page(bare, JournalHistory(bare.journal)))
+    data = read_contents(build_page(bare, JournalHistory(bare.journal)))
     assert data["track"] == [] and data["errors"] == [] and data["beliefs"]
 

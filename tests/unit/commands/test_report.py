@@ -18,6 +18,7 @@ from harvey.cli import main
 from harvey.errors import BadInput
 from harvey.report.page import embedded, fill_in
 from harvey.report.pictures import WIDTH_PX, shrink
+from report_contents import read_contents
 from scripted_turns import decisions
 
 TEXTS = st.text(st.characters(exclude_categories=("Cs",))) | st.sampled_from(
@@ -89,7 +90,7 @@ def test_a_file_that_cannot_be_written_is_one_error(
     assert capsys.readouterr().err.startswith("harvey: --out")
     assert main(["report", "run"]) == 0
     page = (tmp_path / "run.html").read_text(encoding="utf-8")
-    assert "failed in cycle 8" in page and '"plans":[]' in page  # a run without its head has no plan
+    assert "failed in cycle 8" in page and read_contents(page)["plans"] == []  # a run without its head has no plan
 
 
 @pytest.mark.parametrize("journal", [b"", b"\x00" * 100, b"{}\n", b"foreign\n"])
