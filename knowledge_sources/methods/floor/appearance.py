@@ -24,7 +24,7 @@ ROUNDS = 4
 
 def compute_looks(colours: Floats | NDArray[np.float32]) -> Floats:
     """Logarithm of the brightness, and red and blue as parts of it, (..., 3), of colours (..., 3) of 0..255."""
-    total = colours.sum(axis=-1, dtype=float) + DARK
+    total = colours[..., 0].astype(float) + colours[..., 1] + colours[..., 2] + DARK
     return np.stack([np.log(total), (colours[..., 0] + DARK / 3.0) / total, (colours[..., 2] + DARK / 3.0) / total],
                     axis=-1)
 
@@ -48,25 +48,29 @@ def fit_looks(
         max_chroma_error: in place of that of the settings.
     """
     limit = settings.max_chroma_error if max_chroma_error is None else max_chroma_error
-    is_alike = np.all(np.abs(looks[:, 1:] - expected[1:]) <= limit, axis=1)
-    near = looks[is_alike]
+    near = looks.compress(_has_hue(looks, expected, limit), axis=0)
     if len(near) < settings.min_floor_pixels:
         return None
     least = default_covariance(settings)
     mean, covariance = _find_mode(near, expected if is_learnt else None, least), 4.0 * least
     for _ in range(ROUNDS):
-        kept = near[measure_unlike(near, mean, covariance) <= TRIM]
+        kept = near.compress(measure_unlike(near, mean, covariance) <= TRIM, axis=0)
         if len(kept) < settings.min_floor_pixels:
             return None
         mean = kept.mean(axis=0)
-        covariance = np.maximum(np.diag(kept.var(axis=0) * 1.1), least)  # 1.1: trimming makes it smaller
+        variances = kept.var(axis=0, mean=mean[None])
+        covariance = np.maximum(np.diag(variances * 1.1), least)  # 1.1: trimming makes it smaller
     return mean, covariance
 
 
 def measure_unlike(looks: Floats, mean: Floats, covariance: Floats) -> Floats:
     """Squared Mahalanobis distance (...) of looks (..., 3) from the floor's."""
-    off = looks - mean
-    return np.asarray(np.einsum("...i,ij,...j->...", off, np.linalg.inv(covariance), off))
+    information = np.linalg.inv(covariance)
+    off = [looks[..., part] - mean[part] for part in range(3)]
+    squares = np.zeros(looks.shape[:-1])
+    for i, j in np.argwhere(information):  # 3 of 9 where the parts are independent; ten times as fast as einsum
+        squares += off[i] * information[i, j] * off[j]
+    return squares
 
 
 def find_floor_in_shade(
@@ -83,7 +87,7 @@ def find_floor_in_shade(
     """
     alike = np.zeros(here.shape, bool)
     alike[here] = measure_unlike(looks[here], mean, covariance) <= settings.max_unlike**2
-    may_be = here & np.all(np.abs(looks[..., 1:] - mean[1:]) <= settings.max_shade_chroma, axis=-1)
+    may_be = here & _has_hue(looks, mean, settings.max_shade_chroma)
     around, sigmas = np.ones((3, 3), np.uint8), np.sqrt(np.diag(covariance))
     for part, sigma in zip(np.moveaxis(looks.astype(np.float32), -1, 0), sigmas, strict=True):
         may_be &= cv2.dilate(part, around) - cv2.erode(part, around) <= settings.max_shade_step * sigma
@@ -118,6 +122,12 @@ def learn_appearance(
     return FloorAppearance(locale, (red, green, blue), ((rows[0][0], rows[0][1], rows[0][2]), (
         rows[1][0], rows[1][1], rows[1][2]), (rows[2][0], rows[2][1], rows[2][2])),
         min(before + weight, settings.max_samples))
+
+
+def _has_hue(looks: Floats, expected: Floats, limit: float) -> NDArray[np.bool_]:
+    """Which of the looks (..., 3) have the red and the blue of the expected ones (3,), within the limit."""
+    red, blue = (np.abs(looks[..., part] - expected[part]) <= limit for part in (1, 2))
+    return np.asarray(red & blue)
 
 
 def _find_mode(looks: Floats, expected: Floats | None, least: Floats) -> Floats:

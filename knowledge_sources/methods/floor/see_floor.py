@@ -171,15 +171,22 @@ def _fit_most(
     then is the floor, if it has about the floor's hue. That is so only where no picture was taken shortly before: white
     balance follows the light little by little, and what fills the picture all at once is a thing.
     """
-    found = [fit_looks(looks[here], expected, is_learnt, settings) for expected, is_learnt in guesses]
-    fits = [(fit, settings.min_floor_share) for fit in found]
-    if may_be_tinted:
-        fits += [(fit_looks(looks[here], expected, False, settings, settings.max_tint), settings.min_tinted_share)
-                 for expected, _ in guesses]
-    for fit, share in fits:
-        if fit is not None and find_floor_in_shade(looks, here, *fit, settings).sum() >= share * here.sum():
+    seen, size = looks[here], np.count_nonzero(here)
+    first: tuple[Floats, Floats] | None = None
+
+    def agrees(fit: tuple[Floats, Floats], share: float) -> bool:
+        return bool(np.count_nonzero(find_floor_in_shade(looks, here, *fit, settings)) >= share * size)
+
+    for expected, is_learnt in guesses:
+        fit = fit_looks(seen, expected, is_learnt, settings)
+        if fit is not None and agrees(fit, settings.min_floor_share):
             return fit
-    return next((fit for fit in found if fit is not None), None)
+        first = first or fit
+    for expected, _ in guesses if may_be_tinted else ():
+        fit = fit_looks(seen, expected, False, settings, settings.max_tint)
+        if fit is not None and agrees(fit, settings.min_tinted_share):
+            return fit
+    return first
 
 
 class _Scan(NamedTuple):
