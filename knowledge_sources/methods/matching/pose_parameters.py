@@ -12,13 +12,16 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.settings.matching import MatchingSettings
 from world_models.frames import Pose, Pose2, frozen, wrap_angle
 
 Widths = tuple[float, ...]
+
+HALTON_BASES = (2, 3, 5, 7, 11, 13)
+"""The first primes, one for each of the six unknowns."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,5 +157,15 @@ def _build_grid(steps: tuple[int, ...], sigmas: float) -> Floats:
 @lru_cache(maxsize=4)
 def _spread_normal(count: int) -> Floats:
     """(count + 1, 6) zero, and an even spread of the normal law (Halton's sequence, the same at every call)."""
-    spread = norm.ppf(qmc.Halton(6, scramble=False).random(count + 1)[1:])
+    spread = ndtri(np.stack([_reflect_digits(count, base) for base in HALTON_BASES], axis=1))
     return frozen(np.concatenate([np.zeros((1, 6)), spread]))
+
+
+def _reflect_digits(count: int, base: int) -> Floats:
+    """(count,) of van der Corput's sequence without its 0, as scipy.stats.qmc, whose import takes a quarter second."""
+    rest, part, out = np.arange(1, count + 1), 1.0, np.zeros(count)
+    while rest.any():
+        part /= base
+        out += part * (rest % base)
+        rest //= base
+    return out

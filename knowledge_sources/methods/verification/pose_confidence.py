@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.verification.pose_evidence import EVIDENCE_NAMES, PoseEvidence
@@ -101,6 +100,8 @@ def fit_weights(
 
     Right and wrong poses count the same in total. Solved by L-BFGS-B.
     """
+    from scipy.optimize import minimize  # loaded when first used: missions have their weights
+
     right, wrong = max(1, int(np.count_nonzero(is_right))), max(1, int(np.count_nonzero(~is_right)))
     share = np.where(is_right, 0.5 / right, 0.5 / wrong)
     sign = np.where(is_right, 1.0, -1.0)

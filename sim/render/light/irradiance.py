@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, uniform_filter
 
 from sim.render.light.lamps import Lamp
 from sim.render.light.light_map import LightMap
@@ -103,6 +102,8 @@ def _reflected(
 
 def _smooth(light: Floats, places: LightMap) -> Floats:
     """The mean over neighbouring places of a patch: reflected light varies slowly, and its rays are few."""
+    from scipy.ndimage import uniform_filter  # loaded when light is computed: most missions have it plain or baked
+
     out, sizes = light.copy(), places.grid[:, 4:].astype(int)
     for p in np.flatnonzero(sizes.max(axis=1) > 1):
         columns, rows = sizes[p]
@@ -115,6 +116,8 @@ def _fill_covered(light: Floats, places: LightMap, tree: RayTree) -> Floats:
     """The light (T, 3), where something hangs close before a place that of the nearest place of its patch where
     nothing does.
     """
+    from scipy.ndimage import distance_transform_edt
+
     limits = np.full(len(light), COVER_M)
     covered = first_hits(tree, places.points_world, places.normals_world, limits)[0] >= 0
     out, sizes = light.copy(), places.grid[:, 4:].astype(int)

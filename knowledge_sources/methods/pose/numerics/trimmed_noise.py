@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import math
 
-from scipy.optimize import brentq
-
 
 def compute_mean_square(variance: float, bound: float) -> float:
     """Mean square of a residual of the normal law in pairs of which those beyond ``bound`` (sum of squares) are cut."""
@@ -35,5 +33,7 @@ def compute_spread(mean: float, bound: float, most: float) -> float:
     elif mean >= compute_mean_square(most, bound):
         variance = max(most, mean)
     else:
+        from scipy.optimize import brentq  # loaded when first used: most missions start without it
+
         variance = float(brentq(lambda s: compute_mean_square(s, bound) - mean, 1.0, most))
     return variance * variance / compute_mean_square(variance, bound)
