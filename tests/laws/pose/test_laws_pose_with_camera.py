@@ -14,7 +14,13 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from knowledge_sources.methods.localization.camera_matching import compute_space_covariance
-from knowledge_sources.methods.pose.with_camera import CameraEstimate, estimate_camera_and_pose
+from knowledge_sources.methods.pose.with_camera import (
+    FREE,
+    STEPS,
+    CameraEstimate,
+    _Problem,
+    estimate_camera_and_pose,
+)
 from world_models.camera import YAW, Camera, CameraMount, move_camera, subtract_cameras
 from world_models.frames import Pose2, wrap_angle
 
@@ -170,3 +176,18 @@ def test_a_covariance_of_another_shape_is_refused() -> None:
     with pytest.raises(ValueError, match=r"camera_covariance of shape \(7, 7\)"):
         estimate(lines, segments, camera_covariance=np.eye(6))
     assert replace(MOUNT, roll_rad=0.0, yaw_rad=0.0) == CameraMount(1.0, 0.1, 0.02)
+
+
+@quick
+@given(seeds)
+def test_slopes_are_the_central_differences_of_each_unknown_to_the_bit(seed: int) -> None:
+    lines, segments, truth = observe(draw_step(seed), seed)
+    problem = _Problem(lines, segments, CAMERA, MOUNT, SIGMA_PX, np.eye(10), HERE)
+    state = problem.start_at(truth) + np.r_[np.zeros(3), 0.3 * draw_step(seed)]
+    slopes = problem.slopes(state)
+    assert not np.delete(slopes, FREE, axis=2).any()
+    for i in FREE:
+        step = np.zeros(len(state))
+        step[i] = STEPS[i]
+        plain = (problem.measure(state + step) - problem.measure(state - step)) / (2.0 * STEPS[i])
+        assert np.array_equal(slopes[..., i], plain)

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from world_models.building.geometry.outlines import inside_polygon
+from world_models.building.geometry.regions import Region
+from world_models.building.geometry.scene import stack_regions
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose, Pose2
@@ -211,3 +213,21 @@ def test_a_distorting_lens_sees_pieces_within_its_image() -> None:
     view = MOUNT.camera_from_robot @ Pose2(10.0, 1.2, 0.0).lifted().inverse()
     found = visible_lines(WORLD, lens, view)
     assert len(found) > 50 and lens.inside(found.segments_px).all()
+
+
+def test_stacked_regions_are_the_scenes() -> None:
+    polygons, normals = stack_regions([region for face in WORLD.faces for region in (*face.front, *face.back)])
+    assert np.array_equal(polygons, WORLD.scene.polygons_world)
+    assert np.array_equal(normals, WORLD.scene.planes_world[:, :3])
+
+
+@given(st.lists(st.integers(3, 9), min_size=1, max_size=8))
+def test_stacked_regions_are_padded_with_their_last_corners(corners: list[int]) -> None:
+    around = [np.linspace(0.0, 2.0 * math.pi, count, endpoint=False) for count in corners]
+    rounds = [np.stack([np.cos(a), np.sin(a), 0.0 * a], axis=1) for a in around]
+    regions = [Region("round", corners_world, (0.5, 0.5, 0.5), "plain", 1.0, 0) for corners_world in rounds]
+    polygons, normals = stack_regions(regions)
+    for polygon, region in zip(polygons, regions, strict=True):
+        spare = max(corners) - len(region.polygon_world)
+        assert np.array_equal(polygon, np.pad(region.polygon_world, ((0, spare), (0, 0)), "edge"))
+    assert np.allclose(normals, (0.0, 0.0, 1.0))

@@ -64,10 +64,9 @@ def build_scene(faces: Sequence[tuple[int, Face]], landmarks: Sequence[tuple[int
         return np.array([(place[i.locale], place[i.neighbour or i.locale]) for i in items], np.int64).reshape(-1, 2)
 
     surfaces = [(number, face, region) for number, face in faces for region in (*face.front, *face.back)]
-    polygons = _pad_polygons([region for _, _, region in surfaces])
+    polygons, normals = stack_regions([region for _, _, region in surfaces])
     lines, points = [len(mark.lines_world) for mark in marks], [len(mark.points_world) for mark in marks]
     numbers, mark_locales = np.array([number for number, _ in landmarks], np.int64), locale_pairs(marks)
-    normals = np.array([_normalize(area_vector(region.polygon_world)) for _, _, region in surfaces]).reshape(-1, 3)
     return Scene(
         edges=Edges.concatenate(mark.edges for mark in marks),
         line_landmark=np.repeat(numbers, lines),
@@ -85,6 +84,14 @@ def build_scene(faces: Sequence[tuple[int, Face]], landmarks: Sequence[tuple[int
         locales=tuple(names),
         marks=dict(landmarks),
     )
+
+
+def stack_regions(regions: Sequence[Region]) -> tuple[Floats, Floats]:
+    """Polygons (m, k, 3) [m], padded with their last corners, and unit normals towards the visible side (m, 3)."""
+    longest = max((len(region.polygon_world) for region in regions), default=4)
+    polygons = [_pad_polygon(region.polygon_world, longest) for region in regions]
+    normals = [_normalize(area_vector(region.polygon_world)) for region in regions]
+    return np.array(polygons, float).reshape(-1, longest, 3), np.array(normals, float).reshape(-1, 3)
 
 
 def concatenate_scenes(parts: Sequence[Scene]) -> Scene:
@@ -156,11 +163,9 @@ def _corner_lines(landmarks: Sequence[Landmark]) -> Ints:
                     np.int64).reshape(-1, widest)
 
 
-def _pad_polygons(regions: Sequence[Region]) -> Floats:
-    """(M, K, 3) polygons, padded with their last corners."""
-    longest = max((len(region.polygon_world) for region in regions), default=4)
-    padded = [np.pad(r.polygon_world, ((0, longest - len(r.polygon_world)), (0, 0)), "edge") for r in regions]
-    return np.array(padded, float).reshape(-1, longest, 3)
+def _pad_polygon(polygon: Floats, length: int) -> Floats:
+    """(length, 3): np.pad with the last corner, at a tenth of its time."""
+    return np.concatenate([polygon, np.repeat(polygon[-1:], length - len(polygon), axis=0)])
 
 
 def _count_up(counts: Sequence[int]) -> Ints:

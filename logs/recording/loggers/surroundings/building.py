@@ -18,6 +18,7 @@ from logs.recording.paths import BELIEVED_TRAIL, BUILDING, DOORWAYS, NAMES, TRUE
 from logs.recording.signs import viewable
 from logs.recording.stream import RecordingStream
 from world_models.building.geometry.regions import LAMP
+from world_models.building.geometry.scene import stack_regions
 from world_models.building.world import World
 
 HEAD_HIGH_M = 1.8
@@ -92,6 +93,8 @@ def space_view(name: str, eye: Any, *without: str) -> Any:
 def _meshes(world: World) -> Iterator[tuple[str, Any]]:
     """A mesh for each storey, so that one can take the upper ones off; they are one where there is only one."""
     regions = [(face, region) for face in world.faces for region in (*face.front, *face.back)]
+    # Not those of the world's scene: that would find the corners of all landmarks as well.
+    polygons, normals = stack_regions([region for _, region in regions])
     colours = np.nan_to_num([region.colour for _, region in regions], nan=UNKNOWN_GREY)
     floors = {name: world.floor_m(name) for name in world.rooms}
     levels = np.array([floors.get(face.locale, 0.0) for face, _ in regions])
@@ -99,13 +102,14 @@ def _meshes(world: World) -> Iterator[tuple[str, Any]]:
     for number, level_m in enumerate(storeys):
         of_storey = np.abs(levels - level_m) < STOREY_M
         path = BUILDING if len(storeys) == 1 else f"{BUILDING}/storey-{number}"
-        yield path, _mesh(world, colours, of_storey, float(level_m))
+        yield path, _mesh(polygons[of_storey], normals[of_storey], colours[of_storey], float(level_m))
 
 
-def _mesh(world: World, colours: NDArray[np.float64], of_storey: NDArray[np.bool_], floor_m: float) -> Any:
-    """The surfaces of a storey as a mesh that shows from their visible sides only: no wall stands in one's way."""
-    polygons, normals = world.scene.polygons_world, world.scene.planes_world[:, :3]
-    shown = of_storey & ((normals[:, 2] > -0.5) | (polygons[..., 2].min(axis=1) < floor_m + HEAD_HIGH_M))
+def _mesh(
+    polygons: NDArray[np.float64], normals: NDArray[np.float64], colours: NDArray[np.float64], floor_m: float
+) -> Any:
+    """Surfaces (m, k, 3) of a storey as a mesh that shows from their visible sides only: no wall is in one's way."""
+    shown = (normals[:, 2] > -0.5) | (polygons[..., 2].min(axis=1) < floor_m + HEAD_HIGH_M)
     lit = light_colours(colours, normals)[shown]
     corners = polygons.shape[1]
     return rr.Mesh3D(
