@@ -12,7 +12,7 @@ from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
 from knowledge_sources.settings.action import ActionSettings
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand
-from world_models.entries.locale_frame import FRAME_OF, LocaleFrame
+from world_models.entries.locale_frame import CHANGED, FRAME_OF, LocaleFrame
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import Tracks
@@ -65,6 +65,13 @@ def find_robot_in(view: View, locale: str, camera: CameraState | None = None) ->
 def find_building(view: View) -> FrameBuilding:
     """The building as far as its frames are on the board; asking for more asks the world for it."""
     return FrameBuilding(view)
+
+
+def find_building_without_finds(view: View) -> FrameBuilding | None:
+    """The building without the things that it was found to have besides; None where it was found to have none."""
+    changed = [entry.value for entry in view.having(CHANGED, True)]
+    instead = [bare for frame in changed if (bare := frame.without_finds()) is not frame]
+    return FrameBuilding(view, instead, "without finds") if instead else None
 
 
 def find_frames(view: View, locales: Iterable[str]) -> tuple[Entry[LocaleFrame], ...]:

@@ -35,13 +35,17 @@ class FrameBuilding(Building):
 
     locale_source: FrameLocales
 
-    def __init__(self, view: View, instead: Iterable[LocaleFrame] = ()) -> None:
-        """``instead``: of the frames on the board, to ask what would be if they were otherwise."""
+    def __init__(self, view: View, instead: Iterable[LocaleFrame] = (), variant: str = "") -> None:
+        """``instead``: of the frames on the board, to ask what would be if they were otherwise.
+
+        Results of one ``variant`` do not take the place of those of another.
+        """
         super().__init__(FrameLocales(view, instead))
+        self._variant = variant
 
     def cached(self, name: str, max_items: int, key: Hashable, compute: Callable[[], T]) -> T:
         frames = self.locale_source
-        results: dict[Hashable, _Kept] = frames.root().memo.setdefault(name, {})
+        results: dict[Hashable, _Kept] = frames.root().memo.setdefault(name + self._variant, {})
         kept = results.get(key)
         if kept is not None and frames.are_current(kept.frames):
             result: T = kept.result

@@ -19,7 +19,21 @@ from sim.made_up.short_missions import OFFICE, fault
 
 MISSIONS = 100
 OPENED = 5
-MOST_MS, MOST_MB = 2000.0, 5.0
+MOST_MS, MOST_MB, MOST_MB_OF_HOUR = 2000.0, 5.0, 15.0
+HOUR = """
+world = "research_center"
+details = ["research_center_details"]
+goal = "(ptrans (hallway (40,4,0)) (hallway (80,4,0)))"
+
+[start]
+put_down_sigma_in = 0.5
+
+[limits]
+max_cycles = 200000
+max_path_m = 10000.0
+""" + "".join(f"\n[[told]]\nat_s = {25.0 * (n + 1)}\ngoal = \"Go to the {room}\"\n" for n, room in enumerate(
+    ("robot laboratory", "library") * 71))
+"""For an hour somebody sends it elsewhere every 25 seconds, before it has arrived."""
 COLUMNS = ("report", "MB", "first view ms", "worst ms", "complaints", "barriers")
 MB = 1e6
 LACKING = "expected Chromium and the extra 'browser': apt-get install chromium; pip install 'harvey[browser]'"
@@ -46,16 +60,18 @@ def run(quick: bool, seed: int) -> Report:
         return Report("Reports in a browser", COLUMNS, (), (LACKING,))
     rows: list[tuple[Cell, ...]] = []
     seen: list[_Seen] = []
+    are_small: list[bool] = []
     with TemporaryDirectory() as folder:
-        for name, page in _write(Path(folder), quick, seed):
+        for name, page, most_mb in _write(Path(folder), quick, seed):
             found = _open(page, chromium)
             seen.append(found)
+            are_small.append(page.stat().st_size / MB < most_mb)
             rows.append((name, page.stat().st_size / MB, statistics.median(found.first_view_ms),
                          max(found.first_view_ms), len(found.complaints), len(found.barriers)))
     worst = max(ms for one in seen for ms in one.first_view_ms)
     claims = (
         (f"the first view of each stands within {MOST_MS / 1e3:g} s", worst < MOST_MS),
-        (f"each is smaller than {MOST_MB:g} MB", all(isinstance(row[1], float) and row[1] < MOST_MB for row in rows)),
+        (f"each is smaller than {MOST_MB:g} MB, that of an hour than {MOST_MB_OF_HOUR:g} MB", all(are_small)),
         ("no complaint on the browser's console", not any(one.complaints for one in seen)),
         ("axe finds no barrier, in light, in dark, and on a telephone", not any(one.barriers for one in seen)),
     )
@@ -68,23 +84,27 @@ def run(quick: bool, seed: int) -> Report:
     return Report("Reports in a browser", COLUMNS, tuple(rows), notes, claims)
 
 
-def _write(folder: Path, quick: bool, seed: int) -> Iterator[tuple[str, Path]]:
-    """Reports, each with its name."""
+def _write(folder: Path, quick: bool, seed: int) -> Iterator[tuple[str, Path, float]]:
+    """Reports, each with its name, and how large it may be [MB]."""
     office = folder / "office.toml"
     office.write_text(OFFICE, encoding="utf-8")
     kidnap = folder / "kidnap.toml"
     kidnap.write_text(OFFICE + fault("kidnap", "allens-office", 3.0, distance_m=0.8, turn_deg=30.0), encoding="utf-8")
-    wanted = [("a kidnap in an office", str(kidnap), str(seed))]
+    hour = folder / "hour.toml"
+    hour.write_text(HOUR, encoding="utf-8")
+    wanted = [("a kidnap in an office", str(kidnap), str(seed), MOST_MB)]
     if not quick:
-        wanted = [("the main mission", "lab-to-allens-office", str(seed)), ("a kidnap", "hallway-kidnap", str(seed)),
-                  (f"a campaign of {MISSIONS}", str(office), f"{seed}..{seed + MISSIONS - 1}")]
-    for number, (name, scenario, seeds) in enumerate(wanted):
+        wanted = [("the main mission", "lab-to-allens-office", str(seed), MOST_MB),
+                  ("a kidnap", "hallway-kidnap", str(seed), MOST_MB),
+                  (f"a campaign of {MISSIONS}", str(office), f"{seed}..{seed + MISSIONS - 1}", MOST_MB),
+                  ("an hour", str(hour), str(seed), MOST_MB_OF_HOUR)]
+    for number, (name, scenario, seeds, most_mb) in enumerate(wanted):
         out, page = folder / f"run-{number}", folder / f"{number}.html"
         with redirect_stdout(sys.stderr):
             main(["run", scenario, "--seed", seeds, "--out", str(out)])
             if main(["report", str(out), "--out", str(page)]) != 0:
                 raise RuntimeError(f"expected a report of {name}, got none")
-        yield name, page
+        yield name, page, most_mb
 
 
 def _open(page: Path, chromium: str) -> _Seen:

@@ -106,6 +106,8 @@ class CorrelatorTracker(RobotKnowledgeSource):
             yield from self._post_discrepancy(view, what, math.inf, belief.value, tracks, because)
             yield _post_or_revise(old, Tracks(frame.id, self._settings.tracking.template_half_px, ()), because)
             return
+        if agreeing < self._settings.action.min_agreeing_landmarks:
+            corrected = None  # nothing bears out that it is not something else that looks the same
         renewed = self._renew(view, frame, image, followed, belief.value if corrected is None else corrected.hypothesis,
                               old)
         tracked = _post_or_revise(old, renewed.tracks, because)

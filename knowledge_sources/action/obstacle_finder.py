@@ -53,7 +53,7 @@ from world_models.entries.floor import FloorThing, FreeFloor
 from world_models.entries.locale_frame import FrameChange, LocaleFrame
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
-from world_models.entries.task import Leg
+from world_models.entries.task import Certificate, Leg
 from world_models.entries.touch import Contact
 
 
@@ -95,8 +95,9 @@ class ObstacleFinder(RobotKnowledgeSource):
             return 0.95 if trigger.entry.value.things or view.latest(Obstacle, _may_be_there) else None
         if isinstance(trigger.entry.value, Leg):
             return 0.95 if any(True for _ in self._find_halting(view, trigger.entry)) else None
-        touch, most_rad = _find_new_touch(view), self._settings.action.max_touch_sigma_rad
-        return 0.95 if touch is not None and touch.contact.value.sigma_rad <= most_rad else None
+        if any(True for _ in self._take_back(view, trigger.entry)):
+            return 0.95
+        return None if self._find_sure_touch(view) is None else 0.95
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         if isinstance(trigger.entry.value, FreeFloor):
@@ -104,9 +105,29 @@ class ObstacleFinder(RobotKnowledgeSource):
         elif isinstance(trigger.entry.value, Leg):
             drafts = list(self._find_halting(view, trigger.entry))
         else:
-            touch = _find_new_touch(view)
+            touch = self._find_sure_touch(view)
             drafts = [] if touch is None else list(self._weigh_touch(view, touch, trigger.entry))
+            touched = {draft.old.id for draft in drafts if draft.old is not None}
+            drafts += [draft for draft in self._take_back(view, trigger.entry)
+                       if draft.old is not None and draft.old.id not in touched]
         yield from self._write(view, drafts)
+
+    def _find_sure_touch(self, view: View) -> _Touch | None:
+        """The newest contact, where its direction is known well enough."""
+        touch, most_rad = _find_new_touch(view), self._settings.action.max_touch_sigma_rad
+        return touch if touch is not None and touch.contact.value.sigma_rad <= most_rad else None
+
+    def _take_back(self, view: View, belief: Entry[Hypothesis]) -> Iterator[_Draft]:
+        """What was seen since a milestone was last verified, where the robot was lost since: its place rests on a
+        belief that proved wrong. What is there is seen anew.
+        """
+        if belief.value.basis != "relocalization":
+            return
+        sure = view.latest(Certificate, lambda certificate: certificate.verdict == "verified")
+        for entry in view.where(Obstacle, lambda o: _may_be_there(o) and o.touched_s is None):
+            if sure is None or entry.cycle > sure.cycle:
+                told = f"taken back: its place rested on a belief that {belief.ref} proved wrong"
+                yield _Draft(entry, replace(entry.value, status="gone", certainty=0.0, evidence=told), [belief])
 
     # -- touch ---------------------------------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -32,6 +33,7 @@ from knowledge_sources.questions import (
     active_goal,
     find_belief,
     find_building,
+    find_building_without_finds,
     find_robot,
     is_over,
     is_standing,
@@ -120,8 +122,8 @@ class Relocalizer(RobotKnowledgeSource):
                          _find_prior(view, tuning))
         followed = _list_moved_candidates(view, before, robot.actuator, building)
         tried = []
-        for camera in self._list_cameras(view):
-            by = find_robot(view, camera).with_obstruction(obstruction).on_floor_of(locale)
+        for camera, among in itertools.product(self._list_cameras(view), self._list_buildings(view)):
+            by = find_robot(view, camera).in_building(among).with_obstruction(obstruction).on_floor_of(locale)
             tried.append((localize(by, looks, rooms, self._settings, (locale, here), followed), by, camera))
         seen_result, looking, camera = max(tried, key=lambda one: _measure_fit(one[0]))  # of equals the first
         goal = self._settings.goal
@@ -166,6 +168,13 @@ class Relocalizer(RobotKnowledgeSource):
         camera = find_camera(view)
         is_sure = camera.told_lens is None or len(camera.counted) > self._settings.localization.max_doubted_pictures
         return (camera,) if is_sure else (camera, camera.as_told())
+
+    def _list_buildings(self, view: View) -> tuple[FrameBuilding, ...]:
+        """The building as it is known; also without the things that it was found to have besides: if the place was not
+        where it was believed, they may be put where the robot stands or where its view is.
+        """
+        bare = find_building_without_finds(view)
+        return (find_building(view),) if bare is None else (find_building(view), bare)
 
     def _find_far_action(
         self, robot: RobotModel, result: LocalizationResult, glimpses: Sequence[Glimpse], rooms: Sequence[str]

@@ -125,6 +125,9 @@ class ActionSettings:
         2, "count", "A landmark that is not found so many times in a row is dropped.", "engineering judgement")
     min_expected_landmarks: int = setting(
         4, "count", "Fewest expected landmarks that can make a discrepancy.", "engineering judgement")
+    min_agreeing_landmarks: int = setting(
+        2, "count", "Fewest landmarks that must agree for the belief to be corrected by them; of those that were found"
+        " alone, one in 17 was something else.", "34 of them, on drives to and fro in the Research Center")
     min_agreeing_part: float = setting(
         1.0 / 3.0, "1", "If a smaller part of the expected landmarks agrees, tracking has failed.",
         "engineering judgement")

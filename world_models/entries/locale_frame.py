@@ -184,6 +184,14 @@ class LocaleFrame:
         """The frame without a change of an element: as the file says again."""
         return self.with_changes(change for change in self.changes if (change.what, change.name) != (what, name))
 
+    def without_finds(self) -> LocaleFrame:
+        """The frame without things that the file lacks; the same object each time."""
+        if "without finds" not in self.memo:
+            rest = [change for change in self.changes if change.what != "extra"]
+            self.memo["without finds"] = self if len(rest) == len(self.changes) else self.with_changes(rest)
+        bare: LocaleFrame = self.memo["without finds"]
+        return bare
+
     def with_changes(self, changes: Iterable[FrameChange]) -> LocaleFrame:
         """The frame as filed, with these changes, one after the other. Raises ValueError as :meth:`changed` does."""
         frame = self.filed or self

@@ -20,6 +20,7 @@ from harvey.simulation.run import build_robot_model
 from knowledge_sources.action.obstacle_finder import ObstacleFinder
 from knowledge_sources.floor_ahead import list_free_discs
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.questions import find_building_without_finds
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.building.world import World
@@ -28,7 +29,7 @@ from world_models.entries.floor import FloorThing, FreeFloor
 from world_models.entries.locale_frame import FRAME_OF, LocaleFrame
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.obstacle import Obstacle
-from world_models.entries.task import Goal
+from world_models.entries.task import Certificate, Goal, MilestoneVerdict
 from world_models.entries.touch import Contact
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_building import FrameBuilding
@@ -90,6 +91,19 @@ class Hall:
         pose = Pose2(2.0, 1.2, sum(turns))
         known = Hypothesis(HALL, pose, diagonal(0.01, 0.005), basis)
         (found,) = self._apply(Revise(belief, known, (belief,)))
+        if self.source.rate(self.board.view, found) is not None:
+            self._apply(*self.source.act(self.board.view, found))
+
+    def verify(self, verdict: MilestoneVerdict = "verified") -> None:
+        """A milestone is judged."""
+        self._apply(Post(Certificate("Milestone-1", "", verdict, "so it was", 9, 9, 9, 1.0, 0.2, 0.0, 0.0, 0.0, 4.0,
+                                     1e-3)))
+
+    def find(self, basis: str) -> None:
+        """The belief is corrected by a milestone, or by being found after it was lost."""
+        belief = self.board.view.latest(Hypothesis)
+        assert belief is not None
+        (found,) = self._apply(Revise(belief, replace(belief.value, basis=basis), (belief,)))
         if self.source.rate(self.board.view, found) is not None:
             self._apply(*self.source.act(self.board.view, found))
 
@@ -225,6 +239,51 @@ def test_a_pose_in_doubt_never_makes_an_obstacle(hall: Hall) -> None:
     hall.board.apply([Post(Discrepancy(Level.PLAN, "lost", None, (4.0, 30.0), "px"))], author="test", cycle=hall.cycle)
     hall.see(carton(), seen_s=1.0)
     assert hall.obstacles == []
+
+
+def test_what_was_seen_before_it_was_lost_is_taken_back_to_the_last_sure_place(hall: Hall) -> None:
+    hall.verify()
+    hall.see(carton(), seen_s=1.0)
+    hall.verify()
+    hall.see(carton(), carton(by_m=-0.7), seen_s=2.0)
+    hall.verify("refuted")
+    hall.find("milestone")
+    assert [o.status for o in hall.obstacles] == ["there", "there"]
+    hall.find("relocalization")
+    assert [o.status for o in hall.obstacles] == ["there", "gone"]
+    assert [change.name for change in hall.frame.changes] == [hall.obstacles[0].name]
+    assert "taken back" in hall.obstacles[1].sentence()
+    hall.see(carton(), carton(by_m=-0.7), seen_s=3.0)
+    assert [o.status for o in hall.obstacles] == ["there", "there"]
+
+
+def test_what_was_touched_is_not_taken_back(hall: Hall) -> None:
+    hall.touch(0.0, turns=(), basis="relocalization")
+    hall.find("relocalization")
+    assert [o.status for o in hall.obstacles] == ["there"]
+
+
+def test_without_what_was_found_the_building_is_as_before_and_what_is_known_of_both_is_kept(hall: Hall) -> None:
+    assert find_building_without_finds(hall.board.view) is None
+    before = FrameBuilding(hall.board.view).obstacles(HALL)
+    hall.see(carton(), seen_s=1.0)
+    known, bare = FrameBuilding(hall.board.view), find_building_without_finds(hall.board.view)
+    assert bare is not None
+    assert len(known.obstacles(HALL)) == len(before) + 1 and len(bare.obstacles(HALL)) == len(before)
+    computed: list[str] = []
+
+    def count(building: FrameBuilding) -> int:
+        def compute() -> int:
+            computed.append(HALL)
+            return len(building.obstacles(HALL))
+
+        return building.cached("things", 4, HALL, compute)
+
+    for _ in range(3):
+        again = find_building_without_finds(hall.board.view)
+        assert again is not None
+        assert (count(FrameBuilding(hall.board.view)), count(again)) == (len(before) + 1, len(before))
+    assert len(computed) == 2
 
 
 def test_nothing_is_expected_to_be_seen_behind_it_and_all_of_it_when_it_is_gone(world: World, hall: Hall) -> None:

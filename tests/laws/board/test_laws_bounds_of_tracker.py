@@ -1,0 +1,165 @@
+"""The correlator tracker at its bounds: by how many landmarks it corrects, when tracking has failed, what it drops.
+
+It follows real templates through rendered pictures; where a landmark is not to be found, the picture is grey there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from blackboard.board import Blackboard
+from blackboard.change import Change
+from blackboard.effect import Effect, Post, Retract
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from harvey.simulation.run import build_robot_model
+from knowledge_sources.action.correlator_tracker import CorrelatorTracker
+from knowledge_sources.methods.features.images import decode
+from knowledge_sources.methods.tracking.template_tracking import select_landmarks
+from knowledge_sources.settings import DEFAULT
+from sim.render.optics import Optics
+from sim.render.sensor import compress_jpeg, expose
+from sim.scenario import load_scenario
+from sim.stage import Stage, build_stage
+from world_models.entries.body import Frame
+from world_models.entries.location import Hypothesis, covariance_tuple, diagonal
+from world_models.entries.percepts import Anchor, Track, Tracks
+from world_models.frame_store import FrameStore
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+
+ROOM = "robot-laboratory"
+SURE, TURNED = diagonal(0.004, 0.001), diagonal(0.004, 0.02)
+TURN_RAD, SLIP_RAD = math.radians(3.0), math.radians(0.6)
+"""It turns by the first, and believes to have turned by less."""
+ACTION = DEFAULT.action
+NO_EDGES = replace(DEFAULT, tracking=replace(DEFAULT.tracking, min_edge_lines=10**6))
+"""So that only landmarks correct the belief."""
+
+
+class Setting(NamedTuple):
+    """Pictures of before and after the turn, the landmarks of the first, and the poses at which they were taken."""
+
+    before: bytes
+    after: bytes
+    tracks: tuple[Track, ...]
+    start: Pose2
+    end: Pose2
+
+
+@cache
+def stage() -> Stage:
+    return build_stage(load_scenario("lab-to-allens-office"))
+
+
+@cache
+def setting() -> Setting:
+    """The first place of some at which enough landmarks are seen before the turn and after it."""
+    scenario, robot = stage().scenario, build_robot_model(stage().scenario)
+    rng = np.random.default_rng(5)
+
+    def picture(pose: Pose2) -> bytes:
+        radiance = Optics.of(scenario.camera.camera).radiance(stage().building.renderer, robot.camera_from_world(pose))
+        return compress_jpeg(expose(radiance, scenario.sensor, rng, lights_on=True), scenario.sensor.jpeg_quality)
+
+    corners = np.array(robot.world.outline(ROOM))
+    for _ in range(40):
+        x_m, y_m = rng.uniform(corners.min(axis=0) + 1.5, corners.max(axis=0) - 1.5)
+        start = Pose2(x_m, y_m, rng.uniform(-3.0, 3.0))
+        end = Pose2(start.x_m, start.y_m, start.heading_rad + TURN_RAD)
+        before = picture(start)
+        found = select_landmarks(robot, (), "Frame-1", decode(before), start, DEFAULT)
+        half = robot.camera.width / 2
+        inside = tuple(track for track in found if abs(place_px(robot, end, track)[0] - half) < half - 60)
+        if len(inside) >= 2 * ACTION.min_expected_landmarks:
+            return Setting(before, picture(end), inside, start, end)
+    raise AssertionError("expected a place with enough landmarks")
+
+
+def place_px(robot: RobotModel, pose: Pose2, track: Track) -> tuple[float, float]:
+    u, v = robot.camera.project(robot.camera_from_world(pose).apply(np.array(track.point_world)))
+    return float(u), float(v)
+
+
+def follow(found: int, hidden: int = 0, misses: int = 0) -> list[Effect]:
+    """What the tracker does where so many landmarks are followed and so many of them are not to be found."""
+    seen = setting()
+    robot, board, cycle = build_robot_model(stage().scenario), Blackboard(), 0
+    world = stage().world
+    store = FrameStore(world)
+    near = [ROOM, *(doorway.other(ROOM) for doorway in world.doorways_of(ROOM))]
+    tracks = [replace(track, misses=misses) for track in seen.tracks[:found + hidden]]
+    image = decode(seen.after).copy()
+    for track in tracks[found:]:
+        u, v = place_px(robot, seen.end, track)
+        image[max(0, round(v) - 15):round(v) + 16, max(0, round(u) - 15):round(u) + 16] = 128
+
+    def apply(*effects: Effect) -> tuple[Change, ...]:
+        nonlocal cycle
+        cycle += 1
+        return board.apply(effects, author="test", cycle=cycle)
+
+    believed = Pose2(seen.end.x_m, seen.end.y_m, seen.end.heading_rad - SLIP_RAD)
+    containers = [name for name in world.path_of(ROOM) if name != ROOM]
+    apply(*map(Post, robot.entries()), *(Post(store.frame(name)) for name in dict.fromkeys(["", *containers, *near])),
+          Post(Hypothesis.of_world(world, ROOM, believed, np.array(TURNED), "odometry")),
+          Post(Frame(seen.before, 0, 0.0)))
+    anchor = Anchor("Frame-1", seen.start.x_m, seen.start.y_m, covariance_tuple(np.array(SURE)))
+    apply(Post(Tracks("Frame-1", DEFAULT.tracking.template_half_px, tuple(tracks), (anchor,), len(tracks))))
+    (taken,) = apply(Post(Frame(compress_jpeg(image, 95), 1, 1.0, "track")))
+    source = CorrelatorTracker(NO_EDGES)
+    assert source.rate(board.view, taken) is not None
+    return list(source.act(board.view, taken))
+
+
+def written(effects: Sequence[Effect]) -> list[Any]:
+    return [effect.value for effect in effects if not isinstance(effect, Retract)]
+
+
+def corrections(effects: Sequence[Effect]) -> list[Hypothesis]:
+    return [value for value in written(effects) if isinstance(value, Hypothesis)]
+
+
+def discrepancies(effects: Sequence[Effect]) -> list[Discrepancy]:
+    return [value for value in written(effects) if isinstance(value, Discrepancy)]
+
+
+@pytest.mark.parametrize("found", [ACTION.min_agreeing_landmarks - 1, ACTION.min_agreeing_landmarks])
+def test_so_many_landmarks_must_agree_that_one_alone_corrects_nothing(found: int) -> None:
+    assert ACTION.min_agreeing_landmarks >= 2
+    corrected = corrections(follow(found))
+    assert len(corrected) == (found >= ACTION.min_agreeing_landmarks)
+    for belief in corrected:
+        off_rad = belief.world_from_robot(stage().world).heading_rad
+        assert abs(off_rad - setting().end.heading_rad) < 0.2 * SLIP_RAD
+
+
+@pytest.mark.parametrize("hidden", [ACTION.min_expected_landmarks - 1, ACTION.min_expected_landmarks])
+def test_tracking_has_failed_where_enough_landmarks_are_expected_and_none_is_found(hidden: int) -> None:
+    found = discrepancies(follow(0, hidden))
+    has_failed = hidden >= ACTION.min_expected_landmarks
+    assert [one.level for one in found if one.magnitude == math.inf] == [Level.ACTION] * has_failed
+
+
+def test_tracking_has_failed_where_too_small_a_part_of_them_agrees() -> None:
+    expected = 2 * ACTION.min_expected_landmarks
+    least = math.ceil(ACTION.min_agreeing_part * expected)
+    for agreeing in (least - 1, least):
+        found = discrepancies(follow(agreeing, expected - agreeing))
+        assert (math.inf in [one.magnitude for one in found]) == (agreeing < least)
+
+
+def test_a_landmark_is_dropped_when_it_was_missed_so_often_in_a_row() -> None:
+    hidden = 1
+    for misses in (ACTION.max_misses - 2, ACTION.max_misses - 1):
+        effects = follow(2, hidden, misses)
+        (tracks,) = (value for value in written(effects) if isinstance(value, Tracks))
+        kept = [track for track in tracks.items if track.template_frame == "Frame-1"]
+        assert len(kept) == 2 + (misses + 1 < ACTION.max_misses)
