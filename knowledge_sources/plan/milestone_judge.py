@@ -50,7 +50,8 @@ class Weighed:
         shift_px: median distance of the lines from where they were expected.
         tolerance_px: the largest that may be.
         is_inexact: whether the model's lines may be displaced.
-        is_weak: whether what was believed before adds little: it is in doubt, or no landmarks were followed.
+        is_weak: whether what was believed before adds little: it is in doubt, leaves much open in the picture, or no
+            landmarks were followed.
         camera_chi2: squared distance of the camera, as solved for, from what was believed of it.
         is_camera_known: whether the camera's mounting is known well enough for the picture to be predicted.
     """
@@ -87,8 +88,10 @@ class MilestoneJudge(RobotKnowledgeSource):
 
     The evidence are lines and the colours of faces
     (:class:`knowledge_sources.methods.verification.pose_evidence.PoseEvidence`), weighted as fitted on rendered floors.
-    The largest deviation is what the wheels can do since the belief was sure; where the belief is in doubt, it is the
-    matcher's window (§6.1.4). Before the first milestone it is what the mission says of how the robot is put down.
+    The largest deviation is what the wheels can do since the belief was sure, for a place that is surely seen at least
+    the matcher's window (§6.1.4); where the belief is in doubt, it is that window. Before the first milestone it is
+    what the mission says of how the robot is put down. That landmarks were followed speaks for the place only where the
+    belief leaves little open in the picture: a place one door further on has much the same landmarks.
     """
 
     level = Level.PLAN
@@ -140,9 +143,10 @@ class MilestoneJudge(RobotKnowledgeSource):
             robot, lines, segments.segments_px, pose, fix.covariance, before, covariance, agreed, faces,
             s.verification)
         p_false = POSE_CONFIDENCE.p_false(weight)
-        in_doubt, followed = open_discrepancy(view, Level.PLAN) is not None, has_followed(view, s.action)
+        in_doubt = open_discrepancy(view, Level.PLAN) is not None
         covariance = covariance + fix.covariance
         motion_px = compute_motion_tolerance_px(robot, lines, before, covariance, s.verification)
+        followed = has_followed(view, s.action) and motion_px <= s.plan.max_followed_px
         tolerance_px = s.action.min_tolerance_px + motion_px
         is_sure = POSE_CONFIDENCE.accepts(p_false)  # so much agrees at the right place only
         expected_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
@@ -151,7 +155,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         is_as_put_down = belief is not None and belief.value.basis == "command"
         if is_sure or in_doubt:
             most_px = s.plan.max_deviation_px
-            tolerance_px = max(most_px, tolerance_px) if is_as_put_down else most_px
+            tolerance_px = most_px if in_doubt and not is_as_put_down else max(most_px, tolerance_px)
         p_wrong = s.plan.p_wrong_followed if followed else s.plan.p_wrong_unfollowed
         p_wrong = _update(s.plan.p_wrong_in_doubt if in_doubt else p_wrong, milestone.told)
         return Weighed(
@@ -166,7 +170,7 @@ class MilestoneJudge(RobotKnowledgeSource):
             p_false=p_false,
             is_enough=POSE_CONFIDENCE.accepts(p_false, p_wrong),
             shift_px=_median_shift(expected_px, plain_px),
-            tolerance_px=tolerance_px if is_as_put_down else min(tolerance_px, s.plan.max_deviation_px),
+            tolerance_px=tolerance_px if is_as_put_down or is_sure else min(tolerance_px, s.plan.max_deviation_px),
             is_weak=in_doubt or not followed,
             is_inexact=bool(milestone.modes),
             camera_chi2=fix.camera_chi2,

@@ -41,7 +41,7 @@ from world_models.building.model_errors import pack_errors
 from world_models.entries.body import Look
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstruction import Obstruction
-from world_models.entries.task import Certificate, Milestone, PlanSketch
+from world_models.entries.task import Certificate, Milestone, PlanSketch, Subgoal
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import VisibleLines
@@ -50,8 +50,9 @@ from world_models.visibility.lines_and_points import VisibleLines
 class MilestoneSelector(RobotKnowledgeSource):
     """Predicts what should be seen before a subgoal (M0 first), and asks for the picture.
 
-    It prefers the present view, then the next one on the way, then the one that tells the place best. Where a view was
-    not testable, it tries another. It also checks the belief when tracking failed, first in the present view. What an
+    It prefers the present view, then the next one on the way, then the one that tells the place best; before a leg that
+    begins with a long turn the view along that leg, as the turn leaves the heading open. Where a view was not testable,
+    it tries another. It also checks the belief when tracking failed, first in the present view. What an
     obstruction hides is not expected.
     """
 
@@ -187,11 +188,21 @@ class MilestoneSelector(RobotKnowledgeSource):
         wanted = sketch.subgoals[sketch.at - 1].destination if sketch.at else None
         if wanted is not None and wanted.heading_rad is not None:
             yield wanted.in_world(building).heading_rad
+        along = None if sketch.current is None else self._find_leg_heading(building, sketch.current, pose)
+        if along is not None and abs(wrap_angle(along - pose.heading_rad)) > self._settings.plan.long_turn_rad:
+            yield along  # few landmarks are followed through such a turn: it is done before the look
         yield pose.heading_rad
         if sketch.current is not None:
             end = sketch.current.destination.in_world(building)
             yield math.atan2(end.y_m - pose.y_m, end.x_m - pose.x_m)
         yield from self._turned_headings(pose)
+
+    def _find_leg_heading(self, building: Building, subgoal: Subgoal, pose: Pose2) -> float | None:
+        """Where the robot will face as it begins to drive [rad, world]; None where it has no way to drive."""
+        end = subgoal.destination.in_world(building)
+        if not subgoal.primitive or pose.distance_to(end) <= subgoal.tolerance_m:
+            return None
+        return math.atan2(end.y_m - pose.y_m, end.x_m - pose.x_m)
 
     def _turned_headings(self, pose: Pose2) -> Iterator[float]:
         """The headings that are tried for a better view [rad, world]."""

@@ -92,6 +92,9 @@ class PlanSettings:
         0.1, "m", "Tolerance that a view is chosen by where no subgoal states one.", "engineering judgement")
     min_look_difference_rad: float = setting(
         math.radians(20.0), "rad", "Looks whose directions differ by less show much the same.", "engineering judgement")
+    long_turn_rad: float = setting(
+        math.radians(45.0), "rad", "Before a leg that begins with a longer turn the robot turns first, then looks: few"
+        " landmarks are followed through such a turn.", "engineering judgement")
     look_turns_rad: tuple[float, ...] = setting(
         tuple(math.radians(a) for a in (30, -30, 60, -60, 90, -90, 135, -135, 180)), "rad",
         "Turns from the present heading that are tried for a better view, in this order.", "engineering judgement")
@@ -131,6 +134,9 @@ class PlanSettings:
     p_wrong_followed: float = setting(
         0.05, "1", "Prior probability of a wrong belief where landmarks were followed up to here.",
         "engineering judgement")
+    max_followed_px: float = setting(
+        15.0, "px", "Where the belief leaves more than this open in the picture, followed landmarks tell of no place.",
+        "half of max_deviation_px")
     p_wrong_unfollowed: float = setting(
         0.12, "1", "The same where no landmarks were followed.", "engineering judgement")
     p_wrong_in_doubt: float = setting(

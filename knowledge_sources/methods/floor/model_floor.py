@@ -51,11 +51,17 @@ def predict_model_floor(
         aside_px_m: what is added to that for a part of the model, divided by its depth: the place is not exactly known.
     """
     camera_from_world = robot.camera_from_world(pose)
-    rays = robot.camera.rays(grid.pixels[::STEP, ::STEP].reshape(-1, 2))
+    nearest_m = max(DEPTHS_M[0][0], MIN_DEPTH_M)
+    aside = STEP * (1 + int(np.ceil((margin_px + aside_px_m / nearest_m) / STEP_PX)) // STEP)
+    pixels = _widen(grid.pixels, aside)  # what is beside the picture may be in it
+    shape = pixels.shape[:2]
+    rays = robot.camera.rays(pixels[::STEP, ::STEP].reshape(-1, 2))
     bounds = np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)])
-    columns = len(range(0, grid.shape[1], STEP))
+    columns = len(range(0, shape[1], STEP))
+    left, top, right, bottom = image_window(robot.camera)
+    window = min(left, float(bounds[0])), top, max(right, float(bounds[2])), bottom
     colours, normals, surface, depth = cast_rays(
-        robot.world, camera_from_world, np.ascontiguousarray(rays), bounds, image_window(robot.camera), columns, 1)
+        robot.world, camera_from_world, np.ascontiguousarray(rays), bounds, window, columns, 1)
     if not len(colours):
         nothing = np.full(grid.shape, -1)
         return ModelFloor(nothing, np.zeros((0, 3)), nothing >= 0)
@@ -66,20 +72,26 @@ def predict_model_floor(
     is_floor = met & (normals[surface, 2] > MIN_UP) & (np.abs(heights) <= rolled_over_m)
     keys, kind_of = np.unique(np.round(colours, 4), axis=0, return_inverse=True)
     kinds = np.where(is_floor, kind_of.ravel()[surface], -1).reshape(-1, columns)
-    kinds = np.repeat(np.repeat(kinds, STEP, axis=0), STEP, axis=1)[: grid.shape[0], : grid.shape[1]]
+    kinds = np.repeat(np.repeat(kinds, STEP, axis=0), STEP, axis=1)[: shape[0], : shape[1]]
     depths = np.where(is_floor, np.inf, depth).reshape(-1, columns)
-    depths = np.repeat(np.repeat(depths, STEP, axis=0), STEP, axis=1)[: grid.shape[0], : grid.shape[1]]
+    depths = np.repeat(np.repeat(depths, STEP, axis=0), STEP, axis=1)[: shape[0], : shape[1]]
     is_plain = _find_plain(kinds, margin_px)
     for least_m, most_m in DEPTHS_M:
         near = ((depths > least_m) & (depths <= most_m)).astype(np.uint8)
         if aside_px_m > 0.0 and near.any():
             half = int(np.ceil((margin_px + aside_px_m / max(least_m, MIN_DEPTH_M)) / STEP_PX))
             is_plain &= cv2.dilate(near, np.ones((1, 2 * half + 1), np.uint8)) == 0
-    return ModelFloor(kinds, keys, is_plain)
+    return ModelFloor(kinds[:, aside:-aside], keys, is_plain[:, aside:-aside])
+
+
+def _widen(pixels: Floats, count: int) -> Floats:
+    """(rows, columns + 2 count, 2) pixels of a grid, with more columns on both sides."""
+    u = pixels[0, 0, 0] + np.arange(-count, pixels.shape[1] + count) * (pixels[0, 1, 0] - pixels[0, 0, 0])
+    return np.stack(np.meshgrid(u, pixels[:, 0, 1]), axis=-1)
 
 
 def _find_plain(kinds: Ints, margin_px: float) -> NDArray[np.bool_]:
-    """Pixels round which all have the same kind of floor; beyond the picture's border it goes on."""
+    """Pixels round which all have the same kind of floor; above and below the picture it goes on."""
     half = int(np.ceil(margin_px / STEP_PX)) + STEP // 2
     mask = np.ones((2 * half + 1, 2 * half + 1), np.uint8)
     values = (kinds + 1).astype(np.float32)

@@ -32,7 +32,8 @@ from knowledge_sources.methods.localization.repetition import find_repetitions
 from knowledge_sources.methods.localization.views import CameraView, align_headings
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.frames import Pose2
+from knowledge_sources.settings.localization import LocalizationSettings
+from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 LookAlike = Callable[[Pose2, Pose2], bool]
@@ -121,32 +122,33 @@ def find_candidates(
     are weighed too.
     """
     look_alike, tuning = make_alias_test(robot, [view.now_from_then for view in views], settings), settings.localization
-    found = _build_distinct(robot, views, [] if guess is None else [guess], [], settings)
-    first = found[0] if found else None
-    known = []
+    found = _build_distinct(robot, views, [] if guess is None else [guess], settings)
+    known: list[Candidate] = []
     if len(views) > tuning.max_searched_views:
-        known = _build_distinct(robot, views, followed, found, settings)
+        known = _build_distinct(robot, views, followed, settings, found)
     if sum(bool(c.is_accepted) for c in (*found, *known)) >= 2:
-        return rank_candidates([*found, *known], look_alike, len(views), settings, first)
+        return rank_candidates([*found, *known], look_alike, len(views), settings, found[0] if found else None)
+    searched = [*found]
     for pose in _find_refined(robot, views, rooms, settings):
-        if all(are_distinct(pose.world_from_robot, c.world_from_robot, tuning) for c in found):
-            found.append(_build_candidate(robot, views, pose, settings))
-    known = known or _build_distinct(robot, views, followed, found, settings)
-    found += [c for c in known
-              if all(are_distinct(c.world_from_robot, other.world_from_robot, tuning) for other in found)]
-    kept = rank_candidates(found, look_alike, len(views), settings, first)
+        _keep_likelier(searched, _build_candidate(robot, views, pose, settings), tuning)
+    first = None
+    if found:  # the place of the guess, though the search may have found more exactly where it is
+        first = min(searched, key=lambda c: c.world_from_robot.distance_to(found[0].world_from_robot))
+    for candidate in known or _build_distinct(robot, views, followed, settings):
+        _keep_likelier(searched, candidate, tuning)
+    kept = rank_candidates(searched, look_alike, len(views), settings, first)
     if len(kept) != 1 or not kept[0].is_accepted:
         return kept
     aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, settings)
     beside = [_build_candidate(robot, views, pose, settings) for pose in aliases]
     repeated = _list_repetitions(robot, kept[0], rooms, settings)
-    beside += _build_distinct(robot, views, repeated, [*kept, *beside], settings)
+    beside += _build_distinct(robot, views, repeated, settings, [*kept, *beside])
     return rank_candidates([*kept, *beside], look_alike, len(views), settings, kept[0])
 
 
 def _build_distinct(
-    robot: RobotModel, views: Sequence[CameraView], rough: Iterable[tuple[str, Pose2]], known: Sequence[Candidate],
-    settings: Settings,
+    robot: RobotModel, views: Sequence[CameraView], rough: Iterable[tuple[str, Pose2]], settings: Settings,
+    known: Sequence[Candidate] = (),
 ) -> list[Candidate]:
     """Candidates from rough poses in rooms, refined, that are none of those that are known, each once."""
     found: list[Candidate] = []
@@ -156,6 +158,13 @@ def _build_distinct(
                for c in (*known, *found)):
             found.append(_build_candidate(robot, views, refined, settings))
     return found
+
+
+def _keep_likelier(found: list[Candidate], new: Candidate, settings: LocalizationSettings) -> None:
+    """Add a candidate; of those that are one place the likeliest is kept, as refining may end beside the right pose."""
+    near = [c for c in found if not are_distinct(new.world_from_robot, c.world_from_robot, settings)]
+    if all(new.likelihood.log_likelihood > c.likelihood.log_likelihood for c in near):
+        found[:] = [*(c for c in found if c not in near), new]
 
 
 def _list_repetitions(
@@ -179,8 +188,12 @@ def find_aliases(
     predicted = [replace(view, segments_px=seen.segments_px) for view, seen in zip(views, lines, strict=True)]
     look_alike = make_alias_test(robot, [view.now_from_then for view in views], settings)
     tuning = settings.localization
-    found = [other for other in _find_refined(robot, predicted, rooms, settings)
-             if are_distinct(other.world_from_robot, pose, tuning) and look_alike(pose, other.world_from_robot)]
+    found: list[RefinedPose] = []
+    for refined in _find_refined(robot, predicted, rooms, settings):
+        known = (pose, *(alias.world_from_robot for alias in found))
+        is_new = all(are_distinct(refined.world_from_robot, one, tuning) for one in known)
+        if is_new and look_alike(pose, refined.world_from_robot):
+            found.append(refined)
     room_of_pose = _find_room(robot, rooms[0], pose)
     for room, other in find_repetitions(robot.world, room_of_pose, pose, rooms, tuning):
         known = (pose, *(alias.world_from_robot for alias in found))
@@ -246,12 +259,14 @@ def decide(
 def _find_refined(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings
 ) -> list[RefinedPose]:
-    """The best candidates by the last views, refined by all, each once."""
+    """The best candidates by the last views, refined by all; not the same pose twice."""
     tuning, found = settings.localization, list[RefinedPose]()
     last = views[-tuning.max_views_of_search:]
     for candidate in find_pose_candidates(robot, last, rooms, tuning.max_candidates, settings):
         pose, covariance = refine_pose(robot, views, candidate.world_from_robot, settings)
-        if all(are_distinct(pose, other.world_from_robot, tuning) for other in found):
+        if all(pose.distance_to(other.world_from_robot) > tuning.fine_climb_m
+               or abs(wrap_angle(pose.heading_rad - other.world_from_robot.heading_rad)) > tuning.fine_climb_rad
+               for other in found):
             found.append(RefinedPose(candidate.room, pose, covariance))
     return found
 

@@ -7,7 +7,7 @@ the robot is in doubt, has followed landmarks, or has not: each state has its ow
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, TypeVar
@@ -25,11 +25,13 @@ from blackboard.servoing import OPEN, Discrepancy
 from harvey.simulation.run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
-from knowledge_sources.plan.milestone_judge import MilestoneJudge, Verdict, _update
+from knowledge_sources.plan.milestone_judge import MilestoneJudge, Verdict, Weighed, _update
+from knowledge_sources.questions import HELD, find_belief
 from knowledge_sources.settings import DEFAULT, Settings
 from sim.made_up.short_missions import OFFICE
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
+from world_models.entries.location import diagonal
 from world_models.entries.percepts import Segments, Track, Tracks
 from world_models.entries.task import Milestone
 
@@ -108,20 +110,30 @@ def test_a_pose_is_accepted_up_to_the_stated_probability_of_being_wrong(p_wrong:
 
 
 class StateView(TracedView):
-    """The board as if the robot were in doubt or not, and had followed so many landmarks or none."""
+    """The board as if the robot were in doubt or not, had followed so many landmarks or none, and its heading were as
+    uncertain as said.
+    """
 
-    __slots__ = ("_doubt", "_tracks")
+    __slots__ = ("_belief", "_doubt", "_tracks")
 
-    def __init__(self, board: Blackboard, in_doubt: bool, followed: int) -> None:
+    def __init__(self, board: Blackboard, in_doubt: bool, followed: int, sigma_rad: float | None = None) -> None:
         super().__init__(board, ())
+        held = find_belief(board.view)
+        if held is not None and sigma_rad is not None:
+            basis, covariance = "odometry", diagonal(1e-3, sigma_rad)
+            held = held._replace(value=replace(held.value, covariance=covariance, basis=basis))
+        self._belief = held
         doubt = Discrepancy(Level.PLAN, "a milestone is elsewhere", 9.0, (0.0, 30.0), "px")
         self._doubt = Entry("Discrepancy-999", 0, doubt, "test", 0, ()) if in_doubt else None
         track = Track("a", (0.0, 0.0, 0.0), "Frame-1", (0.0, 0.0), 1.0, (0.0, 0.0), (1.0, 1.0), 1.0, 0.3)
         self._tracks = Entry("Tracks-999", 0, Tracks("Frame-1", 10, (track,) * followed), "test", 0, ())
 
     def newest(self, index: Index[T], key: Hashable) -> Entry[T] | None:
-        held: Any = self._doubt
-        return held if index is OPEN and key is Level.PLAN else super().newest(index, key)
+        doubt: Any = self._doubt
+        belief: Any = self._belief
+        if index is HELD:
+            return belief  # type: ignore[no-any-return]
+        return doubt if index is OPEN and key is Level.PLAN else super().newest(index, key)
 
     def newest_first(self, kind: type[T]) -> Iterator[Entry[T]]:
         held: Any = self._tracks
@@ -136,6 +148,23 @@ def find_prior_at_bound(p_false: float) -> float:
     """The probability of a wrong place before a picture, by which it is just accepted."""
     odds = POSE_CONFIDENCE.accept / (1.0 - POSE_CONFIDENCE.accept) * (1.0 - p_false) / p_false
     return odds / (1.0 + odds)
+
+
+def run_with(check: Callable[[Blackboard, Change], None]) -> None:
+    """Drive a mission, and check something on the board before each judgement."""
+    def sources(settings: Settings) -> list[Any]:
+        out: list[Any] = list(knowledge_sources(settings))
+        judge = next(source for source in out if isinstance(source, MilestoneJudge))
+        real = judge.act
+
+        def act(view: View, trigger: Change) -> Iterable[Effect]:
+            check(view._board, trigger)
+            return real(view, trigger)
+
+        judge.act = act
+        return out
+
+    run_mission(build_stage(parse_scenario(OFFICE)), 3, sources=sources)
 
 
 def test_each_state_of_the_robot_asks_for_its_own_evidence() -> None:
@@ -159,20 +188,34 @@ def test_each_state_of_the_robot_asks_for_its_own_evidence() -> None:
                     assert judge._weigh(view, fix, milestone).is_enough is enough, (own, in_doubt, followed, value)
                 checked.append(own)
 
-    def sources(settings: Settings) -> list[Any]:
-        out: list[Any] = list(knowledge_sources(settings))
-        judge = next(source for source in out if isinstance(source, MilestoneJudge))
-        real = judge.act
-
-        def act(view: View, trigger: Change) -> Iterable[Effect]:
-            check(view._board, trigger)
-            return real(view, trigger)
-
-        judge.act = act
-        return out
-
-    run_mission(build_stage(parse_scenario(OFFICE)), 3, sources=sources)
+    run_with(check)
     assert set(checked) == set(states) and len(checked) >= 6
+
+
+def test_landmarks_that_were_followed_speak_for_no_place_where_the_belief_leaves_much_open() -> None:
+    """And what is surely seen may lie as far off as the belief leaves open, though the plan level's window is less.
+
+    Along level lines, which are half of some views, nothing moves as the robot turns: so the uncertainty is large.
+    """
+    least, judge, checked = DEFAULT.action.min_followed_landmarks, MilestoneJudge(), []
+
+    def check(board: Blackboard, trigger: Change) -> None:
+        fix = trigger.entry.value
+        milestone: Milestone = board.view[board.view[fix.match].value.milestone].value
+
+        def weigh_at(sigma_rad: float) -> Weighed:
+            return judge._weigh(StateView(board, False, least, sigma_rad), fix, milestone)
+
+        by_pixel = 1.0 / (VERIFICATION.motion_tolerance_sigmas * weigh_at(1e-3).robot.camera.fx)
+        sure, unsure = weigh_at(0.5 * PLAN.max_followed_px * by_pixel), weigh_at(12.0 * PLAN.max_followed_px * by_pixel)
+        wide = weigh_at(16.0 * PLAN.max_deviation_px * by_pixel)
+        checked.append((sure.is_weak, unsure.is_weak, POSE_CONFIDENCE.accepts(wide.p_false), wide.tolerance_px))
+
+    run_with(check)
+    assert any(is_sure for _, _, is_sure, _ in checked)
+    for sure_is_weak, unsure_is_weak, is_sure, tolerance_px in checked:
+        assert (sure_is_weak, unsure_is_weak) == (False, True)
+        assert tolerance_px > 1.5 * PLAN.max_deviation_px if is_sure else tolerance_px == PLAN.max_deviation_px
 
 
 def test_in_doubt_more_is_asked_than_without_landmarks_and_there_more_than_with_them() -> None:

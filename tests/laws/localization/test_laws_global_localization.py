@@ -26,6 +26,7 @@ from knowledge_sources.methods.localization.next_view import (
     find_widest_gap,
     make_safety_check,
 )
+from knowledge_sources.methods.localization.pose_candidates import are_distinct
 from knowledge_sources.methods.localization.refinement import refine_pose, refine_view_motions
 from knowledge_sources.methods.localization.views import CameraView, align_headings, propagate_pose
 from knowledge_sources.methods.localization.visibility_map import get_visibility_map
@@ -331,6 +332,27 @@ def test_in_a_building_that_differs_everywhere_it_says_where_it_is(seed: int, he
     found = localize(CENTRE, views_from(CENTRE, pose, turns, seed), list(CENTRE.world.rooms))
     assert found.status is LocalizationStatus.FOUND and found.candidates[0].room == "robot-laboratory"
     assert found.candidates[0].world_from_robot.distance_to(pose) < 0.05
+
+
+@settings(deadline=None, max_examples=8)
+@given(seed=st.integers(0, 10_000), part=st.floats(0.2, 0.8), heading=angles, off=st.floats(-0.3, 0.3),
+       turned=st.floats(-0.06, 0.06))
+@example(seed=1, part=0.4, heading=0.0, off=0.13, turned=0.056)
+def test_a_guess_beside_the_right_place_does_not_hide_it(
+    seed: int, part: float, heading: float, off: float, turned: float
+) -> None:
+    """From a pose that is little off, refining may end at a wrong one near the right one."""
+    corners = np.array(CENTRE.world.outline("hallway"))
+    x_m, y_m = corners.min(axis=0) + np.array([part, 0.35]) * np.ptp(corners, axis=0)
+    pose = Pose2(x_m, y_m, heading)
+    views = views_from(CENTRE, pose, (math.pi / 2, 0.0), seed)
+    guess = Pose2(x_m + off, y_m - off / 2, heading + turned)
+    alone, told = (localize(CENTRE, views, ["hallway"], guess=by) for by in (None, ("hallway", guess)))
+    assume(alone.candidates)
+    best, told_best = alone.candidates[0], told.candidates[0]
+    assert told_best.likelihood.log_likelihood >= best.likelihood.log_likelihood - 1e-6
+    for i, one in enumerate(told.candidates):
+        assert all(are_distinct(one.world_from_robot, other.world_from_robot) for other in told.candidates[:i])
 
 
 def is_sufficient(visible: int, matched: int, log_likelihood: float, explained: float, weakest: float) -> bool:
