@@ -30,7 +30,8 @@ def robot() -> RobotModel:
 def predict(camera: Camera, pose: Pose2, margin_px: float, aside_px_m: float) -> ModelFloor:
     grid = build_floor_grid(camera, robot().mount, robot().mount.height_m, 5.0)
     assert grid is not None
-    return predict_model_floor(replace(robot(), camera=camera, lens=camera), pose, grid, 0.0, 0.05, margin_px, aside_px_m)
+    seeing = replace(robot(), camera=camera, lens=camera)
+    return predict_model_floor(seeing, pose, grid, 0.0, 0.05, margin_px, aside_px_m)
 
 
 @settings(deadline=None, max_examples=25)
