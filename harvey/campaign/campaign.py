@@ -98,7 +98,7 @@ class _Staged:
     scenario: Scenario = field(compare=False)
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=1)
 def _stage(staged: _Staged) -> Stage:
     """Set once for all the seeds that a process drives."""
     from sim.stage import build_stage

@@ -174,7 +174,7 @@ def load_known_world(path: Path) -> World:
     return _world(ROOT / _portable(path), _sha256(path))
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=1)  # with all that was computed of it: some 100 MB for a large floor
 def _world(path: Path, _sha256: str) -> World:
     return load_world(path)
 

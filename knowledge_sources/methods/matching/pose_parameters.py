@@ -20,9 +20,6 @@ from world_models.frames import Pose, Pose2, frozen, wrap_angle
 
 Widths = tuple[float, ...]
 
-HALTON_BASES = (2, 3, 5, 7, 11, 13)
-"""The first primes, one for each of the six unknowns."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseParameters(ABC):
@@ -157,7 +154,8 @@ def _build_grid(steps: tuple[int, ...], sigmas: float) -> Floats:
 @lru_cache(maxsize=4)
 def _spread_normal(count: int) -> Floats:
     """(count + 1, 6) zero, and an even spread of the normal law (Halton's sequence, the same at every call)."""
-    spread = ndtri(np.stack([_reflect_digits(count, base) for base in HALTON_BASES], axis=1))
+    bases = 2, 3, 5, 7, 11, 13  # the first primes, one for each of the six unknowns
+    spread = ndtri(np.stack([_reflect_digits(count, base) for base in bases], axis=1))
     return frozen(np.concatenate([np.zeros((1, 6)), spread]))
 
 

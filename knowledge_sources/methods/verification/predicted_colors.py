@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numba import njit
@@ -27,9 +28,9 @@ MAX_CORNERS = 8
 """Corners that the array of polygons has room for; regions of more corners are left out."""
 RAYS = 5
 """Rays of a sample: the pixel itself and four around it."""
-MAX_PACKETS = 256
-"""Size of the cache of surfaces, in parts of locales."""
 WHITE = Finish((1.0, 1.0, 1.0))
+
+_SURFACES: WeakKeyDictionary[LocaleGeometry, tuple[Floats, Floats, Floats]] = WeakKeyDictionary()
 
 
 def predict_face_colors(
@@ -83,7 +84,7 @@ def cast_rays(
     packets = {(p.locale, p.neighbour or ""): p for room in rooms for p in world.locale_source.geometry(room)}
     if not packets:
         return np.zeros((0, 3)), np.zeros((0, 3)), np.full(len(rays), -1), np.full(len(rays), np.inf)
-    parts = [_build_surfaces(packets[key]) for key in sorted(packets)]
+    parts = [_find_surfaces(packets[key]) for key in sorted(packets)]
     corners, colors, normals = (np.concatenate([part[i] for part in parts]) for i in range(3))
     center = camera_from_world.inverse().translation
     facing = np.flatnonzero(np.einsum("ij,ij->i", normals, center - corners[:, 0]) > 1e-6)
@@ -129,9 +130,16 @@ def _to_face_color(color: Floats, points: Floats, max_points: int) -> FaceColor:
     return (red, green, blue), tuple(map(tuple, points[some].round(3).tolist()))
 
 
-@lru_cache(maxsize=MAX_PACKETS)
+def _find_surfaces(packet: LocaleGeometry) -> tuple[Floats, Floats, Floats]:
+    """:func:`_build_surfaces`, kept as long as the packet lives."""
+    found = _SURFACES.get(packet)
+    if found is None:
+        found = _SURFACES[packet] = _build_surfaces(packet)
+    return found
+
+
 def _build_surfaces(packet: LocaleGeometry) -> tuple[Floats, Floats, Floats]:
-    """Corners (m, MAX_CORNERS, 3), shaded colors (m, 3) and normals (m, 3) of a packet's regions; cached."""
+    """Corners (m, MAX_CORNERS, 3), shaded colors (m, 3) and normals (m, 3) of a packet's regions."""
     regions = [region for _, face in packet.faces for region in (*face.front, *face.back)
                if len(region.polygon_world) <= MAX_CORNERS]
     corners = np.array([[*r.polygon_world, *[r.polygon_world[-1]] * (MAX_CORNERS - len(r.polygon_world))]

@@ -156,7 +156,7 @@ EXCEPTIONS = {
     "the size of a cache, on which no result depends": (
         "localization/far_views.py: MAX_FLOORS", "localization/visibility_map.py: MAX_MAPS",
         "motion/routes.py: MAX_FREE_SPACES", "motion/subgoals.py: MAX_FREE_PASSAGES",
-        "tracking/template_tracking.py: MAX_TEMPLATES", "verification/predicted_colors.py: MAX_PACKETS",
+        "tracking/template_tracking.py: MAX_TEMPLATES",
     ),
     "of methods that are new: those of them that somebody may want to tune become settings": (
         "doors/leaf.py: ALIKE_FOOT", "doors/leaf.py: FULL_FOOT", "doors/leaf.py: LEAST_UNIFORM",
