@@ -52,6 +52,12 @@ def _import_arguments(parser: ArgumentParser) -> None:
                         help="of a ROS map: the height of its walls (2.5)")
 
 
+def _new_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("name", metavar="NAME", help="of the world: small letters, digits and hyphens")
+    parser.add_argument("--rooms", metavar="NAME,NAME", default="office,library",
+                        help="2 to 20 rooms along the corridor, from west to east (office,library)")
+
+
 def _run(args: Namespace) -> int:
     verb: Command = args.verb
     return verb.run(args)
@@ -110,6 +116,24 @@ def _import(file: str, out: str | None, wall_height_m: float | None) -> int:
     target.write_text(made.text, encoding="utf-8")
     print(f"{made.report}\n")
     return _check(load_world(target), str(target))
+
+
+def _new(name: str, rooms: str) -> int:
+    from world_models.files.first_world import first_world_text
+
+    try:
+        text = first_world_text(name, [room.strip() for room in rooms.split(",")])
+    except ValueError as error:
+        raise BadInput(str(error)) from None
+    target = Path(f"{name}.toml")
+    try:
+        with target.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise BadInput(f"expected a name that is not taken here, got {str(target)!r}, which exists and is kept"
+                       ) from None
+    print(f"{target}: written; change it to what you measured, and check it with    harvey world check {target}")
+    return 0
 
 
 def _check(world: World, file: str) -> int:
@@ -190,6 +214,15 @@ def _recording(world: World, out: Path) -> None:
 
 VERBS = (
     Command(
+        "new", "write a first world file to change",
+        (("harvey world new second-floor", "second-floor.toml: an office, a library and a corridor, with comments"),
+         ("harvey world new second-floor --rooms office,kitchen,lab", "with these rooms along the corridor"),
+         ("harvey world check second-floor.toml", "what it made has no faults, and missions run in it")),
+        _new_arguments, lambda args: _new(args.name, args.rooms),
+        "A file that exists is never overwritten. At the end of the file is a mission to copy.\n"
+        "With many rooms some views look alike: harvey run MISSION --check says where to hang something else.",
+    ),
+    Command(
         "check", "check a world for faults",
         (("harvey world check my_floor.toml", "faults with file and line; exit code 2 where there are any"),
          ("harvey world check research_center", "one that comes with the project"),
@@ -220,7 +253,7 @@ VERBS = (
     ),
 )
 COMMAND = Command(
-    "world", "check, show, compile or import a world file",
+    "world", "begin, check, show, compile or import a world file",
     tuple(verb.examples[0] for verb in VERBS), _arguments, _run,
     "harvey world VERB --help tells more of each and gives examples.",
 )
