@@ -5,9 +5,8 @@ const scrubber = document.getElementById("cycle");
 
 /** What stands in the element "data": JSON as gzip in base 64. */
 async function unpack() {
-  const bytes = Uint8Array.from(atob(document.getElementById("data").textContent), (one) => one.charCodeAt(0));
-  const text = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Response(text).json();
+  const packed = await fetch(`data:application/gzip;base64,${document.getElementById("data").textContent}`);
+  return new Response(packed.body.pipeThrough(new DecompressionStream("gzip"))).json();
 }
 
 /** The last of some items whose cycle, which grows, is not after this; undefined where there is none. */
