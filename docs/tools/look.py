@@ -6,13 +6,15 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -56,7 +58,7 @@ def viewer() -> Iterator[Any]:
     port = str(_free_port())
     command = [_executable(), "--headless", "--hide-welcome-screen", "--bind", LOCALHOST, "--port", port]
     try:
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, process_group=0)
     except OSError as error:
         raise RecordingError(f"the viewer cannot start ({error.strerror}); {NEEDS}") from None
     try:
@@ -64,7 +66,8 @@ def viewer() -> Iterator[Any]:
         _await(client)
         yield client
     finally:
-        process.terminate()
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)  # its launcher leaves the viewer itself behind when only it ends
         process.wait()
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import pytest
 import rerun.blueprint as rrb
@@ -140,33 +142,42 @@ def test_a_recording_that_is_not_there_is_told(tmp_path: Path) -> None:
         look(tmp_path / "none.rrd", tmp_path, [1])
 
 
-def test_a_viewer_that_dies_of_its_first_frame_is_told(
+def test_a_viewer_that_draws_nothing_is_told_and_ends_with_what_it_started(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As one without a graphics driver does, after it has answered. Only this machine could have reached it."""
-    class Dying:
-        commands: ClassVar[list[list[str]]] = []
-        quits = 0
-
-        def __init__(self, command: list[str], **_: object) -> None:
-            self.commands.append(command)
-
-        def terminate(self) -> None:
-            Dying.quits += 1
-
-        def wait(self) -> None: ...
+    """As one without a graphics driver, which answers at first. Only this machine could have reached it."""
+    launcher = tmp_path / "rerun"
+    launcher.write_text(f"#!/bin/sh\ncd {tmp_path}\nsleep 60 &\necho $! > started\necho $@ > told\nwait\n")
+    launcher.chmod(0o755)
 
     class Client:
-        def __init__(self, url: str) -> None: ...
+        def __init__(self, url: str) -> None:
+            while not (tmp_path / "told").is_file() or not (tmp_path / "told").read_text():
+                REAL_SLEEP(0.01)
 
         def save_screenshot(self, path: str) -> None:
             raise ConnectionError("transport error")
 
-    monkeypatch.setattr(looking.subprocess, "Popen", Dying)
+    monkeypatch.setattr(looking, "_executable", lambda: str(launcher))
     monkeypatch.setattr(looking, "ViewerClient", Client)
     monkeypatch.setattr(looking.time, "sleep", lambda _: None)
     with pytest.raises(RecordingError, match=r"draws nothing \(transport error\); a headless viewer needs a graphics"):
         look(recording, tmp_path / "pictures", [7])
-    assert Dying.quits == 1
-    [command] = Dying.commands
-    assert command[command.index("--bind") + 1] == "127.0.0.1"
+    assert "--bind 127.0.0.1" in (tmp_path / "told").read_text()
+    started = int((tmp_path / "started").read_text())
+    for _ in range(500):
+        if not is_running(started):
+            break
+        REAL_SLEEP(0.01)
+    assert not is_running(started)
+
+
+REAL_SLEEP = time.sleep
+
+
+def is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
