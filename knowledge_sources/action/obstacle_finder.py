@@ -28,6 +28,7 @@ from knowledge_sources.methods.motion.footprints import (
     join_footprints,
     list_corners,
     measure_change_m,
+    measure_common_directions,
     measure_free_part,
     measure_hull_part,
     measure_width_m,
@@ -236,7 +237,7 @@ class ObstacleFinder(RobotKnowledgeSource):
                 continue
             if wide.distance(shapely.Point(at)) > reach_m:
                 continue
-            part = _measure_common_directions(wide, seen, at)
+            part = measure_common_directions(wide, seen, at)
             if part >= s.action.min_common_directions and (best is None or part > best[0]):
                 best = part, entry
         return None if best is None else best[1]
@@ -385,21 +386,9 @@ def _weigh_footprints(
         return seen
     vague_m = settings.vague_sigma_m
     is_vague = sigma_m >= 2.0 * known_sigma_m + vague_m or min(sigma_m, known_sigma_m) >= 2.0 * vague_m
-    if is_vague and _measure_common_directions(known, seen, eye) >= settings.min_common_directions:
+    if is_vague and measure_common_directions(known, seen, eye) >= settings.min_common_directions:
         return take_free(known, free)
     return join_footprints(known, seen, free)
-
-
-def _measure_common_directions(known: shapely.Geometry, seen: shapely.Geometry, eye: Floats) -> float:
-    """Which part of the directions in which a thing is seen from an eye (2,) is that of what is known, 0..1."""
-    corners = [shapely.get_coordinates(shape) - eye for shape in (known, seen)]
-    middle = corners[1].mean(axis=0)
-    ends = []
-    for to in corners:
-        aside = np.arctan2(middle[0] * to[:, 1] - middle[1] * to[:, 0], to @ middle)
-        ends.append((float(aside.min()), float(aside.max())))
-    (a, b), (low, high) = ends
-    return max(0.0, min(b, high) - max(a, low)) / max(high - low, 1e-6)
 
 
 def _with_core(obstacle: Obstacle, seen: shapely.Geometry) -> Obstacle:

@@ -111,3 +111,18 @@ def measure_width_m(footprint: Any) -> float:
     """The longer side of the smallest rectangle round a footprint."""
     ring = shapely.get_coordinates(shapely.minimum_rotated_rectangle(build_polygon(footprint)))
     return max(float(np.linalg.norm(b - a)) for a, b in pairwise(ring))
+
+
+def measure_common_directions(known: shapely.Geometry, seen: shapely.Geometry, eye: Any) -> float:
+    """Which part of the directions in which a thing is seen from an eye (2,) is that of what is known, 0..1."""
+    (known_rad, *ends), (seen_rad, low, high) = (_find_directions(shape, eye) for shape in (known, seen))
+    a, b = (math.remainder(known_rad - seen_rad, math.tau) + end for end in ends)
+    return max(0.0, min(b, high) - max(a, low)) / max(high - low, 1e-6)
+
+
+def _find_directions(shape: shapely.Geometry, eye: Any) -> tuple[float, float, float]:
+    """The direction of a shape's middle from an eye (2,), and its ends from that [rad]."""
+    to = shapely.get_coordinates(shape) - np.asarray(eye, float)
+    middle = to.mean(axis=0)
+    aside = np.arctan2(middle[0] * to[:, 1] - middle[1] * to[:, 0], to @ middle)
+    return math.atan2(middle[1], middle[0]), float(aside.min()), float(aside.max())

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import shapely
+import shapely.affinity
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from knowledge_sources.methods.motion.footprints import (
     build_free_floor,
@@ -13,6 +18,7 @@ from knowledge_sources.methods.motion.footprints import (
     join_footprints,
     list_corners,
     measure_change_m,
+    measure_common_directions,
     measure_free_part,
     measure_hull_part,
     measure_width_m,
@@ -73,3 +79,28 @@ def test_the_faces_of_what_is_extra_face_outwards_and_end_at_its_top() -> None:
         assert np.isnan(face.front[0].colour).all()
         assert area_vector(face.polygon_world) @ (face.polygon_world.mean(axis=0) - middle) > 0.0
         assert face.polygon_world[:, 2].max() == pytest.approx(3.5)
+
+
+def place_square(bearing_rad: float, away_m: float, side_m: float, turn_rad: float) -> shapely.Polygon:
+    half = side_m / 2
+    square = shapely.affinity.rotate(shapely.box(-half, -half, half, half), turn_rad, use_radians=True)
+    return shapely.affinity.translate(square, away_m * math.cos(bearing_rad), away_m * math.sin(bearing_rad))
+
+
+squares = st.builds(
+    place_square, st.floats(-math.pi, math.pi), st.floats(1.0, 3.0), st.floats(0.1, 1.2), st.floats(0.0, 1.5))
+
+
+@given(known=squares, seen=squares)
+@example(known=place_square(0.7, 1.4, 0.8, 0.3), seen=place_square(-1.9, 1.6, 0.3, 0.0))  # on the other side
+def test_directions_that_two_things_share_are_those_of_rays_that_meet_both(
+    known: shapely.Polygon, seen: shapely.Polygon
+) -> None:
+    rays = np.linspace(-math.pi, math.pi, 1440, endpoint=False)
+    ends = 9.0 * np.column_stack([np.cos(rays), np.sin(rays)])
+    far = shapely.linestrings(np.stack([np.zeros((1440, 2)), ends], axis=1))
+    of_seen, of_known = (shapely.intersects(far, shape) for shape in (seen, known))
+    expected = np.count_nonzero(of_seen & of_known) / np.count_nonzero(of_seen)
+    width_rad = np.count_nonzero(of_seen) * math.tau / 1440
+    found = measure_common_directions(known, seen, (0.0, 0.0))
+    assert found == pytest.approx(expected, abs=3.0 * math.tau / 1440 / width_rad)
