@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harvey.commands.command import Command, add_parser
+from harvey.commands.command import Command, add_parser, whole
 from harvey.errors import BadInput
 from world_models.words import count
 
@@ -50,6 +50,16 @@ def _import_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FILE", help="the .toml file (named as the building, here)")
     parser.add_argument("--wall-height", metavar="METRES", type=float,
                         help="of a ROS map: the height of its walls (2.5)")
+
+
+def _export_arguments(parser: ArgumentParser) -> None:
+    _file(parser)
+    parser.add_argument("--to", metavar="OUT", required=True,
+                        help="the file to write: .yaml (a ROS map, with its .pgm), .svg, .geojson, .glb or .gltf")
+    parser.add_argument("--format", choices=("rosmap", "svg", "geojson", "gltf"), help="where the ending does not say")
+    parser.add_argument("--storey", metavar="N", type=whole, help="of a ROS map: which storey, from 1 for the lowest")
+    parser.add_argument("--resolution", metavar="METRES", type=float, help="of a ROS map: side of a cell (0.05)")
+    parser.add_argument("--empty", action="store_true", help="of a ROS map: without what stands in the rooms")
 
 
 def _new_arguments(parser: ArgumentParser) -> None:
@@ -116,6 +126,21 @@ def _import(file: str, out: str | None, wall_height_m: float | None) -> int:
     target.write_text(made.text, encoding="utf-8")
     print(f"{made.report}\n")
     return _check(load_world(target), str(target))
+
+
+def _export(args: Namespace) -> int:
+    from world_models.files.exporters.export_file import ExportError, export_world
+
+    out = Path(args.to)
+    try:
+        told = export_world(_load(args.file, args.details), out, args.format, storey=args.storey,
+                            resolution_m=args.resolution, with_things=not args.empty)
+    except ExportError as error:
+        raise BadInput(f"--to {out}: {error}") from None
+    except OSError as error:
+        raise BadInput(f"--to {out}: expected a file to write to, got: {error.strerror}") from None
+    print(f"{out}: {told}")
+    return 0
 
 
 def _new(name: str, rooms: str) -> int:
@@ -251,9 +276,20 @@ VERBS = (
         _import_arguments, lambda args: _import(args.file, args.out, args.wall_height),
         "Then checks it, as harvey world check does.",
     ),
+    Command(
+        "export", "write a world for other programs: a ROS map, SVG, GeoJSON or glTF",
+        (("harvey world export research_center --to map.yaml --resolution 0.05", "a ROS map: map.yaml and map.pgm"),
+         ("harvey world export campus --to upstairs.yaml --storey 2 --empty", "the second storey, without furniture"),
+         ("harvey world export campus --to campus.svg", "the plan, storey beside storey"),
+         ("harvey world export campus --to campus.geojson", "rooms, doorways, things and links, in metres"),
+         ("harvey world export campus --to campus.glb", "for Blender, or a viewer in a browser (extra gltf)")),
+        _export_arguments, _export,
+        "Coordinates are metres in the building's frame, x to the east and y to the north; in glTF y is up.\n"
+        "An OUT that exists is written anew.",
+    ),
 )
 COMMAND = Command(
-    "world", "begin, check, show, compile or import a world file",
+    "world", "begin, check, show, compile, import or export a world file",
     tuple(verb.examples[0] for verb in VERBS), _arguments, _run,
     "harvey world VERB --help tells more of each and gives examples.",
 )

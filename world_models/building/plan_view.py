@@ -65,7 +65,7 @@ class Storey:
 
 def draw_storeys(world: World) -> list[Storey]:
     """Each storey by itself, from the lowest."""
-    storeys = _find_storeys(world)
+    storeys = find_storeys(world)
     return [_draw_panel(world, floor_m, rooms, len(storeys) > 1) for floor_m, rooms in storeys]
 
 
@@ -101,7 +101,7 @@ def _draw_panel(world: World, floor_m: float, rooms: list[str], titled: bool) ->
     return Storey(tuple(rooms), low, Drawing(size, tuple(shapes)))
 
 
-def _find_storeys(world: World) -> list[tuple[float, list[str]]]:
+def find_storeys(world: World) -> list[tuple[float, list[str]]]:
     """Rooms by the height of their floors, in order."""
     out: list[tuple[float, list[str]]] = []
     for floor_m, name in sorted((world.floor_m(name), name) for name in world.rooms):
