@@ -10,20 +10,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from harvey.errors import BadInput
-from harvey.hardware.base import base_kinds
-from harvey.hardware.body import HardwareBody
 from harvey.runner.ports import Body
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
-from sim.emulators.faulty_line import FaultyLine
-from sim.emulators.pseudo_terminal_link import PseudoTerminalLink
-from sim.emulators.registry import emulator_kinds
 
 IN_PROCESS = "simulated"
 
 
 def body_kinds() -> tuple[str, ...]:
     """The kinds of base that have a driver and an emulator too."""
+    from harvey.hardware.base import base_kinds
+    from sim.emulators.registry import emulator_kinds
+
     return tuple(name for name in base_kinds() if name in emulator_kinds())
 
 
@@ -42,6 +40,13 @@ def open_body(body: SimulatedBody, kind: str) -> Iterator[Body]:
     if kind == IN_PROCESS:
         yield FaultyBody(body)
         return
+    # Drivers and emulators are loaded when they are asked for: most missions have neither.
+    from harvey.hardware.base import base_kinds
+    from harvey.hardware.body import HardwareBody
+    from sim.emulators.faulty_line import FaultyLine
+    from sim.emulators.pseudo_terminal_link import PseudoTerminalLink
+    from sim.emulators.registry import emulator_kinds
+
     emulator = emulator_kinds()[kind]
     clock = (lambda: body.truth.time_s) if emulator.keeps_time else None
     base = base_kinds()[kind].connect_to_emulator(PseudoTerminalLink(FaultyLine(emulator.on_body(body), body), clock))

@@ -121,7 +121,7 @@ EXCEPTIONS = {
     "a fact of geometry or mathematics": (
         "features/images.py: ROUNDING_SIGMA", "features/manhattan.py: RIGHT_ANGLE_RAD",
         "localization/next_view.py: HERE", "localization/pose_candidates.py: _NEIGHBORS",
-        "matching/hough.py: NO_MOTION", "matching/pose_parameters.py: HALTON_BASES",
+        "matching/hough.py: NO_MOTION",
         "pose/med_r_and_t.py: MEDIAN_CHI2_2", "pose/med_r_and_t.py: SUBSET_SIZE",
         "pose/med_r_and_t.py: MAX_CHI2_6", "pose/numerics/finish.py: MIN_INLIERS",
         "pose/planar_from_points.py: MIN_POINTS", "pose/r_and_t.py: MIN_LINES", "pose/r_and_t.py: NO_INFORMATION",
