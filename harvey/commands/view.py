@@ -111,13 +111,13 @@ def _write(runs: list[RunDirectory], overview: Path) -> None:
 
 def _open(recording: Path, in_browser: bool) -> int:
     if in_browser:
-        how = "--web-viewer" if _has_screen() else "--serve-web"  # the latter opens no browser, but says the address
-        return _wait_for([_viewer(), str(recording), how, *LOOPBACK, "--port", "0", "--web-viewer-port", "0"])
-    if not _has_screen():
+        how = "--web-viewer" if has_screen() else "--serve-web"  # the latter opens no browser, but says the address
+        return _wait_for([find_viewer(), str(recording), how, *LOOPBACK, "--port", "0", "--web-viewer-port", "0"])
+    if not has_screen():
         print(f"no screen here to open a window on; the recording is {recording.resolve()}\n"
               f"open it where there is one, with: rerun {recording}", file=sys.stderr)
         return 1
-    return _wait_for([_viewer(), str(recording), *LOOPBACK])
+    return _wait_for([find_viewer(), str(recording), *LOOPBACK])
 
 
 def _wait_for(viewer: list[str]) -> int:
@@ -130,11 +130,11 @@ def _wait_for(viewer: list[str]) -> int:
                 os.killpg(running.pid, signal.SIGKILL)  # it has nothing to save, and may not heed less
 
 
-def _has_screen() -> bool:
+def has_screen() -> bool:
     return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def _viewer() -> str:
+def find_viewer() -> str:
     """The viewer that came with the recording's library, beside this Python, or one on the path."""
     beside = shutil.which("rerun", path=str(Path(sys.executable).parent))
     viewer = beside or shutil.which("rerun")

@@ -62,6 +62,14 @@ def _export_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--empty", action="store_true", help="of a ROS map: without what stands in the rooms")
 
 
+def _edit_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="a world file (.toml)")
+    parser.add_argument("--live", action="store_true", help="go on at each save, until Ctrl-C")
+    parser.add_argument("--page", metavar="OUT", help="the page with the plan (FILE-plan.html, beside FILE)")
+    parser.add_argument("--viewer", action="store_true",
+                        help="also in three dimensions, in the rerun viewer (FILE.rrd, beside FILE)")
+
+
 def _new_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", help="of the world: small letters, digits and hyphens")
     parser.add_argument("--rooms", metavar="NAME,NAME", default="office,library",
@@ -126,6 +134,30 @@ def _import(file: str, out: str | None, wall_height_m: float | None) -> int:
     target.write_text(made.text, encoding="utf-8")
     print(f"{made.report}\n")
     return _check(load_world(target), str(target))
+
+
+def _edit(args: Namespace) -> int:
+    from harvey.commands.view import find_viewer, has_screen
+    from harvey.world_editor import BuildingViewer, WorldEditor
+
+    path = Path(args.file)
+    if path.suffix != ".toml" or not path.is_file():
+        raise BadInput(f"expected a .toml file to edit, got {args.file!r}; harvey world new NAME writes a first one")
+    page = Path(args.page or path.with_name(f"{path.stem}-plan.html"))
+    if page.suffix != ".html":
+        raise BadInput(f"--page: expected a name that ends in .html, got {str(page)!r}")
+    if args.viewer and not has_screen():
+        raise BadInput("--viewer: expected a screen to open a window on, got none; without it the plan is drawn")
+    viewer = BuildingViewer(find_viewer(), path.with_suffix(".rrd")) if args.viewer else None
+    editor = WorldEditor(path, page, lambda line: print(line, flush=True), viewer.show if viewer else None)
+    print(f"the plan is in {page}: open it in a browser, it follows", flush=True)
+    try:
+        return 0 if (editor.watch() if args.live else editor.look()) else 2
+    except OSError as error:
+        raise BadInput(f"--page {page}: expected a file to write to, got: {error.strerror}") from None
+    finally:
+        if viewer is not None and args.live:
+            viewer.close()
 
 
 def _export(args: Namespace) -> int:
@@ -248,6 +280,15 @@ VERBS = (
         "With many rooms some views look alike: harvey run MISSION --check says where to hang something else.",
     ),
     Command(
+        "edit", "check a world file and draw its plan at each save",
+        (("harvey world edit second-floor.toml --live", "second-floor-plan.html follows in a browser, until Ctrl-C"),
+         ("harvey world edit second-floor.toml --live --viewer", "and the building in the rerun viewer"),
+         ("harvey world edit second-floor.toml", "once: checked, and drawn as a page")),
+        _edit_arguments, _edit,
+        "Faults are printed with file and line. While the file cannot be read the page keeps the last plan that\n"
+        "could be drawn. Files that it includes are watched too. Exit code 0 where there are no faults at the end, else 2.",
+    ),
+    Command(
         "check", "check a world for faults",
         (("harvey world check my_floor.toml", "faults with file and line; exit code 2 where there are any"),
          ("harvey world check research_center", "one that comes with the project"),
@@ -289,7 +330,7 @@ VERBS = (
     ),
 )
 COMMAND = Command(
-    "world", "begin, check, show, compile, import or export a world file",
+    "world", "begin, edit, check, show, compile, import or export a world file",
     tuple(verb.examples[0] for verb in VERBS), _arguments, _run,
     "harvey world VERB --help tells more of each and gives examples.",
 )

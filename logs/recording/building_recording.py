@@ -11,10 +11,13 @@ from logs.recording.stream import RecordingStream
 from world_models.building.world import World
 
 
-def record_building(world: World, out: Path) -> None:
-    """Write the building's surfaces, storey by storey, its doorways and room names. Raises RecordingError."""
+def record_building(world: World, out: Path, title: str | None = None) -> None:
+    """Write the building's surfaces, storey by storey, its doorways and room names. Raises RecordingError.
+
+    ``title``: of the recording, the world's name by default; a viewer keeps recordings with different titles apart.
+    """
     look = rrb.Blueprint(building_view(world, world.name), rrb.TimePanel(state="hidden"), auto_views=False)
-    stream = RecordingStream(out, f"building of {world.name}", world.name, look)
+    stream = RecordingStream(out, f"building of {title or world.name}", title or world.name, look)
     try:
         log_building(stream, world)
     finally:

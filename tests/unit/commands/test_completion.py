@@ -36,7 +36,7 @@ def script(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
     (["run", "hallway"], {"hallway-kidnap"}),
     (["experiment", ""], {*list_names(), "mine.toml"}),
     (["why", ""], {"mine.toml"}),
-    (["world", ""], {"new", "check", "show", "compile", "import", "export"}),
+    (["world", ""], {"new", "edit", "check", "show", "compile", "import", "export"}),
     (["world", "import", "--w"], {"--wall-height"}),
     (["run", "bump", "--see"], {"--seed"}),
     (["completion", ""], {"bash", "zsh"}),
