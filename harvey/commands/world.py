@@ -286,7 +286,7 @@ VERBS = (
          ("harvey world edit second-floor.toml", "once: checked, and drawn as a page")),
         _edit_arguments, _edit,
         "Faults are printed with file and line. While the file cannot be read the page keeps the last plan that\n"
-        "could be drawn. Files that it includes are watched too. Exit code 0 where there are no faults at the end, else 2.",
+        "could be drawn. Files that it includes are watched too. Exit code 0 where there are no faults at last, else 2.",
     ),
     Command(
         "check", "check a world for faults",
