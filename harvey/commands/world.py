@@ -46,7 +46,7 @@ def _compile_arguments(parser: ArgumentParser) -> None:
 
 
 def _import_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="a building (.ifc, .gml) or a ROS map (map.yaml)")
+    parser.add_argument("file", metavar="FILE", help="a building (.ifc, .gml, .geojson) or a ROS map (map.yaml)")
     parser.add_argument("--out", metavar="FILE", help="the .toml file (named as the building, here)")
     parser.add_argument("--wall-height", metavar="METRES", type=float,
                         help="of a ROS map: the height of its walls (2.5)")
@@ -286,7 +286,7 @@ VERBS = (
          ("harvey world edit second-floor.toml", "once: checked, and drawn as a page")),
         _edit_arguments, _edit,
         "Faults are printed with file and line. While the file cannot be read the page keeps the last plan that\n"
-        "could be drawn. Files that it includes are watched too. Exit code 0 where there are no faults at last, else 2.",
+        "could be drawn. Files that it includes are watched too. Exit code 0 where it has no faults at last, else 2.",
     ),
     Command(
         "check", "check a world for faults",
@@ -310,9 +310,10 @@ VERBS = (
         _compile_arguments, lambda args: _compile(args.file, args.details, args.out),
     ),
     Command(
-        "import", "import a building from IFC, IndoorGML or a ROS map",
+        "import", "import a building from IFC, IndoorGML, GeoJSON or a ROS map",
         (("harvey world import house.ifc --out house.toml", "what was used of a building, guessed and left out"),
          ("harvey world import campus.gml --out campus.toml", "IndoorGML 1.0, 1.1 and the core of 2.0"),
+         ("harvey world import campus.geojson --out campus.toml", "what export writes, or unit.geojson of IMDF"),
          ("harvey world import map.yaml --out floor.toml --wall-height 2.7", "rooms and doors traced from a ROS map")),
         _import_arguments, lambda args: _import(args.file, args.out, args.wall_height),
         "Then checks it, as harvey world check does.",

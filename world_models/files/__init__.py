@@ -6,7 +6,7 @@ In reading order:
 * :mod:`.toml`: TOML with file and line for every error: worlds, missions, cameras, settings.
 * :mod:`.construction`: from a description to faces and model lines.
 * :mod:`.compiled`: worlds in one SQLite file, read one locale at a time.
-* :mod:`.importers`: IFC, IndoorGML and ROS maps made into world files.
+* :mod:`.importers`: IFC, IndoorGML, GeoJSON and ROS maps made into world files.
 * :mod:`.exporters`: a world for other programs: ROS map, SVG, GeoJSON, glTF.
 * :mod:`.first_world`: the text of a first world file to change.
 """

@@ -1,9 +1,9 @@
-"""How does a building file of another format become a world file? IFC, IndoorGML and ROS maps.
+"""How does a building file of another format become a world file? IFC, IndoorGML, GeoJSON and ROS maps.
 
 In reading order:
 
 * :mod:`.building_plan`: what a building file contains: spaces, openings, furnishings, and a report of what was used.
-* :mod:`.indoor_gml`, :mod:`.ifc`, :mod:`.ros_map`: the readers, each into a building plan.
+* :mod:`.indoor_gml`, :mod:`.ifc`, :mod:`.geojson`, :mod:`.ros_map`: the readers, each into a building plan.
 * :mod:`.polygons`, :mod:`.curved_walls`: outlines cleaned, kept apart by walls, and straightened at doors.
 * :mod:`.openings`: positions of doors, wide openings and windows in walls.
 * :mod:`.furnishings`: furniture and stairs fitted into rooms.
@@ -26,7 +26,8 @@ __all__ = ["FORMATS", "BuildingError", "ImportReport", "ImportedBuilding", "Navi
            "read_plan"]
 
 MAPS = (".yaml", ".yml")
-FORMATS = (".ifc", ".gml", ".xml", *MAPS)
+FEATURES = (".geojson", ".json")
+FORMATS = (".ifc", ".gml", ".xml", *FEATURES, *MAPS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +73,10 @@ def read_plan(path: Path, wall_height_m: float | None = None) -> tuple[BuildingP
         from world_models.files.importers.ros_map.read_ros_map import WALL_HEIGHT_M, read_ros_map
 
         return read_ros_map(path, WALL_HEIGHT_M if wall_height_m is None else wall_height_m), None
+    if path.suffix.lower() in FEATURES:
+        from world_models.files.importers.geojson.read_geojson import read_geojson
+
+        return read_geojson(path), None
     from world_models.files.importers.indoor_gml.read_indoor_gml import read_indoor_gml
 
     return read_indoor_gml(path)
