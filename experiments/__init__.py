@@ -55,6 +55,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "missions": "1,000 missions without trouble and 1,000 with",
         "rosmaps": "ROS maps traced into worlds: rooms, doorways, missions",
         "serial-chaos": "Drivers of bases over serial lines with errors",
+        "soak": "Errands in one building, day after day: 1,000 km",
         "video-stream": "A mission's frames through VideoCapture, compared",
     },
     "scale": {
