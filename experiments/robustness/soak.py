@@ -123,7 +123,7 @@ def _row(name: str, ends: Sequence[SoakResult]) -> tuple[Cell, ...]:
 def _find_growth_mb(ends: Sequence[SoakResult]) -> float:
     """By how much a process grows with a mission, once it has run ``A_DAY``: the worst; NaN where none ran more."""
     found = []
-    for process in {end.process for end in ends}:
+    for process in sorted({end.process for end in ends}):
         sizes = [end.memory_mb for end in ends if end.process == process][A_DAY:]
         if len(sizes) > A_DAY:
             half = len(sizes) // 2
