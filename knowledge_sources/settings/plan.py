@@ -93,8 +93,8 @@ class PlanSettings:
     min_look_difference_rad: float = setting(
         math.radians(20.0), "rad", "Looks whose directions differ by less show much the same.", "engineering judgement")
     long_turn_rad: float = setting(
-        math.radians(45.0), "rad", "Before a leg that begins with a longer turn the robot turns first, then looks: few"
-        " landmarks are followed through such a turn.", "engineering judgement")
+        math.radians(100.0), "rad", "Before a leg that begins with a longer turn the robot turns first, then looks: few"
+        " landmarks are followed as it turns about.", "engineering judgement")
     look_turns_rad: tuple[float, ...] = setting(
         tuple(math.radians(a) for a in (30, -30, 60, -60, 90, -90, 135, -135, 180)), "rad",
         "Turns from the present heading that are tried for a better view, in this order.", "engineering judgement")
