@@ -5,11 +5,12 @@ SCENARIO ?= lab-to-allens-office
 ROOM ?= pose
 SAMPLE ?= 60
 SEED ?= 0
+PIP_VERSION := 26.3
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --quiet --disable-pip-version-check
 LOCK := .venv-lock
-COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe \
+COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --generate-hashes --no-strip-extras --allow-unsafe \
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
 
 # One thread: faster for matrices as small as ours, and the order of additions never varies.
@@ -25,7 +26,7 @@ help:
 	@echo "make site         build the documentation site, build/site/index.html, and the man page, build/man/harvey.1"
 	@echo "make course       execute the notebooks of the course: build/course"
 	@echo "make environment  only prepare $(VENV), for running and for testing"
-	@echo "make lock         write requirements.lock and requirements-dev.lock anew from pyproject.toml"
+	@echo "make lock         write the three requirements*.lock anew from pyproject.toml"
 	@echo "make clean        remove environments and caches; recordings in runs/ stay"
 	@echo "Options: PYTHON=$(PYTHON) (3.11 or newer), VENV=$(VENV), SCENARIO=$(SCENARIO)"
 
@@ -53,7 +54,12 @@ $(BIN)/python:
 	@echo "== Preparing $(VENV) with $$($(PYTHON) -V); the first time takes a minute or two"
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
 
-$(VENV)/.ready-to-run: requirements.lock pyproject.toml | $(BIN)/python
+# The pip that comes with Python may be years old; one version installs the rest, everywhere.
+$(VENV)/.ready-to-install: requirements-pip.lock | $(BIN)/python
+	@$(PIP) install --require-hashes -r requirements-pip.lock
+	@touch $@
+
+$(VENV)/.ready-to-run: requirements.lock pyproject.toml $(VENV)/.ready-to-install
 	@echo "== Installing what harvey needs ($$(grep -c == requirements.lock) packages)"
 	@$(PIP) install --require-hashes -r requirements.lock
 	@echo "== Installing harvey"
@@ -74,7 +80,9 @@ course: $(VENV)/.ready-to-test
 
 lock:
 	@$(PYTHON) -m venv $(LOCK)
-	@$(LOCK)/bin/pip install --quiet --quiet pip-tools
+	@$(LOCK)/bin/pip install --quiet --quiet --require-hashes -r requirements-pip.lock
+	@$(LOCK)/bin/pip install --quiet --quiet pip-tools==7.6.2
+	@echo "== requirements-pip.lock" && echo pip==$(PIP_VERSION) | $(COMPILE) -o requirements-pip.lock -
 	@echo "== requirements.lock" && $(COMPILE) --build-deps-for editable -o requirements.lock pyproject.toml
 	@echo "== requirements-dev.lock" && $(PYTHON) -c "import tomllib; print(*sum(tomllib.load(open('pyproject.toml', 'rb'))\
 	['project']['optional-dependencies'].values(), []), sep='\n')" | $(COMPILE) -c requirements.lock -o requirements-dev.lock -
