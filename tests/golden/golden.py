@@ -84,10 +84,10 @@ def main() -> int:
                 continue
             cycle = first_difference(ours, golden.get(name, []))
             same = same and cycle is None
-            print(f"{name}: " + (f"the same, {len(ours)} lines" if cycle is None else f"NOT THE SAME from cycle {cycle}"))
+            print(f"{name}:", f"the same, {len(ours)} lines" if cycle is None else f"NOT THE SAME from cycle {cycle}")
     if asked.what == "make":
-        FINGERPRINTS.write_text(json.dumps({name: "".join(ours) for name, ours in sorted(golden.items())}, indent=0) + "\n",
-                                encoding="utf-8")
+        told = {name: "".join(ours) for name, ours in sorted(golden.items())}
+        FINGERPRINTS.write_text(json.dumps(told, indent=0) + "\n", encoding="utf-8")
     return 0 if same else 1
 
 
