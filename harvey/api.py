@@ -160,9 +160,9 @@ class Picture:
 
     def pixels(self) -> NDArray[np.uint8]:
         """(height, width, 3) red, green, blue."""
-        from knowledge_sources.methods.features.images import decode_colour
+        from knowledge_sources.methods.features.picture import read_picture
 
-        return np.asarray(decode_colour(self.jpeg))
+        return np.asarray(read_picture(self.jpeg).color)
 
 
 class RecordedRun:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.features.images import decode_colour
+from knowledge_sources.methods.features.picture import read_picture
 from sim.made_up.lights import LIGHT_KINDS, LightKind, draw_light
 from sim.scenario import load_scenario, with_settings
 from sim.stage import build_stage
@@ -44,5 +44,5 @@ def _tile(kind: LightKind, seed: int) -> NDArray[np.uint8]:
     pictures = []
     for view in VIEWS:
         body.put_robot(view)
-        pictures.append(decode_colour(body.look().jpeg))
+        pictures.append(read_picture(body.look().jpeg).color)
     return np.asarray(np.vstack(pictures), np.uint8)

@@ -17,7 +17,7 @@ from tqdm import tqdm
 from experiments.report import Cell, Report
 from knowledge_sources.methods.calibration.chessboard import Pattern, find_corners
 from knowledge_sources.methods.calibration.intrinsics import PARAMETERS, BoardView, Calibration, calibrate
-from knowledge_sources.methods.features.images import decode
+from knowledge_sources.methods.features.picture import read_picture
 from sim.made_up.chessboard import chessboard_picture, chessboard_renderer, chessboard_view
 from sim.render.optics import Optics
 from sim.render.renderer import Renderer
@@ -73,7 +73,7 @@ def _calibrate(renderer: Renderer, optics: Optics, seed: int) -> Calibration:
     views: list[BoardView] = []
     while len(views) < VIEWS:
         pose = chessboard_view(CAMERA, PATTERN.columns, PATTERN.rows, PATTERN.square_m, rng)
-        picture = decode(chessboard_picture(renderer, optics, pose, SensorParameters(), rng))
+        picture = read_picture(chessboard_picture(renderer, optics, pose, SensorParameters(), rng)).grey
         corners = find_corners(picture, PATTERN)
         if not isinstance(corners, str):
             views.append(BoardView(f"view {len(views)}", corners))

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.report import Cell, Report
-from knowledge_sources.methods.features.images import decode
 from knowledge_sources.methods.features.lines import find_lines
-from knowledge_sources.methods.features.rectification import Rectifier
+from knowledge_sources.methods.features.picture import Rectifier, read_picture
 from sim.made_up.box_room import Patch, PatchFace
 from sim.render.optics import Optics
 from sim.render.renderer import Renderer
@@ -74,7 +73,7 @@ def _measure(lens: Camera, way: str, rng: np.random.Generator, cards: int) -> Fl
     for _ in range(cards):
         renderer, corners = _card(rng)
         radiance = optics.radiance(renderer, Pose.identity())
-        raw = decode(compress_jpeg(expose(radiance, SensorParameters(), rng), 92))
+        raw = read_picture(compress_jpeg(expose(radiance, SensorParameters(), rng), 92)).grey
         segments = find_lines(raw if way == "ends" else rectified.rectify(raw)).segments_px
         if way == "ends":
             segments = pinhole.project(lens.rays(segments))

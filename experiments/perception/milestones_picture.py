@@ -9,7 +9,7 @@ import numpy as np
 from experiments.chart import OURS, PEER
 from experiments.perception.milestones_cases import Case, Site
 from experiments.perception.milestones_trials import certify
-from knowledge_sources.methods.features.images import decode_colour
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.verification.line_check import check_lines
 from world_models.entries.percepts import PoseFix, Segments
 from world_models.entries.task import Certificate
@@ -27,7 +27,7 @@ def draw_case(site: Site, case: Case, path: Path) -> None:
     agreed = check_lines(site.robot, lines, segments.value.segments_px, fix.value.world_from_robot)
     figure = Figure(figsize=(6.0, 6.4), dpi=110, layout="constrained")
     axes = figure.add_subplot()
-    axes.imshow(decode_colour(case.jpeg))
+    axes.imshow(read_picture(case.jpeg).color)
     found = np.nan_to_num(agreed.agreement.coverage) >= 0.5
     for some, colour in ((found, OURS), (~found, PEER)):
         shown = agreed.projected_px[some]

@@ -12,7 +12,8 @@ from blackboard.board import View
 from blackboard.effect import Effect, Post
 from experiments.perception.milestones_cases import MIN_DIFFERENCE, Case, Site, generate_cases, get_site
 from harvey.runner.world_port import build_scheduler
-from knowledge_sources.methods.verification.color_check import check_colors, decode_small_color
+from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.verification.color_check import check_colors
 from knowledge_sources.methods.verification.line_check import check_lines
 from knowledge_sources.methods.verification.pose_evidence import compute_evidence
 from knowledge_sources.plan.line_finder import LineFinder
@@ -107,7 +108,7 @@ def _judge_case(site: Site, floor: int, number: int, case: Case) -> JudgedCase:
         robot, lines, segments.value.segments_px, pose, covariance, case.belief.world_from_robot(robot.world),
         case.belief.covariance_world(robot.world), check_lines(
             robot, lines, segments.value.segments_px, pose, errors=case.milestone.errors),
-        check_colors(robot, pose, decode_small_color(case.jpeg), case.milestone.looks),
+        check_colors(robot, pose, read_picture(case.jpeg).quarter, case.milestone.looks),
     )
     sigma_m, sigma_rad = (math.sqrt(float(v)) for v in (np.linalg.eigvalsh(covariance[:2, :2])[-1], covariance[2, 2]))
     error_m = math.inf if case.is_elsewhere else pose.distance_to(case.true)

@@ -129,7 +129,7 @@ def _pictures(args: Namespace, pattern: Pattern) -> Iterator[tuple[str, Grey]]:
 def _live_place(args: Namespace) -> Grey:
     """A picture that is taken when the user says so."""
     from harvey.hardware.drivers.cameras.video_camera import CameraFault
-    from knowledge_sources.methods.features.images import decode
+    from knowledge_sources.methods.features.picture import read_picture
 
     where = "flat on the floor" if args.mount_board == "floor" else "upright on the floor"
     try:
@@ -138,7 +138,7 @@ def _live_place(args: Namespace) -> Grey:
         raise BadInput("--mount-image: expected Enter, or a picture, got the end of the input") from None
     with _open_camera(args.camera) as camera:
         try:
-            return decode(camera.look("mount").jpeg)
+            return read_picture(camera.look("mount").jpeg).grey
         except CameraFault as fault:
             raise BadInput(f"--camera {args.camera}: {fault.kind}: {fault.detail}") from None
 

@@ -15,7 +15,7 @@ from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamer
 from knowledge_sources.methods.calibration.chessboard import Pattern, find_corners
 from knowledge_sources.methods.calibration.intrinsics import PARAMETERS, BoardView, Calibration, calibrate
 from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
-from knowledge_sources.methods.features.images import decode
+from knowledge_sources.methods.features.picture import read_picture
 from world_models.camera import CameraDeviation, CameraMount
 from world_models.words import count
 
@@ -65,7 +65,7 @@ def picture_files(names: Sequence[str]) -> tuple[Path, ...]:
 def grey_of(path: Path) -> Grey:
     """A picture. Raises BadInput."""
     try:
-        return decode(path.read_bytes())
+        return read_picture(path.read_bytes()).grey
     except (OSError, ValueError) as error:
         raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}") from None
 
@@ -101,7 +101,7 @@ def live_pictures(
     told = ""
     while len(kept) < wanted:
         try:
-            grey = decode(camera.look("calibrate").jpeg)
+            grey = read_picture(camera.look("calibrate").jpeg).grey
         except CameraFault as fault:
             raise BadInput(f"camera: {fault.kind}: {fault.detail} ({len(kept)} of {wanted} views taken)") from None
         found = find_corners(grey, pattern)

@@ -17,7 +17,7 @@ from harvey.hardware.base import kind_of, open_base
 from harvey.hardware.drivers.bases.base import Base, BaseFault
 from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
 from harvey.hardware.mission import HardwareMission
-from knowledge_sources.methods.features.images import decode
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.checks import check_world
 from world_models.building.world import World
@@ -210,7 +210,7 @@ class Preflight:
         yield Check("camera", f"{len(pictures)} whole pictures{took}",
                     f"[camera] rate_hz = {eye.rate_hz:g} is needed: less light needs longer exposure; try MJPG, a "
                     "shorter cable, fewer devices on the bus" if slow else "")
-        contrast = float(decode(pictures[-1].jpeg).std())
+        contrast = float(read_picture(pictures[-1].jpeg).grey.std())
         is_enough = contrast >= self._settings.plan.min_contrast
         yield Check("sight", f"contrast {contrast:.0f} of 255",
                     "" if is_enough else "too dark, or the lens is covered: nothing can be recognized")

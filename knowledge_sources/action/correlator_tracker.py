@@ -21,7 +21,7 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.features.correlation import Template
-from knowledge_sources.methods.features.rectification import get_rectifier
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.tracking.edge_alignment import align_to_edges
 from knowledge_sources.methods.tracking.template_tracking import (
     TrackUpdate,
@@ -155,11 +155,11 @@ class CorrelatorTracker(RobotKnowledgeSource):
         if tracks is None:
             return []
         robot, s = find_robot_in(view, belief.locale), self._settings
-        rectifier = get_rectifier(robot.lens, find_robot(view).camera)
+        pinhole = find_robot(view).camera
 
         def template_of(track: Track) -> Template:
             jpeg = view[track.template_frame].value.jpeg
-            return cut_template(rectifier, jpeg, track.template_px, s.tracking.template_half_px, s.features)
+            return cut_template(robot.lens, pinhole, jpeg, track.template_px, s.tracking.template_half_px, s.features)
 
         return follow_landmarks(robot, tracks.items, template_of, image, belief.world_from_robot(robot.world),
                                 belief.covariance_world(robot.world), s)
@@ -243,7 +243,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
 def _read_picture(view: View, frame: Entry[Frame]) -> Image:
     """The rectified picture of a frame."""
     robot = find_robot(view)
-    return get_rectifier(robot.lens, robot.camera)(frame.value.jpeg)
+    return read_picture(frame.value.jpeg).rectified(robot.lens, robot.camera)
 
 
 def _post_or_revise(old: Entry[Tracks] | None, tracks: Tracks, because: tuple[object, ...]) -> Effect:

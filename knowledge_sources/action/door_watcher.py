@@ -19,8 +19,9 @@ from knowledge_sources.doors_in_view import (
 )
 from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.doors.belief import update_door
-from knowledge_sources.methods.doors.leaf import decode_half, describe, measure_opening, weigh_leaf
+from knowledge_sources.methods.doors.leaf import describe, measure_opening, weigh_leaf
 from knowledge_sources.methods.doors.opening import predict_opening
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.questions import (
     find_belief,
     find_frames,
@@ -63,10 +64,9 @@ class DoorWatcher(RobotKnowledgeSource):
         belief, frame = find_belief(view), view.latest(Frame)
         if belief is None or frame is None:
             return
-        image = None
+        picture = read_picture(frame.value.jpeg)
         for watched in list(list_doors_in_view(view, belief.value, self._settings.doors)):
-            image = decode_half(frame.value.jpeg) if image is None else image
-            yield from self._watch(view, watched, belief, frame, image)
+            yield from self._watch(view, watched, belief, frame, picture.half)
 
     def _is_trusted(self, view: View, belief: Hypothesis) -> bool:
         """Whether the belief includes every motion, nothing doubts it, and it is precise enough to look at doors."""

@@ -19,8 +19,9 @@ from knowledge_sources.doors_in_view import (
     with_door_shut,
 )
 from knowledge_sources.methods.doors.explanation import Explanation, explain_picture
-from knowledge_sources.methods.doors.leaf import decode_half, describe, measure_opening, weigh_leaf
+from knowledge_sources.methods.doors.leaf import describe, measure_opening, weigh_leaf
 from knowledge_sources.methods.doors.opening import predict_opening
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.questions import (
     find_belief,
@@ -98,7 +99,7 @@ class DoorDoubter(RobotKnowledgeSource):
         if not _is_near(before, pose, belief.value, s.max_doubted_sigmas):
             return None
         opening = predict_opening(robot, pose, shut.covariance, door, locale, robot.world, s)
-        evidence = None if opening is None else measure_opening(robot, opening, decode_half(frame.value.jpeg), s)
+        evidence = None if opening is None else measure_opening(robot, opening, read_picture(frame.value.jpeg).half, s)
         if opening is None or evidence is None:
             return None
         ratio = weigh_leaf(evidence, s)

@@ -8,9 +8,8 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
-from knowledge_sources.methods.features.images import compute_mean_and_deviation
 from knowledge_sources.methods.features.lines import find_lines
-from knowledge_sources.methods.features.rectification import get_rectifier
+from knowledge_sources.methods.features.picture import compute_mean_and_deviation, read_picture
 from knowledge_sources.questions import find_robot, open_milestone
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Frame
@@ -34,7 +33,7 @@ class LineFinder(RobotKnowledgeSource):
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         frame = trigger.entry
         robot = find_robot(view)
-        image = get_rectifier(robot.lens, robot.camera)(frame.value.jpeg)
+        image = read_picture(frame.value.jpeg).rectified(robot.lens, robot.camera)
         found = find_lines(image, min_length_px=self._settings.plan.min_segment_length_px,
                            settings=self._settings.features)
         brightness, contrast = compute_mean_and_deviation(image)

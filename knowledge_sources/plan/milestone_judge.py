@@ -16,8 +16,9 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.camera_knowledge import add_yaw, compute_camera_covariance, find_camera, is_camera_known
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.localization.aliasing import find_strongest_alias
-from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors, decode_small_color
+from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors
 from knowledge_sources.methods.verification.line_check import LineCheck, check_lines
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.methods.verification.pose_evidence import compute_evidence, compute_motion_tolerance_px
@@ -138,7 +139,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         agreed = check_lines(robot, lines, segments.segments_px, pose, s.verification, milestone.errors, s.pose)
         plain_px = agreed.projected_px if not milestone.modes else check_lines(
             robot, lines, segments.segments_px, pose, s.verification).projected_px
-        faces = check_colors(robot, pose, decode_small_color(frame.jpeg), milestone.looks, s)
+        faces = check_colors(robot, pose, read_picture(frame.jpeg).quarter, milestone.looks, s)
         weight = compute_evidence(
             robot, lines, segments.segments_px, pose, fix.covariance, before, covariance, agreed, faces,
             s.verification)

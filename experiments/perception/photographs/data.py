@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from experiments.shared_data import CORRIDOR, data_path
 from harvey.errors import BadInput
-from knowledge_sources.methods.features.images import decode
+from knowledge_sources.methods.features.picture import read_picture
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -70,7 +70,7 @@ def load_corridor(folder: Path | None = None) -> Corridor | None:
 def _frame(folder: Path, entry: Mapping[str, Any]) -> CorridorFrame:
     pose = entry["camera_from_world"]
     return CorridorFrame(
-        decode((folder / entry["image"]).read_bytes()),
+        read_picture((folder / entry["image"]).read_bytes()).grey,
         Camera(*(entry[name] for name in ("fx", "fy", "cx", "cy", "width", "height"))),
         Pose(np.asarray(pose["rotation"], float), np.asarray(pose["translation"], float)),
         np.asarray(entry["segments"], float).reshape(-1, 2, 2),

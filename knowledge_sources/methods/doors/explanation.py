@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.matching import match_on_floor
 from knowledge_sources.methods.pose import planar_from_lines
-from knowledge_sources.methods.verification.color_check import check_colors, decode_small_color
+from knowledge_sources.methods.verification.color_check import check_colors
 from knowledge_sources.methods.verification.line_check import check_lines
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.methods.verification.pose_evidence import compute_evidence
@@ -65,7 +66,7 @@ def explain_picture(
         sigma_px=settings.features.sigma_across_px, settings=settings.pose)
     pose = fix.world_from_robot
     agreed = check_lines(robot, lines.lines_world, segments_px, pose, s)
-    faces = check_colors(robot, pose, decode_small_color(jpeg), predict_face_colors(robot, pose, s), settings)
+    faces = check_colors(robot, pose, read_picture(jpeg).quarter, predict_face_colors(robot, pose, s), settings)
     weight = compute_evidence(robot, lines.lines_world, segments_px, pose, fix.covariance, belief, covariance, agreed,
                               faces, s)
     return Explanation(pose, fix.covariance, POSE_CONFIDENCE.p_false(weight), agreed.agreement.matched, len(lines))

@@ -69,14 +69,6 @@ WEIGHTS = (4.04, 1.33, -3.65, -7.24, -1.59, 2.18, -1.03, 4.79)
 2109), a third of them with a thing near the door. Of 1,039 open doors none had log odds above 3."""
 
 
-def decode_half(jpeg: bytes) -> Image:
-    """Decode a JPEG picture to half of its width and height, (h, w, 3), red first. Raises ValueError."""
-    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_REDUCED_COLOR_2)
-    if image is None:
-        raise ValueError(f"expected the bytes of a JPEG picture, got {len(jpeg)} bytes that are not one")
-    return np.asarray(image[:, :, ::-1], np.uint8)
-
-
 def measure_opening(
     robot: RobotModel, opening: Opening, image: Image, settings: DoorSettings = DEFAULT.doors
 ) -> LeafEvidence | None:

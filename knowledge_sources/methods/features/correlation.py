@@ -16,8 +16,8 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Floats32
 from knowledge_sources.methods.features.correlation_peak import find_peak, find_second_peak
-from knowledge_sources.methods.features.images import estimate_noise_sigma, require_grey
 from knowledge_sources.methods.features.patch_kernels import compute_corner_strengths, resample_patch
+from knowledge_sources.methods.features.picture import estimate_noise_sigma, require_grey
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.features import FeaturesSettings
 

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices
-from knowledge_sources.methods.features.images import estimate_noise_sigma, to_grey_float
 from knowledge_sources.methods.features.line_bands import find_in_bands
 from knowledge_sources.methods.features.line_refinement import (
     RefinedSegments,
@@ -21,6 +20,7 @@ from knowledge_sources.methods.features.line_refinement import (
     smooth_image,
 )
 from knowledge_sources.methods.features.line_regions import find_line_regions
+from knowledge_sources.methods.features.picture import estimate_noise_sigma, to_grey_float
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.features import FeaturesSettings
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats, Floats32, Image, Ints
-from knowledge_sources.methods.features.images import to_grey_float
+from knowledge_sources.methods.features.picture import to_grey_float
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.features import FeaturesSettings
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import cv2
@@ -13,8 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.features.images import decode_colour
-from knowledge_sources.methods.features.rectification import get_rectifier
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.floor.appearance import (
     compute_looks,
     default_covariance,
@@ -28,7 +26,6 @@ from knowledge_sources.methods.floor.parallax import compute_parallax_odds, meas
 from knowledge_sources.methods.floor.things import Region, find_footprint, find_regions, measure_height
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.floor import FloorSettings
-from world_models.camera import Camera
 from world_models.entries.floor import FloorAppearance, FloorEnd, FloorThing, FreeFloor, Light
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
@@ -87,7 +84,7 @@ def see_free_floor(
     sigma_m = math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0))
     model = predict_model_floor(
         robot, pose, grid, floor_m, s.max_rolled_over_m, margin_px, 2.0 * sigma_m * robot.camera.fx)
-    picture = read_reduced(jpeg, robot.lens, robot.camera)
+    picture = read_picture(jpeg).rectified_half(robot.lens, robot.camera)
     known = appearances.get(locale)
     unlike, tells, light = find_unlike(picture[grid.top:], model, known, s, last_light)
     regions = find_regions(unlike, tells, grid, s) if s.use_appearance else ()
@@ -100,22 +97,6 @@ def see_free_floor(
         bearings_rad=tuple(round(math.remainder(pose.heading_rad + b, math.tau), 5) for b in scan.bearings_rad),
         near_m=scan.near_m, far_m=scan.far_m, ends=scan.ends, sigma_m=scan.sigma_m,
         things=tuple(thing for _, thing, _ in things), seen_s=seen_s, light=light), learnt
-
-
-@lru_cache(maxsize=16)
-def read_reduced(jpeg: bytes, lens: Camera, pinhole: Camera) -> NDArray[np.uint8]:
-    """The rectified picture (h, w, 3), red first, reduced by STEP_PX; the last few are cached, read-only."""
-    if lens.distortion is None:
-        image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_REDUCED_COLOR_2)
-        if image is None:
-            raise ValueError(f"expected the bytes of a JPEG picture, got {len(jpeg)} bytes that are not one")
-        small = np.ascontiguousarray(image[:, :, ::-1], np.uint8)
-    else:
-        whole = get_rectifier(lens, pinhole).rectify(decode_colour(jpeg))
-        small = np.asarray(cv2.resize(whole, (pinhole.width // STEP_PX, pinhole.height // STEP_PX),
-                                      interpolation=cv2.INTER_AREA), np.uint8)
-    small.setflags(write=False)
-    return small
 
 
 def find_unlike(
@@ -258,7 +239,7 @@ def _build_thing(
     if settings.use_parallax and earlier:
         then = earlier[0]
         earlier_from_now = then.pose.inverse() @ pose
-        before = read_reduced(then.jpeg, robot.lens, robot.camera).astype(np.float32) @ GREY
+        before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera).astype(np.float32) @ GREY
         grey = picture.astype(np.float32) @ GREY
         told = compute_parallax_odds(region, grid, grey, before, earlier_from_now, robot.camera, robot.mount, settings)
         odds *= told
@@ -308,7 +289,7 @@ def _learn(
         driven[driven] = shapely.contains_xy(shapely.Polygon(robot.world.outline(locale)), there)
     if not driven.any():
         return ()
-    colours = read_reduced(then.jpeg, robot.lens, robot.camera)[grid.top:][driven].astype(float)
+    colours = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)[grid.top:][driven].astype(float)
     learnt = learn_appearance(known, locale, colours, s)
     return () if learnt is None or learnt == known else (learnt,)
 

@@ -19,13 +19,13 @@ from knowledge_sources.methods.features.correlation import (
     lies_inside,
     measure_corner_strengths,
 )
-from knowledge_sources.methods.features.rectification import Rectifier
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.pose.planar import compute_point_jacobian
 from knowledge_sources.methods.pose.planar_from_points import planar_from_points
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.features import FeaturesSettings
 from knowledge_sources.settings.tracking import TrackingSettings
-from world_models.camera import NEAR_PLANE_M
+from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.entries.percepts import Anchor, Track
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
@@ -83,10 +83,10 @@ def follow_landmarks(
 
 @lru_cache(maxsize=MAX_TEMPLATES)
 def cut_template(
-    rectifier: Rectifier, jpeg: bytes, at_px: tuple[float, float], half_px: int, settings: FeaturesSettings
+    lens: Camera, pinhole: Camera, jpeg: bytes, at_px: tuple[float, float], half_px: int, settings: FeaturesSettings
 ) -> Template:
     """The template round a pixel of a rectified picture; cached, as it serves for many frames."""
-    return extract_template(rectifier(jpeg), at_px, half_px, settings)
+    return extract_template(read_picture(jpeg).rectified(lens, pinhole), at_px, half_px, settings)
 
 
 def correct_pose(

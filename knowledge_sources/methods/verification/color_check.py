@@ -46,18 +46,6 @@ NOT_TESTED = ColorCheck(0, 0.0, 0.0, is_testable=False)
 """Too few faces to compare."""
 
 
-def decode_small_color(jpeg: bytes) -> Image:
-    """Decode a JPEG picture to a quarter of its width and height, (h, w, 3), red first.
-
-    Raises:
-        ValueError: the bytes are not a picture.
-    """
-    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_REDUCED_COLOR_4)
-    if image is None:
-        raise ValueError(f"expected the bytes of a JPEG picture, got {len(jpeg)} bytes that are not one")
-    return np.asarray(image[:, :, ::-1], np.uint8)
-
-
 def check_colors(
     robot: RobotModel, pose: Pose2, image: Image, face_colors: Sequence[FaceColor], settings: Settings = DEFAULT
 ) -> ColorCheck:

@@ -21,7 +21,7 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from harvey.simulation.run import build_robot_model
 from knowledge_sources.action.correlator_tracker import CorrelatorTracker
-from knowledge_sources.methods.features.images import decode
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.tracking.template_tracking import select_landmarks
 from knowledge_sources.settings import DEFAULT
 from sim.render.optics import Optics
@@ -75,7 +75,7 @@ def setting() -> Setting:
         start = Pose2(x_m, y_m, rng.uniform(-3.0, 3.0))
         end = Pose2(start.x_m, start.y_m, start.heading_rad + TURN_RAD)
         before = picture(start)
-        found = select_landmarks(robot, (), "Frame-1", decode(before), start, DEFAULT)
+        found = select_landmarks(robot, (), "Frame-1", read_picture(before).grey, start, DEFAULT)
         half = robot.camera.width / 2
         inside = tuple(track for track in found if abs(place_px(robot, end, track)[0] - half) < half - 60)
         if len(inside) >= 2 * ACTION.min_expected_landmarks:
@@ -96,7 +96,7 @@ def follow(found: int, hidden: int = 0, misses: int = 0) -> list[Effect]:
     store = FrameStore(world)
     near = [ROOM, *(doorway.other(ROOM) for doorway in world.doorways_of(ROOM))]
     tracks = [replace(track, misses=misses) for track in seen.tracks[:found + hidden]]
-    image = decode(seen.after).copy()
+    image = read_picture(seen.after).grey.copy()
     for track in tracks[found:]:
         u, v = place_px(robot, seen.end, track)
         image[max(0, round(v) - 15):round(v) + 16, max(0, round(u) - 15):round(u) + 16] = 128

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from knowledge_sources.methods.doors.belief import update_door
 from knowledge_sources.methods.doors.leaf import (
     LeafEvidence,
-    decode_half,
     describe,
     find_largest_share,
     measure_opening,
     weigh_leaf,
 )
 from knowledge_sources.methods.doors.opening import is_in_view, predict_opening
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.settings import DEFAULT
 from sim.body.building import Building
 from sim.differences.leaf import build_leaf
@@ -70,7 +70,7 @@ def weigh(robot: RobotModel, doorway: Doorway, building: Building, pose: Pose2, 
     radiance = gain * building.renderer.radiance(robot.lens, robot.camera_from_world(pose))
     sensor = SensorParameters()
     jpeg = compress_jpeg(expose(radiance, sensor, np.random.default_rng(1)), sensor.jpeg_quality)
-    evidence = measure_opening(robot, opening, decode_half(jpeg))
+    evidence = measure_opening(robot, opening, read_picture(jpeg).half)
     return None if evidence is None else weigh_leaf(evidence)
 
 
@@ -103,7 +103,7 @@ def test_a_wall_where_the_door_should_be_is_no_leaf(
     sensor = SensorParameters()
     radiance = buildings["open"].renderer.radiance(robot.lens, robot.camera_from_world(elsewhere))
     jpeg = compress_jpeg(expose(radiance, sensor, np.random.default_rng(1)), sensor.jpeg_quality)
-    evidence = measure_opening(robot, opening, decode_half(jpeg))
+    evidence = measure_opening(robot, opening, read_picture(jpeg).half)
     assert evidence is None or weigh_leaf(evidence) <= 0.0
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from harvey.simulation.run import build_robot_model
 from knowledge_sources.methods.arrays import Floats, Image
-from knowledge_sources.methods.features.images import decode
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.motion.routes import compute_free_space
 from knowledge_sources.methods.tracking.edge_alignment import EdgeAlignment, align_to_edges
 from sim.render.optics import Optics
@@ -52,7 +52,7 @@ def draw_pose(rng: np.random.Generator) -> Pose2:
 def render(pose: Pose2, rng: np.random.Generator) -> Image:
     s = stage().scenario
     radiance = Optics.of(s.camera.camera).radiance(stage().building.renderer, robot().camera_from_world(pose))
-    return decode(compress_jpeg(expose(radiance, s.sensor, rng, lights_on=True), s.sensor.jpeg_quality))
+    return read_picture(compress_jpeg(expose(radiance, s.sensor, rng, lights_on=True), s.sensor.jpeg_quality)).grey
 
 
 def draw_belief(pose: Pose2, sigmas: tuple[float, float, float], rng: np.random.Generator) -> tuple[Pose2, Floats]:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
 
 from harvey.simulation.run import build_robot_model
-from knowledge_sources.methods.features.images import decode
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.tracking.template_tracking import _compute_anchor_covariance, select_landmarks
 from knowledge_sources.settings import DEFAULT
 from sim.render.optics import Optics
@@ -44,7 +44,7 @@ def test_new_landmarks_are_apart_from_each_other_and_from_those_kept(seed: int, 
     corners = np.array(robot().world.outline("robot-laboratory"))
     pose = Pose2(*rng.uniform(corners.min(axis=0) + 1.0, corners.max(axis=0) - 1.0), rng.uniform(-math.pi, math.pi))
     radiance = Optics.of(s.camera.camera).radiance(stage().building.renderer, robot().camera_from_world(pose))
-    image = decode(compress_jpeg(expose(radiance, s.sensor, rng, lights_on=True), s.sensor.jpeg_quality))
+    image = read_picture(compress_jpeg(expose(radiance, s.sensor, rng, lights_on=True), s.sensor.jpeg_quality)).grey
     first = select_landmarks(robot(), (), "Frame-1", image, pose)
     assume(len(first) >= 2)
     kept = tuple(replace(track, found_px=None) if rng.random() < 0.3 else track

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.features.rectification import Rectifier
+from knowledge_sources.methods.features.picture import Rectifier
 from sim.made_up.box_room import box_room
 from sim.render.optics import Optics, distort, undistort
 from sim.render.renderer import Renderer

@@ -14,7 +14,7 @@ from harvey.cli import main
 from knowledge_sources.methods.calibration.chessboard import Pattern, find_corners
 from knowledge_sources.methods.calibration.intrinsics import BoardView, Calibration, calibrate
 from knowledge_sources.methods.calibration.mounting import estimate_mounting
-from knowledge_sources.methods.features.images import decode
+from knowledge_sources.methods.features.picture import read_picture
 from sim.made_up.chessboard import chessboard_picture, chessboard_renderer, chessboard_view
 from sim.render.optics import Optics
 from sim.render.sensor import SensorParameters
@@ -37,7 +37,7 @@ def pictures() -> list[bytes]:
 
 @pytest.fixture(scope="module")
 def views(pictures: list[bytes]) -> list[BoardView]:
-    corners = [find_corners(decode(picture), PATTERN) for picture in pictures]
+    corners = [find_corners(read_picture(picture).grey, PATTERN) for picture in pictures]
     return [BoardView(str(i), c) for i, c in enumerate(corners) if not isinstance(c, str)]
 
 
@@ -74,7 +74,7 @@ def test_too_few_views_are_refused(views: list[BoardView]) -> None:
 
 
 def test_useless_pictures_say_why(pictures: list[bytes]) -> None:
-    board = decode(pictures[0])
+    board = read_picture(pictures[0]).grey
     assert find_corners(np.full((200, 200), 99, np.uint8), PATTERN) == "no board of 9 x 6 inner corners in it"
     blurred = find_corners(cv2.GaussianBlur(board, (0, 0), 3.0), PATTERN)
     assert isinstance(blurred, str) and ("blurred" in blurred or "no board" in blurred)
@@ -102,7 +102,7 @@ def test_the_mounting_comes_back(calibration: Calibration, upright: bool) -> Non
     picture = chessboard_picture(
         chessboard_renderer(9, 6, 0.025), Optics.of(CAMERA), pose, SensorParameters(), rng
     )
-    corners = find_corners(decode(picture), PATTERN)
+    corners = find_corners(read_picture(picture).grey, PATTERN)
     assert not isinstance(corners, str)
     found = estimate_mounting(calibration, corners, PATTERN, standing_at_m=0.06 if upright else None)
     got = np.array([found.height_m, found.tilt_rad, found.roll_rad, found.to_board_m, found.yaw_rad])

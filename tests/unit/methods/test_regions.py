@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
-from knowledge_sources.methods.features.images import decode, decode_colour, estimate_noise_sigma
+from knowledge_sources.methods.arrays import Image
+from knowledge_sources.methods.features.picture import Picture, estimate_noise_sigma, read_picture
 from knowledge_sources.methods.features.regions import segment_regions
+from world_models.camera import Camera
 
 
 def test_a_plain_image_is_one_region() -> None:
@@ -30,17 +34,35 @@ def test_regions_need_sensible_limits() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"no picture", b"\xff\xd8\xff\xe0 cut off", "text", None, 7])
-def test_bytes_that_are_no_picture_are_refused(data: Any) -> None:
+@pytest.mark.parametrize("view", ["grey", "half", "quarter", "color"])
+def test_bytes_that_are_no_picture_are_refused(data: Any, view: str) -> None:
     with pytest.raises(ValueError, match="expected the bytes of a"):
-        decode(data)
+        getattr(read_picture(data), view)
 
 
 def test_a_picture_survives_its_compression() -> None:
     image = np.zeros((30, 40, 3), np.uint8)
     image[:, 20:] = (250, 10, 10)  # OpenCV's order: blue first
     data = cv2.imencode(".png", image)[1].tobytes()
-    assert decode(data).shape == (30, 40)
-    np.testing.assert_array_equal(decode_colour(data)[5, 30], [10, 10, 250])
+    assert read_picture(data).grey.shape == (30, 40)
+    np.testing.assert_array_equal(read_picture(data).color[5, 30], [10, 10, 250])
+
+
+def test_a_picture_is_decoded_once_a_view() -> None:
+    data = cv2.imencode(".jpg", np.random.default_rng(1).integers(0, 256, (32, 40, 3)).astype(np.uint8))[1].tobytes()
+    plain = Camera(40.0, 40.0, 20.0, 16.0, 40, 32)
+    bent = replace(plain, distortion=(-0.1, 0.0, 0.0, 0.0))
+    views: tuple[Callable[[Picture], Image], ...] = (
+        lambda p: p.grey, lambda p: p.half, lambda p: p.quarter,
+        lambda p: p.rectified(bent, plain), lambda p: p.rectified_half(bent, plain))
+    shapes = ((32, 40), (16, 20, 3), (8, 10, 3), (32, 40), (16, 20, 3))
+    for view, shape in zip(views, shapes, strict=True):
+        image = view(read_picture(data))
+        assert image.shape == shape and image is view(read_picture(bytes(bytearray(data))))
+        with pytest.raises(ValueError, match="read-only"):
+            image[0] = 0
+    assert read_picture(data).rectified(plain, plain) is read_picture(data).grey
+    assert read_picture(data).rectified_half(plain, plain) is read_picture(data).half
 
 
 @pytest.mark.parametrize("noise", [1.0, 3.0, 8.0])

@@ -1,0 +1,195 @@
+"""Pictures as arrays: one decoder, the views of a picture that methods look at, and statistics of grey levels.
+
+One policy on lens distortion. *As the lens made it* are ``grey``, ``color``, ``half`` and ``quarter``: who looks at
+colors at a few places bends the places, not the picture (doors, colors of faces). *Rectified*, as a camera without
+distortion would have taken it, are ``rectified`` and ``rectified_half``: straight edges are then straight, and pixels
+follow the pinhole model (lines, templates, floor). The alternative, to find segments in the raw picture and to
+undistort their ends, is measured by ``harvey experiment lens``. Without distortion both are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property, lru_cache
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.arrays import Floats32, Image
+from knowledge_sources.methods.features.patch_kernels import compute_noise_response
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.settings.features import FeaturesSettings
+from world_models.camera import Camera
+
+ROUNDING_SIGMA = 12.0**-0.5
+"""Standard deviation of rounding to whole grey levels."""
+
+
+class Picture:
+    """A compressed picture (JPEG or PNG) and its views, decoded when first asked for; arrays are read-only.
+
+    Every view raises ValueError where the bytes are not a picture. ``half`` and ``quarter`` are reduced by the decoder,
+    which is fast.
+
+    Attributes:
+        grey: (h, w) grey levels.
+        half, quarter: (h / 2, w / 2, 3) and (h / 4, w / 4, 3) colors, red first.
+    """
+
+    def __init__(self, jpeg: bytes) -> None:
+        self._jpeg = jpeg
+        self._rectified: dict[tuple[Camera, Camera, bool], Image] = {}
+
+    @cached_property
+    def grey(self) -> Image:
+        return _locked(_decode(self._jpeg, cv2.IMREAD_GRAYSCALE))
+
+    @cached_property
+    def half(self) -> Image:
+        return _locked(_decode_color(self._jpeg, cv2.IMREAD_REDUCED_COLOR_2))
+
+    @cached_property
+    def quarter(self) -> Image:
+        return _locked(_decode_color(self._jpeg, cv2.IMREAD_REDUCED_COLOR_4))
+
+    @property
+    def color(self) -> Image:
+        """(h, w, 3) colors, red first; decoded every time, as no method asks twice."""
+        return _decode_color(self._jpeg, cv2.IMREAD_COLOR)
+
+    def rectified(self, lens: Camera, pinhole: Camera) -> Image:
+        """(h, w) grey levels as ``pinhole`` would have taken them, which has no distortion."""
+        if lens.distortion is None:
+            return self.grey
+        return self._remember((lens, pinhole, False), lambda: get_rectifier(lens, pinhole).rectify(self.grey))
+
+    def rectified_half(self, lens: Camera, pinhole: Camera) -> Image:
+        """(h / 2, w / 2, 3) colors, red first, as ``pinhole`` would have taken them, which has no distortion."""
+        if lens.distortion is None:
+            return self.half
+        size = pinhole.width // 2, pinhole.height // 2
+
+        def reduce() -> Image:
+            whole = get_rectifier(lens, pinhole).rectify(self.color)
+            return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+        return self._remember((lens, pinhole, True), reduce)
+
+    def _remember(self, key: tuple[Camera, Camera, bool], make: Callable[[], Image]) -> Image:
+        if key not in self._rectified:
+            self._rectified[key] = _locked(make())
+        return self._rectified[key]
+
+
+@lru_cache(maxsize=16)
+def read_picture(jpeg: bytes) -> Picture:
+    """The picture of compressed bytes.
+
+    The last few are kept: several knowledge sources look at one picture, and templates lie in earlier ones.
+    """
+    return Picture(jpeg)
+
+
+class Rectifier:
+    """Brings pictures of a camera with lens distortion into those of one without."""
+
+    def __init__(self, lens: Camera, pinhole: Camera) -> None:
+        """Build the map between the two pictures.
+
+        Args:
+            lens: the camera as it is.
+            pinhole: the camera without distortion to whose pictures they are brought.
+
+        Raises:
+            ValueError: ``pinhole`` has distortion.
+        """
+        if pinhole.distortion is not None:
+            raise ValueError(f"expected a camera without distortion to put pictures into, got {pinhole}")
+        self._size = lens.width, lens.height
+        self._map = None if lens.distortion is None else _build_map(lens, pinhole)
+
+    def rectify(self, raw: Image) -> Image:
+        """Rectify a picture (h, w[, 3]) of the camera. Raises ValueError for one of another size."""
+        if self._map is None:
+            return raw
+        if raw.shape[1::-1] != self._size:
+            expected = " x ".join(map(str, self._size))
+            raise ValueError(f"expected a picture of {expected} px, got one of shape {raw.shape}")
+        image = cv2.remap(raw, *self._map, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(image, np.uint8)
+
+
+@lru_cache(maxsize=4)
+def get_rectifier(lens: Camera, pinhole: Camera) -> Rectifier:
+    """The rectifier of a camera; the last few are kept."""
+    return Rectifier(lens, pinhole)
+
+
+def to_grey_float(image: Any) -> Floats32:
+    """An image (h, w) of any number type as contiguous float32; no copy where none is needed.
+
+    Raises:
+        ValueError: the image is not two-dimensional, or a side is under 2 px.
+    """
+    return np.ascontiguousarray(require_grey(image), np.float32)
+
+
+def require_grey(image: Any) -> NDArray[Any]:
+    """An image (h, w) as an array of its own number type. Raises ValueError as :func:`to_grey_float`."""
+    array = np.asarray(image)
+    if array.ndim != 2 or min(array.shape) < 2:
+        raise ValueError(f"expected a grey image of shape (h, w), at least 2 x 2, got shape {array.shape}")
+    return array
+
+
+def compute_mean_and_deviation(image: Image) -> tuple[float, float]:
+    """Mean and standard deviation of the grey levels of an image (h, w)."""
+    mean, deviation = cv2.meanStdDev(image)
+    return float(mean[0, 0]), float(deviation[0, 0])
+
+
+def estimate_noise_sigma(image: Floats32, settings: FeaturesSettings = DEFAULT.features) -> float:
+    """Standard deviation of the pixel noise of an image (h, w) [grey levels], at least that of rounding.
+
+    It is the median response to a mask that is blind to plain, linear and straight-edge structure.
+    Source: J. Immerkaer, Fast noise variance estimation, CVIU 64(2), 1996, with the median in place of the mean.
+    """
+    if min(image.shape) < 3:
+        return ROUNDING_SIGMA
+    step = max(image.shape[0] // settings.noise_rows, 1)
+    response = compute_noise_response(np.ascontiguousarray(image, np.float32), step)
+    return max(response / (0.6745 * 6.0), ROUNDING_SIGMA)
+
+
+def _locked(image: Image) -> Image:
+    image.setflags(write=False)
+    return image
+
+
+def _decode_color(data: bytes, flags: int) -> Image:
+    return np.ascontiguousarray(_decode(data, flags)[:, :, ::-1])
+
+
+def _decode(data: bytes, flags: int) -> Image:
+    try:
+        buffer = np.frombuffer(data, np.uint8)
+    except (TypeError, ValueError, AttributeError):
+        raise ValueError(f"expected the bytes of a compressed picture, got {type(data).__name__}") from None
+    if not buffer.size:
+        raise ValueError("expected the bytes of a JPEG or PNG picture, got none")
+    try:
+        image = cv2.imdecode(buffer, flags)
+    except cv2.error:
+        image = None
+    if image is None:
+        raise ValueError(f"expected the bytes of a JPEG or PNG picture, got {buffer.size} bytes that are not one")
+    return np.asarray(image, np.uint8)
+
+
+def _build_map(lens: Camera, pinhole: Camera) -> tuple[Floats32, Floats32]:
+    """Column and row (h, w) in the raw picture of each pixel of the rectified one [px]."""
+    grid = np.stack(np.meshgrid(np.arange(pinhole.width), np.arange(pinhole.height)), axis=-1)
+    u, v = np.moveaxis(lens.project(pinhole.rays(grid)), -1, 0).astype(np.float32)
+    return np.ascontiguousarray(u), np.ascontiguousarray(v)
