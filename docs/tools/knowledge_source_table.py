@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from blackboard.change import Watch
 from blackboard.knowledge_source import KnowledgeSource
 from harvey.wiring import KNOWLEDGE_SOURCES, foreign_sources
 from world_models.entries.locale_frame import FrameRequest
@@ -18,22 +17,17 @@ EVERYBODY_WRITES = (FrameRequest,)
 
 def rows(sources: Iterable[type[KnowledgeSource]]) -> list[str]:
     """The table in markdown, a line an element."""
-    head = ["| knowledge source | level | closes | wakes on | writes | what it does |", "|---|---|---|---|---|---|"]
+    head = ["| knowledge source | level | wakes on | writes | what it does |", "|---|---|---|---|---|"]
     return head + [_row(source) for source in sources]
 
 
 def _row(source: type[KnowledgeSource]) -> str:
     what = (source.__doc__ or "").strip().split("\n\n")[0]
-    wakes = ", ".join(dict.fromkeys(_watch(watch) for watch in source.watches))
+    wakes = ", ".join(dict.fromkeys(watch.value_type.__name__ for watch in source.watches))
     writes = ", ".join(kind.__name__ for kind in source.writes if kind not in EVERYBODY_WRITES)
-    closes = "" if source.closes is None else str(source.closes)
+    level = str(source.level) + ("" if source.closes is None else ", closes it")
     name = source.__module__.rpartition(".")[2]
-    return f"| `{name}` | {source.level} | {closes} | {wakes} | {writes} | {' '.join(what.split())} |"
-
-
-def _watch(watch: Watch) -> str:
-    kinds = "/".join(kind.__name__.lower() for kind in watch.kinds)
-    return f"{watch.value_type.__name__} {kinds}"
+    return f"| `{name}` | {level} | {wakes} | {writes} | {' '.join(what.split())} |"
 
 
 if __name__ == "__main__":

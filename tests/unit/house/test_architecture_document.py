@@ -28,6 +28,7 @@ MOST_BYTES = 400_000
 SHEET_BYTES = 1_500_000
 """Of a sheet of ten pictures."""
 ARCHITECTURE = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+HOW_TO = ROOT / "docs" / "how-to"
 COMMAND = re.compile(r"^(?:\.venv/bin/)?harvey ([^#\n]+)|`harvey ([^`]+)`", re.MULTILINE)
 
 
@@ -82,7 +83,8 @@ def test_architecture_names_every_folder_of_two_levels() -> None:
 
 def test_the_example_of_a_knowledge_source_is_the_one_in_the_package() -> None:
     example = (ROOT / "examples/plugin/harvey_timekeeper/timekeeper.py").read_text(encoding="utf-8")
-    shown = re.findall(r"```python\n(.*?)```", ARCHITECTURE, re.DOTALL)
+    recipe = (HOW_TO / "knowledge-source.md").read_text(encoding="utf-8")
+    shown = re.findall(r"```python\n(.*?)```", recipe, re.DOTALL)
     assert shown
     lines = [line for text in shown for line in text.splitlines() if "RunningShort.\"" not in line]
     assert [line for line in lines if line.strip(' "') not in example] == []
@@ -109,7 +111,8 @@ def test_entry_points_are_those_of_the_plugins_table() -> None:
     groups = set(re.findall(r"``(harvey\.\w+)``", plugins.__doc__ or ""))
     package = tomllib.loads((ROOT / "examples/plugin/pyproject.toml").read_text(encoding="utf-8"))
     assert groups == set(package["project"]["entry-points"])
-    assert [group for group in sorted(groups) if f"`{group}`" not in ARCHITECTURE] == []
+    recipes = (HOW_TO / "README.md").read_text(encoding="utf-8")
+    assert [group for group in sorted(groups) if f"`{group}`" not in recipes] == []
 
 
 def test_pictures_are_small() -> None:
