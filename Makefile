@@ -10,6 +10,7 @@ PIP_VERSION := 26.3
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --quiet --disable-pip-version-check
 LOCK := .venv-lock
+EXTRAS := $(patsubst %/pyproject.toml,%,$(wildcard extras/*/pyproject.toml))
 COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --generate-hashes --no-strip-extras --allow-unsafe \
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
 
@@ -17,16 +18,17 @@ COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help run test mutants environment site course lock clean
+.PHONY: help run test test-rest test-all mutants environment site course lock clean
 
 help:
 	@echo "make run          prepare everything, then drive: harvey run $(SCENARIO)"
-	@echo "make test         ruff, mypy, import contracts, pytest; installs every extra, and says what was skipped and why"
+	@echo "make test         ruff, mypy, import contracts, pytest; says what was skipped and why"
+	@echo "make test-all     that, and the tests of every extra (extras/), of an installation and in a browser"
 	@echo "make mutants      mutation testing of ROOM=$(ROOM), SAMPLE=$(SAMPLE); goes on where it stopped, and reports"
 	@echo "make site         build the documentation site, build/site/index.html, and the man page, build/man/harvey.1"
 	@echo "make course       execute the notebooks of the course: build/course"
 	@echo "make environment  only prepare $(VENV), for running and for testing"
-	@echo "make lock         write the three requirements*.lock anew from pyproject.toml"
+	@echo "make lock         write the three requirements*.lock anew from pyproject.toml and those of the extras"
 	@echo "make clean        remove environments and caches; recordings in runs/ stay"
 	@echo "Options: PYTHON=$(PYTHON) (3.11 or newer), VENV=$(VENV), SCENARIO=$(SCENARIO)"
 
@@ -37,7 +39,14 @@ test: $(VENV)/.ready-to-test
 	@echo "== ruff" && $(BIN)/ruff check
 	@echo "== mypy" && $(BIN)/mypy
 	@echo "== import contracts" && $(BIN)/lint-imports
-	@echo "== pytest" && $(BIN)/pytest -n 2
+	@echo "== pytest" && $(BIN)/pytest -n 2 tests --ignore tests/installed --ignore tests/browser
+
+test-all: test test-rest
+
+test-rest: $(VENV)/.ready-to-test-all
+	@for extra in $(EXTRAS); do echo "== mypy $$extra" && $(BIN)/mypy $$extra/harvey_* || exit 1; done
+	@echo "== pytest of the extras, of an installation and in a browser" \
+		&& $(BIN)/pytest -n 2 $(wildcard extras/*/tests) tests/installed tests/browser
 
 # Minutes to hours; not in CI. Rooms and equivalent mutants: tests/mutation/rooms.toml.
 mutants: $(VENV)/.ready-to-test
@@ -71,6 +80,11 @@ $(VENV)/.ready-to-test: requirements-dev.lock $(VENV)/.ready-to-run
 	@$(PIP) install --require-hashes -r requirements-dev.lock
 	@touch $@
 
+$(VENV)/.ready-to-test-all: $(EXTRAS:%=%/pyproject.toml) $(VENV)/.ready-to-test
+	@for extra in $(EXTRAS); do echo "== Installing $$extra" \
+		&& $(PIP) install --no-deps --no-build-isolation -e $$extra || exit 1; done
+	@touch $@
+
 site: $(VENV)/.ready-to-test
 	@$(BIN)/sphinx-build -W -q docs build/site && echo "build/site/index.html"
 	@$(BIN)/sphinx-build -W -q -b man docs build/man && echo "build/man/harvey.1: man -l build/man/harvey.1"
@@ -84,8 +98,7 @@ lock:
 	@$(LOCK)/bin/pip install --quiet --quiet pip-tools==7.6.2
 	@echo "== requirements-pip.lock" && echo pip==$(PIP_VERSION) | $(COMPILE) -o requirements-pip.lock -
 	@echo "== requirements.lock" && $(COMPILE) --build-deps-for editable -o requirements.lock pyproject.toml
-	@echo "== requirements-dev.lock" && $(PYTHON) -c "import tomllib; print(*sum(tomllib.load(open('pyproject.toml', 'rb'))\
-	['project']['optional-dependencies'].values(), []), sep='\n')" | $(COMPILE) -c requirements.lock -o requirements-dev.lock -
+	@echo "== requirements-dev.lock" && $(PYTHON) extras/requirements.py | $(COMPILE) -c requirements.lock -o requirements-dev.lock -
 	@rm -rf $(LOCK)
 
 clean:

@@ -86,7 +86,7 @@ def _parse(argv: Sequence[str] | None) -> Namespace:
     """Raises SystemExit, as argparse does, after saying what is wrong."""
     given = list(sys.argv[1:] if argv is None else argv)
     args, unknown = parser(given[0] if given else None).parse_known_args(given)
-    if unknown and not args.command.open_ended:
+    if unknown and not args.open_ended:
         args.parser.error(f"expected no {unknown[0]!r} here")
     return args
 

@@ -6,9 +6,11 @@
 ``harvey.emulators``          a ``sim.emulators.registry.EmulatorKind``
 ``harvey.faults``             a class under ``sim.faults.fault.Fault``
 ``harvey.loggers``            a class under ``logs.recording.logger.Logger``
+``harvey.commands``           a ``harvey.commands.command.Command``; of a verb: ``world.import``
 ============================  ==========================================================================
 
-The name of an entry point is the name under which Harvey knows what it points to.
+The name of an entry point is the name under which Harvey knows what it points to. What the folder ``extras`` has is
+added in the same way; of what is absent it can be said what to install.
 """
 
 from __future__ import annotations
@@ -20,6 +22,10 @@ from typing import Any
 SOURCES_GROUP = "harvey.knowledge_sources"
 """The group of knowledge sources: named in ``run.json`` and put round the board, so it is said once, here."""
 
+COMMANDS_GROUP = "harvey.commands"
+EXTRAS: Mapping[str, Mapping[str, str]] = {COMMANDS_GROUP: {}}
+"""By group: the names that extras of this project have, each with its extra."""
+
 
 class PluginError(ImportError):
     """What an installed package adds cannot be used: names the package, what was expected and what came."""
@@ -30,9 +36,17 @@ def list_plugins(group: str) -> Mapping[str, str]:
     return {point.name: _package(point) for point in _points(group)}
 
 
-def load_plugins(group: str, kind: type[Any]) -> Mapping[str, Any]:
-    """The instances of ``kind`` that a group points to, by name in order. Raises PluginError."""
-    return {point.name: _load(point, kind, lambda found: isinstance(found, kind)) for point in _points(group)}
+def load_plugins(group: str, kind: type[Any], *names: str) -> Mapping[str, Any]:
+    """The instances of ``kind`` that a group points to, by name in order; those of some names. Raises PluginError."""
+    return {point.name: _load(point, kind, lambda found: isinstance(found, kind))
+            for point in _points(group) if not names or point.name in names}
+
+
+def list_absent(group: str) -> Mapping[str, str]:
+    """The names of a group that an extra which is not installed would add, each with what to install."""
+    present = list_plugins(group)
+    return {name: f"{extra}: pip install ./extras/{extra}" for name, extra in EXTRAS.get(group, {}).items()
+            if name not in present}
 
 
 def load_plugin_classes(group: str, kind: type[Any], *names: str) -> Mapping[str, type[Any]]:

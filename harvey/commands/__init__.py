@@ -6,9 +6,13 @@ Only the one that is asked for is imported, and it imports what it needs when it
 from __future__ import annotations
 
 import importlib
+from argparse import Namespace
 from collections.abc import Mapping
+from dataclasses import replace
 
 from harvey.commands.command import Command
+from harvey.errors import BadInput
+from world_models.plugins import COMMANDS_GROUP, list_absent, list_plugins, load_plugins
 
 MODULES: Mapping[str, str] = {
     "list": "listing",
@@ -20,6 +24,36 @@ MODULES: Mapping[str, str] = {
 
 
 def find_commands(name: str | None = None) -> tuple[Command, ...]:
-    """The command of this name alone; all of them where there is none of it."""
-    names = (name,) if name in MODULES else tuple(MODULES)
-    return tuple(importlib.import_module(f"{__name__}.{MODULES[one]}").COMMAND for one in names if one is not None)
+    """The command of this name alone; all of them, with those of other packages, where there is none of it here."""
+    if name is not None and name in MODULES:
+        return (_import(name),)
+    return (*map(_import, MODULES), *find_added_commands())
+
+
+def find_added_commands(of: str = "") -> tuple[Command, ...]:
+    """The commands that other packages add, or the verbs that they add to a command.
+
+    In the place of one whose extra is absent stands one that says what to install.
+    """
+    prefix = f"{of}." if of else ""
+    names = [name for name in list_plugins(COMMANDS_GROUP) if _is_of(name, prefix)]
+    present = load_plugins(COMMANDS_GROUP, Command, *names) if names else {}
+    return (*(replace(command, name=name.removeprefix(prefix)) for name, command in present.items()),
+            *(_absent(name, needs) for name, needs in list_absent(COMMANDS_GROUP).items() if _is_of(name, prefix)))
+
+
+def _is_of(name: str, prefix: str) -> bool:
+    return name.startswith(prefix) and "." not in name.removeprefix(prefix)
+
+
+def _import(name: str) -> Command:
+    command: Command = importlib.import_module(f"{__name__}.{MODULES[name]}").COMMAND
+    return command
+
+
+def _absent(name: str, needs: str) -> Command:
+    def refuse(_: Namespace) -> int:
+        raise BadInput(f"{name.replace('.', ' ')} needs {needs}")
+
+    return Command(name.rpartition(".")[2], f"needs {needs}", ((needs.partition(": ")[2], "adds it"),),
+                   lambda _: None, refuse, open_ended=True)

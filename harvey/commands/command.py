@@ -42,7 +42,7 @@ def add_parser(commands: Any, command: Command) -> ArgumentParser:
         command.name, help=command.summary, epilog=command.epilog, formatter_class=RawDescriptionHelpFormatter,
         description=f"{command.summary[0].upper()}{command.summary[1:]}.\n{command.details}".rstrip())
     command.arguments(parser)
-    parser.set_defaults(parser=parser)
+    parser.set_defaults(parser=parser, open_ended=command.open_ended)
     return parser
 
 

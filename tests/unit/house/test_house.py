@@ -5,10 +5,13 @@ from __future__ import annotations
 import ast
 import importlib
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+
+from world_models.plugins import EXTRAS
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = ("blackboard", "world_models", "knowledge_sources", "sim", "logs", "harvey", "experiments")
@@ -120,6 +123,23 @@ def test_what_computes_or_moves_knows_entries_but_no_board(package: str) -> None
 def test_libraries_are_imported_only_where_they_belong(library: str, allowed: tuple[str, ...]) -> None:
     users = {name for name, found in DIRECT.items() if library in tops(set(found))}
     assert not {name for name in users if not where(name, allowed)}
+
+
+def test_no_extra_is_imported_by_what_it_extends() -> None:
+    extras = {path.parent.name for path in (ROOT / "extras").glob("*/*/__init__.py")}
+    assert extras
+    assert [name for name in MODULES if tops(set(DIRECT[name])) & {"extras", *extras}] == []
+
+
+def test_what_the_extras_add_is_known_where_they_are_absent() -> None:
+    """So that one line says what to install; and none is named that no extra adds."""
+    added: dict[str, dict[str, str]] = {group: {} for group in EXTRAS}
+    for path in sorted((ROOT / "extras").glob("*/pyproject.toml")):
+        project = tomllib.loads(path.read_text(encoding="utf-8"))["project"]
+        for group in EXTRAS:
+            added[group] |= dict.fromkeys(project.get("entry-points", {}).get(group, ()), project["name"])
+        assert path.parent.name == project["name"]
+    assert added == EXTRAS
 
 
 def test_nothing_is_evaluated_or_executed() -> None:

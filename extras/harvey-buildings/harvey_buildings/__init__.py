@@ -1,0 +1,1 @@
+"""Buildings of other programs, in and out."""
