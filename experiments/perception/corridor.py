@@ -21,12 +21,12 @@ from experiments.perception.photographs.trials import (
     run_attempt,
     select_visible,
 )
+from experiments.perception.rivals import CAMERA_MIN_LINE_LENGTH_PX
 from experiments.report import Cell, Report
 from experiments.shared_data import CORRIDOR, describe_absence
 from experiments.trials import campaign_folder, run_trials
 from knowledge_sources.methods.features.lines import find_lines
 from knowledge_sources.methods.verification.agreement import compute_coverage
-from knowledge_sources.settings import DEFAULT
 
 Array = NDArray[np.float64]
 
@@ -135,7 +135,7 @@ def _notes(data: Corridor, seed: int, folder: Path) -> tuple[str, ...]:
         f" {data.step:.3f} of the survey's units. Seed {seed}. Directions of shift and turn are uniform on the sphere,"
         " sizes uniform where the row says 'up to'. The reference poses are the publishers', and have errors too.",
         f"Covered: a segment within {COVER_PX} px and {COVER_RAD} rad of a projected model line of"
-        f" {DEFAULT.localization.camera_min_line_length_px:.0f} px or more, at the reference pose. Peer there: the"
+        f" {CAMERA_MIN_LINE_LENGTH_PX:.0f} px or more, at the reference pose. Peer there: the"
         " publishers' own segments.",
         f"Recovered: within {MAX_ERROR_STEPS} step and {math.degrees(MAX_ERROR_RAD):.1f} degrees. All from our own"
         " segments; the prior's standard deviation per axis is half of 0.5 step and 3 degrees, in every test.",

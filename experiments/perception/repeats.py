@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from experiments.bounds import at_least, at_most
+from experiments.perception.locate_camera import RIVAL_MIN_LEAD, PoseVerdict
 from experiments.perception.repeats_scenes import KINDS, MAX_PITCHES
 from experiments.perception.repeats_trials import TOLERANCE_PITCHES, Case, CaseResult, run_case
 from experiments.report import Cell, Report
 from experiments.trials import RESULTS, campaign_folder, run_trials
-from knowledge_sources.methods.localization.locate_camera import PoseVerdict
-from knowledge_sources.settings import DEFAULT
 
 TITLE = "Structures that repeat themselves: poses verified rightly and wrongly"
 COLUMNS = ("structures", "cases", "wrong, no search", "wrong, ours", "unique", "verified of unique", "not testable",
@@ -65,7 +64,7 @@ def _notes(seed: int, results: str) -> tuple[str, ...]:
         f"Wrong: verified, and more than {TOLERANCE_PITCHES} pitches off. No search: the same without a search for"
         " rivals, as it was before.",
         f"Unique: no other pose on a grid of half a pitch, each refined, comes within"
-        f" {DEFAULT.localization.rival_min_lead:g} of the true pose's log likelihood. It shares the likelihood with"
+        f" {RIVAL_MIN_LEAD:g} of the true pose's log likelihood. It shares the likelihood with"
         " ours, not the search.",
         f"One line per case: {results}",
     )

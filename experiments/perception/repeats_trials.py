@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.perception.locate_camera import RIVAL_MIN_LEAD, CameraFix, PoseVerdict, locate_camera
 from experiments.perception.repeats_scenes import CAMERA, MAX_PITCHES, RepeatScene, draw_scene, to_line_segments
-from knowledge_sources.methods.localization.locate_camera import CameraFix, PoseVerdict, locate_camera
-from knowledge_sources.methods.localization.rivals import measure_apart, refine_near
+from experiments.perception.rivals import (
+    CAMERA_MIN_LINE_LENGTH_PX,
+    RIVAL_REACH_SIGMAS,
+    compute_pose_score,
+    measure_apart,
+    refine_near,
+)
 from knowledge_sources.methods.matching.pose_parameters import build_camera_parameters
-from knowledge_sources.methods.verification.pose_score import compute_pose_score
-from knowledge_sources.settings import DEFAULT, Settings
 from world_models.frames import Pose
 
 Array = NDArray[np.float64]
@@ -22,8 +26,6 @@ TOLERANCE_PITCHES, TOLERANCE_RAD = 0.25, 0.03
 GRID_PITCHES = 0.5
 CHANCE = 0.2
 """That a line is found at a wrong pose, for the exhaustive search."""
-NO_SEARCH = replace(DEFAULT, localization=replace(DEFAULT.localization, rival_min_self_similarity=2.0))
-"""No motion takes more of a model onto itself than all of it: no rival is looked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,22 +70,22 @@ class CaseResult:
 def run_case(case: Case) -> CaseResult:
     """Locate the camera with and without the search for rivals, and search exhaustively."""
     scene = draw_scene(case.kind, case.seed)
-    (fix, is_right), (before, was_right) = locate(scene), locate(scene, NO_SEARCH)
+    (fix, is_right), (before, was_right) = locate(scene), locate(scene, with_rivals=False)
     lead = search_exhaustively(scene)
     nothing = PoseVerdict.NOT_TESTABLE.value
     return CaseResult(
         verdict=nothing if fix is None else fix.verdict.value, is_right=is_right,
         names_rival=fix is not None and fix.rival is not None, reason="no match" if fix is None else fix.reason,
         verdict_before=nothing if before is None else before.verdict.value, was_right=was_right,
-        is_unique=lead >= DEFAULT.localization.rival_min_lead, lead=lead)
+        is_unique=lead >= RIVAL_MIN_LEAD, lead=lead)
 
 
-def locate(scene: RepeatScene, settings: Settings = DEFAULT) -> tuple[CameraFix | None, bool]:
+def locate(scene: RepeatScene, *, with_rivals: bool = True) -> tuple[CameraFix | None, bool]:
     """Our answer, and whether it is right."""
     tolerance_m = TOLERANCE_PITCHES * scene.pitch
     fix = locate_camera(
         scene.model, None, CAMERA, scene.prior, scene.covariance, tolerance_m=tolerance_m, tolerance_rad=TOLERANCE_RAD,
-        rng=np.random.default_rng(0), segments=to_line_segments(scene.segments_px), settings=settings)
+        rng=np.random.default_rng(0), segments=to_line_segments(scene.segments_px), with_rivals=with_rivals)
     if fix is None:
         return None, False
     shift, turn = measure_apart(scene.truth, fix.camera_from_world)
@@ -93,7 +95,7 @@ def locate(scene: RepeatScene, settings: Settings = DEFAULT) -> tuple[CameraFix 
 def search_exhaustively(scene: RepeatScene) -> float:
     """By how much the right pose leads any other, started from a grid about it: half a pitch, within the prior."""
     parameters = build_camera_parameters(scene.prior, scene.covariance)
-    reach, step = DEFAULT.localization.rival_reach_sigmas, GRID_PITCHES * scene.pitch
+    reach, step = RIVAL_REACH_SIGMAS, GRID_PITCHES * scene.pitch
 
     def refine(pose: Pose) -> tuple[Pose, float]:
         there = refine_near(scene.model, scene.segments_px, CAMERA, parameters, pose)
@@ -118,6 +120,6 @@ def search_exhaustively(scene: RepeatScene) -> float:
 
 def _score(scene: RepeatScene, pose: Pose) -> float:
     projected, visible = CAMERA.project_segments(scene.model, pose)
-    short = np.linalg.norm(projected[:, 1] - projected[:, 0], axis=1) < DEFAULT.localization.camera_min_line_length_px
+    short = np.linalg.norm(projected[:, 1] - projected[:, 0], axis=1) < CAMERA_MIN_LINE_LENGTH_PX
     projected[~visible | short] = np.nan
     return compute_pose_score(projected, scene.segments_px, CHANCE).log_likelihood

@@ -10,8 +10,6 @@ from knowledge_sources.settings.setting import setting
 _JUDGED = "engineering judgement"
 _KIDNAP = "engineering judgement, checked with harvey experiment kidnap"
 _MILESTONES = "engineering judgement, checked with harvey experiment milestones"
-_REPEATS = "engineering judgement, checked with harvey experiment repeats"
-_CORRIDOR = "engineering judgement, checked with harvey experiment corridor"
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,54 +228,3 @@ class LocalizationSettings:
         8.0, "px", "Distance within the outline from which a segment lies inside.", _JUDGED)
     max_inside_fraction: float = setting(
         0.1, "1", "Largest length of segments inside an opaque outline, as a part of the outline's own.", _JUDGED)
-
-    # Locating a camera near a prior, with six unknowns
-    camera_min_line_length_px: float = setting(8.0, "px", "Shortest projected model line that is matched.", _CORRIDOR)
-    camera_band_px: float = setting(
-        6.0, "px", "Half-width of the bands that are searched for edges around the first pose.", _CORRIDOR)
-    camera_second_prior: float = setting(
-        0.15, "1", "Standard deviation of the first pose, as a part of the prior's.", _CORRIDOR)
-    camera_coarse_pair_px: float = setting(5.0, "px", "Restricted space of the first match.", "§6.1.4")
-    camera_coarse_sigma_px: float = setting(1.5, "px", "Deviation of an end of a pair of the first match.", _CORRIDOR)
-    camera_fine_pair_px: float = setting(3.0, "px", "Restricted space of the second match.", "§6.1.4")
-    camera_fine_sigma_px: float = setting(1.0, "px", "Deviation of an end of a pair of the second match.", _CORRIDOR)
-    camera_probability: float = setting(
-        0.999, "1", "Probability that one of the drawn subsets is free of outliers.", "§6.2.4")
-    camera_min_pairs: int = setting(6, "count", "Fewest matched pairs that are solved for a pose.", _CORRIDOR)
-    camera_min_matched_lines: int = setting(6, "count", "Fewest matched lines of a pose not refuted.", _CORRIDOR)
-    camera_max_p_false: float = setting(1e-4, "1", "Largest chance of a pose that is not refuted.", _CORRIDOR)
-    camera_min_coverage: float = setting(
-        2.0 / 3.0, "1", "Smallest covered part of the model of a verified pose.", _CORRIDOR)
-    camera_displacement_sigmas: float = setting(
-        2.0, "1", "Displacement of the poses at which chance is counted, in the prior's deviations.", _CORRIDOR)
-    camera_tolerance_sigmas: float = setting(
-        3.0, "1", "Standard deviations of a verified pose that fit into the tolerance.", _CORRIDOR)
-    camera_max_restarts: int = setting(
-        3, "count", "Most times that a pose is replaced by a better one found from it.", _CORRIDOR)
-
-    # Rivals of a pose: others within the prior that explain as much
-    rival_reach_sigmas: float = setting(
-        5.0, "1", "Distance from the prior, in its deviations, up to which a rival is looked for.", _JUDGED)
-    rival_max_voting_lines: int = setting(
-        150, "count", "Most model lines, the longest, that vote for motions onto one another.", _JUDGED)
-    rival_max_motions: int = setting(
-        60, "count", "Most translations that are tried, those with most votes; each as a turn too.", _REPEATS)
-    rival_max_refined: int = setting(10, "count", "Most rivals that are refined, the likeliest.", _REPEATS)
-    rival_parallel_rad: float = setting(
-        0.05, "rad", "Largest angle of model lines that vote for a motion onto one another.", _JUDGED)
-    rival_vote_px: float = setting(
-        6.0, "px", "Cell of the votes, as seen at the lines' median distance.", _REPEATS)
-    rival_min_depth_m: float = setting(0.3, "m", "Least median distance of lines that is counted with.", _JUDGED)
-    rival_same_px: float = setting(
-        6.0, "px", "Distance up to which a moved model line appears on another one.", _REPEATS)
-    rival_same_rad: float = setting(
-        0.08, "rad", "Angle up to which a moved model line appears on another one.", _JUDGED)
-    rival_min_self_similarity: float = setting(
-        0.3, "1", "Part of the model's length that a motion takes onto the model, from which the motion is tried.",
-        _REPEATS)
-    rival_widths_px: tuple[float, ...] = setting(
-        (12.0, 8.0, 5.0, 3.0, 2.0, 2.0), "px", "Widths of the loss by which a rival is refined.", _REPEATS)
-    rival_min_lead: float = setting(
-        5.0, "1", "Log likelihood ratio by which a verified pose leads every rival.", _REPEATS)
-    rival_distinct_tolerances: float = setting(
-        2.0, "1", "Distance of a rival, in tolerances of the pose: nearer ones are the same pose.", _JUDGED)

@@ -1,4 +1,4 @@
-"""Settings of the check of a pose: predicted lines, line and color checks, evidence, milestone preview."""
+"""Settings of the check of a pose: predicted lines, line and color checks, evidence."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from knowledge_sources.settings.setting import setting
 _JUDGED = "engineering judgement"
 _MILESTONES = "engineering judgement, checked with harvey experiment milestones"
 
-_REPEATS = "engineering judgement, checked with harvey experiment repeats"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,28 +96,3 @@ class VerificationSettings:
         1e-12, "1", "Probability of chance agreement that counts as certainty.", _JUDGED)
     fit_ridge: float = setting(
         0.02, "1", "Ridge penalty of the fit of evidence weights.", _JUDGED)
-
-    # Log likelihood of a pose, by which rivals are compared.
-    detection_rate: float = setting(
-        0.85, "1", "Probability that a predicted line is found at the right pose.", _REPEATS)
-    line_independence: float = setting(
-        0.7, "1", "Weight of a line: lines of one thing are seen or missed together (tempered likelihood).", _REPEATS)
-    min_score_chance: float = setting(
-        0.05, "1", "Lower bound of the probability of a line at a wrong pose.", _JUDGED)
-    max_score_chance: float = setting(
-        0.5, "1", "Upper bound of the probability of a line at a wrong pose: one that is found speaks for a pose.",
-        _JUDGED)
-    full_line_px: float = setting(
-        30.0, "px", "Length from which a line counts fully: shorter ones are covered by chance.", _JUDGED)
-    same_line_px: float = setting(
-        5.0, "px", "Distance up to which lines of the picture are one observation.", _REPEATS)
-    same_line_rad: float = setting(
-        0.03, "rad", "Angle up to which lines of the picture are one observation.", _REPEATS)
-
-    # Preview of milestones before a mission.
-    alias_min_coverage: float = setting(
-        0.8, "1", "Part of the lines that another place must show to look like a milestone.", _JUDGED)
-    alias_min_colors: float = setting(
-        0.8, "1", "Part of the colors that another place must show to look like a milestone.", _JUDGED)
-    max_color_difference: float = setting(
-        0.08, "1", "Largest difference of two colors, 0..1, that are the same.", _JUDGED)

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.paper.pose_peer import Peer
+from experiments.perception.locate_camera import CameraFix, PoseVerdict, locate_camera
 from experiments.perception.photographs.data import Corridor, CorridorFrame, load_corridor
+from experiments.perception.rivals import CAMERA_MIN_LINE_LENGTH_PX
 from experiments.shared_data import CORRIDOR, describe_absence
 from harvey.errors import BadInput
 from knowledge_sources.methods.features.lines import LineSegments, find_lines
-from knowledge_sources.methods.localization.locate_camera import CameraFix, PoseVerdict, locate_camera
 from knowledge_sources.methods.matching import match_lines
 from knowledge_sources.methods.pose import med_r_and_t
 from knowledge_sources.settings import DEFAULT
@@ -117,7 +118,7 @@ def locate_from(number: int, prior: Pose, rng: np.random.Generator) -> CameraFix
 def select_visible(lines: Array, frame: CorridorFrame, pose: Pose) -> tuple[Array, Array]:
     """Select model lines (n, 2, 3) in view and long enough, with their projections (n, 2, 2) [px]."""
     px, visible = frame.camera.project_segments(lines, pose)
-    long = np.nan_to_num(np.linalg.norm(px[:, 1] - px[:, 0], axis=1)) >= DEFAULT.localization.camera_min_line_length_px
+    long = np.nan_to_num(np.linalg.norm(px[:, 1] - px[:, 0], axis=1)) >= CAMERA_MIN_LINE_LENGTH_PX
     return lines[visible & long], px[visible & long]
 
 

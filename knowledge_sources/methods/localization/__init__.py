@@ -1,4 +1,4 @@
-"""Where is the robot, when its pose is unknown or in doubt? Five questions, each in reading order.
+"""Where is the robot, when its pose is unknown or in doubt? Four questions, each in reading order.
 
 What was seen:
 
@@ -24,10 +24,4 @@ Could a known pose be another one that looks the same?
 
 * :mod:`repetition`: where the floor plan repeats itself.
 * :mod:`aliasing`: the pose of the room that is hardest to tell from a known one.
-
-Where exactly is a camera, near a prior?
-
-* :mod:`self_motions`: motions of the camera under which the model looks like itself.
-* :mod:`rivals`: other poses within the prior that explain a picture comparably well.
-* :mod:`locate_camera`: match, solve, and judge with six unknowns; used on photographs.
 """

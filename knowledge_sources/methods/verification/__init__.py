@@ -9,10 +9,8 @@ In reading order:
 * :mod:`pose_evidence`: both checks, and the distance from the belief, as eight numbers.
 * :mod:`pose_confidence`: logistic regression of these numbers to the probability of a wrong pose
   (``verification_weights.toml``, fitted by ``harvey experiment milestones-calibrate``).
-* :mod:`pose_score`: a log likelihood by which poses are compared; what is one line in the picture counts once.
 
 About a pose that is not reached yet:
 
 * :mod:`view_quality`: how precise a pose would be, by the information matrix of the predicted lines.
-* :mod:`milestone_preview`: how certain a milestone can become, and whether another place looks like it.
 """

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from scipy.optimize import approx_fprime
 from scipy.stats import bernoulli, binom
 
+from experiments.perception import rivals
+from experiments.perception.rivals import compute_line_odds, compute_pose_score, group_lines
 from knowledge_sources.methods.localization.log_likelihood import compute_log_ratio
 from knowledge_sources.methods.verification.agreement import compute_coverage
-from knowledge_sources.methods.verification.pose_score import compute_line_odds, compute_pose_score, group_lines
 from knowledge_sources.methods.verification.view_quality import EPSILON_INFORMATION, compute_view_quality
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera, CameraMount
@@ -70,7 +71,6 @@ def test_a_view_promises_the_bound_of_its_lines_by_finite_differences(seed: int,
 @given(seed=seeds, count=st.integers(0, 30))
 def test_lines_on_one_line_of_the_picture_are_one_observation(seed: int, count: int) -> None:
     """Against plain angles and distances: the longest leads, the first leader in whose reach a line lies takes it."""
-    tuning = DEFAULT.verification
     lines = draw_crossing_lines(np.random.default_rng(seed), count)
     lengths = [math.dist(*line) for line in lines]
     leaders: list[int] = []
@@ -82,7 +82,7 @@ def test_lines_on_one_line_of_the_picture_are_one_observation(seed: int, count: 
             across = np.array([-math.sin(angle), math.cos(angle)])
             turn = abs((own - angle + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
             off = np.abs((lines[i] - lines[k, 0]) @ across)
-            if turn <= tuning.same_line_rad and np.all(off <= tuning.same_line_px):
+            if turn <= rivals.SAME_LINE_RAD and np.all(off <= rivals.SAME_LINE_PX):
                 expected[i] = g
                 break
         else:
@@ -99,18 +99,18 @@ def test_the_score_of_a_pose_is_that_of_its_observations(seed: int, count: int, 
     lines, segments = draw_crossing_lines(rng, count), draw_crossing_lines(rng, 10)
     segments = np.concatenate([segments[~np.isnan(segments[:, 0, 0])], lines[~np.isnan(lines[:, 0, 0])][::2]])
     score = compute_pose_score(lines, segments, chance)
-    p = min(max(chance, tuning.min_score_chance), tuning.max_score_chance)
-    odds = [float(bernoulli.logpmf(k, tuning.detection_rate) - bernoulli.logpmf(k, p)) for k in (1, 0)]
+    p = min(max(chance, rivals.MIN_SCORE_CHANCE), rivals.MAX_SCORE_CHANCE)
+    odds = [float(bernoulli.logpmf(k, rivals.DETECTION_RATE) - bernoulli.logpmf(k, p)) for k in (1, 0)]
     assert np.allclose(compute_line_odds(chance), odds)
-    covered = compute_coverage(lines, segments, tuning.line_tolerance_px, tuning.line_tolerance_rad, tuning)
+    covered = compute_coverage(lines, segments, tuning.line_tolerance_px, tuning.line_tolerance_rad)
     total, groups = 0.0, group_lines(lines)
     for group in range(int(groups.max()) + 1):
         members = np.flatnonzero(groups == group)
         lengths = np.array([math.dist(*lines[i]) for i in members])
         part = float(np.average(covered[members], weights=lengths))
-        total += min(1.0, lengths.sum() / tuning.full_line_px) * (part * odds[0] + (1.0 - part) * odds[1])
+        total += min(1.0, lengths.sum() / rivals.FULL_LINE_PX) * (part * odds[0] + (1.0 - part) * odds[1])
     assert score.count == int(groups.max()) + 1 and np.array_equal(score.groups, groups)
-    assert math.isclose(score.log_likelihood, tuning.line_independence * total, rel_tol=1e-9, abs_tol=1e-9)
+    assert math.isclose(score.log_likelihood, rivals.LINE_INDEPENDENCE * total, rel_tol=1e-9, abs_tol=1e-9)
 
 
 @some

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from experiments.perception.locate_camera import PoseVerdict
 from experiments.perception.repeats_scenes import CAMERA, RepeatScene, draw_scene
-from experiments.perception.repeats_trials import NO_SEARCH, locate
-from knowledge_sources.methods.localization.locate_camera import PoseVerdict
-from knowledge_sources.methods.localization.rivals import find_rivals
-from knowledge_sources.methods.localization.self_motions import find_self_motions
+from experiments.perception.repeats_trials import locate
+from experiments.perception.rivals import compute_pose_score, find_rivals, find_self_motions, group_lines
 from knowledge_sources.methods.matching.pose_parameters import build_camera_parameters
-from knowledge_sources.methods.verification.pose_score import compute_pose_score, group_lines
 from world_models.frames import Pose
 
 Array = NDArray[np.float64]
@@ -83,7 +81,7 @@ def test_a_line_that_is_not_seen_speaks_against_a_pose() -> None:
 @pytest.mark.parametrize("seed", ONE_STAIR_OFF)
 def test_a_pose_one_stair_off_is_not_verified(seed: int) -> None:
     scene = draw_scene("stairs", seed)
-    before, was_right = locate(scene, NO_SEARCH)
+    before, was_right = locate(scene, with_rivals=False)
     assert before is not None and before.verdict is PoseVerdict.VERIFIED and not was_right  # by 1e-35 and less
     fix, is_right = locate(scene)
     assert fix is not None

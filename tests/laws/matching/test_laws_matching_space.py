@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization.locate_camera import CameraFix, PoseVerdict, locate_camera
+from experiments.perception.locate_camera import CameraFix, PoseVerdict, locate_camera
 from knowledge_sources.methods.matching import PoseMatch, match_in_space
 from world_models.camera import Camera
 from world_models.frames import Pose

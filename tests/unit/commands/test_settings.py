@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import re
 from dataclasses import fields, is_dataclass
@@ -115,93 +114,6 @@ def test_no_setting_is_called_as_a_key_of_a_mission() -> None:
     from sim.scenario import FORMAT as SCENARIO
 
     assert not {*SCENARIO.keys(), *HARDWARE.keys()} & set(names())
-
-
-EXCEPTIONS = {
-    "a fact of geometry or mathematics": (
-        "features/images.py: ROUNDING_SIGMA", "features/manhattan.py: RIGHT_ANGLE_RAD",
-        "localization/next_view.py: HERE", "localization/pose_candidates.py: _NEIGHBORS",
-        "matching/hough.py: NO_MOTION",
-        "pose/med_r_and_t.py: MEDIAN_CHI2_2", "pose/med_r_and_t.py: SUBSET_SIZE",
-        "pose/med_r_and_t.py: MAX_CHI2_6", "pose/numerics/finish.py: MIN_INLIERS",
-        "pose/planar_from_points.py: MIN_POINTS", "pose/r_and_t.py: MIN_LINES", "pose/r_and_t.py: NO_INFORMATION",
-        "verification/color_check.py: NOT_TESTED", "verification/pose_evidence.py: NEAR_M",
-        "verification/predicted_colors.py: WHITE",
-    ),
-    "the shape of an array, or a flag of compiled code": (
-        "localization/camera_matching.py: MOUNTING", "pose/with_camera.py: POSE",
-        "features/line_bands.py: _MAP_WIDTH", "features/manhattan.py: _SMOOTHING", "matching/fit.py: POSE_STEP",
-        "matching/kernels.py: RIGID", "matching/kernels.py: SCALED", "matching/kernels.py: STEP",
-        "pose/numerics/kernels.py: FINE", "pose/numerics/kernels.py: IMAGE", "pose/numerics/kernels.py: NOT_FINITE",
-        "pose/numerics/kernels.py: NO_LENGTH", "pose/numerics/kernels.py: PLANES",
-        "verification/predicted_colors.py: MAX_CORNERS", "verification/predicted_colors.py: RAYS",
-    ),
-    "a table that was computed for one smoothing": (
-        "features/line_refinement.py: _BENDS", "features/line_refinement.py: _SHIFT_PER_SKEW",
-        "features/line_regions.py: _STEPS_PER_LEVEL", "features/correlation.py: _MARGIN_PX",
-    ),
-    "rounding: a guard against division by zero, or the end of a minimisation": (
-        "localization/camera_matching.py: STEP", "pose/with_camera.py: STEPS", "pose/with_camera.py: TINY",
-        "matching/hough.py: MIN_LENGTH_PX", "matching/kernels.py: NEWTON_STEPS", "matching/pose_pairs.py: TINY",
-        "motion/footprints.py: GRAIN_M", "motion/footprints.py: MIN_SIDE_M", "motion/routes.py: CORNER_STEPS",
-        "motion/routes.py: SLACK_M",
-        "pose/numerics/finish.py: MIN_LENGTH_PX",
-        "pose/numerics/kernels.py: MIN_IMAGE_PART", "pose/numerics/kernels.py: MIN_POINT_STEP",
-        "pose/numerics/kernels.py: MIN_RELATIVE_GAIN", "pose/numerics/kernels.py: MIN_STEP",
-        "motion/doorways.py: JOINT_M", "pose/numerics/kernels.py: TINY",
-        "pose/numerics/levenberg_marquardt.py: MIN_RELATIVE_GAIN",
-        "pose/numerics/levenberg_marquardt.py: MIN_STEP", "pose/planar_from_lines.py: NO_BOUND",
-        "verification/view_quality.py: EPSILON_INFORMATION",
-    ),
-    "the size of a cache, on which no result depends": (
-        "localization/far_views.py: MAX_FLOORS", "localization/visibility_map.py: MAX_MAPS",
-        "motion/routes.py: MAX_FREE_SPACES", "motion/subgoals.py: MAX_FREE_PASSAGES",
-        "tracking/template_tracking.py: MAX_TEMPLATES",
-    ),
-    "of methods that are new: those of them that somebody may want to tune become settings": (
-        "doors/leaf.py: ALIKE_FOOT", "doors/leaf.py: FULL_FOOT", "doors/leaf.py: LEAST_UNIFORM",
-        "doors/leaf.py: MAX_COMPARED", "doors/leaf.py: WEIGHTS", "doors/opening.py: OWN_SURFACE_M",
-        "floor/appearance.py: DARK", "floor/appearance.py: ROUNDS", "floor/appearance.py: TRIM",
-        "floor/floor_grid.py: STEP_PX", "floor/lookout.py: BORDER_PX", "floor/lookout.py: HEADINGS",
-        "floor/lookout.py: MAX_FLOORS", "floor/lookout.py: MIN_DEPTH_M", "floor/model_floor.py: DEPTHS_M",
-        "floor/model_floor.py: MIN_DEPTH_M", "floor/model_floor.py: MIN_UP", "floor/model_floor.py: STEP",
-        "floor/parallax.py: COLUMNS", "floor/parallax.py: DEPTHS", "floor/parallax.py: HALF",
-        "floor/parallax.py: MIN_DEVIATION", "floor/parallax.py: PLACES",
-        "floor/see_floor.py: CUT_SIGMA_M", "floor/see_floor.py: DRIVEN_HALF_WIDTH_M",
-        "floor/see_floor.py: GREY", "floor/see_floor.py: SIGHT_PART", "floor/seen_floor.py: HIDDEN_M",
-        "floor/seen_floor.py: MIN_POINTS", "floor/seen_floor.py: SPACING_M", "floor/seen_floor.py: WINDOW_M",
-        "floor/things.py: CUT_PART", "floor/things.py: MAX_STEP", "floor/things.py: MIN_ROWS",
-        "motion/subgoals.py: MAX_ROUTES",
-    ),
-    "a drawing, or a place-holder": (
-        "calibration/chessboard.py: _UNKNOWN_PX", "calibration/picture.py: CORNER", "calibration/picture.py: GRID",
-        "calibration/picture.py: INK", "calibration/picture.py: RESIDUAL", "calibration/picture.py: RESIDUAL_PX",
-        "calibration/picture.py: SIDE_PX",
-    ),
-}
-"""Numbers that stand at the top of a module of methods, by why they are no settings."""
-
-
-def stated_numbers(path: Path) -> set[str]:
-    """The upper-case numbers that a module states at its top."""
-    found = set()
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
-        targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(
-            node, ast.AnnAssign) else []
-        value = getattr(node, "value", None)
-        leaves = [leaf for target in targets for leaf in ast.walk(target) if isinstance(leaf, ast.Name)]
-        if leaves and value is not None and any(
-                isinstance(n, ast.Constant) and isinstance(n.value, int | float) and not isinstance(n.value, bool)
-                for n in ast.walk(value)):
-            found |= {leaf.id for leaf in leaves if leaf.id.strip("_").isupper()}
-    return found
-
-
-def test_no_tunable_number_is_stated_at_the_top_of_a_module() -> None:
-    """A number that can be tuned is a setting."""
-    files = [path for path in FOLDER.rglob("*.py") if path.parent.name != "settings"]
-    stated = {f"{path.relative_to(FOLDER)}: {name}" for path in files for name in stated_numbers(path)}
-    assert stated == {f"methods/{name}" for names in EXCEPTIONS.values() for name in names}
 
 
 @each_row

@@ -15,16 +15,33 @@ from typing import Any
 
 import numpy as np
 
+from experiments.perception.rivals import CAMERA_MIN_LINE_LENGTH_PX, Rival, find_rivals
 from knowledge_sources.methods.arrays import Floats, Indices
 from knowledge_sources.methods.features.lines import LineSegments, find_lines, remove_duplicates
-from knowledge_sources.methods.localization.rivals import Rival, find_rivals
 from knowledge_sources.methods.matching import match_in_space
 from knowledge_sources.methods.matching.pose_parameters import CameraParameters, build_camera_parameters
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml, trunc_r_and_t
 from knowledge_sources.methods.verification.agreement import Agreement, compute_agreement, compute_p_false
-from knowledge_sources.settings import DEFAULT, Settings
+from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose
+
+CAMERA_BAND_PX = 6.0  # half-width of the bands that are searched for edges around the first pose
+CAMERA_SECOND_PRIOR = 0.15  # standard deviation of the first pose, as a part of the prior's
+CAMERA_COARSE_PAIR_PX = 5.0  # restricted space of the first match (§6.1.4)
+CAMERA_COARSE_SIGMA_PX = 1.5  # deviation of an end of a pair of the first match
+CAMERA_FINE_PAIR_PX = 3.0  # restricted space of the second match (§6.1.4)
+CAMERA_FINE_SIGMA_PX = 1.0  # deviation of an end of a pair of the second match
+CAMERA_PROBABILITY = 0.999  # probability that one of the drawn subsets is free of outliers (§6.2.4)
+CAMERA_MIN_PAIRS = 6  # fewest matched pairs that are solved for a pose
+CAMERA_MIN_MATCHED_LINES = 6  # fewest matched lines of a pose not refuted
+CAMERA_MAX_P_FALSE = 1e-4  # largest chance of a pose that is not refuted
+CAMERA_MIN_COVERAGE = 2.0 / 3.0  # smallest covered part of the model of a verified pose
+CAMERA_DISPLACEMENT_SIGMAS = 2.0  # displacement of the poses at which chance is counted, in the prior's deviations
+CAMERA_TOLERANCE_SIGMAS = 3.0  # standard deviations of a verified pose that fit into the tolerance
+CAMERA_MAX_RESTARTS = 3  # most times that a pose is replaced by a better one found from it
+RIVAL_MIN_LEAD = 5.0  # log likelihood ratio by which a verified pose leads every rival
+RIVAL_DISTINCT_TOLERANCES = 2.0  # distance of a rival, in tolerances of the pose: nearer ones are the same pose
 
 RESTLESS = "each pose that is found leads to a better one"
 
@@ -80,7 +97,7 @@ def locate_camera(
     tolerance_rad: float,
     rng: np.random.Generator,
     segments: LineSegments | None = None,
-    settings: Settings = DEFAULT,
+    with_rivals: bool = True,
 ) -> CameraFix | None:
     """Find the pose near the prior that the picture shows; None if too few lines are matched.
 
@@ -95,15 +112,16 @@ def locate_camera(
         tolerance_m, tolerance_rad: how precise a verified pose must be.
         rng: draws subsets of lines.
         segments: those of the whole image, if they are known already.
+        with_rivals: whether poses at which the model repeats itself are looked for.
     """
     if segments is None:
-        segments = find_lines(image, settings=settings.features)
+        segments = find_lines(image)
     parameters = build_camera_parameters(prior, prior_covariance)
     search = _Search(
         parameters, np.asarray(model_lines_world, float), image, camera, np.asarray(prior_covariance, float),
-        segments.segments_px, tolerance_m, tolerance_rad, rng, settings)
+        segments.segments_px, tolerance_m, tolerance_rad, rng, with_rivals)
     best = search.locate(prior, search.covariance)
-    for _ in range(settings.localization.camera_max_restarts):
+    for _ in range(CAMERA_MAX_RESTARTS):
         best, is_better = search.look_elsewhere(best)
         if best is None or not is_better:
             return best
@@ -125,7 +143,7 @@ class _Search:
     tolerance_m: float
     tolerance_rad: float
     rng: np.random.Generator
-    settings: Settings
+    with_rivals: bool
 
     def look_elsewhere(self, best: CameraFix | None) -> tuple[CameraFix | None, bool]:
         """A better pose, from here or where the model repeats itself; else the same, held against its rivals."""
@@ -140,7 +158,7 @@ class _Search:
         rivals = self._find_rivals(best)
         for rival in rivals:
             if rival.lead < 0.0:
-                near = self.settings.localization.camera_second_prior**2 * self.covariance
+                near = CAMERA_SECOND_PRIOR**2 * self.covariance
                 there = self.locate(rival.camera_from_world, near)
                 if there is not None and not self.is_same(there.camera_from_world, pose):
                     return there, True
@@ -148,32 +166,32 @@ class _Search:
 
     def _find_rivals(self, fix: CameraFix) -> list[Rival]:
         """Poses within the prior that explain the picture too, the likeliest first."""
-        apart = self.settings.localization.rival_distinct_tolerances
+        if not self.with_rivals:
+            return []
+        apart = RIVAL_DISTINCT_TOLERANCES
         return find_rivals(
             lambda _: self.model, self.segments_px, self.camera, self.prior, fix.camera_from_world,
-            fix.evidence.chance, same_m=apart * self.tolerance_m, same_rad=apart * self.tolerance_rad,
-            settings=self.settings)
+            fix.evidence.chance, same_m=apart * self.tolerance_m, same_rad=apart * self.tolerance_rad)
 
     def _hold_against(self, fix: CameraFix, rivals: list[Rival]) -> CameraFix:
         """The verdict, now that the rivals are known."""
         if not rivals:
             return fix
         strongest = rivals[0]
-        if fix.verdict is PoseVerdict.VERIFIED and strongest.lead < self.settings.localization.rival_min_lead:
+        if fix.verdict is PoseVerdict.VERIFIED and strongest.lead < RIVAL_MIN_LEAD:
             return replace(fix, verdict=PoseVerdict.NOT_TESTABLE, rival=strongest, reason=strongest.sentence())
         return replace(fix, rival=strongest)
 
     def locate(self, prior: Pose, covariance: Floats) -> CameraFix | None:
         """The pose that the picture shows within a prior, with its own verdict."""
-        tuning = self.settings.localization
-        coarse = tuning.camera_coarse_pair_px, tuning.camera_coarse_sigma_px
-        fine = tuning.camera_fine_pair_px, tuning.camera_fine_sigma_px
+        coarse = CAMERA_COARSE_PAIR_PX, CAMERA_COARSE_SIGMA_PX
+        fine = CAMERA_FINE_PAIR_PX, CAMERA_FINE_SIGMA_PX
         rough = self._solve(self.segments_px, prior, covariance, coarse, trunc_r_and_t)
         if rough is None:
             return None
         pose = rough[0].camera_from_world
         near = self._find_near(pose)
-        solved = self._solve(near, pose, tuning.camera_second_prior**2 * covariance, fine, med_r_and_t)
+        solved = self._solve(near, pose, CAMERA_SECOND_PRIOR**2 * covariance, fine, med_r_and_t)
         return None if solved is None else self._judge(self._state_as_seen(*solved, near), solved[1], near)
 
     def is_same(self, pose: Pose, other: Pose) -> bool:
@@ -185,17 +203,16 @@ class _Search:
         """Indices of the model lines that are visible from a pose at some length."""
         px, visible = self.camera.project_segments(self.model, pose)
         length = np.linalg.norm(px[visible, 1] - px[visible, 0], axis=1)
-        visible[visible] = length >= self.settings.localization.camera_min_line_length_px
+        visible[visible] = length >= CAMERA_MIN_LINE_LENGTH_PX
         return np.flatnonzero(visible)
 
     def _find_near(self, pose: Pose) -> Floats:
         """(k, 2, 2) edges in bands around the model lines as seen from a pose."""
         shown = self.camera.project_segments(self.model[self._find_visible(pose)], pose)[0]
-        band_px, features = self.settings.localization.camera_band_px, self.settings.features
         if self.image is None:
             return self.segments_px
-        found = find_lines(self.image, shown, band_px=band_px, settings=features)
-        return remove_duplicates(found, features).segments_px
+        found = find_lines(self.image, shown, band_px=CAMERA_BAND_PX)
+        return remove_duplicates(found).segments_px
 
     def _solve(
         self, segments_px: Floats, prior: Pose, covariance: Floats, reach_px: tuple[float, float],
@@ -205,47 +222,44 @@ class _Search:
 
         ``reach_px``: of the match, the restricted space and the deviation of an end.
         """
-        tuning, lines = self.settings.localization, self._find_visible(prior)
-        if len(lines) < tuning.camera_min_pairs:
+        lines = self._find_visible(prior)
+        if len(lines) < CAMERA_MIN_PAIRS:
             return None
         pair_px, sigma_px = reach_px
         match = match_in_space(
-            self.model[lines], segments_px, self.camera, prior, covariance, self.settings.matching, pair_px=pair_px,
+            self.model[lines], segments_px, self.camera, prior, covariance, pair_px=pair_px,
             sigma_px=sigma_px)
-        if len(match.pairs) < tuning.camera_min_pairs:
+        if len(match.pairs) < CAMERA_MIN_PAIRS:
             return None
         i, k = lines[match.pairs[:, 0]], match.pairs[:, 1]
         estimate = solver(
             self.model[i], segments_px[k], self.camera, match.camera_from_world, landmark_ids=i.tolist(),
-            sigma_px=self.settings.features.sigma_across_px, probability=tuning.camera_probability, rng=self.rng,
-            settings=self.settings.pose)
+            sigma_px=DEFAULT.features.sigma_across_px, probability=CAMERA_PROBABILITY, rng=self.rng)
         return estimate, np.stack([i, k], axis=1)
 
     def _judge(self, estimate: PoseEstimate, pairs: Indices, near: Floats) -> CameraFix:
         """The verdict, by the segments of the whole image, which were not searched for at this pose."""
-        tuning, pose = self.settings.localization, estimate.camera_from_world
+        pose = estimate.camera_from_world
         displaced = np.array([self.camera.project_segments(self.model, wrong)[0] for wrong in self._displace(pose)])
         here = self.camera.project_segments(self.model, pose)[0]
         lengths = np.linalg.norm(here[:, 1] - here[:, 0], axis=1)
-        here[~(np.nan_to_num(lengths) >= tuning.camera_min_line_length_px)] = np.nan
-        agreement = compute_agreement(here, self.segments_px, displaced, self.settings.verification)
+        here[~(np.nan_to_num(lengths) >= CAMERA_MIN_LINE_LENGTH_PX)] = np.nan
+        agreement = compute_agreement(here, self.segments_px, displaced)
         coverage = agreement.covered_length(lengths)
         verdict, reason = self._decide(estimate, agreement, coverage)
         return CameraFix(estimate, pairs, near, agreement, coverage, verdict, reason=reason)
 
     def _decide(self, estimate: PoseEstimate, agreement: Agreement, coverage: float) -> tuple[PoseVerdict, str]:
         """The verdict by this pose alone, and why it is not verified."""
-        tuning = self.settings.localization
-        best_possible = compute_p_false(
-            agreement.visible, agreement.visible, agreement.chance, self.settings.verification)
-        if agreement.visible < tuning.camera_min_matched_lines or best_possible > tuning.camera_max_p_false:
+        best_possible = compute_p_false(agreement.visible, agreement.visible, agreement.chance)
+        if agreement.visible < CAMERA_MIN_MATCHED_LINES or best_possible > CAMERA_MAX_P_FALSE:
             return PoseVerdict.NOT_TESTABLE, f"{agreement.visible} lines in view: too few to tell the place by"
-        if agreement.matched < tuning.camera_min_matched_lines or agreement.p_false > tuning.camera_max_p_false:
+        if agreement.matched < CAMERA_MIN_MATCHED_LINES or agreement.p_false > CAMERA_MAX_P_FALSE:
             found = f"{agreement.matched} of {agreement.visible} lines are found"
             return PoseVerdict.REFUTED, f"{found}; at a wrong place {agreement.chance:.0%} are"
         if not estimate.ok:
             return PoseVerdict.NOT_TESTABLE, estimate.reason or ""
-        if coverage < tuning.camera_min_coverage:
+        if coverage < CAMERA_MIN_COVERAGE:
             return PoseVerdict.NOT_TESTABLE, f"{coverage:.0%} of the lines' length is found"
         if not self._is_precise(estimate.covariance):
             return PoseVerdict.NOT_TESTABLE, "not precise enough"
@@ -253,26 +267,25 @@ class _Search:
 
     def _state_as_seen(self, estimate: PoseEstimate, pairs: Indices, near: Floats) -> PoseEstimate:
         """The estimate with the covariance that the noise of its own residuals gives, and the shared error."""
-        kept, sigma_px = estimate.inliers, self.settings.features.sigma_across_px
+        kept, sigma_px = estimate.inliers, DEFAULT.features.sigma_across_px
         squares = (estimate.residuals_px[kept] / sigma_px) ** 2
         if not estimate.ok or squares.size <= 6:
             return estimate
         i, k = pairs[kept].T
         seen = math.sqrt(float(np.sum(squares)) / (squares.size - 6))
-        seen_px = sigma_px * max(seen, self.settings.pose.min_noise_part)
+        seen_px = sigma_px * max(seen, DEFAULT.pose.min_noise_part)
         again = r_and_t_ml(
-            self.model[i], near[k], self.camera, estimate.camera_from_world, sigma_px=seen_px,
-            settings=self.settings.pose)
+            self.model[i], near[k], self.camera, estimate.camera_from_world, sigma_px=seen_px)
         return replace(estimate, covariance=again.covariance) if again.ok else estimate
 
     def _is_precise(self, covariance: Floats) -> bool:
         """Whether the worst deviations fit into the tolerances."""
-        sigmas = self.settings.localization.camera_tolerance_sigmas
+        sigmas = CAMERA_TOLERANCE_SIGMAS
         turn, shift = (float(np.linalg.eigvalsh(covariance[a : a + 3, a : a + 3])[-1]) for a in (0, 3))
         return sigmas * math.sqrt(turn) <= self.tolerance_rad and sigmas * math.sqrt(shift) <= self.tolerance_m
 
     def _displace(self, pose: Pose) -> list[Pose]:
         """Eighteen wrong poses nearby, turned and shifted: what agrees there agrees by chance."""
-        root = self.settings.localization.camera_displacement_sigmas * np.linalg.cholesky(self.covariance)
+        root = CAMERA_DISPLACEMENT_SIGMAS * np.linalg.cholesky(self.covariance)
         steps = [sign * root[:, i] + root[:, j] for i in range(3) for j in range(3, 6) for sign in (1.0, -1.0)]
         return [pose.perturbed(step[:3], step[3:]) for step in steps]
