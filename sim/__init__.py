@@ -3,6 +3,6 @@
 In reading order: ``scenario`` (a mission file), ``stage`` (scenario and building, from which runs get their bodies),
 ``scenario_checks``, ``scenario_changes`` and ``moved_things``, ``truth`` (the true state, and the score),
 ``differences`` (where building and camera differ from the model), ``body`` (the robot), ``faults`` (what goes wrong,
-one class a kind), ``render`` (the camera), ``emulators`` (bases on serial lines), ``made_up`` (rooms, floors, clutter
-for tests and experiments). ``scenarios`` and ``buildings`` hold TOML files.
+one class a kind), ``render`` (the camera), ``emulators`` (bases on serial lines). ``scenarios`` and ``buildings`` hold
+TOML files.
 """

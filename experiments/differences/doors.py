@@ -13,9 +13,9 @@ from pathlib import Path
 from experiments.bounds import at_least, at_most
 from experiments.chart import OURS, PAPER, chart
 from experiments.differences.doors_trial import DoorResult, DoorTrial, run_door_mission
+from experiments.generated.door_missions import CASES, DoorCase
 from experiments.report import Cell, Report
 from experiments.trials import RESULTS, campaign_folder, run_trials
-from sim.made_up.door_missions import CASES, DoorCase
 from world_models.words import listed
 
 MISSIONS, QUICK_MISSIONS = 1_000, 4

@@ -8,8 +8,8 @@ from tempfile import TemporaryDirectory
 
 from blackboard.change import Change
 from blackboard.journal import Decision
+from experiments.generated.door_missions import DoorCase, write_door_mission
 from harvey.campaign.campaign import Task, run_task
-from sim.made_up.door_missions import DoorCase, write_door_mission
 from sim.scenario import load_scenario
 from world_models.entries.door_state import DoorState
 

@@ -10,13 +10,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from blackboard.journal import Decision
+from experiments.generated.missions import WHEELS_WORSE, write_inexact_mission
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task
 from harvey.run_files.run_recorder import RunRecorder
 from harvey.simulation.run import SimulatedRun, build_head
 from sim.body.simulated_body import SimulatedBody
 from sim.differences.inexact import TrueInexact
-from sim.made_up.inexact_missions import WHEELS_WORSE, write_inexact_mission
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate
 from world_models.frames import wrap_angle

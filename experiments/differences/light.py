@@ -12,9 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from experiments.bounds import at_least, at_most
 from experiments.differences.light_picture import draw_sheet
 from experiments.differences.light_trial import LightResult, LightTrial, run_light_mission
+from experiments.generated.light import LIGHT_KINDS, LightKind
 from experiments.report import Cell, Report
 from experiments.trials import RESULTS, campaign_folder, run_trials
-from sim.made_up.lights import LIGHT_KINDS, LightKind
 
 MISSIONS = 1_000
 QUICK_KINDS: tuple[LightKind, ...] = ("flat", "lamps", "sun")

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.generated.light import LIGHT_KINDS, LightKind, draw_light
 from knowledge_sources.methods.features.picture import read_picture
-from sim.made_up.lights import LIGHT_KINDS, LightKind, draw_light
 from sim.scenario import load_scenario, with_settings
 from sim.stage import build_stage
 from world_models.frames import Pose2

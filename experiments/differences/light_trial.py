@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from experiments.generated.door_missions import write_door_mission
+from experiments.generated.light import LightKind, draw_light, format_light
 from harvey.campaign.campaign import Task, run_task
-from sim.made_up.door_missions import write_door_mission
-from sim.made_up.lights import LightKind, draw_light, format_light
 
 
 @dataclass(frozen=True, slots=True)

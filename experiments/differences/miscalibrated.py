@@ -12,9 +12,9 @@ import numpy as np
 
 from experiments.bounds import at_least, at_most
 from experiments.differences.miscalibrated_trial import CameraResult, CameraTrial, run_camera_mission
+from experiments.generated.missions import CAMERA_CASES, CameraCase
 from experiments.report import Cell, Report
 from experiments.trials import RESULTS, campaign_folder, run_trials
-from sim.made_up.camera_missions import CASES, CameraCase
 from world_models.camera import CAMERA_UNKNOWNS
 
 MISSIONS, QUICK_MISSIONS = 1_000, 2
@@ -37,10 +37,11 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
     """Drive each case's share of so many missions, of seeds 100,000 + 10,000 ``seed`` + 0, 1, ...."""
     number = missions or (QUICK_MISSIONS if quick else MISSIONS)
     first = FIRST_SEED + SEEDS_APART * seed
-    trials = [CameraTrial(case, first + k) for case in CASES for k in range(math.ceil(number * PARTS[case] - 1e-9))]
+    trials = [CameraTrial(case, first + k) for case in CAMERA_CASES
+              for k in range(math.ceil(number * PARTS[case] - 1e-9))]
     folder = campaign_folder(f"miscalibrated-{missions}" if missions else "miscalibrated", seed, quick=quick)
     ends = run_trials(run_camera_mission, trials, CameraResult, folder, "mission")
-    found = {case: [end for end in ends if end.case == case] for case in CASES}
+    found = {case: [end for end in ends if end.case == case] for case in CAMERA_CASES}
     report = Report(
         "Missions with a camera that is not mounted as told", COLUMNS,
         tuple(_row(case, e) for case, e in found.items()),

@@ -12,8 +12,8 @@ from blackboard.change import Change
 from blackboard.entry import Ref
 from blackboard.journal import Decision
 from experiments.differences.obstacles_truth import Lacking, count_stops, find_shortest_m, judge
+from experiments.generated.missions import write_cluttered_mission
 from harvey.campaign.campaign import Task, run_task
-from sim.made_up.cluttered_missions import write_cluttered_mission
 from world_models.building.world import World
 from world_models.entries.body import Look, MotorCommand
 from world_models.entries.locale_frame import LocaleFrame

@@ -9,8 +9,8 @@ from tempfile import TemporaryDirectory
 from blackboard.journal import Decision
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from experiments.generated.missions import write_twin_mission
 from harvey.campaign.campaign import Task, run_task
-from sim.made_up.twin_missions import write_twin_mission
 from world_models.entries.location import PlaceOdds
 
 REACHED_M = 0.3

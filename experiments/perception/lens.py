@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.generated.scenes import Patch, PatchFace
 from experiments.report import Cell, Report
 from knowledge_sources.methods.features.lines import find_lines
 from knowledge_sources.methods.features.picture import Rectifier, read_picture
-from sim.made_up.box_room import Patch, PatchFace
 from sim.render.optics import Optics
 from sim.render.renderer import Renderer
 from sim.render.sensor import SensorParameters, compress_jpeg, expose

@@ -159,7 +159,7 @@ def _claims(
 def _notes(judged: Sequence[JudgedCase], counted: Sequence[JudgedCase], folder: Path) -> list[str]:
     floors = sorted({j.floor for j in judged})
     return [
-        f"Floors {floors[0]} to {floors[-1]} of {ROOMS} rooms (sim/made_up/generated_floors.py); every fifth is"
+        f"Floors {floors[0]} to {floors[-1]} of {ROOMS} rooms (experiments/generated/floors.py); every fifth is"
         " symmetric, every fifth has identical doors. None was used for calibration.",
         "right: the true pose is drawn from the covariance of the believed one; the wrong places have the same"
         " covariance. Every building has clutter that the model lacks, every second one lacks"

@@ -15,11 +15,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.generated.floors import Floor, generated_floor
 from knowledge_sources.plan.milestone_selector import choose_heading, predict_milestone
 from knowledge_sources.settings import DEFAULT
 from sim.body.building import Building
 from sim.differences.inexact import TrueInexact
-from sim.made_up.generated_floors import Floor, generated_floor
 from sim.render.occluder import Occluder
 from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from experiments.generated.scenes import generate_house
 from experiments.report import Report
-from sim.made_up.generated_house import generate_house
 from sim.render.mesh import build_mesh
 from sim.render.projection import Pinhole, project_mesh
 from sim.render.rasterizer import find_visible_patches, sample_offsets

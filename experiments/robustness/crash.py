@@ -18,11 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.generated.short_missions import HALLWAY, OFFICE, fault
 from experiments.report import Cell, Report
 from experiments.trials import campaign_folder, run_trials
 from harvey.run_files.records import read_records
 from harvey.simulation.body_replay import find_interrupted
-from sim.made_up.short_missions import HALLWAY, OFFICE, fault
 
 CHILD = (sys.executable, "-m", "experiments.robustness.crash_child")
 MAX_CHILD_S = 600.0

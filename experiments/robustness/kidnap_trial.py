@@ -15,6 +15,7 @@ from blackboard.effect import Post
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy, Servoing
+from experiments.generated.floors import Floor, generated_floor
 from harvey.runner.ports import BodyPort
 from harvey.runner.run import run_to_outcome
 from harvey.runner.world_port import build_scheduler
@@ -28,7 +29,6 @@ from knowledge_sources.settings import DEFAULT
 from sim.body.building import Building
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
-from sim.made_up.generated_floors import Floor, generated_floor
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount

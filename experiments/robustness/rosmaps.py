@@ -16,14 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from experiments.bounds import at_least
+from experiments.generated.floors import ScanNoise, generated_floor, write_floor_map
 from experiments.report import Cell, Report, count_kinds
 from experiments.robustness.imported_building import Trip, draw_trips
 from experiments.robustness.rosmaps_scores import MapTruth, correlate_rooms, count_found, draw_rooms, read_truth
 from experiments.shared_data import MAP_PLANS, data_path, describe_absence
 from experiments.trials import campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
-from sim.made_up.floor_maps import ScanNoise, write_floor_map
-from sim.made_up.generated_floors import generated_floor
 from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.files.importers import import_building

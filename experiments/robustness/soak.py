@@ -15,12 +15,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from experiments.bounds import at_most
+from experiments.generated.light import LIGHT_KINDS, MOST_SAG_DEG, SAG_DEG_PER_DAY, write_soak_mission
 from experiments.report import Cell, Report
 from experiments.scale.agenda_memory import resident_bytes
 from experiments.trials import RESULTS, campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
-from sim.made_up.lights import LIGHT_KINDS
-from sim.made_up.soak_missions import MOST_SAG_DEG, SAG_DEG_PER_DAY, write_soak_mission
 
 MISSIONS, QUICK_MISSIONS, A_DAY = 20_000, 2, 10
 FIRST_SEED, SEEDS_APART = 1_000_000, 100_000

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from experiments.bounds import at_least
+from experiments.generated.short_missions import HALLWAY, OFFICE, fault
 from experiments.report import Report
 from experiments.scale.questions_asked import KINDS, Question, ask
 from experiments.trials import campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
 from harvey.run_files.run_directory import RunDirectory
-from sim.made_up.short_missions import HALLWAY, OFFICE, fault
 
 MISSIONS: Mapping[str, str] = {
     "office": OFFICE,

@@ -8,8 +8,8 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.generated.scenes import Patch, PatchFace
 from experiments.report import Report
-from sim.made_up.box_room import Patch, PatchFace
 from sim.render.renderer import Renderer
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario

@@ -13,9 +13,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from experiments.generated.short_missions import OFFICE, fault
 from experiments.report import Cell, Report
 from harvey.cli import main
-from sim.made_up.short_missions import OFFICE, fault
 
 MISSIONS = 100
 OPENED = 5

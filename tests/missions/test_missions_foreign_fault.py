@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from experiments.generated.short_missions import OFFICE, fault
 from harvey.simulation.run import run_mission
 from sim.faults.registry import list_fault_kinds
-from sim.made_up.short_missions import OFFICE, fault
 from sim.scenario import Scenario, ScenarioError, parse_scenario, scenario_from_tables
 from sim.stage import build_stage
 from world_models.frames import Pose2

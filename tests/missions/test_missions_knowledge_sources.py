@@ -17,6 +17,7 @@ from blackboard.journal import Decision, plain
 from blackboard.kinds import inference
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
+from experiments.generated.short_missions import OFFICE
 from harvey.simulation.run import run_mission
 from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources
 from knowledge_sources.settings import Settings
@@ -24,7 +25,6 @@ from sim.body.building import Building as TrueBuilding
 from sim.body.simulated_body import SimulatedBody
 from sim.differences.change import Change as Difference
 from sim.differences.table import Lasting, TrueCamera
-from sim.made_up.short_missions import OFFICE
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from sim.truth import Truth

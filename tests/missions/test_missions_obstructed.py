@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from blackboard.journal import Decision
+from experiments.generated.short_missions import HALLWAY, fault
 from harvey.simulation.run import run_mission
 from sim.faults.occlusion import Occlusion
-from sim.made_up.short_missions import HALLWAY, fault
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from world_models.entries.obstruction import Obstruction

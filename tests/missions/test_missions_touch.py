@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from experiments.generated.short_missions import OFFICE
 from harvey.cli import main
 from harvey.run_files.records import EntryRecord, read_records
 from harvey.run_files.run_directory import RunDirectory
@@ -20,7 +21,6 @@ from harvey.story.turns import read_turning_points
 from harvey.why.journal import JournalHistory
 from harvey.why.story import tell_stories
 from logs.recording.paths import CONTACTS, RANGES
-from sim.made_up.short_missions import OFFICE
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 

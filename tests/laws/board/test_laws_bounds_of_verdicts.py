@@ -22,13 +22,13 @@ from blackboard.entry import Entry
 from blackboard.entry_store import Index
 from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
+from experiments.generated.short_missions import OFFICE
 from harvey.simulation.run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.plan.milestone_judge import MilestoneJudge, Verdict, Weighed, _update
 from knowledge_sources.questions import HELD, find_belief
 from knowledge_sources.settings import DEFAULT, Settings
-from sim.made_up.short_missions import OFFICE
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 from world_models.entries.location import diagonal

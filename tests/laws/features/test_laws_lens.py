@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
+from experiments.generated.scenes import box_room
 from knowledge_sources.methods.features.picture import Rectifier
-from sim.made_up.box_room import box_room
 from sim.render.optics import Optics, distort, undistort
 from sim.render.renderer import Renderer
 from sim.scenario import ScenarioError, load_scenario, with_settings

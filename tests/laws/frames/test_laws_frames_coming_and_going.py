@@ -19,6 +19,7 @@ from blackboard.journal import Decision, decision_record
 from blackboard.kinds import Kind, Registry
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
+from experiments.generated.short_missions import HALLWAY
 from harvey.agent import build_agent
 from harvey.run_files.observations import effect_of
 from harvey.run_files.records import EntryRecord, decision_of, read_records
@@ -31,7 +32,6 @@ from harvey.wiring import load_kinds
 from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.questions import find_building, find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from sim.made_up.short_missions import HALLWAY
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from strategies import Note

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.generated.floors import generated_floor
 from knowledge_sources.goal.relocalizer import Relocalizer, _find_prior, _prefer_reachable
 from knowledge_sources.methods.localization.global_localization import (
     Candidate,
@@ -31,7 +32,6 @@ from knowledge_sources.methods.localization.place_odds import (
     weigh_told,
 )
 from knowledge_sources.settings import DEFAULT
-from sim.made_up.generated_floors import generated_floor
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries.percepts import Segments

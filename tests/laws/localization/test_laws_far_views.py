@@ -11,6 +11,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.generated.floors import Floor, generated_floor
 from knowledge_sources.methods.localization.far_views import choose_far_action, find_common_floor
 from knowledge_sources.methods.localization.hypotheses import (
     PoseHypothesis,
@@ -19,7 +20,6 @@ from knowledge_sources.methods.localization.hypotheses import (
     make_view_predictor,
 )
 from knowledge_sources.settings import DEFAULT
-from sim.made_up.generated_floors import Floor, generated_floor
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle

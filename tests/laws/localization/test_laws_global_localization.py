@@ -11,6 +11,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
 from knowledge_sources.methods.localization.global_localization import LocalizationStatus, find_aliases, localize
 from knowledge_sources.methods.localization.hypotheses import (
@@ -31,7 +32,6 @@ from knowledge_sources.methods.localization.refinement import refine_pose, refin
 from knowledge_sources.methods.localization.views import CameraView, align_headings, propagate_pose
 from knowledge_sources.methods.localization.visibility_map import get_visibility_map
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
-from sim.made_up.generated_floors import generated_floor
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.verification.color_check import (
     NOT_TESTED,
     ColorCheck,
@@ -32,7 +33,6 @@ from knowledge_sources.methods.verification.pose_evidence import (
 )
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from knowledge_sources.plan.milestone_selector import predict_milestone
-from sim.made_up.generated_floors import generated_floor
 from sim.render.renderer import Renderer
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.generated.scenes import box_room
 from harvey.simulation.body_replay import part_of
 from sim.body.actuator import ActuatorParameters
 from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.made_up.box_room import box_room
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import Frame, MotorCommand
 from world_models.frames import Pose2

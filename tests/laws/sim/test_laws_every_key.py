@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from experiments.generated.scenes import box_room
 from sim.body.building import Building
 from sim.body.elevator import Helper
 from sim.body.simulated_body import SimulatedBody
@@ -21,7 +22,6 @@ from sim.faults.lights_off import LightsOff
 from sim.faults.occlusion import Occlusion
 from sim.faults.registry import BUILT_IN
 from sim.faults.schedule import FaultSchedule
-from sim.made_up.box_room import box_room
 from sim.moved_things import MovedThing
 from sim.scenario import FORMAT
 from world_models.camera import Camera, CameraMount

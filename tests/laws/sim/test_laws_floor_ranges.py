@@ -9,13 +9,13 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.methods.floor.seen_floor import SeenFloor
 from knowledge_sources.settings.floor import FloorSettings
 from sim.body.collision import Obstacles
 from sim.body.range_ring import RangeRing
-from sim.made_up.generated_floors import generated_floor
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries.floor import FreeFloor

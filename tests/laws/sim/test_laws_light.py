@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from sim.made_up.box_room import Patch, PatchFace, box_faces, box_room
+from experiments.generated.scenes import Patch, PatchFace, box_faces, box_room
 from sim.render.light.auto_exposure import MAX_GAIN, MIN_GAIN, TARGET, AutoExposure, vignette
 from sim.render.light.irradiance import SUN_COLOUR, compute_irradiance
 from sim.render.light.lamps import Lamp, Room, hang_lamps

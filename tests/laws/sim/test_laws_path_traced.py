@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from sim.made_up.box_room import box_room
+from experiments.generated.scenes import box_room
 from sim.render.light.lamps import Room
 from sim.render.light.lighting import Lighting
 from sim.render.light.lights import Lights

@@ -9,10 +9,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.generated.scenes import box_room
 from sim.body.actuator import ActuatorParameters, arc_displacement, arc_steps
 from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.made_up.box_room import box_room
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotorCommand
 from world_models.frames import Pose2

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from blackboard.board import Blackboard
 from blackboard.change import Posted
 from blackboard.effect import Post
+from experiments.generated.scenes import box_room
 from harvey.runner.ports import BodyPort
 from sim.body.building import Building
 from sim.body.collision import ROBOT_RADIUS_M
 from sim.body.faulty_body import FaultyBody
 from sim.body.range_ring import RangeRing, find_echo
 from sim.body.simulated_body import SimulatedBody
-from sim.made_up.box_room import box_room
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import Course, Frame, Look, MotorCommand
 from world_models.entries.touch import Ranges

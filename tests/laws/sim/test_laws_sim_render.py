@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from sim.made_up.box_room import Patch, PatchFace, box_faces, box_room
+from experiments.generated.scenes import Patch, PatchFace, box_faces, box_room
 from sim.render.mesh import Mesh, build_mesh
 from sim.render.pieces import split_pieces
 from sim.render.projection import Pinhole, project_mesh

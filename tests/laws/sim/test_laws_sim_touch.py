@@ -15,13 +15,13 @@ from blackboard.board import Blackboard
 from blackboard.change import Posted
 from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
+from experiments.generated.scenes import box_room
 from harvey.runner.ports import BodyPort
 from sim.body.actuator import ActuatorParameters
 from sim.body.building import Building
 from sim.body.bumper import Bumper
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
-from sim.made_up.box_room import box_room
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand
 from world_models.entries.touch import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD, Contact

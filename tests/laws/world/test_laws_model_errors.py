@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.made_up.generated_floors import generated_floor
+from experiments.generated.floors import generated_floor
 from world_models.building.model_errors import find_line_errors, find_sigma_m, pack_errors, unpack_errors
 from world_models.building.world import World
 from world_models.files.toml.source import Source

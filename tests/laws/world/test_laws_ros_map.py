@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sim.made_up.floor_maps import ScanNoise, write_floor_map
+from experiments.generated.floors import ScanNoise, write_floor_map
 from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.files.importers import BuildingError, import_building

@@ -8,8 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from experiments.generated.scenes import generate_house
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from sim.made_up.generated_house import generate_house
 from world_models.actuator import ActuatorModel
 from world_models.building.changes.shut_doors import build_shut_faces, shut_door
 from world_models.building.geometry.outlines import inside_polygon

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.generated.scenes import generate_house
 from experiments.perception.visibility import MIN_AGREEMENT, count_agreement
-from sim.made_up.generated_house import generate_house
 from world_models.building.checks import check_world
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world

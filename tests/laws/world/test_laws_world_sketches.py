@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from blackboard.change import Quiescence
 from blackboard.effect import Post
 from blackboard.journal import Decision
+from experiments.generated.scenes import generate_house
 from experiments.perception.visibility import CAMERA, MOUNT
 from harvey.dry_run import build_dry_run
-from sim.made_up.generated_house import generate_house
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.entries.location import diagonal

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from experiments.generated.short_missions import OFFICE, fault
 from harvey.campaign.campaign import Task, run_task
 from harvey.report.page import build_page
 from harvey.run_files.run_directory import RunDirectory
 from harvey.why.journal import JournalHistory
 from report_contents import read_contents
-from sim.made_up.short_missions import OFFICE, fault
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,7 @@ import pytest
 from blackboard.journal import decision_line
 from docs.tools.look import look
 from docs.tools.moments import moments_of
+from experiments.generated.short_missions import OFFICE, fault
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
@@ -29,7 +30,6 @@ from harvey.why.journal import JournalHistory
 from logs.errors import RecordingError
 from logs.reader import read_series
 from logs.recording.paths import POSITION
-from sim.made_up.short_missions import OFFICE, fault
 
 TOLD_SHUT = """
 description = "To Allen's office; that its door is shut is told at once."

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from blackboard.scheduler import registry_of
+from experiments.generated.short_missions import OFFICE, fault
 from experiments.scale.long_journal import write_hour
 from harvey.agent import Agent, build_agent
 from harvey.campaign.campaign import Task, run_task
@@ -29,7 +30,6 @@ from harvey.why.milestone import milestone_story, milestones
 from harvey.why.reach import check
 from harvey.why.story import lines_of, story
 from harvey.why.why_not import in_cycle
-from sim.made_up.short_missions import OFFICE, fault
 from world_models.entries.kinds import KINDS
 
 BUMPED = OFFICE + fault("bump", "allens-office", 3.0, left_m=0.3, turn_deg=10.0)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from experiments.generated.short_missions import OFFICE
 from harvey.campaign.campaign import Task
 from harvey.errors import BadInput
 from harvey.simulation.run import build_head
-from sim.made_up.short_missions import OFFICE
 from world_models.files.world_files import WORLDS
 
 

@@ -11,7 +11,7 @@ import pytest
 from driven_here import run_here
 from experiments.differences import light
 from experiments.differences.light_trial import LightResult, LightTrial, run_light_mission, write_light_mission
-from sim.made_up.lights import LIGHT_KINDS, LightKind, draw_light
+from experiments.generated.light import LIGHT_KINDS, LightKind, draw_light
 from sim.render.light.lighting import Lighting
 from sim.scenario import load_scenario
 

@@ -10,7 +10,7 @@ import pytest
 from driven_here import run_here
 from experiments.differences import miscalibrated
 from experiments.differences.miscalibrated_trial import CameraResult, CameraTrial, run_camera_mission
-from sim.made_up.camera_missions import CASES, MAX_TURN_RAD, write_camera_mission
+from experiments.generated.missions import CAMERA_CASES, MAX_TURN_RAD, write_camera_mission
 from sim.scenario import load_scenario
 from sim.stage import build_stage
 
@@ -24,7 +24,7 @@ def end(trial: CameraTrial, **other: Any) -> CameraResult:
     return CameraResult(trial.case, trial.floor, **(values | other))
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", CAMERA_CASES)
 def test_a_mission_is_written_the_same_again_and_can_be_staged(tmp_path: Path, case: Any) -> None:
     path = write_camera_mission(tmp_path, 3, case)
     text = path.read_text("utf-8")
@@ -60,4 +60,4 @@ def test_a_flaw_fails_its_claim(
 def test_the_small_version_drives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     found = run_here(monkeypatch, tmp_path, miscalibrated, run_camera_mission, quick=True)
     assert found.holds, found.text()
-    assert {row[0] for row in found.rows} == set(CASES)
+    assert {row[0] for row in found.rows} == set(CAMERA_CASES)

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from driven_here import run_here
+from experiments.generated.light import HALL_FT, write_soak_mission
 from experiments.robustness import soak
 from experiments.robustness.soak import SoakResult, SoakTrial
-from sim.made_up.soak_missions import HALL_FT, write_soak_mission
 from sim.scenario import load_scenario
 from sim.stage import build_stage
 

@@ -12,8 +12,8 @@ import pytest
 from driven_here import run_here
 from experiments.differences import twins
 from experiments.differences.twins_trial import TwinResult, TwinTrial
-from sim.made_up.generated_floors import generated_floor
-from sim.made_up.twin_missions import write_twin_mission
+from experiments.generated.floors import generated_floor
+from experiments.generated.missions import write_twin_mission
 from sim.scenario import load_scenario
 from sim.stage import build_stage
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import sim.emulators.p2os
+from experiments.generated.scenes import box_room
 from experiments.robustness.serial.line_noise import Noise
 from experiments.robustness.serial.noisy_line import Killed, NoisyLine
 from harvey.hardware.drivers.bases.base import Base, BaseFault
@@ -30,7 +31,6 @@ from sim.emulators.ground import IdealGround, SimulatedGround
 from sim.emulators.p2os import P2osEmulator
 from sim.emulators.pseudo_terminal import PseudoTerminal
 from sim.emulators.pseudo_terminal_link import PseudoTerminalLink
-from sim.made_up.box_room import box_room
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotionReport, MotorCommand
 from world_models.frames import Pose2

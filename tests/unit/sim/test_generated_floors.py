@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.made_up.generated_floors import generated_floor
+from experiments.generated.floors import generated_floor
 from sim.render.renderer import Renderer
 from sim.scenario import CameraSettings
 from world_models.building.checks import check_world

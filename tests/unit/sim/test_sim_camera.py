@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.made_up.box_room import Patch, PatchFace, box_room
+from experiments.generated.scenes import Patch, PatchFace, box_room
 from sim.render.mesh import build_mesh
 from sim.render.rasterizer import sample_offsets
 from sim.render.renderer import Renderer, illumination

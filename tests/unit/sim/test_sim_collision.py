@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from experiments.generated.scenes import Patch, PatchFace, box_faces
 from sim.body.collision import Obstacles
-from sim.made_up.box_room import Patch, PatchFace, box_faces
 from sim.truth import Truth, cross_track_m, score
 from world_models.frames import Pose2
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from experiments.generated.scenes import box_room
 from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
 from sim.faults.base_faults import Stall
@@ -14,7 +15,6 @@ from sim.faults.displacement import Bump, Kidnap
 from sim.faults.fault import Fault
 from sim.faults.lights_off import LightsOff
 from sim.faults.schedule import FaultSchedule
-from sim.made_up.box_room import box_room
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotorCommand
 from world_models.frames import Pose2

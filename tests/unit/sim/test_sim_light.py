@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from experiments.generated.scenes import box_room
 from sim.body.building import Building
 from sim.body.collision import Obstacles
 from sim.body.simulated_body import SimulatedBody
-from sim.made_up.box_room import box_room
 from sim.render.light.lamps import Room
 from sim.render.light.lighting import Lighting
 from sim.render.light.lights import Lights

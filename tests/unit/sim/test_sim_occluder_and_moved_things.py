@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from experiments.generated.scenes import box_room
 from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
 from sim.faults.fault import Fault
 from sim.faults.occlusion import Occlusion
-from sim.made_up.box_room import box_room
 from sim.moved_things import MovedThing, move_things
 from sim.render.occluder import Occluder
 from sim.scenario import SCENARIOS, ScenarioError, load_scenario, parse_scenario

@@ -13,26 +13,23 @@ import networkx as nx
 import numpy as np
 import shapely
 
+from experiments.generated.floors import Floor, generated_floor
+from experiments.generated.missions import ROOM_M, ROOMS, draw_ends, draw_heading_deg, draw_rooms, format_mission
 from sim.body.collision import Obstacles
 from sim.body.free_floor import find_free_floor, find_shortest_way, has_way, take_from_floor
 from sim.differences.leaf import build_leaf
 from sim.differences.table import TrueDoor
-from sim.made_up.generated_floors import Floor, generated_floor
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage, move_ends
 from world_models.building.locales import Doorway
 from world_models.building.world import World
-from world_models.units import FOOT_M
 
 DoorCase = Literal["another way", "no way", "extra door", "stands open", "opens", "shuts", "ajar", "as filed"]
 """What is otherwise about the doors: shut, with another way or with none; a door that the model lacks; one that stands
 open and is closed in the model; one that opens or shuts during the mission; one that is ajar, with another way."""
 CASES: tuple[DoorCase, ...] = get_args(DoorCase)
-ROOMS = 6
-MARGIN_FT = 2.5
-"""Start and goal are as far from the walls of their rooms."""
-ROOM_M, WAY_MARGIN_M = 0.3, 0.12
-"""Free floor round start and goal, and beside the robot on a way that counts as one."""
+WAY_MARGIN_M = 0.12
+"""Free floor beside the robot on a way that counts as one."""
 OPENS_S, SHUTS_S = (20.0, 60.0), (5.0, 25.0)
 """When a door opens, or shuts."""
 MAX_DRAWS = 60
@@ -73,13 +70,11 @@ def _write_on_floor(folder: Path, seed: int, floor_seed: int, case: DoorCase) ->
     floor = generated_floor(floor_seed, ROOMS, open_share=0.6 if case == "stands open" else 1.0, joined=loops)
     if case == "stands open" and not 2 <= len(floor.world.doorways) < ROOMS:
         return None
-    world, details = floor.write(folder)
+    files = floor.write(folder)
     stage: Stage | None = None
     for _ in range(MAX_DRAWS):
-        text = (f'description = "A generated floor; doors: {case}."\nworld = "{world.name}"\n'
-                f'details = ["{details.name}"]\n{_draw_goal(floor, rng)}\n[start]\n'
-                f"heading_deg = {math.degrees(rng.uniform(-math.pi, math.pi)):.1f}\n"
-                "put_down_sigma_m = 0.02\nput_down_sigma_deg = 1.0\n")
+        ends = draw_ends(floor, draw_rooms(floor, rng), rng)
+        text = format_mission(f"A generated floor; doors: {case}.", files, ends, draw_heading_deg(rng))
         try:
             scenario = parse_scenario(text, "doors", folder)
             stage = build_stage(scenario) if stage is None else move_ends(stage, scenario)
@@ -93,15 +88,6 @@ def _write_on_floor(folder: Path, seed: int, floor_seed: int, case: DoorCase) ->
         path.write_text(text + drawn[1], "utf-8")
         return DoorMission(path, drawn[0])
     return None
-
-
-def _draw_goal(floor: Floor, rng: np.random.Generator) -> str:
-    ends = []
-    for room in rng.choice(floor.rooms, 2, replace=False):
-        outline, margin_m = floor.world.locale(str(room)).outline, MARGIN_FT * FOOT_M
-        x, y = rng.uniform(outline.min(axis=0) + margin_m, outline.max(axis=0) - margin_m)
-        ends.append(f"({room} ({x / FOOT_M:.2f},{y / FOOT_M:.2f},0))")
-    return f'goal = "(ptrans {" ".join(ends)})"\n'
 
 
 def _draw_doors(stage: Stage, floor: Floor, case: DoorCase, rng: np.random.Generator) -> tuple[str, str] | None:

@@ -1,0 +1,156 @@
+"""Small scenes: a furnished room, a chessboard before a camera, houses of a few rooms as world files."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.render.optics import Optics
+from sim.render.renderer import Renderer
+from sim.render.sensor import SensorParameters, compress_jpeg, expose
+from world_models.camera import Camera
+from world_models.frames import Pose
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """A region of a face: a flat convex polygon (k, 3) [m], colour and texture."""
+
+    name: str
+    polygon_world: Any
+    colour: tuple[float, float, float] = (0.7, 0.7, 0.7)
+    texture: str = "plain"
+    texture_scale_m: float = 0.1
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class PatchFace:
+    """A face with regions on its two sides."""
+
+    front: tuple[Patch, ...]
+    back: tuple[Patch, ...] = ()
+
+
+def box_faces(low: Any, high: Any, name: str, *, inside: bool = False, **appearance: Any) -> tuple[PatchFace, ...]:
+    """The six faces of an axis-aligned box from corner ``low`` (3,) to ``high`` (3,) [m], seen from out- or inside."""
+    return tuple(
+        PatchFace((Patch(f"{name}-{side}", polygon, seed=index, **appearance),))
+        for index, (side, polygon) in enumerate(_sides(np.asarray(low, float), np.asarray(high, float), inside))
+    )
+
+
+def _sides(low: NDArray[np.float64], high: NDArray[np.float64], inside: bool) -> list[tuple[str, NDArray[np.float64]]]:
+    out = []
+    for axis, (minus, plus) in enumerate((("west", "east"), ("south", "north"), ("bottom", "top"))):
+        b, c = (axis + 1) % 3, (axis + 2) % 3
+        for side, level, outward in ((minus, low, False), (plus, high, True)):
+            polygon = np.empty((4, 3))
+            polygon[:, axis] = level[axis]
+            polygon[:, b] = [low[b], high[b], high[b], low[b]]
+            polygon[:, c] = [low[c], low[c], high[c], high[c]]
+            out.append((side, polygon if outward != inside else polygon[::-1]))
+    return out
+
+
+def box_room(length_m: float = 6.0, width_m: float = 4.0, height_m: float = 2.6) -> tuple[PatchFace, ...]:
+    """A closed room from (0, 0, 0), with a brick wall, a poster, a desk and a cabinet."""
+    walls = box_faces((0, 0, 0), (length_m, width_m, height_m), "room", inside=True, texture="speckle",
+                      texture_scale_m=0.06, colour=(0.78, 0.76, 0.70))
+    floor = Patch("carpet", walls[4].front[0].polygon_world, (0.42, 0.40, 0.38), "carpet", 0.03, 5)
+    bricks = Patch("bricks", walls[1].front[0].polygon_world, (0.62, 0.50, 0.44), "brick", 0.24, 6)
+    x = length_m
+    poster = Patch("poster", [(x, 2.6, 1.0), (x, 2.0, 1.0), (x, 2.0, 1.8), (x, 2.6, 1.8)], (0.6, 0.5, 0.4), "poster",
+                   0.15, 7)
+    return (
+        *(walls[i] for i in (0, 2, 3, 5)),
+        PatchFace((bricks, poster)),
+        PatchFace((floor,)),
+        *box_faces((3.6, 0.3, 0.0), (4.8, 1.0, 0.75), "desk", texture="wood", texture_scale_m=0.03,
+                   colour=(0.52, 0.34, 0.2)),
+        *box_faces((4.6, 3.3, 0.0), (5.4, 3.9, 1.9), "cabinet", colour=(0.35, 0.42, 0.45)),
+    )
+
+
+UNIFORM_SCALE_M = 1e6
+"""Texture scale at which a plain surface has one colour."""
+WHITE, BLACK, WALL = (0.75, 0.75, 0.75), (0.05, 0.05, 0.05), (0.4, 0.4, 0.4)
+
+
+def chessboard_renderer(columns: int, rows: int, square_m: float, samples: int = 8) -> Renderer:
+    """A renderer of a board with (columns, rows) inner corners, before a wall.
+
+    Board frame: the plane z = 0, origin at the first inner corner, x along a row. It is seen from z < 0, with x to the
+    right and y down.
+    """
+    def rectangle(x0: float, y0: float, x1: float, y1: float, z: float) -> np.ndarray:
+        return np.array([(x0, y0, z), (x0, y1, z), (x1, y1, z), (x1, y0, z)])
+
+    low, wide, high = -1.9, columns + 0.9, rows + 0.9
+    paper = Patch("paper", square_m * rectangle(low, low, wide, high, 0.0), WHITE, "plain", UNIFORM_SCALE_M)
+    squares = [
+        Patch(f"{i}-{j}", square_m * rectangle(i, j, i + 1, j + 1, 0.0), BLACK, "plain", UNIFORM_SCALE_M)
+        for i in range(-1, columns) for j in range(-1, rows) if (i + j) % 2 == 0
+    ]
+    wall = Patch("wall", rectangle(-40.0, -40.0, 40.0, 40.0, 9.0), WALL, "plain", UNIFORM_SCALE_M)
+    return Renderer.of_faces((PatchFace((wall,)), PatchFace((paper, *squares))), samples)
+
+
+def chessboard_view(
+    camera: Camera, columns: int, rows: int, square_m: float, rng: np.random.Generator, reach: float = 1.0
+) -> Pose:
+    """A random ``camera_from_board``, as a person holds a board.
+
+    The board is 35 % to 80 % as wide as the picture, tilted by up to 45 degrees, turned a little, and wholly visible.
+    ``reach`` is the part of the margin at the border that it may enter: 1 leaves 4 px.
+    """
+    outer = np.array([(x, y, 0.0) for x in (-1.0, columns) for y in (-1.0, rows)]) * square_m
+    middle = outer.mean(axis=0)
+    while True:
+        way, tilt, turn = rng.uniform(-math.pi, math.pi), rng.uniform(0.0, 0.8), rng.normal(0.0, 0.15)
+        leaning = Pose.from_rotation_vector(tilt * np.array([math.cos(way), math.sin(way), 0.0]), np.zeros(3))
+        turned = Pose.from_rotation_vector(np.array([0.0, 0.0, turn]), np.zeros(3))
+        depth_m = camera.fx * (columns + 1) * square_m / (camera.width * rng.uniform(0.35, 0.8))
+        aside = camera.rays(rng.uniform(0.1, 0.9, 2) * (camera.width, camera.height)) * depth_m
+        there = leaning @ turned
+        pose = Pose(there.rotation, aside - there.rotation @ middle)
+        shown = pose.apply(outer)
+        if np.all(shown[:, 2] > 0.1) and np.all(camera.inside(camera.project(shown), 4.0 / reach)):
+            return pose
+
+
+def chessboard_picture(
+    renderer: Renderer, optics: Optics, camera_from_board: Pose, sensor: SensorParameters, rng: np.random.Generator
+) -> bytes:
+    """The JPEG bytes of a picture of the board."""
+    return compress_jpeg(expose(optics.radiance(renderer, camera_from_board), sensor, rng), sensor.jpeg_quality)
+
+
+def generate_house(rng: np.random.Generator) -> str:
+    """Generate a world file: two or three rooms in a row, with open doors, boxes and boards."""
+    text = ['name = "house"\nunits = "metres"', "[finishes]\nplain = { colour = [0.6, 0.6, 0.6] }",
+            '[defaults]\nheight = 2.6\nwalls = "plain"\nbaseboard = "plain"\nframe = "plain"', "[parts]"]
+    for part in range(3):
+        x, y, z = rng.uniform(0.2, 0.6), rng.uniform(0.3, 0.8), rng.uniform(0.4, 2.0)
+        text.append(f'p{part} = [ {{ x = [{-x:.3f}, {x:.3f}], y = [0.0, {y:.3f}], z = [0.0, {z:.3f}],'
+                    ' finish = "plain" },'
+                    f' {{ x = [{-x:.3f}, {x / 2:.3f}], y = [0.0, {y / 2:.3f}], z = [{z:.3f}, {z + 0.3:.3f}],'
+                    ' finish = "plain" } ]')
+    rooms, doors, at = int(rng.integers(2, 4)), [], 0.0
+    for room in range(rooms):
+        width, depth = rng.uniform(3.5, 6.0), rng.uniform(3.5, 5.0)
+        things = [f'{{ part = "p{rng.integers(3)}", at = [{rng.uniform(1.0, width - 1.0):.3f},'
+                  f' {rng.uniform(0.8, depth - 1.0):.3f}], turn = {rng.uniform(-30, 30):.2f} }}']
+        things += [f'{{ part = "p{rng.integers(3)}", wall = "north", along = {width * part:.3f} }}'
+                   for part in (0.25, 0.75)]
+        text.append(f"[locales.r{room}]\nkind = 'room'\nat = [{at:.3f}, 0]\nsize = [{width:.3f}, {depth:.3f}]\n"
+                    f"things = [ {', '.join(things)} ]")
+        if room:
+            doors.append(f"d{room} = {{ between = ['r{room - 1}', 'r{room}'], wall = 'east',"
+                         f" along = {rng.uniform(0.8, 2.6):.3f}, open = true }}")
+        at += width + rng.uniform(0.1, 0.4)
+    return "\n".join([*text, "[doors]", *doors])
