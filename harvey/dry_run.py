@@ -28,6 +28,7 @@ from knowledge_sources.methods.verification.pose_evidence import compute_evidenc
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from knowledge_sources.methods.verification.view_quality import compute_view_quality
+from knowledge_sources.plan.milestone_selector import CHECK_TOLERANCE_M, MAX_SIGMA_PART, MAX_SIGMA_RAD, MIN_LINES
 from knowledge_sources.questions import find_belief, find_robot
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.verification import VerificationSettings
@@ -164,15 +165,15 @@ def _preview(
     lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
     pose = belief.world_from_robot(robot.world)
     mount = robot.on_floor_of(belief.locale).mount
-    s, v, sigma_px = settings.plan, settings.verification, settings.features.sigma_across_px
+    v, sigma_px = settings.verification, settings.features.sigma_across_px
     quality = compute_view_quality(lines, robot.camera, mount.camera_from_robot, pose, sigma_px)
-    most_m = s.max_sigma_part * (_tolerance_m(view, milestone) or s.check_tolerance_m)
-    sharp = quality.sigma_m <= most_m and quality.sigma_rad <= s.max_sigma_rad
+    most_m = MAX_SIGMA_PART * (_tolerance_m(view, milestone) or CHECK_TOLERANCE_M)
+    sharp = quality.sigma_m <= most_m and quality.sigma_rad <= MAX_SIGMA_RAD
     standing = robot.on_floor_of(belief.locale)
     seen = len(lines) >= v.min_matched_lines
     p_false = predict_p_false(standing, pose, lines, np.array(diagonal(FIX_SIGMA_M, FIX_SIGMA_RAD)), v) if seen else 1.0
     other = find_alias(standing, belief.locale, pose, lines, v) if seen else None
-    clear = sharp and len(lines) >= s.min_lines and p_false <= POSE_CONFIDENCE.accept
+    clear = sharp and len(lines) >= MIN_LINES and p_false <= POSE_CONFIDENCE.accept
     return MilestonePreview(
         milestone.what, belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m,
         milestone.look_heading_rad, len(milestone.landmarks), len(lines), quality.sigma_m, quality.sigma_rad,

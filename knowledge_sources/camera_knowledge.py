@@ -11,11 +11,15 @@ from blackboard.board import View
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.settings import Settings
 from knowledge_sources.settings.camera_state import CameraStateSettings
-from knowledge_sources.settings.plan import PlanSettings
 from world_models.camera import YAW, Camera
 from world_models.entries.robot import CameraState
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
+
+RIGID_DISTANCE_M = 2.5  # distance at which that uncertainty is taken
+PRIOR_COVARIANCE_FACTOR = 4.0  # factor by which the belief's covariance is loosened as a prior of the pose
+PRIOR_SIGMA_M = 0.05  # standard deviation of the place that is added to that prior
+PRIOR_SIGMA_RAD = math.radians(1.5)  # standard deviation of the heading that is added to that prior
 
 
 def find_camera(view: View) -> CameraState:
@@ -49,11 +53,10 @@ def compute_knocked_covariance(camera: CameraState, settings: CameraStateSetting
     return np.asarray(covariance + np.diag(opened))
 
 
-def loosen(covariance: Floats, settings: PlanSettings) -> Floats:
+def loosen(covariance: Floats) -> Floats:
     """A belief's covariance (3, 3), world, as the prior of a pose that lines tell."""
-    s = settings
-    return np.asarray(s.prior_covariance_factor * covariance
-                      + np.diag([s.prior_sigma_m**2, s.prior_sigma_m**2, s.prior_sigma_rad**2]))
+    return np.asarray(PRIOR_COVARIANCE_FACTOR * covariance
+                      + np.diag([PRIOR_SIGMA_M**2, PRIOR_SIGMA_M**2, PRIOR_SIGMA_RAD**2]))
 
 
 def add_yaw(pose_covariance: Floats, camera_covariance: Floats, known: Floats) -> Floats:
@@ -71,7 +74,7 @@ def compute_camera_px(camera: Camera, covariance: Floats, distance_m: float) -> 
 
 def is_camera_known(robot: RobotModel, covariance: Floats, settings: Settings) -> bool:
     """Whether a covariance (7, 7) moves what is seen by no more than lines are looked for where they are predicted."""
-    px = compute_camera_px(robot.camera, covariance, settings.plan.rigid_distance_m)
+    px = compute_camera_px(robot.camera, covariance, RIGID_DISTANCE_M)
     return px <= settings.camera_state.max_known_px
 
 

@@ -10,12 +10,14 @@ from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from knowledge_sources.methods.doors.opening import is_in_view
 from knowledge_sources.questions import find_frames, find_robot_in
-from knowledge_sources.settings.doors import DoorSettings
 from world_models.building.locales import Doorway
 from world_models.entries.door_state import DoorState
 from world_models.entries.locale_frame import FrameChange, LocaleFrame
 from world_models.entries.location import Hypothesis
 from world_models.frame_building import FrameBuilding
+
+MAX_SIGMA_M = 0.1  # largest standard deviation of the robot's place when it judges a door
+MAX_SIGMA_RAD = 0.035  # largest standard deviation of its heading when it does
 
 Frames = tuple[Entry[LocaleFrame], ...]
 
@@ -27,14 +29,14 @@ class Watched(NamedTuple):
     is_shut: bool
 
 
-def list_doors_in_view(view: View, belief: Hypothesis, settings: DoorSettings) -> Iterator[Watched]:
+def list_doors_in_view(view: View, belief: Hypothesis) -> Iterator[Watched]:
     """The doorways of the robot's room that a picture may show."""
     robot = find_robot_in(view, belief.locale)
     pose = belief.world_from_robot(robot.world)
     for frame in find_frames(view, (belief.locale,)):
         doors = [Watched(doorway, is_shut=False) for doorway in frame.value.doorways]
         doors += [Watched(doorway, is_shut=True) for doorway in frame.value.shut_doorways]
-        yield from (w for w in doors if is_in_view(robot, pose, w.doorway, belief.locale, settings))
+        yield from (w for w in doors if is_in_view(robot, pose, w.doorway, belief.locale))
 
 
 def find_door_state(view: View, door: str) -> Entry[DoorState] | None:

@@ -13,7 +13,7 @@ import shapely
 from blackboard.board import View
 from blackboard.entry import Entry
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor.lookout import Costs, Look, choose_look, find_floor
+from knowledge_sources.methods.floor.lookout import MAX_HIDDEN_M, Costs, Look, choose_look, find_floor
 from knowledge_sources.methods.floor.seen_floor import (
     SeenFloor,
     Sweep,
@@ -33,6 +33,17 @@ from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Goal, Leg, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
+
+SEEN_MARGIN_M = 0.03  # margin round the robot's disc within which the floor must be seen to be free
+PUT_DOWN_FREE_M = 0.75  # round where it was put down the floor is free to this distance: a person sees it
+NEAR_MODEL_M = 0.08  # nearer to a wall or a thing of the model the floor need not be seen
+MIN_INCREMENT_M = 0.2  # shortest move at full speed into floor that is seen to be free; less of it is crept
+MIN_CREEP_M = 0.05  # shortest move into floor that was not seen to be free
+MAX_DRIVEN_GAP_M = 0.8  # between two pictures that are no further apart the robot drove straight
+LOOK_AHEAD_M = 1.1  # so much of the way beyond a leg is looked at before it ends: what is too near to be seen then
+LOOK_FROM_M = 3.0  # distance from the end of a leg from which that begins
+LOOK_TURN_RAD_PER_S = math.radians(45.0)  # how fast the robot turns, as far as the time that a look takes is weighed
+LOOK_PICTURE_S = 0.2  # time that a picture with its command takes, weighed likewise
 
 Point = tuple[float, float]
 
@@ -54,7 +65,7 @@ class FloorAhead:
 
     def __init__(self, view: View, leg: Leg, belief: Entry[Hypothesis], whole: Settings) -> None:
         settings = whole.action
-        self._settings, self._leg, self._max_hidden_m = settings, leg, whole.floor.max_hidden_m
+        self._settings, self._leg = settings, leg
         self._robot = find_robot(view)
         self._here = belief.value.world_from_robot(self._robot.world)
         self._way: list[Point] = [(self._here.x_m, self._here.y_m), (leg.x1_m, leg.y1_m)]
@@ -63,10 +74,10 @@ class FloorAhead:
         self._floor = find_floor(self._robot.world, self._locales)
         found = [shapely.Polygon(thing.footprint_world) for name in self._locales
                  for thing in self._robot.world.things_of(name) if thing.kind == EXTRA_KIND]
-        self._asked = shapely.buffer(shapely.union_all([self._floor, *found]), -settings.near_model_m)
+        self._asked = shapely.buffer(shapely.union_all([self._floor, *found]), -NEAR_MODEL_M)
         self._suspected = _list_what_may_stand(view)
         self._scans = _find_scans(view, belief, settings)
-        self._discs = list_free_discs(view, self._robot, self._here, self._scans, settings)
+        self._discs = list_free_discs(view, self._robot, self._here, self._scans)
         self._told = dict[str, Entry[Any]]()
         self._seen = SeenFloor(
             tuple(entry.value for entry in self._scans), np.array([disc.circle for disc in self._discs]),
@@ -88,7 +99,7 @@ class FloorAhead:
 
     def _measure_to_things_m(self, most_m: float) -> float:
         """How far the robot can go towards the leg's end before it comes nearer to what may stand there; 0..most."""
-        way, step_m = shapely.LineString(self._way), self._settings.min_creep_m
+        way, step_m = shapely.LineString(self._way), MIN_CREEP_M
         along = np.arange(0.0, most_m + step_m, step_m)
         points = shapely.line_interpolate_point(way, along)
         free_m = most_m
@@ -108,16 +119,16 @@ class FloorAhead:
         """A look from here at floor that is needed behind the end of this leg, where it is the best place for that."""
         s, end = self._settings, (self._leg.x1_m, self._leg.y1_m)
         to_go_m = math.dist(end, self._here.position)
-        if to_go_m > s.look_from_m or not self._beyond or len(self._leg.looks) >= s.max_looks:
+        if to_go_m > LOOK_FROM_M or not self._beyond or len(self._leg.looks) >= s.max_looks:
             return None
-        unseen = self._find_unseen(self._sweep([end, *self._beyond], s.look_ahead_m))
+        unseen = self._find_unseen(self._sweep([end, *self._beyond], LOOK_AHEAD_M))
         if len(unseen.points) == 0:
             return None
         actuator = self._robot.actuator
-        costs = Costs(s.look_turn_rad_per_s, s.look_picture_s, actuator.turn_increment_rad,
+        costs = Costs(LOOK_TURN_RAD_PER_S, LOOK_PICTURE_S, actuator.turn_increment_rad,
                       1.0 / s.creep_speed_m_per_s - 1.0 / actuator.speed_m_per_s)
         look = choose_look(self._robot, self._floor, self._here, self._list_poses_ahead(to_go_m), unseen, costs,
-                           self._max_hidden_m)
+                           MAX_HIDDEN_M)
         if look is None or self._was_tried(look.heading_rad):
             return None
         return look
@@ -140,7 +151,7 @@ class FloorAhead:
 
     def _sweep(self, way: Sequence[Point], most_m: float) -> Sweep:
         """What the robot sweeps on a way, but for where it begins."""
-        return sample_sweep(way, self._robot.radius_m + self._settings.seen_margin_m, most_m)
+        return sample_sweep(way, self._robot.radius_m + SEEN_MARGIN_M, most_m)
 
     def _find_unseen(self, sweep: Sweep) -> Sweep:
         """The part of a sweep that is not seen free, and not hard by something that the model has."""
@@ -171,7 +182,7 @@ def _list_what_may_stand(view: View) -> list[tuple[Entry[Obstacle], shapely.Poly
 def find_known_free(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> shapely.Geometry:
     """The floor of the locales here that was seen to be free, or driven over, or told to be free [m, world]."""
     robot, scans = find_robot(view), _find_scans(view, belief, settings)
-    discs = list_free_discs(view, robot, belief.value.world_from_robot(robot.world), scans, settings)
+    discs = list_free_discs(view, robot, belief.value.world_from_robot(robot.world), scans)
     seen = [build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
             for f in (entry.value for entry in scans)]
     circles = np.array([disc.circle for disc in discs])
@@ -191,45 +202,45 @@ class FreeDisc(NamedTuple):
 
 
 def list_free_discs(
-    view: View, robot: RobotModel, here: Pose2, scans: Sequence[Entry[FreeFloor]], settings: ActionSettings
+    view: View, robot: RobotModel, here: Pose2, scans: Sequence[Entry[FreeFloor]]
 ) -> list[FreeDisc]:
     """What is free under the robot, where it has driven from look to look, and where it was put down."""
     radius_m = robot.radius_m
     step_m = 0.3 * radius_m  # so near to one another they leave no gap at the sides
-    discs = [FreeDisc((here.x_m, here.y_m, radius_m + settings.seen_margin_m))]
+    discs = [FreeDisc((here.x_m, here.y_m, radius_m + SEEN_MARGIN_M))]
     for pair in pairwise([entry for entry in scans if entry.value.sense == "camera"]):
         a, b = (entry.value for entry in pair)
         gap_m = math.dist((a.x_m, a.y_m), (b.x_m, b.y_m))
-        if step_m < gap_m <= settings.max_driven_gap_m:
+        if step_m < gap_m <= MAX_DRIVEN_GAP_M:
             parts = np.linspace(0.0, 1.0, math.ceil(gap_m / step_m) + 1).tolist()
             discs += [FreeDisc((a.x_m + part * (b.x_m - a.x_m), a.y_m + part * (b.y_m - a.y_m), radius_m), pair)
                       for part in parts]
     goal = active_goal(view)
     if goal is not None and goal.id == f"{Goal.__name__}-1" and view.latest(RideReport) is None:
-        discs.append(_find_put_down(view, robot, goal.value, settings))
+        discs.append(_find_put_down(view, robot, goal.value))
     return discs
 
 
-def _find_put_down(view: View, robot: RobotModel, goal: Goal, settings: ActionSettings) -> FreeDisc:
+def _find_put_down(view: View, robot: RobotModel, goal: Goal) -> FreeDisc:
     """Round where the robot was put down: by the first picture, if it is still on the board, else by what was said."""
     first = view.get(f"{FreeFloor.__name__}-1")
     start = goal.origin.in_world(robot.world)
     if first is None or not first.value.bearings_rad:
-        return FreeDisc((start.x_m, start.y_m, settings.put_down_free_m), () if first is None else (first,))
+        return FreeDisc((start.x_m, start.y_m, PUT_DOWN_FREE_M), () if first is None else (first,))
     eye, ahead = first.value, first.value.bearings_rad[len(first.value.bearings_rad) // 2]
     before_m = robot.mount.forward_m if eye.sense == "camera" else 0.0  # the robot's axis is that far behind its camera
     x_m, y_m = eye.x_m - before_m * math.cos(ahead), eye.y_m - before_m * math.sin(ahead)
-    if math.dist((x_m, y_m), start.position) > settings.max_driven_gap_m:
-        return FreeDisc((start.x_m, start.y_m, settings.put_down_free_m), (first,))
-    return FreeDisc((x_m, y_m, settings.put_down_free_m), (first,))
+    if math.dist((x_m, y_m), start.position) > MAX_DRIVEN_GAP_M:
+        return FreeDisc((start.x_m, start.y_m, PUT_DOWN_FREE_M), (first,))
+    return FreeDisc((x_m, y_m, PUT_DOWN_FREE_M), (first,))
 
 
 def limit_move(unseen: Sweep, move_m: float, settings: ActionSettings) -> Caution:
     """How far of a move the robot may go, by what of its sweep is not seen; it creeps where the rest is too short."""
     free_m = measure_free_m(unseen, move_m)
-    if free_m >= min(move_m, settings.min_increment_m):
+    if free_m >= min(move_m, MIN_INCREMENT_M):
         return Caution(free_m, False)
-    return Caution(min(move_m, settings.max_creep_m, measure_blind_end_m(unseen, settings.min_increment_m)), True)
+    return Caution(min(move_m, settings.max_creep_m, measure_blind_end_m(unseen, MIN_INCREMENT_M)), True)
 
 
 def _find_scans(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> tuple[Entry[FreeFloor], ...]:

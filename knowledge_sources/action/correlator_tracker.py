@@ -47,6 +47,18 @@ from world_models.entries.percepts import Anchor, Track, Tracks
 from world_models.entries.robot import Drift
 from world_models.visibility.lines_and_points import visible_lines
 
+MIN_LANDMARKS = 5  # with fewer tracked landmarks than this, new ones are always taken
+ENOUGH_LANDMARKS = 9  # with this many tracked landmarks or more, no new ones are taken
+MIN_REMAINING_PART = 0.5  # between these two, new landmarks are taken below this part of those at the last renewal
+MAX_TEMPLATE_DISTANCE_M = 1.3
+"""A template is dropped when the robot is further than this from where it was cut: two increments (Table 1:
+increments of two feet)."""
+MAX_TEMPLATE_DISTANCE_ROLLING_M = 0.8  # the same on the move, where many pictures show the same template
+MIN_DRIFT_STRETCH_M = 0.3  # shortest stretch of way from which the drift of the wheels is learnt (§3.2)
+MIN_EDGE_LENGTH_PX = 16.0  # shortest projected model edge that the belief is aligned with before templates are cut
+MIN_EDGE_CONTRAST = 0.05  # smallest contrast of such an edge
+MAX_EDGE_DISTANCE_M = 15.0  # largest distance of such an edge
+
 
 class Corrected(NamedTuple):
     """The belief after tracking, and how many landmarks agree with it."""
@@ -144,7 +156,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
     def _learn_drift(self, view: View, belief: Hypothesis, correction: Revise) -> Iterable[Effect]:
         """Learn how the wheels drift, when the robot has gone far enough to tell."""
         drift = view.latest(Drift)
-        if drift is None or drift.value.gone_m < self._settings.action.min_drift_stretch_m:
+        if drift is None or drift.value.gone_m < MIN_DRIFT_STRETCH_M:
             return
         robot = find_robot(view)
         heading = belief.world_from_robot(robot.world).heading_rad
@@ -183,7 +195,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         kept = tuple(f.track for f in followed if f.expected and f.track.misses < s.max_misses
                      and f.track.template_frame in near)
         taken = 0 if old is None else old.value.taken
-        if len(kept) >= max(s.min_landmarks, min(s.enough_landmarks, s.min_remaining_part * taken)):
+        if len(kept) >= max(MIN_LANDMARKS, min(ENOUGH_LANDMARKS, MIN_REMAINING_PART * taken)):
             return Renewed(self._with_anchors(view, kept, anchors, frame, belief, taken), belief)
         return self._take_new(view, frame, image, kept, anchors, belief)
 
@@ -192,12 +204,12 @@ class CorrelatorTracker(RobotKnowledgeSource):
         belief: Hypothesis,
     ) -> Renewed:
         """Take new landmarks beside those that are kept, once the belief is aligned with the model's edges."""
-        robot, s = find_robot_in(view, belief.locale), self._settings.action
+        robot = find_robot_in(view, belief.locale)
         world = robot.world
         pose = belief.world_from_robot(world)
         lines = visible_lines(
-            world, robot.camera, robot.camera_from_world(pose), min_length_px=s.min_edge_length_px,
-            min_contrast=s.min_edge_contrast, max_distance_m=s.max_edge_distance_m,
+            world, robot.camera, robot.camera_from_world(pose), min_length_px=MIN_EDGE_LENGTH_PX,
+            min_contrast=MIN_EDGE_CONTRAST, max_distance_m=MAX_EDGE_DISTANCE_M,
         )
         found = None
         if find_errors(robot, lines).is_exact:  # else the edges are not where the model has them
@@ -211,9 +223,9 @@ class CorrelatorTracker(RobotKnowledgeSource):
 
     def _find_near_frames(self, view: View, anchors: tuple[Anchor, ...], belief: Hypothesis) -> frozenset[str]:
         """The frames that were taken near enough to here for their templates to be used."""
-        robot, s = find_robot(view), self._settings.action
+        robot = find_robot(view)
         here = belief.world_from_robot(robot.world)
-        far_m = s.max_template_distance_rolling_m if robot.continuous else s.max_template_distance_m
+        far_m = MAX_TEMPLATE_DISTANCE_ROLLING_M if robot.continuous else MAX_TEMPLATE_DISTANCE_M
         return frozenset(a.frame for a in anchors if math.hypot(a.x_m - here.x_m, a.y_m - here.y_m) <= far_m)
 
     def _with_anchors(

@@ -24,6 +24,8 @@ from world_models.entries.robot import Drift
 from world_models.entries.travel import Travel, begin_travel
 from world_models.frames import Pose2
 
+MIN_CLAIMED_PART = 0.7  # if the wheels claim less than this part of a move, something stopped the robot
+
 UNSEEN = ("command", "relocalization")
 """What a belief rests on that no way is measured from."""
 
@@ -87,7 +89,7 @@ class DeadReckoner(RobotKnowledgeSource):
         contact = find_contact(view, request.id)
         what = "something was touched on the move" if on_the_move else (
             f"something stopped the robot: {report.move_m:.2f} m of {request.value.move_m:.2f} m are claimed")
-        is_short = not on_the_move and report.move_m < self._settings.action.min_claimed_part * request.value.move_m
+        is_short = not on_the_move and report.move_m < MIN_CLAIMED_PART * request.value.move_m
         if contact is not None or is_short:
             bound_px = self._settings.plan.max_deviation_px
             stopped = Discrepancy(Level.ACTION, what, math.inf, (bound_px, bound_px), "px")

@@ -10,6 +10,8 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.doors_in_view import (
+    MAX_SIGMA_M,
+    MAX_SIGMA_RAD,
     Watched,
     find_door_state,
     list_doors_in_view,
@@ -58,44 +60,43 @@ class DoorWatcher(RobotKnowledgeSource):
         belief, frame = find_belief(view), view.latest(Frame)
         if belief is None or frame is None or not self._is_trusted(view, belief.value):
             return None
-        return 0.8 if any(True for _ in list_doors_in_view(view, belief.value, self._settings.doors)) else None
+        return 0.8 if any(True for _ in list_doors_in_view(view, belief.value)) else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, frame = find_belief(view), view.latest(Frame)
         if belief is None or frame is None:
             return
         picture = read_picture(frame.value.jpeg)
-        for watched in list(list_doors_in_view(view, belief.value, self._settings.doors)):
+        for watched in list(list_doors_in_view(view, belief.value)):
             yield from self._watch(view, watched, belief, frame, picture.half)
 
     def _is_trusted(self, view: View, belief: Hypothesis) -> bool:
         """Whether the belief includes every motion, nothing doubts it, and it is precise enough to look at doors."""
-        s = self._settings.doors
         if is_over(view) or is_in_doubt(view) or not is_up_to_date(view):
             return False
-        return belief.sigma_m <= s.max_sigma_m and belief.sigma_rad <= s.max_sigma_rad
+        return belief.sigma_m <= MAX_SIGMA_M and belief.sigma_rad <= MAX_SIGMA_RAD
 
     def _watch(
         self, view: View, watched: Watched, belief: Entry[Hypothesis], frame: Entry[Frame], image: Image
     ) -> Iterable[Effect]:
         """Weigh what a picture shows of a door, and revise what is believed of it."""
-        s, door, locale = self._settings.doors, watched.doorway, belief.value.locale
+        door, locale = watched.doorway, belief.value.locale
         robot = find_robot_in(view, locale)
         pose, covariance = belief.value.world_from_robot(robot.world), belief.value.covariance_world(robot.world)
         frames = find_frames(view, door.between)
         beyond = with_door_open(view, door.name, frames) if watched.is_shut else robot.world
-        opening = predict_opening(robot, pose, covariance, door, locale, beyond, s)
-        evidence = None if opening is None else measure_opening(robot, opening, image, s)
+        opening = predict_opening(robot, pose, covariance, door, locale, beyond)
+        evidence = None if opening is None else measure_opening(robot, opening, image)
         if opening is None or evidence is None:
             return
         known = find_door_state(view, door.name)
-        ratio = weigh_leaf(evidence, s)
+        ratio = weigh_leaf(evidence)
         picture = DoorPicture(frame.id, opening.box_px, pose.x_m, pose.y_m, pose.heading_rad, ratio,
                               describe(evidence, ratio))
         if known is None and (ratio > 0.0) == watched.is_shut:
             return  # as it is believed to be
         now = update_door(None if known is None else known.value, door.name, door.between, picture,
-                          frame.value.sim_time_s, is_believed_shut=watched.is_shut, settings=s)
+                          frame.value.sim_time_s, is_believed_shut=watched.is_shut)
         if now is None or (known is not None and now.state == known.value.state == "open"):
             return
         because = (frame, belief) if known is None else (frame, belief, known)

@@ -28,6 +28,9 @@ from world_models.entries.percepts import Tracks
 from world_models.entries.task import PlanSketch
 from world_models.frames import Pose2
 
+ELEVATOR_SIGMA_M = 0.01  # standard deviation of where an elevator car stops, from floor to floor
+ELEVATOR_SIGMA_RAD = 0.003  # standard deviation of the heading of an elevator car, from floor to floor
+
 
 class ElevatorRider(RobotKnowledgeSource):
     """Asks for the ride that a verified sketch needs, and moves the belief to the floor where the doors open.
@@ -95,7 +98,7 @@ class ElevatorRider(RobotKnowledgeSource):
         turn = behind.heading_rad - before.heading_rad
         c, s = np.cos(turn), np.sin(turn)
         turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        sigma_m, sigma_rad = self._settings.action.elevator_sigma_m, self._settings.action.elevator_sigma_rad
+        sigma_m, sigma_rad = ELEVATOR_SIGMA_M, ELEVATOR_SIGMA_RAD
         uneven = np.diag([sigma_m**2, sigma_m**2, sigma_rad**2])
         covariance = turned @ belief.covariance_world(world) @ turned.T + uneven
         return Hypothesis.of_world(world, destination, pose, covariance, "ride", motion=belief.motion)

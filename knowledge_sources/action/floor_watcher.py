@@ -10,7 +10,7 @@ from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.methods.floor.see_floor import Seen, see_free_floor
+from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M, Seen, see_free_floor
 from knowledge_sources.questions import (
     find_belief,
     find_robot,
@@ -24,6 +24,12 @@ from world_models.entries.body import Frame
 from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor
 from world_models.entries.location import Hypothesis
 from world_models.frames import Pose2
+
+FLOOR_STEP_M = 0.04  # on the move the floor is looked at again after so much of the way
+MAX_FLOOR_SIGMA_M = 0.1  # the floor is looked at while the robot's place is known to this
+MAX_FLOOR_SIGMA_RAD = math.radians(1.0)  # the same of its heading
+
+MAX_LIGHT_AGE_S = 20.0  # the light of a picture tells that of the next ones for so long
 
 CORRECTED_BY = ("milestone", "tracks", "relocalization")
 """What the belief rests on when a picture has corrected it."""
@@ -49,8 +55,7 @@ class FloorWatcher(RobotKnowledgeSource):
         frame, belief = view.latest(Frame), find_belief(view)
         if frame is None or belief is None or is_over(view) or is_in_doubt(view) or not is_up_to_date(view):
             return None
-        s = self._settings.action
-        if belief.value.sigma_m > s.max_floor_sigma_m or belief.value.sigma_rad > s.max_floor_sigma_rad:
+        if belief.value.sigma_m > MAX_FLOOR_SIGMA_M or belief.value.sigma_rad > MAX_FLOOR_SIGMA_RAD:
             return None
         if _is_seen(view, frame) or (rolling_course(view) is not None and self._is_near_last(view, belief.value)):
             return None
@@ -65,7 +70,7 @@ class FloorWatcher(RobotKnowledgeSource):
         known = {entry.value.locale: entry for entry in view.all(FloorAppearance)}
         kept = [entry for entry in view.newest_first(FloorView)
                 if entry.value.belief == belief.id and entry.value.floor_m == floor_m]
-        apart_m = self._settings.action.floor_view_distance_m
+        apart_m = FLOOR_VIEW_DISTANCE_M
         earlier = [entry for entry in kept if _measure_way_m(entry.value, pose) >= apart_m]
         lit = self._find_lit(view, frame.value.sim_time_s)
         seen, learnt = see_free_floor(
@@ -84,7 +89,7 @@ class FloorWatcher(RobotKnowledgeSource):
 
     def _find_lit(self, view: View, now_s: float) -> Entry[FreeFloor] | None:
         """The last picture of which the light is known, if it was taken shortly before."""
-        since_s = now_s - self._settings.floor.max_light_age_s
+        since_s = now_s - MAX_LIGHT_AGE_S
         return view.latest(FreeFloor, lambda f: f.light is not None and f.seen_s >= since_s)
 
     def _is_near_last(self, view: View, belief: Hypothesis) -> bool:
@@ -96,7 +101,7 @@ class FloorWatcher(RobotKnowledgeSource):
         if last is None:
             return False
         eye = belief.world_from_robot(robot.world) @ Pose2(robot.mount.forward_m, 0.0, 0.0)
-        return math.hypot(last.value.x_m - eye.x_m, last.value.y_m - eye.y_m) < self._settings.action.floor_step_m
+        return math.hypot(last.value.x_m - eye.x_m, last.value.y_m - eye.y_m) < FLOOR_STEP_M
 
 
 def _is_seen(view: View, frame: Entry[Frame]) -> bool:

@@ -13,7 +13,7 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.floor_ahead import FloorAhead
+from knowledge_sources.floor_ahead import MIN_CREEP_M, FloorAhead
 from knowledge_sources.methods.motion.pure_pursuit import (
     compute_bearing,
     compute_chord_turn,
@@ -42,6 +42,15 @@ from world_models.entries.location import Hypothesis
 from world_models.entries.robot import Drift
 from world_models.entries.task import Leg, Milestone, PlanSketch
 from world_models.frames import Pose2, wrap_angle
+
+MAX_HEADING_ERROR_RAD = math.radians(3.0)  # the motor moves when it faces its aim to within this; else it turns
+MAX_ARRIVAL_HEADING_ERROR_RAD = math.radians(0.5)  # largest error of a heading that the goal states
+MAX_START_OFFSET_M = 0.15
+"""From nearer than this the robot returns to the planned line; from further off it draws a new one."""
+AIM_AT_END_M = 0.25  # with less than this to go, the motor steers at the end of the leg itself
+ARRIVAL_PART = 0.8  # part of a leg's tolerance within which it has arrived
+MAX_LOOK_ERROR_RAD = math.radians(6.0)
+"""The robot looks where the floor is to be seen when it faces there to within this."""
 
 
 class Motor(RobotKnowledgeSource):
@@ -98,7 +107,7 @@ class Motor(RobotKnowledgeSource):
             return None
         here = belief.value.world_from_robot(find_building(view))
         error = wrap_angle(milestone.look_heading_rad - here.heading_rad)
-        return error if abs(error) > self._settings.action.max_heading_error_rad else None
+        return error if abs(error) > MAX_HEADING_ERROR_RAD else None
 
     def _begin_leg(self, view: View, belief: Entry[Hypothesis]) -> Iterable[Effect]:
         sketch = _sketch_for_leg(view)
@@ -107,7 +116,7 @@ class Motor(RobotKnowledgeSource):
         subgoal, world = sketch.value.current, find_building(view)
         here, end = belief.value.world_from_robot(world), subgoal.destination.in_world(world)
         planned = subgoal.origin.in_world(world)
-        start = planned if planned.distance_to(here) <= self._settings.action.max_start_offset_m else here
+        start = planned if planned.distance_to(here) <= MAX_START_OFFSET_M else here
         heading = None if subgoal.destination.heading_rad is None else end.heading_rad
         leg = Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m, subgoal.tolerance_m, heading)
         yield Post(leg, (sketch, belief))
@@ -142,7 +151,7 @@ class Motor(RobotKnowledgeSource):
         if leg.looking_rad is None:
             return None
         turn = wrap_angle(leg.looking_rad - here.heading_rad)
-        most = self._settings.action.max_look_error_rad
+        most = MAX_LOOK_ERROR_RAD
         return MotorCommand(_limit_turn(turn, actuator), 0.0) if abs(turn) > most else None
 
     def _keep_to_seen_floor(
@@ -165,7 +174,7 @@ class Motor(RobotKnowledgeSource):
                 return looking, turned, floor.because
         wanted_m = actuator.reach * command.move_m
         caution = floor.limit_move(wanted_m)
-        if caution.creeps and caution.move_m < min(s.min_creep_m, wanted_m):
+        if caution.creeps and caution.move_m < min(MIN_CREEP_M, wanted_m):
             return leg, None, floor.because
         move_m = min(command.move_m, actuator.compute_command_m(caution.move_m))
         slowly = s.creep_speed_m_per_s if caution.creeps else None
@@ -175,22 +184,22 @@ class Motor(RobotKnowledgeSource):
         self, actuator: ActuatorModel, leg: Leg, here: Pose2, curvature_per_m: float
     ) -> MotorCommand | None:
         """The next increment; None on arrival. A move is an arc whose chord points at the aim."""
-        s, (along, left) = self._settings.action, measure_progress(leg, here)
-        within_m = leg.tolerance_m * s.arrival_part
+        along, left = measure_progress(leg, here)
+        within_m = leg.tolerance_m * ARRIVAL_PART
         away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
         if away <= within_m or (along <= 0.0 and abs(left) <= within_m):
             return self._final_turn(leg, here, actuator)
         turn = compute_bearing(self._aim(leg, here), here)
-        if abs(turn) > s.max_heading_error_rad:
+        if abs(turn) > MAX_HEADING_ERROR_RAD:
             return MotorCommand(_limit_turn(turn, actuator), 0.0)
         distance = min(actuator.increment_m, actuator.compute_command_m(away))
         turn = compute_chord_turn(turn, curvature_per_m, actuator.reach * distance)
-        return MotorCommand(turn if abs(turn) > s.max_arrival_heading_error_rad / 10 else 0.0, distance)
+        return MotorCommand(turn if abs(turn) > MAX_ARRIVAL_HEADING_ERROR_RAD / 10 else 0.0, distance)
 
     def _aim(self, leg: Leg, here: Pose2) -> tuple[float, float]:
         """The point of the line to steer at [m, world]: ahead by ``lookahead_m``, near the end the end itself."""
         along, _ = measure_progress(leg, here)
-        if along < self._settings.action.aim_at_end_m:
+        if along < AIM_AT_END_M:
             return leg.x1_m, leg.y1_m
         return find_aim_point(leg, along, self._settings.action.lookahead_m)
 
@@ -198,7 +207,7 @@ class Motor(RobotKnowledgeSource):
         if leg.heading_rad is None:
             return None
         turn = wrap_angle(leg.heading_rad - here.heading_rad)
-        most = self._settings.action.max_arrival_heading_error_rad
+        most = MAX_ARRIVAL_HEADING_ERROR_RAD
         return MotorCommand(_limit_turn(turn, actuator), 0.0) if abs(turn) > most else None
 
 

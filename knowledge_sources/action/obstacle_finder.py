@@ -18,8 +18,9 @@ from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.floor_ahead import find_known_free
+from knowledge_sources.floor_ahead import SEEN_MARGIN_M, find_known_free
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M
 from knowledge_sources.methods.motion.footprints import (
     Corners,
     build_free_floor,
@@ -56,6 +57,22 @@ from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
 from world_models.entries.task import Certificate, Leg
 from world_models.entries.touch import Contact
+
+VAGUE_SIGMA_M = 0.05  # sights of an obstacle whose standard deviations differ by this and twofold are not joined
+MIN_COMMON_DIRECTIONS = 0.6
+"""A sight without feet tells nothing new where this part of its directions is that of what is known."""
+TOUCH_MARGIN_M = 0.05  # a wall or thing of the model that is so much further than the robot's rim explains a contact
+MAX_TOUCH_SIGMA_RAD = 0.6  # a contact whose direction is less sure tells of no obstacle
+MIN_FREE_PART = 0.5  # part of an obstacle's footprint that must be seen free to tell that it is not there any more
+MAX_SHARED_PART = 0.25  # where a thing that is seen takes more of the footprint, the rest seen free tells nothing of it
+FREE_FLOOR_ODDS = 0.03  # odds of an obstacle that is there while all of its footprint is seen free
+MIN_EVIDENCE_INTERVAL_S = 0.3  # pictures that follow each other faster are no further evidence of an obstacle
+MAX_OBSTACLE_SIGMA_M = 0.25
+"""What is seen on the floor with a larger standard deviation is waited for until it is nearer."""
+MAX_HULL_PART = 1.5  # two sights are of one thing where the hull round both is at most so much larger than both
+OBSTACLE_DEPTH_M = 0.3  # depth that something is taken to have of which only the near side is seen
+MIN_HEIGHT_CHANGE_M = 0.15  # the same of its height
+MAX_BEHIND_DOOR_M = 4.0  # a thing that is seen through a doorway stands at most so far behind it
 
 
 @dataclass
@@ -115,7 +132,7 @@ class ObstacleFinder(RobotKnowledgeSource):
 
     def _find_sure_touch(self, view: View) -> _Touch | None:
         """The newest contact, where its direction is known well enough."""
-        touch, most_rad = _find_new_touch(view), self._settings.action.max_touch_sigma_rad
+        touch, most_rad = _find_new_touch(view), MAX_TOUCH_SIGMA_RAD
         return touch if touch is not None and touch.contact.value.sigma_rad <= most_rad else None
 
     def _take_back(self, view: View, belief: Entry[Hypothesis]) -> Iterator[_Draft]:
@@ -140,7 +157,7 @@ class ObstacleFinder(RobotKnowledgeSource):
         ahead = pose.heading_rad - touch.turned_rad + c.direction_rad
         out, across = np.array([math.cos(ahead), math.sin(ahead)]), np.array([-math.sin(ahead), math.cos(ahead)])
         touched = np.array(pose.position) + robot.radius_m * out
-        reach_m = s.touch_margin_m + 3.0 * belief.value.sigma_m
+        reach_m = TOUCH_MARGIN_M + 3.0 * belief.value.sigma_m
         known = _find_touched(view, touched, reach_m + 3.0 * sigma_m)
         if known is not None:
             yield _Draft(known, self._touch_again(robot.world, known.value, touched, out, across, c.when_s),
@@ -161,7 +178,7 @@ class ObstacleFinder(RobotKnowledgeSource):
     ) -> Obstacle:
         """A known obstacle after it was touched: it reaches to where it was touched."""
         s = self._settings.action
-        corner = build_polygon(_build_footprint(touched, out, across, 0.5 * s.obstacle_depth_m))
+        corner = build_polygon(_build_footprint(touched, out, across, 0.5 * OBSTACLE_DEPTH_M))
         joined = shapely.convex_hull(shapely.union_all([build_polygon(known.footprint), corner]))
         core = list_corners(shapely.union(build_polygon(known.core), corner)) if known.core else ()
         new = replace(known, footprint=list_corners(joined), core=core, certainty=s.max_obstacle_certainty,
@@ -178,13 +195,13 @@ class ObstacleFinder(RobotKnowledgeSource):
         known = {entry.id: entry for entry in view.all(Obstacle)}
         fresh = 0
         for thing in f.things:
-            if thing.p_thing < s.min_thing_certainty or thing.sigma_m > s.max_obstacle_sigma_m:
+            if thing.p_thing < s.min_thing_certainty or thing.sigma_m > MAX_OBSTACLE_SIGMA_M:
                 continue
-            shape = deepen(thing.footprint, (f.x_m, f.y_m), s.obstacle_depth_m)
+            shape = deepen(thing.footprint, (f.x_m, f.y_m), OBSTACLE_DEPTH_M)
             core = shape
             if thing.is_cut:
                 shape = self._reach_to_rim(view, shape, f)
-            rest, whole = [e for e in known.values() if e.id not in drafts], s.max_hull_part
+            rest, whole = [e for e in known.values() if e.id not in drafts], MAX_HULL_PART
             if f.sense == "ranges":  # an echo tells how far a thing is, not where in its cone: any in it may be heard
                 rest, whole = [e for e in rest if _may_be_there(e.value)], math.inf
             entry = self._find_before(rest, core, (f.x_m, f.y_m)) if thing.is_cut else None
@@ -210,7 +227,7 @@ class ObstacleFinder(RobotKnowledgeSource):
         for entry in known.values():
             if entry.id in drafts or not _may_be_there(entry.value):
                 continue
-            if measure_free_part(entry.value.footprint, seen) <= s.max_shared_part:
+            if measure_free_part(entry.value.footprint, seen) <= MAX_SHARED_PART:
                 gone = self._miss(find_building(view), entry.value, free, f.seen_s)
                 if gone is not None:
                     yield _Draft(entry, gone, [scan, entry])
@@ -228,17 +245,17 @@ class ObstacleFinder(RobotKnowledgeSource):
         """The obstacle that a sight without feet is one of: known well, nearer than the picture's border, and in most
         of its directions, where its top may be wider than its feet.
         """
-        s, at = self._settings, np.array(eye)
+        at, overhang_m = np.array(eye), self._settings.plan.overhang_m
         reach_m = float(np.linalg.norm(shapely.get_coordinates(seen) - at, axis=1).max())
         best: tuple[float, Entry[Obstacle]] | None = None
         for entry in known:
-            wide = build_polygon(entry.value.footprint).buffer(s.plan.overhang_m)
-            if not entry.value.is_there or entry.value.sigma_m > s.action.vague_sigma_m:
+            wide = build_polygon(entry.value.footprint).buffer(overhang_m)
+            if not entry.value.is_there or entry.value.sigma_m > VAGUE_SIGMA_M:
                 continue
             if wide.distance(shapely.Point(at)) > reach_m:
                 continue
             part = measure_common_directions(wide, seen, at)
-            if part >= s.action.min_common_directions and (best is None or part > best[0]):
+            if part >= MIN_COMMON_DIRECTIONS and (best is None or part > best[0]):
                 best = part, entry
         return None if best is None else best[1]
 
@@ -250,7 +267,7 @@ class ObstacleFinder(RobotKnowledgeSource):
         robot = find_robot(view)
         here = shapely.Point(belief.value.world_from_robot(robot.world).position)
         way = shapely.LineString([here, (leg.x1_m, leg.y1_m)])
-        around_m = robot.radius_m + s.seen_margin_m
+        around_m = robot.radius_m + SEEN_MARGIN_M
         return shapely.intersection(way, here.buffer(s.act_within_m)).buffer(around_m)
 
     def _reach_to_rim(self, view: View, shape: shapely.Polygon, scan: FreeFloor) -> shapely.Polygon:
@@ -258,7 +275,7 @@ class ObstacleFinder(RobotKnowledgeSource):
         belief, s = find_belief(view), self._settings.action
         if belief is None:
             return shape
-        eye, rim_m = np.array([scan.x_m, scan.y_m]), find_robot(view).radius_m + s.seen_margin_m
+        eye, rim_m = np.array([scan.x_m, scan.y_m]), find_robot(view).radius_m + SEEN_MARGIN_M
         away = shapely.get_coordinates(shape)[:-1] - eye
         rim = eye + rim_m * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
         whole = build_polygon(np.concatenate([shapely.get_coordinates(shape), rim]))
@@ -270,8 +287,8 @@ class ObstacleFinder(RobotKnowledgeSource):
     ) -> Obstacle | None:
         """A thing that was not known; None where walls and things of the model may be all that is seen."""
         world, f, s = find_building(view), scan.value, self._settings.action
-        locale = _find_room(world, shape, f.locale, s.max_behind_door_m)
-        margin_m = s.touch_margin_m + thing.sigma_m
+        locale = _find_room(world, shape, f.locale, MAX_BEHIND_DOOR_M)
+        margin_m = TOUCH_MARGIN_M + thing.sigma_m
         unexplained = shapely.intersection(shape, _find_open_floor(world, locale, margin_m))
         if unexplained.area < 0.3 * shape.area:
             return None
@@ -297,7 +314,7 @@ class ObstacleFinder(RobotKnowledgeSource):
         certainty = max(known.certainty, thing.p_thing)
         if known.status == "gone":
             certainty = thing.p_thing
-        elif _measure_way_m(view, entry, scan) >= s.floor_view_distance_m / 2.0:
+        elif _measure_way_m(view, entry, scan) >= FLOOR_VIEW_DISTANCE_M / 2.0:
             certainty = _combine(known.certainty, thing.p_thing / (1.0 - min(thing.p_thing, 0.999)))
         certainty = min(certainty, s.max_obstacle_certainty)
         own = shapely.intersection(shape, _find_open_floor(world, known.locale, 0.0))
@@ -306,7 +323,7 @@ class ObstacleFinder(RobotKnowledgeSource):
             joined = take_free(polygon, free)
         else:
             joined = _weigh_footprints(polygon, shape if own.is_empty else own, free, known.sigma_m, thing.sigma_m,
-                                       np.array([scan.value.x_m, scan.value.y_m]), s)
+                                       np.array([scan.value.x_m, scan.value.y_m]))
         footprint = list_corners(joined)
         moved = measure_change_m(known.footprint, footprint) >= s.min_footprint_change_m
         surer = certainty > known.certainty + 0.005 or _status(certainty, s) != known.status
@@ -323,10 +340,10 @@ class ObstacleFinder(RobotKnowledgeSource):
         """A known obstacle after its floor, or some of it, was seen free; None where that tells nothing."""
         s, polygon = self._settings.action, build_polygon(known.footprint)
         free_part = measure_free_part(known.footprint, free)
-        if seen_s - known.looked_s < s.min_evidence_interval_s:
+        if seen_s - known.looked_s < MIN_EVIDENCE_INTERVAL_S:
             return None
-        if free_part >= s.min_free_part:
-            certainty = _combine(known.certainty, s.free_floor_odds**free_part)
+        if free_part >= MIN_FREE_PART:
+            certainty = _combine(known.certainty, FREE_FLOOR_ODDS**free_part)
             status: ObstacleStatus = "gone" if certainty < s.min_gone_certainty else known.status
             return replace(known, certainty=certainty, looked_s=seen_s, status=status)
         left = take_free(polygon, free)
@@ -367,7 +384,7 @@ class ObstacleFinder(RobotKnowledgeSource):
             return frame.changed(change)
         moved_m = measure_change_m(known.footprint, change.footprint)
         is_touched = obstacle.touched_s == obstacle.seen_s
-        same_height = abs(known.height_m - change.height_m) < s.min_height_change_m
+        same_height = abs(known.height_m - change.height_m) < MIN_HEIGHT_CHANGE_M
         if not is_touched and moved_m < s.min_footprint_change_m and same_height:
             return frame
         return frame.restored("extra", obstacle.name).changed(change)
@@ -375,18 +392,18 @@ class ObstacleFinder(RobotKnowledgeSource):
 
 def _weigh_footprints(
     known: shapely.Geometry, seen: shapely.Geometry, free: shapely.Geometry, known_sigma_m: float, sigma_m: float,
-    eye: Floats, settings: ActionSettings,
+    eye: Floats,
 ) -> shapely.Geometry:
     """The footprint by two sights: the sharper one decides.
 
     A sight of which the feet are not seen tells in which directions the thing is, and that it is nearer than the
     picture's lower border: it adds to what is known only in directions in which nothing was known.
     """
-    if known_sigma_m >= 2.0 * sigma_m + settings.vague_sigma_m:
+    if known_sigma_m >= 2.0 * sigma_m + VAGUE_SIGMA_M:
         return seen
-    vague_m = settings.vague_sigma_m
+    vague_m = VAGUE_SIGMA_M
     is_vague = sigma_m >= 2.0 * known_sigma_m + vague_m or min(sigma_m, known_sigma_m) >= 2.0 * vague_m
-    if is_vague and measure_common_directions(known, seen, eye) >= settings.min_common_directions:
+    if is_vague and measure_common_directions(known, seen, eye) >= MIN_COMMON_DIRECTIONS:
         return take_free(known, free)
     return join_footprints(known, seen, free)
 

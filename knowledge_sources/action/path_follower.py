@@ -42,6 +42,13 @@ from world_models.entries.robot import Drift
 from world_models.entries.task import Leg, Milestone, PlanSketch
 from world_models.frames import Pose2
 
+ROLLING_LOOKAHEAD_M = 0.75  # distance ahead on the line at which the path follower steers (pure pursuit)
+MIN_ROLLING_LEG_M = 0.3  # shortest rest of a leg, beyond the stopping distance, that is driven without stopping
+ROLLING_STOP_MARGIN_M = 0.1  # the path follower stops so far before floor that was not seen to be free
+MAX_ROLLING_START_ERROR_RAD = math.radians(3.0)  # the path follower starts when it faces its aim to within this
+MAX_ROLLING_ERROR_RAD = math.radians(12.0)  # the path follower stops when its aim is further to the side than this
+MAX_CURVATURE_PER_M = 1.0  # largest curvature that is steered on the move
+
 
 class PathFollower(RobotKnowledgeSource):
     """Drives a leg without stopping at each increment, and corrects the course by each picture.
@@ -85,8 +92,8 @@ class PathFollower(RobotKnowledgeSource):
         """Steer an arc to the point of the line ahead, less the curvature that the wheels add."""
         robot, drift = find_robot(view), view.latest(Drift)
         here = belief.value.world_from_robot(robot.world)
-        s, (along, _) = self._settings.action, measure_progress(leg.value, here)
-        point = find_aim_point(leg.value, along, s.rolling_lookahead_m)
+        along, _ = measure_progress(leg.value, here)
+        point = find_aim_point(leg.value, along, ROLLING_LOOKAHEAD_M)
         discrepancy = open_discrepancy(view, Level.ACTION)
         corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
         yield from corrected
@@ -94,7 +101,7 @@ class PathFollower(RobotKnowledgeSource):
         step = Revise(leg, replace(seen, increments=seen.increments + (course is None)), (leg, belief, *corrected))
         yield step
         wanted = compute_curvature_to(point, here) - (0.0 if drift is None else drift.value.curvature_per_m)
-        curvature = min(max(wanted, -s.max_curvature_per_m), s.max_curvature_per_m)
+        curvature = min(max(wanted, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
         free_m, told = self._look_ahead(view, leg.value, belief, robot.actuator)
         new = Course(leg.id, self._choose_speed(free_m, robot.actuator), curvature)
         because = (step, belief, *(() if drift is None else (drift,)), *told)
@@ -102,7 +109,7 @@ class PathFollower(RobotKnowledgeSource):
 
     def _choose_speed(self, free_m: float, actuator: ActuatorModel) -> float:
         """The full speed, or what can be stopped from before the floor ends that is seen to be free."""
-        room_m = max(0.0, free_m - self._settings.action.rolling_stop_margin_m)
+        room_m = max(0.0, free_m - ROLLING_STOP_MARGIN_M)
         fastest = math.sqrt(2.0 * actuator.brake_m_per_s2 * room_m)
         return min(actuator.speed_m_per_s, max(fastest, self._settings.action.creep_speed_m_per_s))
 
@@ -110,7 +117,7 @@ class PathFollower(RobotKnowledgeSource):
         self, view: View, leg: Leg, belief: Entry[Hypothesis], actuator: ActuatorModel
     ) -> tuple[float, tuple[Entry[Any], ...]]:
         """How far ahead the floor is seen to be free, as far as that matters at full speed; and what tells that."""
-        most_m = actuator.stopping_distance_m() + self._settings.action.min_rolling_leg_m
+        most_m = actuator.stopping_distance_m() + MIN_ROLLING_LEG_M
         if not self._settings.action.keeps_to_seen_floor:
             return most_m, ()
         floor = FloorAhead(view, leg, belief, self._settings)
@@ -119,7 +126,7 @@ class PathFollower(RobotKnowledgeSource):
     def _is_floor_ahead(self, view: View, leg: Leg, belief: Entry[Hypothesis], actuator: ActuatorModel) -> bool:
         """Whether enough floor ahead is seen to be free to roll on."""
         free_m, _ = self._look_ahead(view, leg, belief, actuator)
-        return free_m > 2.0 * self._settings.action.rolling_stop_margin_m
+        return free_m > 2.0 * ROLLING_STOP_MARGIN_M
 
     def _may_start(self, view: View) -> bool:
         """Whether the robot stands before a leg that is long enough, and faces along it."""
@@ -129,9 +136,9 @@ class PathFollower(RobotKnowledgeSource):
         if is_over(view) or not is_standing(view) or is_in_doubt(view) or open_milestone(view) is not None:
             return False
         here = belief.value.world_from_robot(robot.world)
-        leg, s = driving[0].value, self._settings.action
+        leg = driving[0].value
         is_long = self._is_long_enough(leg, here, robot.actuator)
-        is_ready = is_long and abs(self._aim_error(leg, here)) <= s.max_rolling_start_error_rad
+        is_ready = is_long and abs(self._aim_error(leg, here)) <= MAX_ROLLING_START_ERROR_RAD
         return is_ready and leg.looking_rad is None and self._is_floor_ahead(view, leg, belief, robot.actuator)
 
     def _must_stop(self, view: View) -> bool:
@@ -140,20 +147,20 @@ class PathFollower(RobotKnowledgeSource):
             return True
         robot = find_robot(view)
         here = belief.value.world_from_robot(robot.world)
-        leg, s = driving[0].value, self._settings.action
+        leg = driving[0].value
         is_long = self._is_long_enough(leg, here, robot.actuator)
-        is_astray = not is_long or abs(self._aim_error(leg, here)) > s.max_rolling_error_rad
+        is_astray = not is_long or abs(self._aim_error(leg, here)) > MAX_ROLLING_ERROR_RAD
         return is_astray or not self._is_floor_ahead(view, leg, belief, robot.actuator)
 
     def _is_long_enough(self, leg: Leg, here: Pose2, actuator: ActuatorModel) -> bool:
         """Whether the robot can drive and still stop before the end of the leg."""
-        least_m = actuator.stopping_distance_m() + self._settings.action.min_rolling_leg_m
+        least_m = actuator.stopping_distance_m() + MIN_ROLLING_LEG_M
         return measure_progress(leg, here)[0] > least_m
 
     def _aim_error(self, leg: Leg, here: Pose2) -> float:
         """Angle from the robot's heading to the point that it steers at, to the left [rad]."""
         along, _ = measure_progress(leg, here)
-        return compute_bearing(find_aim_point(leg, along, self._settings.action.rolling_lookahead_m), here)
+        return compute_bearing(find_aim_point(leg, along, ROLLING_LOOKAHEAD_M), here)
 
 
 def _reasons(view: View) -> tuple[Entry[Discrepancy], ...]:

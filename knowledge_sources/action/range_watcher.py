@@ -16,6 +16,10 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.floor import FreeFloor
 from world_models.entries.touch import Ranges
 
+MAX_BELIEF_SIGMA_M = 0.15  # a less certain place tells of no free floor
+MAX_RANGE_AGE_S = 5.0  # a reading is compared with those that are no older
+MAX_EARLIER_READINGS = 4  # readings that the newest is compared with
+
 
 class RangeWatcher(RobotKnowledgeSource):
     """Concludes from a reading of range sensors where the floor is free, and what ends it.
@@ -32,7 +36,7 @@ class RangeWatcher(RobotKnowledgeSource):
         s, belief = self._settings.floor, find_belief(view)
         if not s.use_ranges or belief is None or is_in_doubt(view) or not is_up_to_date(view):
             return None
-        return 0.6 if view.latest(Ranges) is trigger.entry and belief.value.sigma_m <= s.max_belief_sigma_m else None
+        return 0.6 if view.latest(Ranges) is trigger.entry and belief.value.sigma_m <= MAX_BELIEF_SIGMA_M else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         reading: Entry[Ranges] = trigger.entry
@@ -41,10 +45,9 @@ class RangeWatcher(RobotKnowledgeSource):
             return
         robot, b = find_robot(view), belief.value
         pose = b.world_from_robot(robot.world)
-        s = self._settings.floor
         before = (entry for entry in view.newest_first(FreeFloor) if entry.value.sense == "ranges")
-        earlier = tuple(entry for entry in islice(before, s.max_earlier_readings)
-                        if reading.value.when_s - entry.value.seen_s <= s.max_range_age_s)
+        earlier = tuple(entry for entry in islice(before, MAX_EARLIER_READINGS)
+                        if reading.value.when_s - entry.value.seen_s <= MAX_RANGE_AGE_S)
         floor = see_ranges(robot, b.locale, pose, b.sigma_m, b.sigma_rad, reading.value,
-                           [entry.value for entry in earlier], s)
+                           [entry.value for entry in earlier])
         yield Post(floor, (reading, belief, *earlier[:1]))

@@ -22,6 +22,8 @@ from world_models.entries.obstacle import Obstacle
 from world_models.entries.percepts import Tracks
 from world_models.entries.task import Milestone, PlanSketch
 
+LEG_SLACK_M = 0.03  # an obstacle that is nearer to a leg than the least clearance by so much blocks it
+
 
 class Withdrawer(RobotKnowledgeSource):
     """Withdraws milestones, plan sketches and tracks that rested on what a frame no longer says.
@@ -115,7 +117,7 @@ def _meets(view: View, sketch: Entry[PlanSketch], obstacle: Obstacle, settings: 
     footprint = build_polygon(obstacle.footprint)
     here = shapely.Point(belief.value.world_from_robot(world).position)
     clearance_m = settings.plan.clearances_m[-1] if obstacle.is_there else settings.plan.clearances_m[0]
-    slack_m = settings.action.leg_slack_m
+    slack_m = LEG_SLACK_M
     reach_m = robot.radius_m + clearance_m + (-slack_m if obstacle.is_there else slack_m)
     for index, subgoal in enumerate(s.subgoals[s.at:]):
         if obstacle.locale not in (subgoal.origin.locale, subgoal.destination.locale):

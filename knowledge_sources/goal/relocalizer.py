@@ -53,6 +53,9 @@ from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
+MAX_PROBES = 8  # so many looks are taken when lost and no place fits; then the robot says that it does not know
+MAX_DARK_FRAMES = 150  # so many dark frames are taken while waiting for light
+
 
 class Relocalizer(RobotKnowledgeSource):
     """Keeps every place of the floor that agrees with its pictures, and takes more until one place is left.
@@ -90,7 +93,7 @@ class Relocalizer(RobotKnowledgeSource):
             yield Post(Look("probe"), (trigger.entry, lost))
             return
         if self._is_dark(trigger.entry.value):
-            if len(_probes_since(view, lost)) < self._settings.goal.max_dark_frames:
+            if len(_probes_since(view, lost)) < MAX_DARK_FRAMES:
                 yield Post(Look("probe"), (trigger.entry, lost))
             return
         yield from self._consider(view, trigger.entry, lost, belief)
@@ -127,7 +130,7 @@ class Relocalizer(RobotKnowledgeSource):
             tried.append((localize(by, looks, rooms, self._settings, (locale, here), followed), by, camera))
         seen_result, looking, camera = max(tried, key=lambda one: _measure_fit(one[0]))  # of equals the first
         goal = self._settings.goal
-        is_last = len(glimpses) >= (goal.max_far_probes if seen_result.candidates else goal.max_probes)
+        is_last = len(glimpses) >= (goal.max_far_probes if seen_result.candidates else MAX_PROBES)
         if is_last:
             seen_result = replace(seen_result, next_action=None)
         look_alike = make_alias_test(looking, [g.now_from_then for g in glimpses], self._settings)

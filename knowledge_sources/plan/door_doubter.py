@@ -12,12 +12,15 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.doors_in_view import (
+    MAX_SIGMA_M,
+    MAX_SIGMA_RAD,
     Watched,
     find_door_state,
     list_doors_in_view,
     shut_in_frames,
     with_door_shut,
 )
+from knowledge_sources.methods.doors.belief import MAX_LOG_ODDS, MIN_LOG_RATIO, PRIOR_LOG_ODDS, SHUT_LOG_ODDS
 from knowledge_sources.methods.doors.explanation import Explanation, explain_picture
 from knowledge_sources.methods.doors.leaf import describe, measure_opening, weigh_leaf
 from knowledge_sources.methods.doors.opening import predict_opening
@@ -40,6 +43,15 @@ from world_models.entries.percepts import Segments
 from world_models.entries.task import Milestone
 from world_models.frames import Pose2, wrap_angle
 
+MAX_DOUBTED_SIGMA_M = 0.3  # largest standard deviation of the place at which a shut door may explain a picture
+MAX_DOUBTED_SIGMA_RAD = 0.07  # largest standard deviation of the believed heading at which it may
+MAX_DOUBTED_SIGMAS = 3.0  # standard deviations of the belief within which the explained pose must be
+MIN_EXPLAINED_BETTER = 10.0  # least ratio by which the pose is likelier to be wrong with the door open
+REFUTED_LOG_RATIO = 4.6  # what a milestone that is refuted at a trusted place adds for a door that explains it
+MIN_FEW_LINES = 3  # fewest lines by which a frame is told, where they are too few to tell the place by
+MIN_FEW_SHARE = 0.6  # least share of these that must be there
+MIN_SURE_FRAME_SHARE = 0.8  # where there are fewer, least share of the opening's frame that has the model's color
+
 
 class DoorDoubter(RobotKnowledgeSource):
     """Holds "I am where I believe, and this door is shut" against a picture by which a milestone was refuted.
@@ -60,17 +72,16 @@ class DoorDoubter(RobotKnowledgeSource):
             return None
         if open_discrepancy(view, Level.GOAL) is not None or _find_segments(view, trigger.entry) is None:
             return None
-        s = self._settings.doors
-        if belief.value.sigma_m > s.max_doubted_sigma_m or belief.value.sigma_rad > s.max_doubted_sigma_rad:
+        if belief.value.sigma_m > MAX_DOUBTED_SIGMA_M or belief.value.sigma_rad > MAX_DOUBTED_SIGMA_RAD:
             return None
-        return 1.0 if any(not w.is_shut for w in list_doors_in_view(view, belief.value, s)) else None
+        return 1.0 if any(not w.is_shut for w in list_doors_in_view(view, belief.value)) else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, segments = find_belief(view), _find_segments(view, trigger.entry)
         doubt = open_discrepancy(view, Level.PLAN)
         if belief is None or segments is None or doubt is None:
             return
-        for watched in list(list_doors_in_view(view, belief.value, self._settings.doors)):
+        for watched in list(list_doors_in_view(view, belief.value)):
             if not watched.is_shut:
                 found = self._hold_against(view, watched, trigger.entry, belief, segments)
                 if found is not None:
@@ -85,7 +96,7 @@ class DoorDoubter(RobotKnowledgeSource):
         segments: Entry[Segments],
     ) -> Post | Revise | None:
         """The door's state, where the picture says that it is shut and the robot where it believes to be."""
-        s, door, locale = self._settings.doors, watched.doorway, belief.value.locale
+        door, locale = watched.doorway, belief.value.locale
         frame: Entry[Frame] = view[segments.value.frame]
         robot, frames = find_robot_in(view, locale), find_frames(view, door.between)
         before, covariance = belief.value.world_from_robot(robot.world), belief.value.covariance_world(robot.world)
@@ -96,20 +107,20 @@ class DoorDoubter(RobotKnowledgeSource):
         if shut is None or not self._is_explained(shut, opened, belief.value):
             return None
         pose = shut.pose
-        if not _is_near(before, pose, belief.value, s.max_doubted_sigmas):
+        if not _is_near(before, pose, belief.value, MAX_DOUBTED_SIGMAS):
             return None
-        opening = predict_opening(robot, pose, shut.covariance, door, locale, robot.world, s)
-        evidence = None if opening is None else measure_opening(robot, opening, read_picture(frame.value.jpeg).half, s)
+        opening = predict_opening(robot, pose, shut.covariance, door, locale, robot.world)
+        evidence = None if opening is None else measure_opening(robot, opening, read_picture(frame.value.jpeg).half)
         if opening is None or evidence is None:
             return None
-        ratio = weigh_leaf(evidence, s)
-        if ratio < s.min_log_ratio or (shut.matched < s.min_few_lines and evidence.frame < s.min_sure_frame_share):
+        ratio = weigh_leaf(evidence)
+        if ratio < MIN_LOG_RATIO or (shut.matched < MIN_FEW_LINES and evidence.frame < MIN_SURE_FRAME_SHARE):
             return None
-        odds = min(ratio - s.prior_log_odds + s.refuted_log_ratio, s.max_log_odds)
-        if odds < s.shut_log_odds:
+        odds = min(ratio - PRIOR_LOG_ODDS + REFUTED_LOG_RATIO, MAX_LOG_ODDS)
+        if odds < SHUT_LOG_ODDS:
             return None
         told = f"with it shut {shut.matched} of {shut.expected} lines are where they should be"
-        told = told if shut.matched >= s.min_few_lines else "in its frame"
+        told = told if shut.matched >= MIN_FEW_LINES else "in its frame"
         what = milestone.value.what.partition(", because")[0]
         shows = f"{describe(evidence, ratio)}, {told}, while {what} is {milestone.value.status}"
         picture = DoorPicture(frame.id, opening.box_px, pose.x_m, pose.y_m, pose.heading_rad, ratio, shows)
@@ -126,14 +137,13 @@ class DoorDoubter(RobotKnowledgeSource):
         Where too few lines are in view to tell the place by, the belief must be sure, and these lines be there; of
         none, or next to none, the frame of the opening must do.
         """
-        s = self._settings.doors
         if not shut.is_solved:
-            is_sure = belief.sigma_m <= s.max_sigma_m and belief.sigma_rad <= s.max_sigma_rad
-            are_there = shut.matched >= s.min_few_share * shut.expected
-            return is_sure and (are_there or shut.expected < s.min_few_lines)
+            is_sure = belief.sigma_m <= MAX_SIGMA_M and belief.sigma_rad <= MAX_SIGMA_RAD
+            are_there = shut.matched >= MIN_FEW_SHARE * shut.expected
+            return is_sure and (are_there or shut.expected < MIN_FEW_LINES)
         if not POSE_CONFIDENCE.accepts(shut.p_false):
             return False
-        return opened is None or not opened.is_solved or opened.p_false > s.min_explained_better * shut.p_false
+        return opened is None or not opened.is_solved or opened.p_false > MIN_EXPLAINED_BETTER * shut.p_false
 
 
 def _find_segments(view: View, milestone: Entry[Milestone]) -> Entry[Segments] | None:

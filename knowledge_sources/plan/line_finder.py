@@ -16,6 +16,8 @@ from world_models.entries.body import Frame
 from world_models.entries.percepts import Segments
 from world_models.frames import frozen
 
+MIN_SEGMENT_LENGTH_PX = 10.0  # shortest segment that is kept; shorter ones mostly belong to what the model lacks
+
 
 class LineFinder(RobotKnowledgeSource):
     """Finds the line segments of a frame that was taken for a milestone or for relocalization.
@@ -34,7 +36,7 @@ class LineFinder(RobotKnowledgeSource):
         frame = trigger.entry
         robot = find_robot(view)
         image = read_picture(frame.value.jpeg).rectified(robot.lens, robot.camera)
-        found = find_lines(image, min_length_px=self._settings.plan.min_segment_length_px,
+        found = find_lines(image, min_length_px=MIN_SEGMENT_LENGTH_PX,
                            settings=self._settings.features)
         brightness, contrast = compute_mean_and_deviation(image)
         waiting = open_milestone(view) if frame.value.purpose == "milestone" else None

@@ -13,6 +13,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
 from knowledge_sources.camera_knowledge import (
+    RIGID_DISTANCE_M,
     add_yaw,
     compute_camera_covariance,
     compute_knocked_covariance,
@@ -29,6 +30,8 @@ from world_models.entries.percepts import LineMatch, Segments
 from world_models.entries.task import Milestone
 from world_models.frames import frozen
 from world_models.robot import RobotModel
+
+MAX_RIGID_SIGMA_PX = 6.0  # up to this uncertainty lines are matched in the image (§6.1); beyond it, on the floor
 
 Floats = NDArray[np.float64]
 
@@ -83,7 +86,7 @@ class Matcher(RobotKnowledgeSource):
         if not is_camera_known(robot, known, self._settings):
             return match_with_camera(*given, *prior, known, self._settings).match, False
         found = rate_match(self._match_with_known_camera(robot, milestone, lines_world, data_px, belief), *given,
-                           prior[0], loosen(prior[1], self._settings.plan), known, self._settings)
+                           prior[0], loosen(prior[1]), known, self._settings)
         if found.sharp_part >= s.min_sharp_part and found.prior_chi2 <= s.max_chi2:
             return found.match, False
         opened = compute_knocked_covariance(camera, s)
@@ -94,9 +97,8 @@ class Matcher(RobotKnowledgeSource):
     def _match_with_known_camera(
         self, robot: RobotModel, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
     ) -> Match | PoseMatch:
-        s = self._settings.plan
-        sigma_px = robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / s.rigid_distance_m)
-        if sigma_px <= s.max_rigid_sigma_px:
+        sigma_px = robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / RIGID_DISTANCE_M)
+        if sigma_px <= MAX_RIGID_SIGMA_PX:
             model_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
             return match_lines(model_px, data_px, self._settings.matching)
         return match_on_floor(

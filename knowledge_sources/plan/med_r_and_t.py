@@ -52,10 +52,10 @@ class MedRAndT(RobotKnowledgeSource):
         if belief is None or milestone is None:
             return
         m: Milestone = milestone.value
-        s, own, locale = self._settings.plan, self._settings.camera_state, belief.value.locale
+        own, locale = self._settings.camera_state, belief.value.locale
         robot, camera = find_robot(view).on_floor_of(locale), find_camera(view)
         here = belief.value.world_from_robot(robot.world)
-        prior, known = loosen(belief.value.covariance_world(robot.world), s), compute_camera_covariance(camera, own)
+        prior, known = loosen(belief.value.covariance_world(robot.world)), compute_camera_covariance(camera, own)
         if match.value.is_camera_open:
             opened = compute_knocked_covariance(camera, own)
             prior, known = add_yaw(prior, opened, known), opened

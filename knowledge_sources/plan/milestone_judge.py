@@ -32,6 +32,15 @@ from world_models.entries.task import Certificate, Milestone, MilestoneVerdict
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
+MIN_ALIAS_PART = 0.8  # another place at which this part of the agreement is seen is not ruled out
+P_FALSE_ALIAS = 0.3
+"""Probability of a wrong place where another one is not ruled out (harvey experiment milestones: 993 of 10,289
+cases)."""
+MAX_P_FALSE_UNMISTAKABLE = 2e-4  # up to this probability of a wrong place, it is not compared with others
+MAX_P_FALSE_CLEAR = 2e-3
+"""Up to this one, only with places at which the room repeats itself; beyond, with the whole room."""
+MIN_ALIAS_MARGIN = 1.0  # fewest lines that must speak for the place and not for the other one
+
 Floats = NDArray[np.float64]
 
 
@@ -183,7 +192,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         kind, reason = self._first_verdict(weighed)
         elsewhere = self._elsewhere(view, weighed) if kind == "verified" and weighed.room else ""
         if elsewhere:
-            p_false = max(weighed.p_false, self._settings.plan.p_false_alias)
+            p_false = max(weighed.p_false, P_FALSE_ALIAS)
             return Verdict("not testable", f"{reason}; but {elsewhere}", p_false)
         return Verdict(kind, reason, weighed.p_false)
 
@@ -215,12 +224,11 @@ class MilestoneJudge(RobotKnowledgeSource):
         other = self._find_likely_hypothesis(view, weighed)
         if other is not None:
             return f"as much agrees at {other.id}"
-        s = self._settings.plan
-        if weighed.p_false <= s.max_p_false_unmistakable or not weighed.is_weak:
+        if weighed.p_false <= MAX_P_FALSE_UNMISTAKABLE or not weighed.is_weak:
             return ""
         alias = find_strongest_alias(weighed.robot, weighed.segments.segments_px, weighed.room, weighed.pose,
-                                     search=weighed.p_false > s.max_p_false_clear, settings=self._settings)
-        if alias is not None and alias.margin < s.min_alias_margin:
+                                     search=weighed.p_false > MAX_P_FALSE_CLEAR, settings=self._settings)
+        if alias is not None and alias.margin < MIN_ALIAS_MARGIN:
             return f"it may be another door of {weighed.room}, or its other side"
         return ""
 
@@ -228,7 +236,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         """A candidate with which the picture agrees as well, once it is corrected as the belief is."""
         correction = weighed.before.inverse() @ weighed.pose
         s = self._settings.verification
-        least = self._settings.plan.min_alias_part * weighed.lines.coverage
+        least = MIN_ALIAS_PART * weighed.lines.coverage
         for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
             there = other.value.world_from_robot(weighed.robot.world) @ correction
             lines = predict_lines(weighed.robot, there, s)

@@ -35,7 +35,6 @@ from knowledge_sources.questions import (
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.plan import PlanSettings
 from world_models.building.building import Building
 from world_models.building.model_errors import pack_errors
 from world_models.entries.body import Look
@@ -45,6 +44,17 @@ from world_models.entries.task import Certificate, Milestone, PlanSketch, Subgoa
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import VisibleLines
+
+MAX_LOOK_ERROR_RAD = math.radians(3.5)  # the robot faces a milestone when its heading is off by no more than this
+MAX_COUNTED_LENGTH_PX = 120.0  # a line longer than this is no clearer than one of this length
+MAX_COUNTED_CONTRAST = 0.3  # a line of more contrast than this is no clearer than one of this contrast
+MAX_SIGMA_PART = 0.3  # a view is good if it tells the place to this part of the subgoal's tolerance
+MAX_SIGMA_RAD = math.radians(0.25)  # a view is good if it tells the heading to this standard deviation
+MIN_LINES = 10  # fewest lines of a good view
+CHECK_TOLERANCE_M = 0.1  # tolerance that a view is chosen by where no subgoal states one
+MIN_LOOK_DIFFERENCE_RAD = math.radians(20.0)  # looks whose directions differ by less show much the same
+INDEPENDENT_LOOK_RAD = math.radians(65.0)
+"""Looks that differ by so much show nothing twice; nearer ones count less (the field of view)."""
 
 
 class MilestoneSelector(RobotKnowledgeSource):
@@ -117,7 +127,7 @@ class MilestoneSelector(RobotKnowledgeSource):
             return
         robot, pose = _find_robot_and_pose(view, belief.value)
         headings = self._find_untried(self._turned_headings(pose), tried) or [pose.heading_rad]
-        heading = choose_heading(robot, pose, headings, self._settings.plan.check_tolerance_m, settings=self._settings)
+        heading = choose_heading(robot, pose, headings, CHECK_TOLERANCE_M, settings=self._settings)
         turned = replace(check, look_heading_rad=heading)
         yield Post(replace(turned, told=self._sum_told(view, turned)), (doubt, belief))
 
@@ -176,12 +186,12 @@ class MilestoneSelector(RobotKnowledgeSource):
         p = min(max(c.p_false, 1e-9), 1.0 - 1e-9)
         apart = min(abs(wrap_angle(milestone.look_heading_rad - heading)) for heading in milestone.tried)
         said = min(max(math.log(p / (1.0 - p)), -s.max_told), s.max_told)
-        return last.value.told + min(1.0, apart / s.independent_look_rad) * said
+        return last.value.told + min(1.0, apart / INDEPENDENT_LOOK_RAD) * said
 
     def _choose_direction(self, robot: RobotModel, sketch: PlanSketch, pose: Pose2, tried: Sequence[float]) -> float:
         before = sketch.subgoals[sketch.at - 1] if sketch.at else None
         headings = self._find_untried(self._candidate_headings(robot.world, sketch, pose), tried)
-        tolerance_m = before.tolerance_m if before else self._settings.plan.check_tolerance_m
+        tolerance_m = before.tolerance_m if before else CHECK_TOLERANCE_M
         return choose_heading(robot, pose, headings, tolerance_m, _car(sketch, sketch.at), self._settings)
 
     def _candidate_headings(self, building: Building, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
@@ -210,12 +220,12 @@ class MilestoneSelector(RobotKnowledgeSource):
 
     def _find_untried(self, headings: Iterable[float], tried: Sequence[float]) -> list[float]:
         """The headings whose views differ from those that were tried."""
-        least = self._settings.plan.min_look_difference_rad
+        least = MIN_LOOK_DIFFERENCE_RAD
         return [h for h in headings if all(abs(wrap_angle(h - other)) > least for other in tried)]
 
     def _faces(self, view: View, belief: Hypothesis, milestone: Milestone) -> bool:
         error = wrap_angle(_find_heading(view, belief) - milestone.look_heading_rad)
-        return abs(error) <= self._settings.plan.max_look_error_rad
+        return abs(error) <= MAX_LOOK_ERROR_RAD
 
 
 def _find_robot_and_pose(view: View, belief: Hypothesis) -> tuple[RobotModel, Pose2]:
@@ -268,17 +278,17 @@ def choose_heading(
     rated: list[tuple[ViewQuality, float]] = []
     for heading in headings:
         quality = _compute_quality(robot, Pose2(pose.x_m, pose.y_m, heading), car, settings)
-        if is_good_view(quality, tolerance_m, settings.plan):
+        if is_good_view(quality, tolerance_m):
             return heading
         rated.append((quality, heading))
-    best = min(range(len(rated)), key=lambda i: (rated[i][0].lines < settings.plan.min_lines, rated[i][0].sigma_m, i))
+    best = min(range(len(rated)), key=lambda i: (rated[i][0].lines < MIN_LINES, rated[i][0].sigma_m, i))
     return rated[best][1]
 
 
-def is_good_view(quality: ViewQuality, tolerance_m: float, settings: PlanSettings) -> bool:
+def is_good_view(quality: ViewQuality, tolerance_m: float) -> bool:
     """Whether a view tells place and heading well enough for a tolerance, by enough lines."""
-    sharp = quality.sigma_m <= settings.max_sigma_part * tolerance_m and quality.sigma_rad <= settings.max_sigma_rad
-    return sharp and quality.lines >= settings.min_lines
+    sharp = quality.sigma_m <= MAX_SIGMA_PART * tolerance_m and quality.sigma_rad <= MAX_SIGMA_RAD
+    return sharp and quality.lines >= MIN_LINES
 
 
 def predict_milestone(
@@ -317,7 +327,7 @@ def _predict_clear_lines(robot: RobotModel, pose: Pose2, car: str, settings: Set
     if len(lines) <= s.max_lines:
         return lines
     lengths = np.linalg.norm(lines.segments_px[:, 1] - lines.segments_px[:, 0], axis=1)
-    clear = np.minimum(lengths, s.max_counted_length_px) * np.minimum(lines.contrast, s.max_counted_contrast)
+    clear = np.minimum(lengths, MAX_COUNTED_LENGTH_PX) * np.minimum(lines.contrast, MAX_COUNTED_CONTRAST)
     return lines[np.sort(np.argsort(-clear, kind="stable")[:s.max_lines])]
 
 

@@ -22,6 +22,9 @@ from world_models.entries.obstruction import Obstruction
 from world_models.entries.percepts import Segments
 from world_models.frames import Pose2
 
+MIN_OBSTRUCTION_LOOKS = 3  # what stands still in so many looks is before the camera; in two it may by chance
+MIN_OBSTRUCTION_PART = 0.04  # smallest part of the picture that an obstruction covers
+
 
 class ObstructionFinder(RobotKnowledgeSource):
     """Finds what is at the same place in pictures taken in several directions: it is before the camera.
@@ -50,7 +53,7 @@ class ObstructionFinder(RobotKnowledgeSource):
         looks, known = _list_last_looks(view, self._settings.plan.max_obstruction_looks), view.latest(Obstruction)
         views = [CameraView(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
                  for s, heading_rad in looks]
-        if len(views) < self._settings.plan.min_obstruction_looks:
+        if len(views) < MIN_OBSTRUCTION_LOOKS:
             return None
         camera = find_robot(view).camera
         now = _find_in_last_looks(views, camera, None if known is None else known.value, self._settings)
@@ -61,9 +64,9 @@ def _find_in_last_looks(
     views: Sequence[CameraView], camera: Camera, known: Obstruction | None, settings: Settings
 ) -> Obstruction | None:
     """The obstruction that all looks show; else that fewer of the last ones show, as it may be new."""
-    for number in range(len(views), settings.plan.min_obstruction_looks - 1, -1):
+    for number in range(len(views), MIN_OBSTRUCTION_LOOKS - 1, -1):
         found = update_obstruction(
-            views[:number], camera, known, settings.plan.min_obstruction_part, settings.localization)
+            views[:number], camera, known, MIN_OBSTRUCTION_PART, settings.localization)
         if found is not None:
             return found
     return None

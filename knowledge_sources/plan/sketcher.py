@@ -23,6 +23,12 @@ from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch, Subgoal
 from world_models.frames import wrap_angle
 
+GOAL_TOLERANCE_M = 0.010  # tolerance at the goal
+GOAL_HEADING_TOLERANCE_RAD = 0.02  # tolerance of a heading that the goal states
+MAX_WALKED_ROOMS = 200  # so many rooms are searched for a way that people can walk, to say so where wheels have none
+INEXACT_TOLERANCE_SIGMAS = 2.0
+"""Deviations of the belief that are added to the tolerance of a goal where the model is inexact."""
+
 
 class Sketcher(RobotKnowledgeSource):
     """Draws (M0 (ptrans a b) M1 ... Mg) for a goal, then for the current subgoal, until that is primitive (Figure 9).
@@ -99,7 +105,7 @@ class Sketcher(RobotKnowledgeSource):
             yield self._look_again(view, goal, named, looks) or Post(Outcome("blocked", reason), (*because, *named))
             return
         subgoals = _find_first(planner.plan_between_locales(
-            here, goal.value.destination, self._settings.plan.goal_tolerance_m) for planner in planners)
+            here, goal.value.destination, GOAL_TOLERANCE_M) for planner in planners)
         if subgoals is None:
             obstacles = _find_obstacles(view)
             why = self._explain_no_way(view, here.locale, goal.value.destination.locale)
@@ -140,7 +146,7 @@ class Sketcher(RobotKnowledgeSource):
         least = list_corners(middle.buffer(MIN_SIDE_M))
         obstacles = [replace(o.value, core=least if o.id == without.id else ()) for o in _find_obstacles(view)]
         planner = SubgoalPlanner(find_robot(view), self._settings.plan, obstacles, by_cores=True)
-        tolerance_m = self._settings.plan.goal_tolerance_m
+        tolerance_m = GOAL_TOLERANCE_M
         return not planner.explain_unfit(goal.destination) and planner.plan_between_locales(
             _place_of(belief), goal.destination, tolerance_m) is not None
 
@@ -167,8 +173,8 @@ class Sketcher(RobotKnowledgeSource):
         here, there = belief.world_from_robot(building), subgoal.destination.in_world(building)
         heading = subgoal.destination.heading_rad
         error = 0.0 if heading is None else wrap_angle(here.heading_rad - there.heading_rad)
-        turned = abs(error) > self._settings.plan.goal_heading_tolerance_rad
-        wider_m = self._settings.plan.inexact_tolerance_sigmas * belief.sigma_m if is_inexact else 0.0
+        turned = abs(error) > GOAL_HEADING_TOLERANCE_RAD
+        wider_m = INEXACT_TOLERANCE_SIGMAS * belief.sigma_m if is_inexact else 0.0
         return here.distance_to(there) > math.hypot(subgoal.tolerance_m, wider_m) or turned
 
     def _adjust(
@@ -229,7 +235,7 @@ class Sketcher(RobotKnowledgeSource):
         """Whether a way leads to the goal by other passages than those of the sketch that is being carried out."""
         drawn = view.latest(PlanSketch, lambda s: s.is_active and not s.path)
         parts = _find_first(planner.plan_between_locales(
-            _place_of(belief), goal.destination, self._settings.plan.goal_tolerance_m)
+            _place_of(belief), goal.destination, GOAL_TOLERANCE_M)
             for planner in self._list_planners(view))
         if parts is None:
             return False
@@ -257,7 +263,7 @@ class Sketcher(RobotKnowledgeSource):
         here, there = _place_of(belief.value), goal.value.destination
         planner, drawn = self._list_planners(view)[0], view.latest(PlanSketch, lambda s: s.is_active and not s.path)
         halts = 1 if drawn is None else drawn.value.halts + 1
-        leads_there = planner.plan_between_locales(here, there, self._settings.plan.goal_tolerance_m) is not None
+        leads_there = planner.plan_between_locales(here, there, GOAL_TOLERANCE_M) is not None
         if leads_there and halts <= self._settings.plan.max_adjustments:
             yield from self._begin(view, goal, halts=halts)
             return
@@ -289,7 +295,7 @@ class Sketcher(RobotKnowledgeSource):
                 return f"no way is left from {here} to {there}{_name_obstacles(obstacles)}"
             return f"something stands before a passage on the way from {here} to {there}"
         shut = "".join(f"; {doorway.name} is shut" for doorway in building.shut_doorways())
-        by_stairs = building.is_walkable(here, there, self._settings.plan.max_walked_rooms)
+        by_stairs = building.is_walkable(here, there, MAX_WALKED_ROOMS)
         stairs = "; people can walk there, by stairs" * by_stairs
         return f"no passage for wheels leads from {here} to {there}{shut}{stairs}"
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from knowledge_sources.settings.action import ActionSettings
 from knowledge_sources.settings.calibration import CalibrationSettings
 from knowledge_sources.settings.camera_state import CameraStateSettings
-from knowledge_sources.settings.doors import DoorSettings
 from knowledge_sources.settings.features import FeaturesSettings
 from knowledge_sources.settings.floor import FloorSettings
 from knowledge_sources.settings.goal import GoalSettings
@@ -34,7 +33,6 @@ class Settings:
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
     calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
     camera_state: CameraStateSettings = field(default_factory=CameraStateSettings)
-    doors: DoorSettings = field(default_factory=DoorSettings)
     action: ActionSettings = field(default_factory=ActionSettings)
     plan: PlanSettings = field(default_factory=PlanSettings)
     goal: GoalSettings = field(default_factory=GoalSettings)

@@ -12,9 +12,6 @@ class GoalSettings:
     """The numbers of the knowledge sources of the goal level (§2)."""
 
     # Relocalizer
-    max_probes: int = setting(
-        8, "count", "So many looks are taken when lost and no place fits; then the robot says that it does not know.",
-        "engineering judgement")
     max_far_probes: int = setting(
         20, "count", "So many looks are taken when lost and places fit: it turns, and drives to views that tell them"
         " apart.", "engineering judgement")
@@ -28,5 +25,3 @@ class GoalSettings:
     min_brightness: float = setting(
         40.0, "grey levels", "A dark frame also has a lower mean than this; a brighter one shows a bare wall.",
         "engineering judgement")
-    max_dark_frames: int = setting(
-        150, "count", "So many dark frames are taken while waiting for light.", "engineering judgement")

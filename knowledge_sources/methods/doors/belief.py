@@ -4,33 +4,40 @@ from __future__ import annotations
 
 import math
 
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.doors import DoorSettings
 from world_models.entries.door_state import DoorCondition, DoorPicture, DoorState
 from world_models.frames import wrap_angle
+
+MIN_LOG_RATIO = 2.0  # least that is counted
+PRIOR_LOG_ODDS = 4.0  # log odds that a door is as it is believed to be, before a picture is taken: 98 %
+SHUT_LOG_ODDS = 4.6  # log odds from which a door is shut: 99 %
+OPEN_LOG_ODDS = -3.0  # log odds up to which a door is open: 95 %
+MAX_LOG_ODDS = 7.0  # largest log odds that are kept, that a door may open again
+MIN_PICTURES = 2  # fewest pictures by which a door is shut
+MIN_STEP_M = 0.3  # pictures of a door that count both are taken so far from each other
+MIN_TURN_RAD = 0.17  # or turned by so much
 
 
 def update_door(
     known: DoorState | None, door: str, between: tuple[str, str], picture: DoorPicture, seen_s: float, *,
-    is_believed_shut: bool, settings: DoorSettings = DEFAULT.doors,
+    is_believed_shut: bool,
 ) -> DoorState | None:
     """What is believed of a door after a picture; None where that picture adds nothing.
 
     A picture from where the last one was taken shows the same again: it counts only for what it says more.
     """
-    log_odds = known.log_odds if known is not None else (1 if is_believed_shut else -1) * settings.prior_log_odds
+    log_odds = known.log_odds if known is not None else (1 if is_believed_shut else -1) * PRIOR_LOG_ODDS
     gain, count = picture.log_ratio, 0 if known is None else known.pictures
-    if known is not None and is_same_view(known.last, picture, settings):
+    if known is not None and is_same_view(known.last, picture):
         gain = _stronger(picture.log_ratio, known.last.log_ratio)
         if gain == 0.0:
             return None
     else:
         count += 1
-    if abs(gain) < settings.min_log_ratio:
+    if abs(gain) < MIN_LOG_RATIO:
         return None
-    most = settings.max_log_odds
+    most = MAX_LOG_ODDS
     log_odds = min(max(log_odds + gain, -most), most)
-    state = _name_state(log_odds, count, known, settings)
+    state = _name_state(log_odds, count, known)
     if known is not None and (state, log_odds) == (known.state, known.log_odds):
         return None
     p_shut = 1.0 / (1.0 + math.exp(-log_odds))
@@ -38,10 +45,10 @@ def update_door(
     return DoorState(door, between, state, certainty, log_odds, count, picture, seen_s)
 
 
-def is_same_view(one: DoorPicture, other: DoorPicture, settings: DoorSettings = DEFAULT.doors) -> bool:
+def is_same_view(one: DoorPicture, other: DoorPicture) -> bool:
     """Whether two pictures were taken from nearly the same pose."""
-    near = math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) < settings.min_step_m
-    return near and abs(wrap_angle(one.heading_rad - other.heading_rad)) < settings.min_turn_rad
+    near = math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) < MIN_STEP_M
+    return near and abs(wrap_angle(one.heading_rad - other.heading_rad)) < MIN_TURN_RAD
 
 
 def _stronger(now: float, before: float) -> float:
@@ -51,10 +58,10 @@ def _stronger(now: float, before: float) -> float:
     return math.copysign(max(abs(now) - abs(before), 0.0), now)
 
 
-def _name_state(log_odds: float, count: int, known: DoorState | None, settings: DoorSettings) -> DoorCondition:
-    if log_odds >= settings.shut_log_odds and count >= settings.min_pictures:
+def _name_state(log_odds: float, count: int, known: DoorState | None) -> DoorCondition:
+    if log_odds >= SHUT_LOG_ODDS and count >= MIN_PICTURES:
         return "shut"
-    if log_odds <= settings.open_log_odds:
+    if log_odds <= OPEN_LOG_ODDS:
         return "open"
     was = "unknown" if known is None else known.state
     return was if was == "shut" else "unknown"

@@ -15,9 +15,23 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Image
 from knowledge_sources.methods.doors.opening import Opening
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.doors import DoorSettings
 from world_models.robot import RobotModel
+
+MIN_GREY = 6.0  # least median brightness of an opening that is judged [grey levels]
+MAX_GREY = 250.0  # a sample is overexposed where one of its colors is brighter [grey levels]
+MIN_EXPOSED_SHARE = 0.8  # least share of an opening's samples that are not overexposed, where it is judged
+DARK_OFFSET = 4.0  # grey levels added before a ratio of colors is taken, against noise in the dark
+MIN_COMPARED = 20  # fewest samples for which the model has a color
+MAX_LEAF_BRIGHTNESS = 0.2  # largest difference of log brightness within a leaf
+MAX_LEAF_TINT = 0.08  # largest difference of log color, without brightness, within a leaf
+MAX_GAIN_BRIGHTNESS = 0.15  # largest difference of log brightness from the model's, up to one gain
+MAX_GAIN_TINT = 0.06  # largest difference of log color, without brightness, from the model's, up to one gain
+FOOT_M = 0.35  # height of what counts as the foot of an opening
+MIN_FOOT_SAMPLES = 8  # fewest samples at the foot, and above it, by which both compare
+MIN_FRAME_SAMPLES = 12  # fewest samples round an opening by which it is told whether something stands before it
+MIN_FRAME_SHARE = 0.6  # least share of them that has the model's color, up to one gain, where nothing stands before it
+MAX_FRAME_LEAF_SHARE = 0.4  # largest share of them that has the color of the opening, where that is a leaf
+MAX_LOG_RATIO = 4.5  # most that one picture may add to the log odds of a door: 90 to 1
 
 MAX_COMPARED = 60
 """Samples that the others are compared with."""
@@ -70,7 +84,7 @@ WEIGHTS = (4.04, 1.33, -3.65, -7.24, -1.59, 2.18, -1.03, 4.79)
 
 
 def measure_opening(
-    robot: RobotModel, opening: Opening, image: Image, settings: DoorSettings = DEFAULT.doors
+    robot: RobotModel, opening: Opening, image: Image
 ) -> LeafEvidence | None:
     """Measure an opening in a picture (h, w, 3), as the lens made it, maybe reduced; None where it is too dark or too
     bright: all that is overexposed has one color.
@@ -82,23 +96,23 @@ def measure_opening(
     part = (at + 0.5) / (lens.width, lens.height) * (width, height)
     column, row = np.clip(part.astype(np.int64), 0, (width - 1, height - 1)).T
     seen, around = np.split(cv2.blur(image, (3, 3))[row, column].astype(np.float64), [len(opening.pixels)])
-    is_exposed = seen.max(axis=1) <= settings.max_grey
-    if np.median(seen) < settings.min_grey or is_exposed.mean() < settings.min_exposed_share:
+    is_exposed = seen.max(axis=1) <= MAX_GREY
+    if np.median(seen) < MIN_GREY or is_exposed.mean() < MIN_EXPOSED_SHARE:
         return None
-    colors = np.log(seen + settings.dark_offset)
+    colors = np.log(seen + DARK_OFFSET)
     compared = opening.is_whole & ~np.isnan(opening.colors[:, 0])
-    if np.count_nonzero(compared) < settings.min_compared:
+    if np.count_nonzero(compared) < MIN_COMPARED:
         return None
-    expected = np.log(255.0 * opening.colors[compared] + settings.dark_offset)
+    expected = np.log(255.0 * opening.colors[compared] + DARK_OFFSET)
     frame, frame_leaf = _compare_frame(
-        np.log(around + settings.dark_offset), opening.frame_colors, np.median(colors, axis=0), settings)
-    one, other = settings.max_leaf_brightness, settings.max_leaf_tint
+        np.log(around + DARK_OFFSET), opening.frame_colors, np.median(colors, axis=0))
+    one, other = MAX_LEAF_BRIGHTNESS, MAX_LEAF_TINT
     return LeafEvidence(
         len(colors), len(expected),
         find_largest_share(colors, one, other), find_largest_share(expected, one, other),
-        find_largest_share(colors[compared] - expected, settings.max_gain_brightness, settings.max_gain_tint),
-        _compare_foot(colors, opening.height_m, settings),
-        _compare_foot(expected, opening.height_m[compared], settings),
+        find_largest_share(colors[compared] - expected, MAX_GAIN_BRIGHTNESS, MAX_GAIN_TINT),
+        _compare_foot(colors, opening.height_m),
+        _compare_foot(expected, opening.height_m[compared]),
         frame, frame_leaf,
     )
 
@@ -112,43 +126,43 @@ def find_largest_share(logs: Floats, brightness: float, tint: float) -> float:
     return float(((np.abs(level) <= brightness) & (tints <= tint)).mean(axis=0).max())
 
 
-def _compare_foot(logs: Floats, height_m: Floats, settings: DoorSettings) -> float:
+def _compare_foot(logs: Floats, height_m: Floats) -> float:
     """How different the colors at the foot are from those above; NaN where too few of either are in view."""
-    low, high = logs[height_m < settings.foot_m], logs[height_m > 2.0 * settings.foot_m]
-    if min(len(low), len(high)) < settings.min_foot_samples:
+    low, high = logs[height_m < FOOT_M], logs[height_m > 2.0 * FOOT_M]
+    if min(len(low), len(high)) < MIN_FOOT_SAMPLES:
         return math.nan
     return float(np.abs(np.median(low, axis=0) - np.median(high, axis=0)).max())
 
 
-def _compare_frame(seen: Floats, colors: Floats, leaf: Floats, settings: DoorSettings) -> tuple[float, float]:
+def _compare_frame(seen: Floats, colors: Floats, leaf: Floats) -> tuple[float, float]:
     """The shares of what is round an opening that have the model's color and the opening's own; NaN without samples."""
     known = ~np.isnan(colors[:, 0])
-    if np.count_nonzero(known) < settings.min_frame_samples:
+    if np.count_nonzero(known) < MIN_FRAME_SAMPLES:
         return math.nan, math.nan
-    expected = np.log(255.0 * colors[known] + settings.dark_offset)
-    agreeing = find_largest_share(seen[known] - expected, settings.max_gain_brightness, settings.max_gain_tint)
+    expected = np.log(255.0 * colors[known] + DARK_OFFSET)
+    agreeing = find_largest_share(seen[known] - expected, MAX_GAIN_BRIGHTNESS, MAX_GAIN_TINT)
     off = seen - leaf
     level = off.mean(axis=1)
     tint = np.abs(off - level[:, None]).max(axis=1)
-    alike = (np.abs(level) <= settings.max_leaf_brightness) & (tint <= settings.max_leaf_tint)
+    alike = (np.abs(level) <= MAX_LEAF_BRIGHTNESS) & (tint <= MAX_LEAF_TINT)
     return agreeing, float(alike.mean())
 
 
-def weigh_leaf(evidence: LeafEvidence, settings: DoorSettings = DEFAULT.doors) -> float:
+def weigh_leaf(evidence: LeafEvidence) -> float:
     """The log likelihood ratio of a leaf against an open doorway, as much as one picture may say.
 
     A leaf stands in its frame: where what is round the opening is not as the model has it, or has the color of the
     opening, something may stand before it.
     """
     ratio = float(np.dot(evidence.features, WEIGHTS))
-    if ratio > 0.0 and not is_framed(evidence, settings):
+    if ratio > 0.0 and not is_framed(evidence):
         return 0.0
-    return min(max(ratio, -settings.max_log_ratio), settings.max_log_ratio)
+    return min(max(ratio, -MAX_LOG_RATIO), MAX_LOG_RATIO)
 
 
-def is_framed(evidence: LeafEvidence, settings: DoorSettings = DEFAULT.doors) -> bool:
+def is_framed(evidence: LeafEvidence) -> bool:
     """Whether the opening is seen in its frame of casing and wall."""
-    return evidence.frame >= settings.min_frame_share and evidence.frame_leaf <= settings.max_frame_leaf_share
+    return evidence.frame >= MIN_FRAME_SHARE and evidence.frame_leaf <= MAX_FRAME_LEAF_SHARE
 
 
 def describe(evidence: LeafEvidence, ratio: float) -> str:

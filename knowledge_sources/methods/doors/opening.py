@@ -8,13 +8,24 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.verification.predicted_colors import RAYS, cast_rays
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.doors import DoorSettings
 from world_models.building.building import Building
 from world_models.building.locales import Doorway
 from world_models.camera import NEAR_PLANE_M
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
+
+MAX_DISTANCE_M = 7.0  # largest distance of a doorway that is looked at
+MIN_AWAY_M = 0.5  # least distance of the camera from the plane of the opening
+MIN_SINE = 0.35  # least sine of the angle at which the opening is seen
+MIN_WIDTH_PX = 20.0  # least width of an opening in the picture
+MIN_HEIGHT_PX = 40.0  # least height of an opening in the picture
+BORDER_PX = 6.0  # distance that samples keep from the border of the picture
+FRAME_M = 0.3  # how much of what is round an opening is compared too
+SAMPLES_PER_SIDE = 28  # samples along each side of an opening
+EDGE_MARGIN_PX = 3.0  # distance that samples keep from the edges of faces
+JAMB_MARGIN_M = 0.05  # distance that samples keep from jambs, head and floor
+MARGIN_SIGMAS = 2.0  # standard deviations of the pose that are added to that distance
+MIN_SAMPLES = 40  # fewest samples by which an opening is judged
 
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom [px]."""
@@ -48,7 +59,7 @@ class Opening:
 
 
 def is_in_view(
-    robot: RobotModel, pose: Pose2, doorway: Doorway, locale: str, settings: DoorSettings = DEFAULT.doors
+    robot: RobotModel, pose: Pose2, doorway: Doorway, locale: str
 ) -> bool:
     """Whether a doorway of a room is near enough, seen from well inside the room, and before the camera."""
     left, right = doorway.threshold_of(locale)
@@ -56,17 +67,16 @@ def is_in_view(
     center = camera_from_world.inverse().translation
     away_m = float((left - center[:2]) @ outward)
     distance_m = float(np.linalg.norm(0.5 * (left + right) - center[:2]))
-    if not settings.min_away_m <= away_m or distance_m > settings.max_distance_m:
+    if not away_m >= MIN_AWAY_M or distance_m > MAX_DISTANCE_M:
         return False
-    if away_m < settings.min_sine * distance_m:
+    if away_m < MIN_SINE * distance_m:
         return False
-    box = _find_box(robot, camera_from_world, doorway, locale, robot.world.floor_m(locale), 0.0, settings)
-    return box is not None and box[2] - box[0] >= settings.min_width_px and box[3] - box[1] >= settings.min_height_px
+    box = _find_box(robot, camera_from_world, doorway, locale, robot.world.floor_m(locale), 0.0)
+    return box is not None and box[2] - box[0] >= MIN_WIDTH_PX and box[3] - box[1] >= MIN_HEIGHT_PX
 
 
 def predict_opening(
     robot: RobotModel, pose: Pose2, covariance: Floats, doorway: Doorway, locale: str, beyond: Building,
-    settings: DoorSettings = DEFAULT.doors,
 ) -> Opening | None:
     """What should be seen of a doorway from a pose in one of its rooms; None where too little of it is in view.
 
@@ -76,31 +86,31 @@ def predict_opening(
         locale: the room where the robot is.
         beyond: the building with this door open.
     """
-    if not is_in_view(robot, pose, doorway, locale, settings):
+    if not is_in_view(robot, pose, doorway, locale):
         return None
     camera_from_world, floor_m = robot.camera_from_world(pose), robot.world.floor_m(locale)
     center = camera_from_world.inverse().translation
     distance_m = float(np.linalg.norm(doorway.threshold_of(locale).mean(axis=0) - center[:2]))
-    box = _find_box(robot, camera_from_world, doorway, locale, floor_m, 0.0, settings)
+    box = _find_box(robot, camera_from_world, doorway, locale, floor_m, 0.0)
     if box is None:
         return None
-    sampled = _find_box(robot, camera_from_world, doorway, locale, floor_m, settings.frame_m, settings) or box
-    pixels = _sample(sampled, settings)
+    sampled = _find_box(robot, camera_from_world, doorway, locale, floor_m, FRAME_M) or box
+    pixels = _sample(sampled)
     rays = robot.camera.rays(pixels).reshape(-1, 3)
     rays = np.ascontiguousarray(rays / rays[:, 2:])
     bounds = np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)])
     a, b, c, d = bounds.tolist()
     colors, normals, surface, depth = cast_rays(
-        beyond, camera_from_world, rays, bounds, (a, b, c, d), settings.samples_per_side)
+        beyond, camera_from_world, rays, bounds, (a, b, c, d), SAMPLES_PER_SIDE)
     world = rays @ camera_from_world.rotation  # directions in the world: z = 1 in the camera
-    margin_m = settings.jamb_margin_m + settings.margin_sigmas * _spread(covariance, distance_m)
+    margin_m = JAMB_MARGIN_M + MARGIN_SIGMAS * _spread(covariance, distance_m)
     through, beside, across, height_m, first_m = _pass_through(center, world, doorway, locale, floor_m, margin_m)
     mine = slice(None, None, RAYS)
     clear = depth[mine] > first_m[mine] - OWN_SURFACE_M
     if robot.camera.obstruction is not None:
         clear &= ~robot.camera.obstruction.covers(pixels[:, 0])
     free = through[mine] & clear
-    if np.count_nonzero(free) < settings.min_samples:
+    if np.count_nonzero(free) < MIN_SAMPLES:
         return None
     known = np.vstack([colors, np.full((1, 3), np.nan)])[surface]
     look = np.vstack([np.column_stack([colors, normals]), np.full((1, 6), np.nan)])[surface].reshape(-1, RAYS, 6)
@@ -112,7 +122,6 @@ def predict_opening(
 
 def _find_box(
     robot: RobotModel, camera_from_world: Pose, doorway: Doorway, locale: str, floor_m: float, around_m: float,
-    settings: DoorSettings,
 ) -> Box | None:
     """The rectangle round an opening, and so much round it, as far as it is in the picture; None where it is not."""
     left, right = doorway.threshold_of(locale)
@@ -123,16 +132,16 @@ def _find_box(
     if near[:, 2].min() <= NEAR_PLANE_M:
         return None
     px = robot.camera.project(near)
-    low = np.maximum(px.min(axis=0), settings.border_px)
-    high = np.minimum(px.max(axis=0), np.array([robot.camera.width, robot.camera.height]) - 1.0 - settings.border_px)
+    low = np.maximum(px.min(axis=0), BORDER_PX)
+    high = np.minimum(px.max(axis=0), np.array([robot.camera.width, robot.camera.height]) - 1.0 - BORDER_PX)
     if np.any(high <= low):
         return None
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
-def _sample(box: Box, settings: DoorSettings) -> Floats:
+def _sample(box: Box) -> Floats:
     """(n, RAYS, 2) a grid of pixels in a rectangle, each with four around it [px]."""
-    size, off = settings.samples_per_side, settings.edge_margin_px
+    size, off = SAMPLES_PER_SIDE, EDGE_MARGIN_PX
     u, v = np.linspace(box[0], box[2], size), np.linspace(box[1], box[3], size)
     around = off * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)], float)
     return np.asarray(np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 1, 2) + around)

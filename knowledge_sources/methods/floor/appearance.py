@@ -12,8 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.settings.floor import FloorSettings
 from world_models.entries.floor import FloorAppearance
+
+MIN_FLOOR_PIXELS = 150  # with fewer pixels of a floor in sight, its looks are not learnt from a picture
+MAX_CHROMA_ERROR = 0.035
+"""Largest difference from the model's colour, in its parts of red and blue, of what may be floor."""
+MIN_CHROMA_SIGMA = 0.005  # floor of the standard deviation of the floor's colour
+MIN_BRIGHTNESS_SIGMA = 0.05  # floor of the standard deviation of the logarithm of the floor's brightness
+MAX_UNLIKE = 5.0  # pixels further than so many standard deviations from the floor's looks do not look like it
+MAX_SHADE_STEP = 2.5
+"""From floor in light to floor in shade, neighbouring pixels differ by at most so many standard deviations of the
+floor's looks."""
+MAX_SHADE_CHROMA = 0.06  # largest difference of the parts of red and blue between floor in light and in shade
+MAX_SAMPLES = 2000.0  # past pixels of a floor weigh at most as much as this many
 
 DARK = 6.0
 """Added to the sum of the three channels [0..765]: in the dark, noise is no colour."""
@@ -29,13 +40,13 @@ def compute_looks(colours: Floats | NDArray[np.float32]) -> Floats:
                     axis=-1)
 
 
-def default_covariance(settings: FloorSettings) -> Floats:
+def default_covariance() -> Floats:
     """(3, 3) of looks, where none is learnt: the least that is ever taken."""
-    return np.diag([settings.min_brightness_sigma**2, settings.min_chroma_sigma**2, settings.min_chroma_sigma**2])
+    return np.diag([MIN_BRIGHTNESS_SIGMA**2, MIN_CHROMA_SIGMA**2, MIN_CHROMA_SIGMA**2])
 
 
 def fit_looks(
-    looks: Floats, expected: Floats, is_learnt: bool, settings: FloorSettings, max_chroma_error: float | None = None
+    looks: Floats, expected: Floats, is_learnt: bool, max_chroma_error: float | None = None
 ) -> tuple[Floats, Floats] | None:
     """Mean (3,) and covariance (3, 3) of the looks (n, 3) of a floor in one picture; None where it is not to be seen.
 
@@ -47,15 +58,15 @@ def fit_looks(
         is_learnt: whether the brightness of ``expected`` tells anything.
         max_chroma_error: in place of that of the settings.
     """
-    limit = settings.max_chroma_error if max_chroma_error is None else max_chroma_error
+    limit = MAX_CHROMA_ERROR if max_chroma_error is None else max_chroma_error
     near = looks.compress(_has_hue(looks, expected, limit), axis=0)
-    if len(near) < settings.min_floor_pixels:
+    if len(near) < MIN_FLOOR_PIXELS:
         return None
-    least = default_covariance(settings)
+    least = default_covariance()
     mean, covariance = _find_mode(near, expected if is_learnt else None, least), 4.0 * least
     for _ in range(ROUNDS):
         kept = near.compress(measure_unlike(near, mean, covariance) <= TRIM, axis=0)
-        if len(kept) < settings.min_floor_pixels:
+        if len(kept) < MIN_FLOOR_PIXELS:
             return None
         mean = kept.mean(axis=0)
         variances = kept.var(axis=0, mean=mean[None])
@@ -74,7 +85,7 @@ def measure_unlike(looks: Floats, mean: Floats, covariance: Floats) -> Floats:
 
 
 def find_floor_in_shade(
-    looks: Floats, here: NDArray[np.bool_], mean: Floats, covariance: Floats, settings: FloorSettings
+    looks: Floats, here: NDArray[np.bool_], mean: Floats, covariance: Floats
 ) -> NDArray[np.bool_]:
     """Which pixels (rows, columns) of ``here`` look like the floor, or like it in other light.
 
@@ -86,11 +97,11 @@ def find_floor_in_shade(
         looks: (rows, columns, 3); mean, covariance: the floor's.
     """
     alike = np.zeros(here.shape, bool)
-    alike[here] = measure_unlike(looks[here], mean, covariance) <= settings.max_unlike**2
-    may_be = here & _has_hue(looks, mean, settings.max_shade_chroma)
+    alike[here] = measure_unlike(looks[here], mean, covariance) <= MAX_UNLIKE**2
+    may_be = here & _has_hue(looks, mean, MAX_SHADE_CHROMA)
     around, sigmas = np.ones((3, 3), np.uint8), np.sqrt(np.diag(covariance))
     for part, sigma in zip(np.moveaxis(looks.astype(np.float32), -1, 0), sigmas, strict=True):
-        may_be &= cv2.dilate(part, around) - cv2.erode(part, around) <= settings.max_shade_step * sigma
+        may_be &= cv2.dilate(part, around) - cv2.erode(part, around) <= MAX_SHADE_STEP * sigma
     _, parts = cv2.connectedComponents(((here & alike) | may_be).astype(np.uint8), connectivity=4)
     reached = np.zeros(int(parts.max()) + 1, bool)
     reached[parts[alike]] = True
@@ -99,29 +110,29 @@ def find_floor_in_shade(
 
 
 def learn_appearance(
-    known: FloorAppearance | None, locale: str, colours: Floats, settings: FloorSettings
+    known: FloorAppearance | None, locale: str, colours: Floats
 ) -> FloorAppearance | None:
     """What a floor looks like after some of it (n, 3; 0..255) was driven over: the mean over what was learnt before.
 
     None where there are too few pixels to add.
     """
-    if len(colours) < settings.min_floor_pixels:
+    if len(colours) < MIN_FLOOR_PIXELS:
         return known
     looks = compute_looks(colours)
     mean = np.median(colours, axis=0)
-    least = default_covariance(settings)
+    least = default_covariance()
     spread = np.percentile(np.abs(looks - np.median(looks, axis=0)), 68.0, axis=0)
     covariance = np.maximum(np.diag(spread**2), least)
     weight, before = float(len(colours)), 0.0
     if known is not None and known.samples > 0.0:
-        before = min(known.samples, settings.max_samples)
+        before = min(known.samples, MAX_SAMPLES)
         mean = (before * np.array(known.mean) + weight * mean) / (before + weight)
         covariance = (before * np.array(known.covariance) + weight * covariance) / (before + weight)
     red, green, blue = (round(float(x), 1) for x in mean)
     rows = [tuple(round(float(x), 9) for x in row) for row in covariance]
     return FloorAppearance(locale, (red, green, blue), ((rows[0][0], rows[0][1], rows[0][2]), (
         rows[1][0], rows[1][1], rows[1][2]), (rows[2][0], rows[2][1], rows[2][2])),
-        min(before + weight, settings.max_samples))
+        min(before + weight, MAX_SAMPLES))
 
 
 def _has_hue(looks: Floats, expected: Floats, limit: float) -> NDArray[np.bool_]:

@@ -10,6 +10,8 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats
 from world_models.camera import Camera, CameraMount
 
+SIGHT_M = 4.5  # the floor is looked at up to this distance from the camera
+
 STEP_PX = 2
 """The floor is looked at in a picture of half the width and height."""
 

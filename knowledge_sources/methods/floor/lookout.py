@@ -15,6 +15,8 @@ from world_models.building.building import Building
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
+MAX_HIDDEN_M = 0.2  # floor counts as seen where nothing higher than this can hide below the picture's lower border
+
 MAX_FLOORS = 64
 BORDER_PX = 8.0
 """What is nearer to the border of the picture does not count as seen."""

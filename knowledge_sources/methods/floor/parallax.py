@@ -11,9 +11,18 @@ from numpy.typing import NDArray
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.floor_grid import STEP_PX, FloorGrid
 from knowledge_sources.methods.floor.things import Region
-from knowledge_sources.settings.floor import FloorSettings
 from world_models.camera import NEAR_PLANE_M, Camera, CameraMount
 from world_models.frames import Pose2
+
+MIN_PARALLAX_PX = 3.0  # parallax tells where solid and flat things differ by at least this
+PARALLAX_ODDS = 50.0  # odds that one clear comparison of two pictures is worth
+MIN_PARALLAX_CORRELATION = 0.5  # smallest correlation of two patches that tells anything
+MIN_PARALLAX_MARGIN = 0.15  # smallest difference of the correlations of the two hypotheses that tells anything
+FOOT_PART_STEP = 0.05  # distances at which a lower border may hang over the floor are tried in steps of this part
+MIN_FOOT_PART = 0.4  # least part of its seeming distance at which a lower border is looked for
+MIN_FOOT_MARGIN = 0.07
+"""Smallest difference of the mean correlations of a lower border over the floor and on it that tells anything."""
+MIN_FOOT_COLUMNS = 6  # with fewer patches of a lower border its height is not told
 
 HALF = 4
 """Patches are squares of 2 HALF + 1 pixels of the reduced picture."""
@@ -31,7 +40,7 @@ MIN_DEVIATION = 4.0
 
 def compute_parallax_odds(
     region: Region, grid: FloorGrid, picture: NDArray[np.float32], earlier: NDArray[np.float32],
-    earlier_from_now: Pose2, camera: Camera, mount: CameraMount, settings: FloorSettings,
+    earlier_from_now: Pose2, camera: Camera, mount: CameraMount,
 ) -> float:
     """The odds that a region is solid against flat or reflected, by an earlier picture; 1 where nothing tells.
 
@@ -66,21 +75,21 @@ def compute_parallax_odds(
         patch = _cut(picture, grid.top + int(rows[i]), int(columns[i]))
         as_flat = _correlate(earlier, patch, then_flat[i])
         as_solid, as_mirrored = (
-            _correlate_best(earlier, patch, then_flat[i], [there[i] for there in then], settings.min_parallax_px)
+            _correlate_best(earlier, patch, then_flat[i], [there[i] for there in then], MIN_PARALLAX_PX)
             for then in (then_solid, then_mirrored))
         as_solid = as_flat if as_solid is None else as_solid  # too near to each other to tell them apart
         lying = as_flat if as_mirrored is None else max(as_flat, as_mirrored)
-        is_found = max(lying, as_solid) >= settings.min_parallax_correlation
-        if is_found and abs(as_solid - lying) >= settings.min_parallax_margin:
+        is_found = max(lying, as_solid) >= MIN_PARALLAX_CORRELATION
+        if is_found and abs(as_solid - lying) >= MIN_PARALLAX_MARGIN:
             votes += 1 if as_solid > lying else -1
     if votes == 0:
         return 1.0
-    return float(settings.parallax_odds ** np.clip(votes / 2.0, -1.0, 1.0))
+    return float(PARALLAX_ODDS ** np.clip(votes / 2.0, -1.0, 1.0))
 
 
 def measure_foot_part(
     region: Region, grid: FloorGrid, picture: NDArray[np.float32], earlier: NDArray[np.float32],
-    earlier_from_now: Pose2, camera: Camera, mount: CameraMount, settings: FloorSettings,
+    earlier_from_now: Pose2, camera: Camera, mount: CameraMount,
 ) -> float:
     """How far a region's lower border is, as a part of the distance at which it would stand on the floor; 1: it does.
 
@@ -96,7 +105,7 @@ def measure_foot_part(
         return 1.0
     feet = feet[np.unique(np.linspace(0, len(feet) - 1, min(COLUMNS, len(feet))).astype(int))]
     points = grid.points_robot[feet[:, 0], feet[:, 1]]
-    parts = np.arange(1.0, settings.min_foot_part - 1e-9, -settings.foot_part_step)
+    parts = np.arange(1.0, MIN_FOOT_PART - 1e-9, -FOOT_PART_STEP)
     eye = np.array([mount.forward_m, 0.0])
     then = np.stack([_project(_below(points, eye, part, grid), earlier_from_now, camera, mount, grid)
                      for part in parts])
@@ -104,13 +113,13 @@ def measure_foot_part(
     alike = np.array([[_correlate(earlier, patch, at) for patch, at in zip(patches, there, strict=True)]
                       for there in then])
     shown = alike[0] > -1.0
-    if np.count_nonzero(shown) < settings.min_foot_columns:
+    if np.count_nonzero(shown) < MIN_FOOT_COLUMNS:
         return 1.0
     mean = alike[:, shown].mean(axis=1)
     apart = np.linalg.norm(then - then[0], axis=2)[:, shown].mean(axis=1) * STEP_PX
     best = int(np.argmax(mean))
-    tells = mean[best] >= settings.min_parallax_correlation and apart[best] >= settings.min_parallax_px
-    return float(parts[best]) if tells and mean[best] - mean[0] >= settings.min_foot_margin else 1.0
+    tells = mean[best] >= MIN_PARALLAX_CORRELATION and apart[best] >= MIN_PARALLAX_PX
+    return float(parts[best]) if tells and mean[best] - mean[0] >= MIN_FOOT_MARGIN else 1.0
 
 
 def _below(points: Floats, eye: Floats, depth: float, grid: FloorGrid) -> Floats:

@@ -17,13 +17,24 @@ import shapely
 from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
-from knowledge_sources.settings.floor import FloorSettings
 from world_models.building.building import Building
 from world_models.building.things import ROBOT_TOP_M, STEP_M
 from world_models.entries.floor import FloorEnd, FloorThing, FreeFloor, Point
 from world_models.entries.touch import Ranges
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
+
+RANGE_SIGMAS = 3.0  # free floor ends so many standard deviations of a distance before an echo
+RANGE_SLACK_M = 0.1
+"""An echo that is nearer than the model's nearest wall or thing by no more is of that: what is flush with a wall is
+not in the model."""
+MAX_RANGE_THING_M = 1.2  # a thing is concluded from an echo up to here from its sensor: further, its cone is too wide
+RANGE_BEARINGS = 120  # directions in which the free floor of a reading is written down
+RANGE_ARC_POINTS = 9  # places on the arc of an echo that are asked after
+RANGE_JOIN_M = 0.2  # echoes of neighbouring sensors that are no further apart are of one thing
+RANGE_DEPTH_M = 0.1  # how deep a thing is taken to be that was ranged
+ECHO_P = 0.7  # probability of a thing after one echo that the model does not explain
+MAX_RANGE_P = 0.99  # probability that many echoes come to
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +67,7 @@ class Cones:
 
 def see_ranges(
     robot: RobotModel, locale: str, pose: Pose2, sigma_m: float, sigma_rad: float, ranges: Ranges,
-    earlier: Sequence[FreeFloor], settings: FloorSettings,
+    earlier: Sequence[FreeFloor],
 ) -> FreeFloor:
     """What one reading tells of the floor round a robot.
 
@@ -68,12 +79,12 @@ def see_ranges(
     rooms = find_rooms_within(robot.world, locale, pose, ranges.max_range_m)
     place_m = math.hypot(ranges.sigma_m, sigma_m)
     expected = measure_nearest(cones, list_solid_segments(robot.world, rooms), 3.0 * sigma_rad, 3.0 * sigma_m)
-    slack_m = settings.range_slack_m + 3.0 * place_m
+    slack_m = RANGE_SLACK_M + 3.0 * place_m
     is_new = cones.is_heard & (cones.away_m < expected - slack_m)
     is_known = cones.is_heard & (np.abs(cones.away_m - expected) <= slack_m)
-    count = settings.range_bearings
+    count = RANGE_BEARINGS
     bearings = (np.arange(count + 1) - count // 2) * math.tau / count  # the last is the first again
-    near, far, ended_by = find_free_intervals(cones, bearings, settings.range_sigmas * ranges.sigma_m)
+    near, far, ended_by = find_free_intervals(cones, bearings, RANGE_SIGMAS * ranges.sigma_m)
     free = far > near
     ends: list[FloorEnd] = ["thing" if is_new[k] else "model" if is_known[k] else "sight" for k in ended_by]
     touching_m = _find_touching(cones, is_new, bearings)
@@ -84,8 +95,8 @@ def see_ranges(
     floor = FreeFloor(
         "ranges", locale, pose.x_m, pose.y_m, _rounded(bearings), _rounded(np.where(free, near, cones.rim_m)),
         _rounded(far), tuple(ends), _rounded(sigmas), (), ranges.when_s)
-    is_new &= cones.away_m <= settings.max_range_thing_m
-    things = _find_things(cones, is_new, floor, earlier, rooms, robot.world, place_m, settings)
+    is_new &= cones.away_m <= MAX_RANGE_THING_M
+    things = _find_things(cones, is_new, floor, earlier, rooms, robot.world, place_m)
     return _with_things(floor, tuple(things))
 
 
@@ -191,21 +202,21 @@ def is_free_at(floor: FreeFloor, points: Floats, margin_m: float) -> Mask:
 
 def _find_things(
     cones: Cones, is_new: Mask, floor: FreeFloor, earlier: Sequence[FreeFloor], rooms: Sequence[str],
-    building: Building, sigma_m: float, settings: FloorSettings,
+    building: Building, sigma_m: float,
 ) -> Iterator[FloorThing]:
     """Something for each group of neighbouring echoes that the model does not explain."""
     outlines = shapely.union_all([shapely.buffer(shapely.Polygon(building.outline(room)), -sigma_m) for room in rooms])
     arcs: list[tuple[int, Floats]] = []
     for k in np.flatnonzero(is_new):
-        arc = _cut_arc(cones, int(k), floor, earlier, 3.0 * sigma_m, settings.range_arc_points)
+        arc = _cut_arc(cones, int(k), floor, earlier, 3.0 * sigma_m, RANGE_ARC_POINTS)
         if shapely.contains_xy(outlines, *arc[len(arc) // 2]):
             arcs.append((int(k), arc))
-    for group in _join_neighbours(arcs, len(cones.axes_rad), settings.range_join_m):
-        footprint = _build_footprint(cones, group, settings.range_depth_m)
+    for group in _join_neighbours(arcs, len(cones.axes_rad), RANGE_JOIN_M):
+        footprint = _build_footprint(cones, group, RANGE_DEPTH_M)
         echoes = len(group)
         nearest_m = min(float(cones.away_m[k]) for k, _ in group)
         yield FloorThing(
-            footprint, sigma_m, 0.0, math.inf, min(settings.max_range_p, 1.0 - (1.0 - settings.echo_p) ** echoes),
+            footprint, sigma_m, 0.0, math.inf, min(MAX_RANGE_P, 1.0 - (1.0 - ECHO_P) ** echoes),
             (0.0, 0.0, 0.0, 0.0),
             f"{echoes} echo{'es' * (echoes > 1)} where the model has free floor, the nearest {nearest_m:.2f} m away")
 

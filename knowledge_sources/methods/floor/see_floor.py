@@ -14,21 +14,35 @@ from numpy.typing import NDArray
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.floor.appearance import (
+    MAX_CHROMA_ERROR,
     compute_looks,
     default_covariance,
     find_floor_in_shade,
     fit_looks,
     learn_appearance,
 )
-from knowledge_sources.methods.floor.floor_grid import STEP_PX, FloorGrid, build_floor_grid
+from knowledge_sources.methods.floor.floor_grid import SIGHT_M, STEP_PX, FloorGrid, build_floor_grid
+from knowledge_sources.methods.floor.lookout import MAX_HIDDEN_M
 from knowledge_sources.methods.floor.model_floor import ModelFloor, predict_model_floor
-from knowledge_sources.methods.floor.parallax import compute_parallax_odds, measure_foot_part
+from knowledge_sources.methods.floor.parallax import FOOT_PART_STEP, compute_parallax_odds, measure_foot_part
 from knowledge_sources.methods.floor.things import Region, find_footprint, find_regions, measure_height
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.floor import FloorSettings
 from world_models.entries.floor import FloorAppearance, FloorEnd, FloorThing, FreeFloor, Light
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
+
+FLOOR_VIEW_DISTANCE_M = 0.25
+"""A picture is kept to compare later ones with when the robot has gone so far since the last."""
+
+BEARINGS = 64  # directions in which the free floor of a picture is written down
+MAX_ROLLED_OVER_M = 0.05  # what is not higher than this is rolled over
+MIN_FLOOR_SHARE = 0.3
+"""Share of what should be floor that must agree with its known looks; else the picture may be tinted."""
+MIN_TINTED_SHARE = 0.6  # share of what should be floor that must look alike, to be the floor in a tinted picture
+MAX_TINT = 0.12  # largest difference from the floor's colour, in its parts of red and blue, in a tinted picture
+MODEL_MARGIN_PX = 3.0  # pixels so near to an edge of the model tell nothing; the belief's uncertainty comes on top
+P_SEEN_ONCE = 0.7  # probability that what does not look like the floor stands on it, before parallax tells
 
 DRIVEN_HALF_WIDTH_M = 0.25
 """Half the width of the strip that was driven over, from which the floor's looks are learnt."""
@@ -75,23 +89,23 @@ def see_free_floor(
     s = settings.floor
     floor_m = robot.world.floor_m(locale)
     height_m = robot.mount.height_m - floor_m
-    grid = build_floor_grid(robot.camera, robot.mount, height_m, SIGHT_PART * s.sight_m)
+    grid = build_floor_grid(robot.camera, robot.mount, height_m, SIGHT_PART * SIGHT_M)
     eye = pose @ Pose2(robot.mount.forward_m, 0.0, 0.0)
     if grid is None:
         return _blind(locale, eye, seen_s), ()
     sigma_rad = math.sqrt(max(float(covariance[2, 2]), 0.0))
-    margin_px = s.model_margin_px + 2.0 * sigma_rad * robot.camera.fx
+    margin_px = MODEL_MARGIN_PX + 2.0 * sigma_rad * robot.camera.fx
     sigma_m = math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0))
     model = predict_model_floor(
-        robot, pose, grid, floor_m, s.max_rolled_over_m, margin_px, 2.0 * sigma_m * robot.camera.fx)
+        robot, pose, grid, floor_m, MAX_ROLLED_OVER_M, margin_px, 2.0 * sigma_m * robot.camera.fx)
     picture = read_picture(jpeg).rectified_half(robot.lens, robot.camera)
     known = appearances.get(locale)
-    unlike, tells, light = find_unlike(picture[grid.top:], model, known, s, last_light)
-    regions = find_regions(unlike, tells, grid, s) if s.use_appearance else ()
+    unlike, tells, light = find_unlike(picture[grid.top:], model, known, last_light)
+    regions = find_regions(unlike, tells, grid) if s.use_appearance else ()
     built = [(region, _build_thing(region, grid, robot, pose, covariance, picture, earlier, s)) for region in regions]
     things = [(region, *thing) for region, thing in built if thing is not None]
     scan = _scan(grid, model, tells, things, robot.camera.fy, s)
-    learnt = _learn(robot, locale, pose, earlier, known, floor_m, settings)
+    learnt = _learn(robot, locale, pose, earlier, known, floor_m)
     return FreeFloor(
         sense="camera", locale=locale, x_m=round(eye.x_m, 4), y_m=round(eye.y_m, 4),
         bearings_rad=tuple(round(math.remainder(pose.heading_rad + b, math.tau), 5) for b in scan.bearings_rad),
@@ -100,7 +114,7 @@ def see_free_floor(
 
 
 def find_unlike(
-    picture: NDArray[np.uint8], model: ModelFloor, known: FloorAppearance | None, settings: FloorSettings,
+    picture: NDArray[np.uint8], model: ModelFloor, known: FloorAppearance | None,
     last_light: Light | None = None,
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Light | None]:
     """Which pixels (rows, columns) do not look like the floor that the model has there, where that tells anything, and
@@ -124,25 +138,25 @@ def find_unlike(
                 guesses += [(by_model, False)]
             else:
                 guesses += [(by_model + last_light, True), (by_model + last_light, False)]
-            fitted = _fit_most(looks, here, guesses, settings, may_be_tinted=last_light is None)
+            fitted = _fit_most(looks, here, guesses, may_be_tinted=last_light is None)
             if fitted is None:
                 continue
             mean, covariance = fitted
             shift = mean - by_model
             light = (float(shift[0]), float(shift[1]), float(shift[2]))
-            if np.abs(shift[1:]).max() <= settings.max_chroma_error:
+            if np.abs(shift[1:]).max() <= MAX_CHROMA_ERROR:
                 shift[1:] = 0.0
         else:
             expected = by_model + shift
-            mean, covariance = fit_looks(looks[here], expected, True, settings) or (
-                expected, 4.0 * default_covariance(settings))
-        unlike |= here & ~find_floor_in_shade(looks, here, mean, covariance, settings)
+            mean, covariance = fit_looks(looks[here], expected, True) or (
+                expected, 4.0 * default_covariance())
+        unlike |= here & ~find_floor_in_shade(looks, here, mean, covariance)
         tells |= here
     return unlike, tells, light
 
 
 def _fit_most(
-    looks: Floats, here: NDArray[np.bool_], guesses: Sequence[tuple[Floats, bool]], settings: FloorSettings, *,
+    looks: Floats, here: NDArray[np.bool_], guesses: Sequence[tuple[Floats, bool]], *,
     may_be_tinted: bool
 ) -> tuple[Floats, Floats] | None:
     """Mean and covariance of the looks of the floor ``here``, by the first of the guesses (as ``expected`` and
@@ -156,16 +170,16 @@ def _fit_most(
     first: tuple[Floats, Floats] | None = None
 
     def agrees(fit: tuple[Floats, Floats], share: float) -> bool:
-        return bool(np.count_nonzero(find_floor_in_shade(looks, here, *fit, settings)) >= share * size)
+        return bool(np.count_nonzero(find_floor_in_shade(looks, here, *fit)) >= share * size)
 
     for expected, is_learnt in guesses:
-        fit = fit_looks(seen, expected, is_learnt, settings)
-        if fit is not None and agrees(fit, settings.min_floor_share):
+        fit = fit_looks(seen, expected, is_learnt)
+        if fit is not None and agrees(fit, MIN_FLOOR_SHARE):
             return fit
         first = first or fit
     for expected, _ in guesses if may_be_tinted else ():
-        fit = fit_looks(seen, expected, False, settings, settings.max_tint)
-        if fit is not None and agrees(fit, settings.min_tinted_share):
+        fit = fit_looks(seen, expected, False, MAX_TINT)
+        if fit is not None and agrees(fit, MIN_TINTED_SHARE):
             return fit
     return first
 
@@ -193,26 +207,26 @@ def _scan(
     is_floor = model.kinds >= 0
     up = np.arange(rows)[::-1]
     first_thing, first_model = _first(blocked[up]), _first(~is_floor[up])
-    groups = np.array_split(np.arange(columns)[::-1], settings.bearings)  # bearings grow to the left
+    groups = np.array_split(np.arange(columns)[::-1], BEARINGS)  # bearings grow to the left
     near, far, ends, sigmas, bearings = [], [], [], [], []
     for group in groups:
         bearings.append(float(grid.bearings_rad[group].mean()))
         lowest_m = float(grid.ranges_m[-1, group].max())
-        near_m = lowest_m * max(0.0, 1.0 - settings.max_hidden_m / grid.camera_height_m)
+        near_m = lowest_m * max(0.0, 1.0 - MAX_HIDDEN_M / grid.camera_height_m)
         at_thing, at_model = int(first_thing[group].min()), int(first_model[group].min())
         stop = min(at_thing, at_model)
         told = np.flatnonzero(tells[up][:max(stop, 1), group].any(axis=1))
-        range_m = settings.sight_m if stop >= rows else float(grid.ranges_m[rows - 1 - stop, group].min())
+        range_m = SIGHT_M if stop >= rows else float(grid.ranges_m[rows - 1 - stop, group].min())
         if len(told):  # next to the model's own parts the looks tell nothing, and something may stand there
             range_m = min(range_m, float(grid.ranges_m[rows - 1 - told[-1], group].min()) + settings.max_untold_m)
         if at_thing <= at_model and stop < rows:
             range_m *= float(parts[group].min())
-        end: FloorEnd = "sight" if range_m >= settings.sight_m else "thing" if at_thing <= at_model else "model"
+        end: FloorEnd = "sight" if range_m >= SIGHT_M else "thing" if at_thing <= at_model else "model"
         if stop == 0 or not len(told):  # nothing of the floor is seen, or its looks are not known
             range_m = 0.0
             end = end if stop == 0 else "sight"
         near.append(round(near_m, 3))
-        far.append(round(min(range_m, settings.sight_m), 3))
+        far.append(round(min(range_m, SIGHT_M), 3))
         ends.append(end)
         sigmas.append(round(0.01 + STEP_PX * range_m**2 / (grid.camera_height_m * fy), 3))
     return _Scan(tuple(bearings), tuple(near), tuple(far), tuple(ends), tuple(sigmas))
@@ -232,26 +246,26 @@ def _build_thing(
     """
     part = 1.0
     height_m, sigma_height_m = measure_height(region, grid)
-    if height_m < settings.max_rolled_over_m and math.isfinite(sigma_height_m):
+    if height_m < MAX_ROLLED_OVER_M and math.isfinite(sigma_height_m):
         return None
-    odds = settings.p_seen_once / (1.0 - settings.p_seen_once)
+    odds = P_SEEN_ONCE / (1.0 - P_SEEN_ONCE)
     how = "it does not look like the floor"
     if settings.use_parallax and earlier:
         then = earlier[0]
         earlier_from_now = then.pose.inverse() @ pose
         before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera).astype(np.float32) @ GREY
         grey = picture.astype(np.float32) @ GREY
-        told = compute_parallax_odds(region, grid, grey, before, earlier_from_now, robot.camera, robot.mount, settings)
+        told = compute_parallax_odds(region, grid, grey, before, earlier_from_now, robot.camera, robot.mount)
         odds *= told
         if not region.is_cut and told >= 1.0:
             part = measure_foot_part(
-                region, grid, grey, before, earlier_from_now, robot.camera, robot.mount, settings)
+                region, grid, grey, before, earlier_from_now, robot.camera, robot.mount)
         if part < 1.0:
             height_m, sigma_height_m = measure_height(region, grid, part)
         how += "" if told == 1.0 else " and stands up from it" if told > 1.0 else ", but lies flat on it"
     elif not settings.use_parallax:
         odds = 1e6
-    corners = find_footprint(region, grid, settings, part)
+    corners = find_footprint(region, grid, part)
     world = pose.apply(corners)
     foot_m = float(np.linalg.norm(corners, axis=1).min())
     spread = math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0) + foot_m**2 * float(covariance[2, 2]))
@@ -259,7 +273,7 @@ def _build_thing(
     (left, top), (right, bottom) = grid.pixels[at[0], left_right[0]], grid.pixels[at[-1], left_right[-1]]
     own = CUT_SIGMA_M if region.is_cut else STEP_PX * foot_m**2 / (grid.camera_height_m * robot.camera.fy)
     if part < 1.0:
-        own = math.hypot(own, settings.foot_part_step * foot_m / part)
+        own = math.hypot(own, FOOT_PART_STEP * foot_m / part)
         how += f", and hangs {grid.camera_height_m * (1.0 - part):.2f} m over it"
     return FloorThing(
         footprint=tuple((round(float(x), 3), round(float(y), 3)) for x, y in world),
@@ -270,15 +284,13 @@ def _build_thing(
 
 def _learn(
     robot: RobotModel, locale: str, pose: Pose2, earlier: Sequence[Seen], known: FloorAppearance | None, floor_m: float,
-    settings: Settings,
 ) -> tuple[FloorAppearance, ...]:
     """What the floor looks like where the robot has driven since the oldest picture, as that picture shows it."""
     if not earlier:
         return ()
     then = earlier[-1]
     now = then.pose.inverse() @ pose
-    s = settings.floor
-    grid = build_floor_grid(robot.camera, robot.mount, robot.mount.height_m - floor_m, SIGHT_PART * s.sight_m)
+    grid = build_floor_grid(robot.camera, robot.mount, robot.mount.height_m - floor_m, SIGHT_PART * SIGHT_M)
     if grid is None or now.x_m <= 0.0:
         return ()
     away = math.hypot(*now.position)
@@ -290,7 +302,7 @@ def _learn(
     if not driven.any():
         return ()
     colours = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)[grid.top:][driven].astype(float)
-    learnt = learn_appearance(known, locale, colours, s)
+    learnt = learn_appearance(known, locale, colours)
     return () if learnt is None or learnt == known else (learnt,)
 
 

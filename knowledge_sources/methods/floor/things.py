@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats, Ints
-from knowledge_sources.methods.floor.floor_grid import FloorGrid
-from knowledge_sources.settings.floor import FloorSettings
+from knowledge_sources.methods.floor.floor_grid import SIGHT_M, FloorGrid
+
+MIN_THING_PIXELS = 10  # smallest region, in pixels of half the picture's size
+ASSUMED_DEPTH_M = 0.3  # depth that a thing is taken to have behind what is seen of it
+MAX_THING_DEPTH_M = 0.8  # feet of one thing are at most so much further than its nearest
 
 MIN_ROWS = 3
 """A region of fewer rows is noise."""
@@ -42,7 +45,7 @@ class Region:
 
 
 def find_regions(
-    unlike: NDArray[np.bool_], tells: NDArray[np.bool_], grid: FloorGrid, settings: FloorSettings
+    unlike: NDArray[np.bool_], tells: NDArray[np.bool_], grid: FloorGrid
 ) -> tuple[Region, ...]:
     """The regions of unlike pixels, the largest first.
 
@@ -55,19 +58,19 @@ def find_regions(
     found = []
     for i in sorted(range(1, count), key=lambda i: (-stats[i, cv2.CC_STAT_AREA], i)):
         mask = (labels == i) & seen
-        if np.count_nonzero(mask) < settings.min_thing_pixels:
+        if np.count_nonzero(mask) < MIN_THING_PIXELS:
             continue
         rows = np.flatnonzero(mask.any(axis=1))
         if len(rows) < MIN_ROWS:
             continue
-        region = _describe_region(mask, tells, grid, settings)
+        region = _describe_region(mask, tells, grid)
         if region is not None:
             found.append(region)
     return tuple(found)
 
 
 def _describe_region(
-    mask: NDArray[np.bool_], tells: NDArray[np.bool_], grid: FloorGrid, settings: FloorSettings
+    mask: NDArray[np.bool_], tells: NDArray[np.bool_], grid: FloorGrid
 ) -> Region | None:
     columns = np.flatnonzero(mask.any(axis=0))
     lowest = mask.shape[0] - 1 - np.argmax(mask[::-1, columns], axis=0)
@@ -79,9 +82,9 @@ def _describe_region(
     if not stands.any():
         return None
     nearest = float(ranges[stands].min())
-    if nearest > settings.sight_m:
+    if nearest > SIGHT_M:
         return None
-    is_foot = _find_feet(columns, ranges, stands, cut, nearest, settings)
+    is_foot = _find_feet(columns, ranges, stands, cut, nearest)
     highest = np.argmax(mask[:, columns], axis=0)
     k = int(np.argmin(highest))
     above = max(0, int(highest[k]) - 2)
@@ -92,7 +95,6 @@ def _describe_region(
 
 def _find_feet(
     columns: NDArray[np.intp], ranges: Floats, stands: NDArray[np.bool_], cut: NDArray[np.bool_], nearest: float,
-    settings: FloorSettings,
 ) -> NDArray[np.bool_]:
     """Which columns (k,) of a region have a foot on the floor, by the ranges (k,) at which it seems to stand.
 
@@ -100,7 +102,7 @@ def _find_feet(
     from the nearest, or its column is next to such a one and stands about as far off. Where the picture's border cuts
     the feet off, only what is as near as that border tells where they are.
     """
-    deep_m = 0.5 * settings.assumed_depth_m if cut.any() else settings.max_thing_depth_m
+    deep_m = 0.5 * ASSUMED_DEPTH_M if cut.any() else MAX_THING_DEPTH_M
     is_foot = stands & (ranges <= nearest + deep_m)
     for order in (range(1, len(columns)), range(len(columns) - 2, -1, -1)):
         for i in order:
@@ -121,7 +123,7 @@ def _drop_slivers(seen: NDArray[np.bool_], tells: NDArray[np.bool_]) -> NDArray[
     return np.asarray(seen & ((thick > 0) | ~above))
 
 
-def find_footprint(region: Region, grid: FloorGrid, settings: FloorSettings, part: float = 1.0) -> Floats:
+def find_footprint(region: Region, grid: FloorGrid, part: float = 1.0) -> Floats:
     """(k, 2) corners, counter-clockwise, robot's frame, of what a region takes of the floor [m].
 
     It is the hull of its feet, and of the same points further off by the depth that is assumed. What hangs over the
@@ -134,7 +136,7 @@ def find_footprint(region: Region, grid: FloorGrid, settings: FloorSettings, par
     cut = region.feet[:, 0] >= grid.shape[0] - 2
     near = np.where(cut[:, None], eye + away * CUT_PART, points)
     nearest = float(np.linalg.norm(near - eye, axis=1).min())
-    deep = np.clip(nearest + settings.assumed_depth_m - lengths, 0.1, settings.assumed_depth_m)
+    deep = np.clip(nearest + ASSUMED_DEPTH_M - lengths, 0.1, ASSUMED_DEPTH_M)
     far = points + away / lengths * np.where(cut[:, None], 0.0, deep)  # one that is cut off is nearer than its border
     hull = shapely.convex_hull(shapely.multipoints(np.concatenate([near, far])))
     if not isinstance(hull, shapely.Polygon):

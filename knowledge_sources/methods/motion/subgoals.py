@@ -33,6 +33,18 @@ from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Subgoal
 from world_models.robot import RobotModel
 
+DOORWAY_DISTANCES_M = (0.65, 0.55, 0.47, 0.40)
+"""Distances from a doorway at which it is approached straight, tried in this order."""
+DOORWAY_OFFSETS_M = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+"""Distances from its middle, to either side, at which it is approached aslant, past what stands before it."""
+LOOKOUT_DISTANCES_M = (1.8, 2.4, 3.0)  # distances from which it does so: the floor before it is in the picture
+LOOKOUT_DIRECTIONS = 24  # directions round it from which that is tried
+LOOKOUT_SHORT_M = 0.4  # so near before it something else may be in the line of sight: it may be a part of it
+LOOKOUT_SAME_SIDE_M = 3.0  # so much farther another side of it may be than the one from which it was seen last
+MIN_LOOKOUT_CHANGE_M = 0.4  # a place nearer than this to where the robot stands shows nothing new
+WAY_TOLERANCE_M = 0.15  # tolerance at the end of a leg on the way
+MIN_DOORWAY_CLEARANCE_M = 0.10  # a doorway with less room on each side of the robot is approached more exactly
+
 MAX_ROUTES = 24
 """So many routes are tried for one that obstacles leave free."""
 
@@ -141,7 +153,7 @@ class SubgoalPlanner:
             subgoals.append(self._build_subgoal(here, ends.before, ends.tolerance_m))
             on_wheels = not isinstance(step.passage, Link)  # else it is a ride: there is nothing to drive
             subgoals.append(
-                Subgoal(ends.before, ends.behind, on_wheels, step.passage.name, self._settings.way_tolerance_m))
+                Subgoal(ends.before, ends.behind, on_wheels, step.passage.name, WAY_TOLERANCE_M))
             here = ends.behind
         subgoals.append(self._build_subgoal(here, destination, tolerance_m))
         return tuple(subgoals)
@@ -156,8 +168,8 @@ class SubgoalPlanner:
         middles = [passage.threshold_of(side).mean(axis=0) for side in (origin, destination)]
         for clearance_m in self._settings.clearances_m:
             free = self._find_free_passage(passage, (origin, destination), clearance_m)
-            line = find_line_through(free, middles, passage.outward_from(origin), self._settings.doorway_distances_m,
-                                     self._settings.doorway_offsets_m)
+            line = find_line_through(free, middles, passage.outward_from(origin), DOORWAY_DISTANCES_M,
+                                     DOORWAY_OFFSETS_M)
             if line is not None:
                 before, behind = (Place.of_world(self._building, side, float(x), float(y))
                                   for side, (x, y) in zip((origin, destination), line, strict=True))
@@ -177,10 +189,10 @@ class SubgoalPlanner:
     def _way_tolerance_m(self, passage: Passage) -> float:
         """Tolerance at the place before a passage, so that the robot passes it straight without contact."""
         if isinstance(passage, Link):
-            return self._settings.way_tolerance_m
+            return WAY_TOLERANCE_M
         beside = passage.width_m / 2 - self._robot.radius_m
-        if beside >= self._settings.min_doorway_clearance_m:
-            return self._settings.way_tolerance_m
+        if beside >= MIN_DOORWAY_CLEARANCE_M:
+            return WAY_TOLERANCE_M
         return max(beside, self._settings.clearances_m[-1])
 
     def _find_place_before(self, passage: Passage, locale: str) -> Place | None:
@@ -190,7 +202,7 @@ class SubgoalPlanner:
             return Place.of_world(self._building, locale, float(x), float(y), float(heading))
         middle, outward = passage.threshold_of(locale).mean(axis=0), passage.outward_from(locale)
         free = self._free_space(locale, self._settings.clearances_m[-1])
-        distances = self._settings.doorway_distances_m
+        distances = DOORWAY_DISTANCES_M
         fit = (m for m in distances if free.covers(Point(middle - m * outward)))
         if locale in self._cluttered:
             fit = (m for m in fit if self._is_passed(middle, middle - m * outward, locale))
@@ -223,7 +235,7 @@ class SubgoalPlanner:
         places[-1] = subgoal.destination
         last = len(places) - 2
         return tuple(
-            Subgoal(a, b, True, tolerance_m=subgoal.tolerance_m if i == last else self._settings.way_tolerance_m)
+            Subgoal(a, b, True, tolerance_m=subgoal.tolerance_m if i == last else WAY_TOLERANCE_M)
             for i, (a, b) in enumerate(pairwise(places))
         )
 
@@ -235,20 +247,20 @@ class SubgoalPlanner:
         s, locale, here = self._settings, belief.locale, belief.world_from_robot(self._building)
         poses = list_lookouts(
             self._free_space(locale, s.clearances_m[0], is_round=True),
-            find_floor(self._building, {locale, obstacle.locale}), obstacle.footprint, s.lookout_distances_m,
-            s.lookout_directions, s.lookout_short_m)
+            find_floor(self._building, {locale, obstacle.locale}), obstacle.footprint, LOOKOUT_DISTANCES_M,
+            LOOKOUT_DIRECTIONS, LOOKOUT_SHORT_M)
         away = np.linalg.norm(poses[:, :2] - here.position, axis=1)
         middle = np.mean(build_polygon(obstacle.footprint).exterior.coords[:-1], axis=0)
         side_rad = math.atan2(*(middle - here.position)[::-1])
         same_side = np.maximum(0.0, np.cos(poses[:, 2] - side_rad))
-        for k in np.argsort(away + s.lookout_same_side_m * same_side, kind="stable"):
-            if away[k] < s.min_lookout_change_m:
+        for k in np.argsort(away + LOOKOUT_SAME_SIDE_M * same_side, kind="stable"):
+            if away[k] < MIN_LOOKOUT_CHANGE_M:
                 continue
             if self._find_way(locale, here.position, poses[k, :2]) is not None:
                 x, y, heading = (float(v) for v in poses[k])
                 return self._build_subgoal(
                     Place.of_world(self._building, locale, here.x_m, here.y_m),
-                    Place.of_world(self._building, locale, x, y, heading), s.way_tolerance_m)
+                    Place.of_world(self._building, locale, x, y, heading), WAY_TOLERANCE_M)
         return None
 
     def _find_way(self, locale: str, start: Floats, end: Floats) -> list[Floats] | None:

@@ -10,17 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.doors.belief import update_door
+from knowledge_sources.methods.doors.belief import MAX_LOG_ODDS, MIN_LOG_RATIO, MIN_PICTURES, SHUT_LOG_ODDS, update_door
 from knowledge_sources.methods.doors.leaf import (
+    MAX_LOG_RATIO,
     LeafEvidence,
     describe,
     find_largest_share,
     measure_opening,
     weigh_leaf,
 )
-from knowledge_sources.methods.doors.opening import is_in_view, predict_opening
+from knowledge_sources.methods.doors.opening import MAX_DISTANCE_M, is_in_view, predict_opening
 from knowledge_sources.methods.features.picture import read_picture
-from knowledge_sources.settings import DEFAULT
 from sim.body.building import Building
 from sim.differences.leaf import build_leaf
 from sim.differences.table import TrueDoor
@@ -34,10 +34,9 @@ from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
-S = DEFAULT.doors
 HALL, DOOR = "north-hall", "archive-north-door"
 SURE = np.diag([0.01**2, 0.01**2, 0.005**2])
-RATIOS = st.floats(-S.max_log_ratio, S.max_log_ratio)
+RATIOS = st.floats(-MAX_LOG_RATIO, MAX_LOG_RATIO)
 
 
 @pytest.fixture(scope="module")
@@ -88,8 +87,8 @@ def test_a_leaf_is_told_from_what_is_beyond_in_any_light(
 ) -> None:
     pose = before_door(doorway, away_m, aside_m)
     shut, opened = (weigh(robot, doorway, buildings[state], pose, gain) for state in ("shut", "open"))
-    assert shut is not None and shut >= S.min_log_ratio
-    assert opened is not None and opened <= -S.min_log_ratio
+    assert shut is not None and shut >= MIN_LOG_RATIO
+    assert opened is not None and opened <= -MIN_LOG_RATIO
 
 
 def test_a_wall_where_the_door_should_be_is_no_leaf(
@@ -110,7 +109,7 @@ def test_a_wall_where_the_door_should_be_is_no_leaf(
 def test_a_door_that_is_far_behind_or_seen_from_the_side_is_not_looked_at(robot: RobotModel, doorway: Doorway) -> None:
     middle = doorway.pose_from(HALL)
     assert is_in_view(robot, before_door(doorway, 3.0, 0.0), doorway, HALL)
-    assert not is_in_view(robot, before_door(doorway, S.max_distance_m + 0.5, 0.0), doorway, HALL)
+    assert not is_in_view(robot, before_door(doorway, MAX_DISTANCE_M + 0.5, 0.0), doorway, HALL)
     assert not is_in_view(robot, middle @ Pose2(-3.0, 0.0, math.pi), doorway, HALL)
     assert not is_in_view(robot, middle @ Pose2(-0.3, 1.0, -1.3), doorway, HALL)
 
@@ -132,7 +131,7 @@ def test_one_picture_says_no_more_than_it_may_and_nothing_for_a_leaf_without_a_f
 ) -> None:
     evidence = LeafEvidence(200, 150, uniform, expected, agreeing, foot, expected_foot, frame, own)
     ratio = weigh_leaf(evidence)
-    assert abs(ratio) <= S.max_log_ratio
+    assert abs(ratio) <= MAX_LOG_RATIO
     assert weigh_leaf(replace(evidence, frame=math.nan)) <= 0.0
     assert weigh_leaf(replace(evidence, frame_leaf=1.0)) <= 0.0
     assert describe(evidence, ratio)
@@ -158,9 +157,9 @@ def test_a_door_is_shut_only_at_its_odds_and_by_pictures_from_two_places(looks: 
     before: DoorState | None = None
     for state in look(looks):
         if state is not None:
-            assert abs(state.log_odds) <= S.max_log_odds and 0.0 <= state.certainty <= 1.0
+            assert abs(state.log_odds) <= MAX_LOG_ODDS and 0.0 <= state.certainty <= 1.0
             if state.state == "shut" and (before is None or before.state != "shut"):
-                assert state.log_odds >= S.shut_log_odds and state.pictures >= S.min_pictures
+                assert state.log_odds >= SHUT_LOG_ODDS and state.pictures >= MIN_PICTURES
                 assert state.certainty >= 0.98
         before = state
 

@@ -18,14 +18,12 @@ from knowledge_sources.methods.floor.model_floor import ModelFloor
 from knowledge_sources.methods.floor.parallax import compute_parallax_odds
 from knowledge_sources.methods.floor.see_floor import GREY, find_unlike
 from knowledge_sources.methods.floor.things import find_regions
-from knowledge_sources.settings import DEFAULT
 from sim.render.light.lamps import Room
 from sim.render.light.lighting import Lighting
 from sim.render.light.lights import Lights
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 
-S = DEFAULT.floor
 CAMERA, MOUNT = Camera.from_field_of_view(math.radians(65.0), 512, 512), CameraMount(1.0, 0.1)
 FLOOR = np.array([110.0, 104.0, 98.0])
 SHAPE = (90, 160)
@@ -45,9 +43,9 @@ def test_what_darkens_little_by_little_is_floor_and_a_thing_in_it_is_not(
     along = (x - 80) * math.cos(direction) + (y - 45) * math.sin(direction)
     picture = shaded(dark + (1.0 - dark) / (1.0 + np.exp(along / width_px)))
     mean, everywhere = compute_looks(FLOOR), np.ones(SHAPE, bool)
-    assert find_floor_in_shade(compute_looks(picture), everywhere, mean, default_covariance(S), S).mean() > 0.97
+    assert find_floor_in_shade(compute_looks(picture), everywhere, mean, default_covariance()).mean() > 0.97
     picture[40:60, 70:95] *= 0.5
-    with_thing = find_floor_in_shade(compute_looks(picture), everywhere, mean, default_covariance(S), S)
+    with_thing = find_floor_in_shade(compute_looks(picture), everywhere, mean, default_covariance())
     assert with_thing[42:58, 72:93].mean() < 0.05, "its own edges part it from the floor"
     assert with_thing[:38].mean() > 0.97
 
@@ -58,7 +56,7 @@ def test_a_tinted_picture_has_floor_and_a_thing_on_it(red: float, blue: float, g
     picture = np.clip(shaded(np.full(SHAPE, gain)) * (red, 1.0, blue), 0.0, 255.0)
     picture[40:60, 70:95] = np.clip(picture[40:60, 70:95] * (0.45, 0.3, 0.3), 0.0, 255.0)
     model = ModelFloor(np.zeros(SHAPE, np.int64), FLOOR[None] / 255.0, np.ones(SHAPE, bool))
-    unlike, tells, _ = find_unlike(picture.astype(np.uint8), model, None, S)
+    unlike, tells, _ = find_unlike(picture.astype(np.uint8), model, None)
     if gain * 110.0 * max(red, 1.0, blue) < 250.0 and tells.any():
         assert unlike[43:57, 73:92].mean() > 0.95
         assert unlike[:38].mean() < 0.02
@@ -71,10 +69,10 @@ def test_a_thing_that_fills_the_picture_at_once_is_not_the_floor_in_other_light(
 ) -> None:
     model = ModelFloor(np.zeros(SHAPE, np.int64), FLOOR[None] / 255.0, np.ones(SHAPE, bool))
     picture = shaded(np.ones(SHAPE))
-    _, _, light = find_unlike(picture.astype(np.uint8), model, None, S)
+    _, _, light = find_unlike(picture.astype(np.uint8), model, None)
     assert light is not None and np.allclose(light, 0.0, atol=0.1)
     picture[:, :width] = np.clip(picture[:, :width] * (red, 0.8, blue), 0.0, 255.0)
-    unlike, _, _ = find_unlike(picture.astype(np.uint8), model, None, S, light)
+    unlike, _, _ = find_unlike(picture.astype(np.uint8), model, None, light)
     assert unlike[:, : width - 3].mean() > 0.95
     assert unlike[:, width + 3 :].mean() < 0.02
 
@@ -86,7 +84,7 @@ def test_white_balance_that_changes_little_by_little_is_followed(red: float, blu
     light = None
     for part in np.linspace(0.0, 1.0, 12):
         gains = (red**part, 1.0, blue**part)
-        unlike, tells, light = find_unlike((shaded(np.ones(SHAPE)) * gains).astype(np.uint8), model, None, S, light)
+        unlike, tells, light = find_unlike((shaded(np.ones(SHAPE)) * gains).astype(np.uint8), model, None, light)
         assert tells.all() and unlike.mean() < 0.02
 
 
@@ -110,7 +108,7 @@ def views(gloss: float, thing: bool) -> tuple[NDArray[np.float32], NDArray[np.fl
     grid = build_floor_grid(CAMERA, MOUNT, 1.0, 9.0)
     assert grid is not None
     model = ModelFloor(np.zeros(grid.shape, np.int64), np.array([(0.4, 0.39, 0.37)]), np.ones(grid.shape, bool))
-    unlike, _, _ = find_unlike(pictures[0][grid.top :], model, None, S)
+    unlike, _, _ = find_unlike(pictures[0][grid.top :], model, None)
     grey = [picture.astype(np.float32) @ GREY for picture in pictures]
     return grey[0], grey[1], unlike, before.inverse() @ now
 
@@ -121,8 +119,8 @@ def test_mirrored_lamps_do_not_stand_on_the_floor_and_a_box_does(gloss: float, t
     grid = build_floor_grid(CAMERA, MOUNT, 1.0, 9.0)
     assert grid is not None and now.shape == (512 // STEP_PX, 512 // STEP_PX)
     near = (grid.ranges_m < 7.0) & (np.abs(grid.points_robot[..., 1]) < 1.8)
-    regions = find_regions(unlike & near, near, grid, S)
-    odds = [compute_parallax_odds(region, grid, now, before, moved, CAMERA, MOUNT, S) for region in regions]
+    regions = find_regions(unlike & near, near, grid)
+    odds = [compute_parallax_odds(region, grid, now, before, moved, CAMERA, MOUNT) for region in regions]
     assert regions
     if thing:
         assert max(odds) > 1.0

@@ -13,13 +13,11 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.floor_grid import STEP_PX, build_floor_grid
-from knowledge_sources.methods.floor.parallax import measure_foot_part
+from knowledge_sources.methods.floor.parallax import FOOT_PART_STEP, measure_foot_part
 from knowledge_sources.methods.floor.things import find_footprint, find_regions
-from knowledge_sources.settings.floor import FloorSettings
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 
-S = FloorSettings()
 CAMERA = Camera.from_field_of_view(math.radians(65.0))
 MOUNT = CameraMount(1.0, 0.1)
 BUILT = build_floor_grid(CAMERA, MOUNT, MOUNT.height_m, 9.0)
@@ -49,14 +47,14 @@ def test_a_border_is_on_the_floor_or_as_far_as_its_height_makes_it(
     texture = cv2.resize(noise, (200, 200), interpolation=cv2.INTER_LINEAR)
     earlier, _ = draw(texture, at_m, low_m, 0.0)
     now, board = draw(texture, at_m, low_m, moved_m)
-    (region,) = find_regions(board[GRID.top:], np.ones(GRID.shape, bool), GRID, S)
-    part = measure_foot_part(region, GRID, now, earlier, Pose2(moved_m, 0.0, 0.0), CAMERA, MOUNT, S)
+    (region,) = find_regions(board[GRID.top:], np.ones(GRID.shape, bool), GRID)
+    part = measure_foot_part(region, GRID, now, earlier, Pose2(moved_m, 0.0, 0.0), CAMERA, MOUNT)
     true_part = 1.0 - low_m / MOUNT.height_m
-    assert part == pytest.approx(true_part, abs=2.0 * S.foot_part_step)
+    assert part == pytest.approx(true_part, abs=2.0 * FOOT_PART_STEP)
     if low_m == 0.0:
         assert part == 1.0
-    near_m = float(find_footprint(region, GRID, S, part)[:, 0].min())
-    assert near_m == pytest.approx(at_m - moved_m, abs=2.0 * S.foot_part_step * (at_m - moved_m) / true_part)
+    near_m = float(find_footprint(region, GRID, part)[:, 0].min())
+    assert near_m == pytest.approx(at_m - moved_m, abs=2.0 * FOOT_PART_STEP * (at_m - moved_m) / true_part)
 
 
 @settings(max_examples=25, deadline=None)
@@ -64,5 +62,5 @@ def test_a_border_is_on_the_floor_or_as_far_as_its_height_makes_it(
 def test_without_motion_nothing_is_told(seed: int, at_m: float) -> None:
     noise = np.random.default_rng(seed).uniform(0.0, 255.0, (40, 40))
     picture, board = draw(cv2.resize(noise, (200, 200)), at_m, 0.2, 0.0)
-    (region,) = find_regions(board[GRID.top:], np.ones(GRID.shape, bool), GRID, S)
-    assert measure_foot_part(region, GRID, picture, picture, Pose2(0.0, 0.0, 0.0), CAMERA, MOUNT, S) == 1.0
+    (region,) = find_regions(board[GRID.top:], np.ones(GRID.shape, bool), GRID)
+    assert measure_foot_part(region, GRID, picture, picture, Pose2(0.0, 0.0, 0.0), CAMERA, MOUNT) == 1.0

@@ -17,8 +17,8 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from harvey.simulation.run import build_robot_model
-from knowledge_sources.action.obstacle_finder import ObstacleFinder
-from knowledge_sources.floor_ahead import list_free_discs
+from knowledge_sources.action.obstacle_finder import FREE_FLOOR_ODDS, ObstacleFinder
+from knowledge_sources.floor_ahead import PUT_DOWN_FREE_M, list_free_discs
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.questions import find_building_without_finds
 from knowledge_sources.settings import DEFAULT
@@ -311,7 +311,7 @@ def total_length(segments: Floats) -> float:
 def test_the_numbers_fit_together() -> None:
     s = DEFAULT.action
     assert s.min_thing_certainty < s.min_obstacle_certainty < s.max_obstacle_certainty
-    odds = s.max_obstacle_certainty / (1.0 - s.max_obstacle_certainty) * s.free_floor_odds**2
+    odds = s.max_obstacle_certainty / (1.0 - s.max_obstacle_certainty) * FREE_FLOOR_ODDS**2
     assert odds < s.min_gone_certainty / (1.0 - s.min_gone_certainty)  # two pictures are enough
 
 
@@ -343,7 +343,7 @@ def test_the_floor_that_is_free_as_it_was_put_down_is_round_the_robot_and_not_ro
                      (0.02,) * 41, (), 0.5)
     at = Place.of_world(hall.robot.world, HALL, HERE.x_m + 0.03, HERE.y_m)
     hall._apply(Post(scan), Post(Goal(at, at)))
-    discs = list_free_discs(hall.board.view, hall.robot, HERE, hall.board.view.all(FreeFloor), DEFAULT.action)
+    discs = list_free_discs(hall.board.view, hall.robot, HERE, hall.board.view.all(FreeFloor))
     x_m, y_m, radius_m = discs[-1].circle
-    assert radius_m == DEFAULT.action.put_down_free_m
+    assert radius_m == PUT_DOWN_FREE_M
     assert hall.robot.mount.forward_m > 0.05 and math.dist((x_m, y_m), HERE.position) < 1e-6

@@ -13,7 +13,6 @@ from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.methods.floor.seen_floor import SeenFloor
-from knowledge_sources.settings.floor import FloorSettings
 from sim.body.collision import Obstacles
 from sim.body.range_ring import RangeRing
 from world_models.actuator import ActuatorModel
@@ -26,7 +25,6 @@ FLOOR = generated_floor(3, 4)
 WORLD = FLOOR.world
 ROBOT = RobotModel(WORLD, Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1), ActuatorModel())
 SOLID = Obstacles.of_faces(face for part in WORLD.locale_source.all_geometry() for _, face in part.faces)
-SETTINGS = FloorSettings()
 SIGMA_M = 0.02
 
 
@@ -54,7 +52,7 @@ def read(solid: Floats, pose: Pose2, seed: int, dropout: float) -> FreeFloor | N
     if locale is None:
         return None
     reading = type(exact)(exact.directions_rad, noisy, SIGMA_M, exact.half_beam_rad, exact.max_range_m, 1.0)
-    return see_ranges(ROBOT, locale, pose, 0.02, 0.005, reading, (), SETTINGS)
+    return see_ranges(ROBOT, locale, pose, 0.02, 0.005, reading, ())
 
 
 def free_area(floor: FreeFloor) -> shapely.Geometry:
@@ -128,7 +126,7 @@ def test_more_readings_make_it_narrower() -> None:
         here = Pose2(pose.x_m + 0.2 * step, pose.y_m + 0.1 * step, 0.15 * step)
         reading = ring.measure(solid, here, rng, float(step))
         assert reading is not None
-        found.insert(0, see_ranges(ROBOT, name, here, 0.01, 0.002, reading, found, SETTINGS))
+        found.insert(0, see_ranges(ROBOT, name, here, 0.01, 0.002, reading, found))
     first, last = found[-1].things, found[0].things
     assert len(first) == len(last) == 1
     assert shapely.Polygon(last[0].footprint).area < shapely.Polygon(first[0].footprint).area
@@ -139,7 +137,7 @@ def test_what_touches_the_robot_ends_the_floor_there() -> None:
     solid = np.concatenate([SOLID.segments_world, box(pose.x_m + 0.56, pose.y_m, 0.4, 0.0)])
     reading = RangeRing(24, sigma_m=0.0, dropout=0.0).measure(solid, pose, np.random.default_rng(1), 0.0)
     assert reading is not None
-    floor = see_ranges(ROBOT, name, pose, 0.01, 0.002, reading, (), SETTINGS)
+    floor = see_ranges(ROBOT, name, pose, 0.01, 0.002, reading, ())
     ahead = int(np.argmin(np.abs(floor.bearings_rad)))
     assert floor.ends[ahead] == "thing" and floor.far_m[ahead] <= 0.36
     assert not SeenFloor((floor,), np.array([[pose.x_m, pose.y_m, 0.5]])).find_free(
@@ -150,6 +148,6 @@ def test_without_an_echo_nothing_is_free() -> None:
     name, pose = place(0, 0.5, 0.5)
     reading = RangeRing(24).measure(np.zeros((0, 2, 2)), pose, np.random.default_rng(0), 0.0)
     assert reading is not None
-    floor = see_ranges(ROBOT, name, pose, 0.02, 0.005, reading, (), SETTINGS)
+    floor = see_ranges(ROBOT, name, pose, 0.02, 0.005, reading, ())
     assert not any(far > near for near, far in zip(floor.near_m, floor.far_m, strict=True))
     assert set(floor.ends) == {"sight"}
