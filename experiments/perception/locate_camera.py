@@ -19,7 +19,7 @@ from experiments.perception.rivals import CAMERA_MIN_LINE_LENGTH_PX, Rival, find
 from knowledge_sources.methods.arrays import Floats, Indices
 from knowledge_sources.methods.features.lines import LineSegments, find_lines, remove_duplicates
 from knowledge_sources.methods.matching import match_in_space
-from knowledge_sources.methods.matching.pose_parameters import CameraParameters, build_camera_parameters
+from knowledge_sources.methods.matching.pose_pairs import CameraParameters, build_camera_parameters
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml, trunc_r_and_t
 from knowledge_sources.methods.verification.agreement import Agreement, compute_agreement, compute_p_false
 from knowledge_sources.settings import DEFAULT

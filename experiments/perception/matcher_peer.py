@@ -6,9 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching import Similarity2
-from knowledge_sources.methods.matching.fit import compute_best_fits
-from knowledge_sources.methods.matching.hough import build_line_table
-from knowledge_sources.methods.matching.pairs import PairTable, build_pair_table, compute_model_motion
+from knowledge_sources.methods.matching.image_pairs import (
+    PairTable,
+    build_line_table,
+    build_pair_table,
+    compute_model_motion,
+)
+from knowledge_sources.methods.matching.search import compute_best_fits
 
 Array = NDArray[np.float64]
 

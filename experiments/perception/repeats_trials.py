@@ -16,7 +16,7 @@ from experiments.perception.rivals import (
     measure_apart,
     refine_near,
 )
-from knowledge_sources.methods.matching.pose_parameters import build_camera_parameters
+from knowledge_sources.methods.matching.pose_pairs import build_camera_parameters
 from world_models.frames import Pose
 
 Array = NDArray[np.float64]

@@ -16,8 +16,8 @@ import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Indices
-from knowledge_sources.methods.matching.pose_parameters import PoseParameters
-from knowledge_sources.methods.matching.pose_starts import refine_pose
+from knowledge_sources.methods.matching.pose_matching import refine_pose
+from knowledge_sources.methods.matching.pose_pairs import PoseParameters
 from knowledge_sources.methods.verification.agreement import compute_coverage
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera

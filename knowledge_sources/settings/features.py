@@ -20,7 +20,7 @@ class FeaturesSettings:
     # Line segments, whether predicted or not
     edge_smoothing_px: float = setting(
         0.8, "px", "Standard deviation of the Gaussian smoothing before an edge is located.",
-        "engineering judgement; the phase-bias table of line_refinement was computed for it")
+        "engineering judgement; the phase-bias table of lines.py was computed for it")
     edge_profile_px: float = setting(
         1.1, "px", "Standard deviation of a sharp edge's gradient profile after smoothing and differencing.", _RENDERED)
     min_gradient_sigmas: float = setting(

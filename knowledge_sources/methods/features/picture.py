@@ -15,10 +15,10 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats32, Image
-from knowledge_sources.methods.features.patch_kernels import compute_noise_response
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.features import FeaturesSettings
 from world_models.camera import Camera
@@ -159,8 +159,26 @@ def estimate_noise_sigma(image: Floats32, settings: FeaturesSettings = DEFAULT.f
     if min(image.shape) < 3:
         return ROUNDING_SIGMA
     step = max(image.shape[0] // settings.noise_rows, 1)
-    response = compute_noise_response(np.ascontiguousarray(image, np.float32), step)
+    response = _compute_noise_response(np.ascontiguousarray(image, np.float32), step)
     return max(response / (0.6745 * 6.0), ROUNDING_SIGMA)
+
+
+@njit(cache=True, error_model="numpy")
+def _compute_noise_response(image: Any, step: int) -> float:
+    """Median absolute response of every ``step``-th row to Immerkaer's noise mask, blind to linear structure."""
+    height, width = image.shape
+    count = (height - 3) // step + 1
+    response = np.empty(count * (width - 2))
+    at = 0
+    for k in range(count):
+        r = k * step
+        for c in range(width - 2):
+            a = image[r, c] - 2.0 * image[r + 1, c] + image[r + 2, c]
+            b = image[r, c + 1] - 2.0 * image[r + 1, c + 1] + image[r + 2, c + 1]
+            d = image[r, c + 2] - 2.0 * image[r + 1, c + 2] + image[r + 2, c + 2]
+            response[at] = abs(a - 2.0 * b + d)
+            at += 1
+    return float(np.median(response))
 
 
 def _locked(image: Image) -> Image:

@@ -21,11 +21,10 @@ Three lines of a model, of which the data show two, moved by (5, -3) pixels, and
 [5, -3]
 """
 
-from knowledge_sources.methods.matching.fit import Similarity2
-from knowledge_sources.methods.matching.hough import Peak
 from knowledge_sources.methods.matching.image_matching import Match, format_trace, match_lines
+from knowledge_sources.methods.matching.image_pairs import Peak
 from knowledge_sources.methods.matching.pose_matching import FloorMatch, PoseMatch, match_in_space, match_on_floor
-from knowledge_sources.methods.matching.search import TraceStep
+from knowledge_sources.methods.matching.search import Similarity2, TraceStep
 
 __all__ = [
     "FloorMatch",

@@ -9,23 +9,29 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
-from knowledge_sources.methods.matching.fit import Fitting, Similarity2
-from knowledge_sources.methods.matching.hough import LineTable, Peak, build_line_table, find_hough_peaks
-from knowledge_sources.methods.matching.objective import Terms, build_likelihood_terms, build_paper_terms
-from knowledge_sources.methods.matching.pairs import (
+from knowledge_sources.methods.matching.image_pairs import (
+    LineTable,
     PairTable,
+    Peak,
     build_anchors,
+    build_line_table,
     build_pair_table,
     compute_model_motion,
     compute_placement,
     find_gated,
+    find_hough_peaks,
     refine_placements,
 )
 from knowledge_sources.methods.matching.search import (
+    Fitting,
     PairSpace,
     SearchResult,
+    Similarity2,
+    Terms,
     TraceStep,
+    build_likelihood_terms,
     build_masks,
+    build_paper_terms,
     choose_nearest,
     compute_coverage,
     fit_state,

@@ -1,17 +1,186 @@
-"""Local search over correspondences (§6.1.1, §6.1.4)."""
+"""Local search over correspondences, in the image or with a pose (§6.1.1 to §6.1.4).
+
+A state, the chosen pairs, has a best fit (in closed form in the image, §6.1.2, or a step of a pose), and a match error:
+the paper's, or one derived as a likelihood (§6.1.3). The inner loops are compiled, in `kernels`.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
-from knowledge_sources.methods.matching.fit import Fits, Fitting
-from knowledge_sources.methods.matching.kernels import SpaceArrays, apply_move, search_locally
-from knowledge_sources.methods.matching.objective import Terms
+from knowledge_sources.methods.matching.kernels import (
+    RIGID,
+    SCALED,
+    STEP,
+    SpaceArrays,
+    TermArrays,
+    apply_move,
+    compute_fits,
+    search_locally,
+)
 from knowledge_sources.settings.matching import MatchingSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Similarity2:
+    """A motion of the model onto the data: ``p_data = scale R(rotation) (p_model - centre) + centre + shift``.
+
+    Attributes:
+        rotation_rad: from u towards v.
+        shift_px: (u, v).
+        scale: 1 unless scale was fitted.
+        centre_px: the centre of the rotation.
+    """
+
+    rotation_rad: float
+    shift_px: tuple[float, float]
+    scale: float
+    centre_px: tuple[float, float]
+
+    def apply(self, points_px: Floats) -> Floats:
+        """Model points (..., 2) moved to the data."""
+        c, s = math.cos(self.rotation_rad), math.sin(self.rotation_rad)
+        turned = (np.asarray(points_px, float) - self.centre_px) @ np.array([[c, s], [-s, c]])
+        return np.asarray(self.scale * turned + self.centre_px + self.shift_px)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fits:
+    """Best fits of k states.
+
+    Attributes:
+        errors: (k,) E_fit at the minimum.
+        placements: (k, 5) (cos, sin, T_u, T_v, s), or the steps (k, d) of a pose.
+    """
+
+    errors: Floats
+    placements: Floats
+
+
+class Fitting(NamedTuple):
+    """How states are fitted: RIGID, SCALED or STEP, and the turn [rad] that a rigid fit starts from."""
+
+    kind: int
+    turn_rad: float
+
+    @staticmethod
+    def in_image(with_scale: bool, start: Floats) -> Fitting:
+        """As :func:`compute_best_fits`, from the turn of a placement (5,)."""
+        return Fitting(SCALED if with_scale else RIGID, math.atan2(start[1], start[0]))
+
+    def fit(self, forms: Floats) -> Fits:
+        """The best fits of k forms (k, d, d)."""
+        return Fits(*compute_fits(np.ascontiguousarray(forms), self.kind, np.full(len(forms), self.turn_rad)))
+
+
+POSE_STEP = Fitting(STEP, 0.0)
+"""As :func:`compute_step_fits`."""
+
+
+def compute_best_fits(forms: Floats, with_scale: bool, start: Floats) -> Fits:
+    """Minimise k quadratic forms (k, 5, 5) over R, T and, if asked, s: T and s by elimination, then R.
+
+    Source: §6.1.2, E_fit = sum_i (l_i / 2) sum over both ends (n_i . (R p_i + T) - s rho_i)^2, each bracket linear
+    in (cos, sin, T_u, T_v, s), so that a state is the sum of its pairs' forms.
+    With scale the rest is x'Qx on the unit circle, tan 2 phi = 2 Q12 / (Q11 - Q22): the second-order equation.
+    Without scale a linear term is left, and the minimum is a root of a quartic, which Newton's method finds from the
+    turn of ``start`` (5,) or (k, 5).
+    """
+    turns = np.empty(len(forms))
+    turns[:] = np.arctan2(start[..., 1], start[..., 0])
+    return Fits(*compute_fits(np.ascontiguousarray(forms), SCALED if with_scale else RIGID, turns))
+
+
+def compute_step_fits(forms: Floats) -> Fits:
+    """Minimise k forms (k, d + 1, d + 1) over the first d of (step, 1); ``placements`` are the steps (k, d)."""
+    return POSE_STEP.fit(forms)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Terms:
+    """An objective as the search uses it: each part adds to the match error, smaller is better.
+
+    Attributes:
+        end_weights: (k,) weight of a squared end distance [1/px^2], one a data line.
+        omission_scale, lengths: (m,), and omission_rate: omission of model line L is ``scale_L * e^(rate P_L)``,
+            or, if the rate is 0, ``scale_L * log((1 + length_L) / (1 + length_L (1 - P_L)))``; P_L is the part of the
+            line that no data line covers.
+        anchor_weights: of the weak pull to the start: shift [1/px^2], turn [1/rad^2], scale.
+    """
+
+    end_weights: Floats
+    omission_scale: Floats
+    lengths: Floats
+    omission_rate: float
+    anchor_weights: tuple[float, float, float]
+
+    @property
+    def arrays(self) -> TermArrays:
+        """Of the omission, as the compiled functions take them."""
+        return self.omission_scale, self.lengths, self.omission_rate
+
+    def compute_omission(self, uncovered: Floats, lines: Indices) -> Floats:
+        """Weighted omission (...) of model lines of which the data leave the part ``uncovered`` (...)."""
+        if self.omission_rate == 0.0:
+            size = self.lengths[lines]
+            return np.asarray(self.omission_scale[lines] * np.log((1.0 + size) / (1.0 + size * (1.0 - uncovered))))
+        return np.asarray(self.omission_scale[lines] * np.exp(self.omission_rate * uncovered))
+
+
+def build_paper_terms(model_lengths: Floats, data_lengths: Floats, settings: MatchingSettings) -> Terms:
+    """E_match = E_fit + alpha sum_L e^(beta P_L). Source: §6.1.3.
+
+    Lengths (m,), (k,) [px] count relative to the model's: E_fit is a mean squared distance [px^2], and a model line's
+    omission weighs by its share of the model ("perhaps on the basis of model line length"). So weighted, the error
+    spans the range of Figure 12(d).
+    """
+    total = max(float(np.sum(model_lengths)), 1.0)
+    return Terms(
+        end_weights=0.5 * data_lengths / total,
+        omission_scale=settings.omission_alpha * model_lengths / total,
+        lengths=model_lengths,
+        omission_rate=settings.omission_beta,
+        anchor_weights=(1e-6, 1e-2, 1e-2),
+    )
+
+
+def build_likelihood_terms(
+    model_lengths: Floats, data_count: int, sigma_px: float, start_px: float, settings: MatchingSettings
+) -> Terms:
+    """Minus the log likelihood ratio of "the model is here" against "only clutter is here".
+
+    The end of a paired segment lies off its line by N(0, sigma). Clutter lies along a model line, by chance, for a
+    length of at least c with probability (1 + c / chance_length)^-exponent: long lines are rare in clutter, but not as
+    rare as if each piece were independent, as a distractor (a crack, a poster's edge) is as straight as a contour. So
+    the evidence grows with the logarithm of the length covered, and many model lines seen in part outweigh a few seen
+    in full.
+
+    Args:
+        model_lengths: (m,) [px]. sigma_px: of a data end across its model line. start_px: error of the start.
+
+    Raises:
+        ValueError: a number that must be positive is not.
+    """
+    exponent, length_px = settings.chance_exponent, settings.chance_length_px
+    if not (sigma_px > 0 and exponent > 0 and length_px > 0):
+        raise ValueError(
+            f"expected sigma, chance_exponent and chance_length_px > 0, got {sigma_px}, {exponent}, {length_px}"
+        )
+    half = 0.5 * float(np.max(model_lengths, initial=1.0))
+    return Terms(
+        end_weights=np.full(data_count, 0.5 / sigma_px**2),
+        omission_scale=np.full(len(model_lengths), exponent),
+        lengths=model_lengths / length_px,
+        omission_rate=0.0,
+        anchor_weights=(0.5 / start_px**2, 0.5 * (half / start_px) ** 2, 0.5 * (half / start_px) ** 2),
+    )
+
 
 STRATEGIES = ("first", "steepest")
 

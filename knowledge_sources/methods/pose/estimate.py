@@ -1,11 +1,25 @@
-"""The results of the pose solvers."""
+"""The results of the pose solvers, and the last steps of every solver.
+
+These are the sign of the depths, rejections, the covariance by how much the lines scatter, and the prior where it is
+better or where few lines leave it much to say.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TypeVar
+
+import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Mask
-from world_models.frames import Pose, Pose2
+from knowledge_sources.methods.pose import kernels
+from knowledge_sources.methods.pose.levenberg_marquardt import orthonormalise
+from knowledge_sources.methods.pose.line_set import LineSet, compute_image_jacobian, find_in_front, measure_lines
+from knowledge_sources.settings.pose import PoseSettings
+from world_models.frames import Pose, Pose2, frozen
 
 DISTANCE = "too far from the model line"
 BEHIND = "behind the camera"
@@ -70,3 +84,245 @@ class PlanarEstimate:
     def ok(self) -> bool:
         """Whether the image alone (with the prior covariance, if one was given) decided the pose."""
         return self.reason is None
+
+
+def compute_mean_square(variance: float, bound: float) -> float:
+    """Mean square of a residual of the normal law in pairs of which those beyond ``bound`` (sum of squares) are cut."""
+    if math.isinf(bound):
+        return variance
+    half = 0.5 * bound / variance
+    outside = math.exp(-half)
+    return variance * (1.0 - outside * (1.0 + half)) / (1.0 - outside)
+
+
+def compute_spread(mean: float, bound: float, most: float) -> float:
+    """Factor on the covariance of the kept ones' Hessian, by their mean square over the stated variance.
+
+    Args:
+        mean: of the squared residuals; below what noise as stated leaves, the noise is as stated.
+        bound: of a pair's squared residuals over their stated variance; infinite where none is cut.
+        most: the largest variance that is looked for: the mean hardly tells larger ones apart.
+    """
+    if mean <= compute_mean_square(1.0, bound):
+        variance = 1.0
+    elif mean >= compute_mean_square(most, bound):
+        variance = max(most, mean)
+    else:
+        from scipy.optimize import brentq  # loaded when first used: most missions start without it
+
+        variance = float(brentq(lambda s: compute_mean_square(s, bound) - mean, 1.0, most))
+    return variance * variance / compute_mean_square(variance, bound)
+
+
+State = TypeVar("State")
+
+
+def compute_max_chi2(freedom: float, settings: PoseSettings) -> float:
+    """The largest sum of squares, over their variance, that noise of so many degrees of freedom leaves."""
+    return freedom + settings.max_chi2_sigmas * math.sqrt(2.0 * freedom)
+
+
+def solve_near_prior(
+    prior: State,
+    solve: Callable[[float], State],
+    compute_chi2: Callable[[State], float],
+    max_chi2: float,
+    settings: PoseSettings,
+) -> State:
+    """The state nearest to the prior that explains the lines to their noise, by Morozov's discrepancy principle.
+
+    Many poses fit few lines, and in directions of which they say little their noise would move the pose far. Nobody
+    stated how good the prior is; so its weight is the largest one under which the lines are still explained, or fitted
+    as well as any state near the prior does. The weight is found by bisection.
+
+    Args:
+        solve: the likeliest state where the prior weighs this many weak ones.
+        compute_chi2: a state's sum of squared residuals over their variance.
+        max_chi2: up to this the lines are explained.
+    """
+    if compute_chi2(prior) <= max_chi2:
+        return prior
+    best, low = solve(1.0), 0.0
+    high = settings.max_prior_weight_log10 if compute_chi2(best) <= max_chi2 else low
+    while high - low > settings.prior_weight_step_log10:
+        middle = 0.5 * (low + high)
+        trial = solve(10.0**middle)
+        if compute_chi2(trial) <= max_chi2:
+            best, low = trial, middle
+        else:
+            high = middle
+    return best
+
+
+FEW_LINES = "fewer than 3 lines: the prior decides the rest"
+UNDECIDED = "the lines leave a direction open: the prior decides it"
+NOT_BETTER = "no pose fits better than the prior"
+ALL_BEHIND = "every pose found lies behind the camera: the prior is returned"
+FEW_INLIERS = "fewer than 3 lines fit the pose"
+MINORITY = "most lines do not fit the pose"
+FAR_LINES = "the lines lie further from the pose than their noise allows"
+NO_SUBSET = "no subset of lines agrees: the prior is returned"
+
+MIN_INLIERS = 3
+"""Three lines decide six unknowns."""
+MIN_LENGTH_PX = 1e-9
+"""A shorter segment has no direction."""
+
+
+def compute_weak_information(settings: PoseSettings) -> Floats:
+    """(6, 6) information of a prior without a covariance: too little to move a pose that lines decide. Read-only."""
+    return _compute_weak_information(settings.weak_rotation_rad, settings.weak_translation_m)
+
+
+@lru_cache(maxsize=8)
+def _compute_weak_information(rotation_rad: float, translation_m: float) -> Floats:
+    return frozen(np.diag([rotation_rad**-2] * 3 + [translation_m**-2] * 3))
+
+
+def has_open_direction(hessian: Floats, settings: PoseSettings) -> bool:
+    """Whether, in some direction, the lines know less than a weak prior."""
+    scale = 1.0 / np.sqrt(np.diag(compute_weak_information(settings)))
+    return bool(np.linalg.eigvalsh(hessian * scale[:, None] * scale)[0] < 1.0)
+
+
+def is_mostly_in_front(lines: LineSet, rotation: Floats, translation: Floats) -> bool:
+    """Whether more than half of the lines pass in front of the camera."""
+    return len(lines) == 0 or 2 * int(np.count_nonzero(find_in_front(lines, rotation, translation))) > len(lines)
+
+
+def find_rejections(
+    lines: LineSet, rotation: Floats, translation: Floats, near: Mask, settings: PoseSettings
+) -> tuple[str | None, ...]:
+    """Why each line is no inlier (n); ``near`` (n,) says which are near enough to their model line."""
+    _, front, overlap = measure_lines(lines, rotation, translation, settings.max_beside_px)
+    tests = (
+        (lines.lengths_px <= MIN_LENGTH_PX, NO_LENGTH), (~near, DISTANCE), (~front, BEHIND), (~overlap, NO_OVERLAP)
+    )
+    out: list[str | None] = [None] * len(lines)
+    for mask, reason in tests:
+        for i in np.flatnonzero(mask):
+            out[i] = out[i] or reason
+    return tuple(out)
+
+
+def reject_behind(lines: LineSet, rotation: Floats, translation: Floats) -> tuple[str | None, ...]:
+    """Reasons of a solver that rejects only what lies behind the camera."""
+    return tuple(None if f else BEHIND for f in find_in_front(lines, rotation, translation))
+
+
+def build_estimate(
+    lines: LineSet,
+    rotation: Floats,
+    translation: Floats,
+    covariance: Floats,
+    rejected: tuple[str | None, ...],
+    cost: float,
+    iterations: int,
+    reason: str | None,
+    settings: PoseSettings,
+    bound: float = math.inf,
+) -> PoseEstimate:
+    """The estimate at a pose, with its residuals; its reason, if there is none yet, is :func:`find_doubt`'s."""
+    residuals = measure_lines(lines, rotation, translation)[0]
+    return PoseEstimate(
+        camera_from_world=Pose(orthonormalise(rotation), translation),
+        covariance=0.5 * (covariance + covariance.T),
+        inliers=np.array([r is None for r in rejected], dtype=bool),
+        residuals_px=residuals,
+        rejected=rejected,
+        cost=cost,
+        iterations=iterations,
+        reason=reason or find_doubt(residuals / lines.sigma_px[:, None], rejected, settings, bound),
+    )
+
+
+def find_doubt(
+    whitened: Floats, rejected: tuple[str | None, ...], settings: PoseSettings, bound: float = math.inf
+) -> str | None:
+    """Why a pose has not earned to be called decided by its lines, ``None`` if it has.
+
+    ``whitened`` (n, 2) are the residuals over their deviations. A few gross outliers among the lines that count make
+    the mean square large, whether the pose is right or not: the solver does not know. Lines of a squared distance
+    beyond ``bound`` are left out, and what is kept scatters the less.
+    """
+    kept = np.array([r is None for r in rejected], bool)
+    count = int(np.count_nonzero(kept))
+    if count < MIN_INLIERS:
+        return FEW_INLIERS
+    if 2 * count < len(rejected):
+        return MINORITY
+    freedom = 2.0 * count
+    limit = compute_mean_square(settings.max_residual_sigmas**2, bound) * compute_max_chi2(freedom, settings)
+    return FAR_LINES if float(np.sum(whitened[kept] ** 2)) > limit else None
+
+
+def compute_covariance(
+    lines: LineSet, rotation: Floats, translation: Floats, rejected: tuple[str | None, ...],
+    gain: tuple[Floats, Floats], settings: PoseSettings, bound: float | None = None, doubtful: Mask | None = None,
+) -> Floats:
+    """(6, 6) covariance from how the pose moves with the ends of the lines, see :func:`kernels.spread_errors`.
+
+    The lines' own errors may be larger than stated. Lines of which only the best part is kept, those within ``bound``
+    (squared distance over variance), scatter more than that part shows. Lines that scatter more than their noise
+    allows have more noise. And ``doubtful`` ones (n,) may be wrong by as much as an inlier can be.
+    """
+    kept = np.array([r is None for r in rejected], bool)
+    noise = measure_scatter(lines.take(kept), rotation, translation, settings)
+    if bound is not None:
+        mean = noise if noise > 1.0 else compute_mean_square(1.0, bound)
+        noise = compute_spread(mean, bound, settings.max_scatter)
+    arrays = lines.arrays
+    if bound is not None and doubtful is not None:
+        arrays = (*arrays[:6], lines.sigma_px * np.where(doubtful, math.sqrt(max(0.5 * bound, 1.0)), 1.0), arrays[7])
+    covariance: Floats = kernels.spread_errors(arrays, *gain, noise, settings.shared_px)
+    return covariance
+
+
+def measure_scatter(lines: LineSet, rotation: Floats, translation: Floats, settings: PoseSettings) -> float:
+    """The lines' variance over the stated one, if that does not allow it; else 1.
+
+    From what is left of the residuals when the pose, and the error that all lines share, are fitted to them: a pose
+    that is not the likeliest one has larger residuals without more noise.
+    """
+    freedom = 2.0 * len(lines) - 6.0
+    distances = measure_lines(lines, rotation, translation)[0]
+    chi2 = float(np.sum((distances / lines.sigma_px[:, None]) ** 2))
+    if freedom < settings.min_scatter_freedom or chi2 <= compute_max_chi2(freedom, settings):
+        return 1.0
+    residuals, slopes = compute_image_jacobian(lines, rotation, translation)
+    normals_px = kernels.compute_gain(
+        lines.arrays, np.zeros(len(lines)), np.array(rotation), np.array(translation), np.eye(6))[1]
+    places = np.concatenate([np.ones((*lines.rays.shape[:2], 1)), lines.rays[..., :2]], axis=2)
+    shared = np.einsum("ia,iec->ieac", normals_px, places).reshape(len(lines), 2, 6) * (settings.shared_px > 0.0)
+    sigma = np.repeat(lines.sigma_px, 2)
+    columns = np.concatenate([slopes, shared], axis=2).reshape(-1, 12) / sigma[:, None]
+    whitened = residuals.reshape(-1) / sigma
+    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    basis = basis[:, sizes > 1e-9 * sizes[0]]
+    freedom = len(whitened) - basis.shape[1]
+    left = float(np.sum((whitened - basis @ (basis.T @ whitened)) ** 2))
+    is_more = freedom >= settings.min_scatter_freedom and left > compute_max_chi2(freedom, settings)
+    return left / freedom if is_more else 1.0
+
+
+def build_prior_estimate(
+    lines: LineSet, prior: Pose, reason: str, settings: PoseSettings, covariance: Floats | None = None
+) -> PoseEstimate:
+    """The prior unchanged, with the reason why and its ``covariance`` (6, 6); lines behind it are no inliers."""
+    rejected = reject_behind(lines, prior.rotation, prior.translation)
+    if covariance is None:
+        covariance = np.asarray(np.linalg.inv(compute_weak_information(settings)), float)
+    return build_estimate(
+        lines, prior.rotation, prior.translation, covariance, rejected, float("inf"), 0, reason, settings
+    )
+
+
+def check_in_front(
+    lines: LineSet, prior: Pose, estimate: PoseEstimate, settings: PoseSettings, kept: Mask | None = None,
+    covariance: Floats | None = None,
+) -> PoseEstimate:
+    """The estimate if most of its lines (those ``kept``) lie in front of the camera, else the prior."""
+    pose = estimate.camera_from_world
+    if is_mostly_in_front(lines if kept is None else lines.take(kept), pose.rotation, pose.translation):
+        return estimate
+    return replace(build_prior_estimate(lines, prior, ALL_BEHIND, settings, covariance), iterations=estimate.iterations)

@@ -1,35 +1,35 @@
-"""Med R and T: least median of squares over 3-line or 3-landmark subsets (§6.2.4)."""
+"""Robust poses from subsets of 3 lines or landmarks: least median of squares (§6.2.4), or a truncated loss."""
 
 from __future__ import annotations
 
 import math
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from knowledge_sources.methods.arrays import Floats, Mask
-from knowledge_sources.methods.pose.estimate import PoseEstimate
-from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, build_line_set, group_by_landmark
-from knowledge_sources.methods.pose.numerics.finish import (
+from knowledge_sources.methods.arrays import Floats, Indices, Mask
+from knowledge_sources.methods.pose import kernels
+from knowledge_sources.methods.pose.estimate import (
     MIN_LENGTH_PX,
     NO_SUBSET,
+    PoseEstimate,
     build_estimate,
     build_prior_estimate,
     check_in_front,
+    compute_weak_information,
     find_rejections,
 )
-from knowledge_sources.methods.pose.numerics.image_error import compute_image_jacobian
-from knowledge_sources.methods.pose.numerics.levenberg_marquardt import invert_information
-from knowledge_sources.methods.pose.numerics.subsets import (
-    compute_squared_distances,
-    concentrate,
-    count_subsets,
-    list_subsets,
-    pad_rows,
-    solve_subsets,
+from knowledge_sources.methods.pose.levenberg_marquardt import invert_information
+from knowledge_sources.methods.pose.line_set import (
+    LandmarkIds,
+    LineSet,
+    build_line_set,
+    compute_image_jacobian,
+    group_by_landmark,
 )
-from knowledge_sources.methods.pose.r_and_t import PoseState
+from knowledge_sources.methods.pose.r_and_t import NO_INFORMATION, PoseState
 from knowledge_sources.methods.pose.r_and_t_ml import (
     compute_likeliest_covariance,
     find_likeliest,
@@ -212,3 +212,159 @@ def _compute_robust_scale(median_squared: float, n: int, settings: PoseSettings)
     """Standard deviation of one residual from the median over n lines, with Rousseeuw's small-sample factor."""
     scale = (1.0 + 5.0 / max(n - SUBSET_SIZE, 1)) * float(np.sqrt(median_squared / MEDIAN_CHI2_2))
     return max(scale, settings.min_noise_part)
+
+
+def trunc_r_and_t(
+    model_lines_world: Any,
+    segments_px: Any,
+    camera: Camera,
+    prior: Pose,
+    *,
+    landmark_ids: LandmarkIds = None,
+    sigma_px: Any = 1.0,
+    probability: float | None = None,
+    rng: np.random.Generator | None = None,
+    prior_covariance: Any = None,
+    settings: PoseSettings = DEFAULT.pose,
+) -> PoseEstimate:
+    """Camera pose of least truncated loss (MSAC): holds beyond 50 % of wrong lines, if ``sigma_px`` is true.
+
+    The loss is the sum of squared errors over their variance, each line's at most ``2 outlier_sigmas^2``. Candidates
+    and arguments are those of :func:`med_r_and_t`; the prior's share is part of the loss if its covariance is given.
+    The best candidates are refined on their own inliers, and a line that matches only beside its model line's ends, or
+    behind the camera, counts as an outlier.
+
+    Raises:
+        ValueError: as :func:`med_r_and_t`.
+    """
+    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
+    outlier_part = settings.trunc_drawn_outlier_part
+    candidates = compute_candidates(lines, prior, landmark_ids, probability, outlier_part, rng, settings)
+    if candidates is None:
+        return r_and_t_ml(
+            model_lines_world, segments_px, camera, prior, sigma_px=sigma_px, prior_covariance=prior_covariance,
+            settings=settings,
+        )
+    bound = 2.0 * settings.outlier_sigmas**2
+    rotations, translations = _add_concentrated_by_loss(lines, *candidates, bound, settings)
+    rotations, translations = keep_possible(lines, prior, prior_covariance, rotations, translations)
+    costs = _compute_costs(lines, rotations, translations, bound)
+    order = np.argsort(costs, kind="stable")[: settings.trunc_finalists].tolist()
+    information = NO_INFORMATION
+    if prior_covariance is not None:
+        information, order = np.linalg.inv(prior_covariance), [*order, len(rotations) - 1]
+    refined = [_refine(lines, prior, information, (rotations[i], translations[i]), bound, settings) for i in order]
+    state, _ = min(refined, key=lambda end: end[1])
+    near = _find_near(lines, state, bound, settings)
+    return refine_on_inliers(lines, prior, prior_covariance, landmark_ids, state, near, bound, settings)
+
+
+def _add_concentrated_by_loss(
+    lines: LineSet, rotations: Floats, translations: Floats, bound: float, settings: PoseSettings
+) -> tuple[Floats, Floats]:
+    """The candidates, and the best of them solved again on the few lines that fit them best."""
+    costs = _compute_costs(lines, rotations, translations, bound)
+    few = np.argsort(costs, kind="stable")[: settings.trunc_candidates]
+    keep = max(SUBSET_SIZE + 1, int(len(lines) * settings.trunc_inlier_part))
+    more = concentrate(lines, rotations[few], translations[few], keep, settings)
+    return np.concatenate([rotations, more[0]]), np.concatenate([translations, more[1]])
+
+
+def _compute_costs(lines: LineSet, rotations: Floats, translations: Floats, bound: float) -> Floats:
+    return np.asarray(np.minimum(compute_squared_distances(lines, rotations, translations), bound).sum(axis=1))
+
+
+def _refine(
+    lines: LineSet, prior: Pose, information: Floats, state: PoseState, bound: float, settings: PoseSettings
+) -> tuple[PoseState, float]:
+    """Alternate inliers and likelihood until they agree; the state and its truncated cost, with the prior's share."""
+    rotation, translation, cost = kernels.refine_truncated(
+        lines.arrays, (np.array(state[0]), np.array(state[1])), (np.array(prior.rotation), np.array(prior.translation)),
+        np.array(information), np.array(compute_weak_information(settings)), bound, settings.max_beside_px, SUBSET_SIZE,
+        settings.trunc_rounds, settings.max_iterations,
+    )
+    return (rotation, translation), cost
+
+
+def _find_near(lines: LineSet, state: PoseState, bound: float, settings: PoseSettings) -> Mask:
+    costs = kernels.compute_truncated_costs(
+        lines.arrays, np.array(state[0]), np.array(state[1]), bound, settings.max_beside_px
+    )
+    return np.asarray(costs < bound)
+
+
+def count_subsets(size: int, outliers: float, probability: float) -> int:
+    """Random subsets to draw so that one is free of outliers with the stated probability (RANSAC's count).
+
+    Raises:
+        ValueError: ``outliers`` is not in [0, 1), or ``probability`` not in (0, 1).
+    """
+    if not (0.0 <= outliers < 1.0 and 0.0 < probability < 1.0):
+        raise ValueError(f"expected outliers in [0, 1) and probability in (0, 1), got {outliers} and {probability}")
+    clean = (1.0 - outliers) ** size
+    return 1 if clean >= 1.0 else max(1, math.ceil(math.log1p(-probability) / math.log1p(-clean)))
+
+
+def list_subsets(
+    count: int, size: int, needed: int | None = None, rng: np.random.Generator | None = None
+) -> Indices:
+    """Subsets (k, size) of ``count`` groups: all of them, or ``needed`` different ones drawn with ``rng``.
+
+    Raises:
+        ValueError: subsets must be drawn and there is no ``rng``.
+    """
+    total = math.comb(count, size)
+    if needed is None or needed >= total:
+        return np.array(list(combinations(range(count), size)), dtype=np.intp).reshape(-1, size)
+    if rng is None:
+        raise ValueError(f"expected an rng to draw {needed} of {total} subsets, got None")
+    keys = rng.random((needed, count))
+    drawn = np.sort(np.argpartition(keys, size - 1, axis=1)[:, :size], axis=1)
+    return np.unique(drawn, axis=0).astype(np.intp)
+
+
+def pad_rows(groups: list[Indices], subsets: Indices) -> tuple[Indices, Floats]:
+    """Line indices (k, w) of each subset of groups, padded with 0, and weights (k, w) that are 0 on the padding."""
+    width = max((len(g) for g in groups), default=0)
+    table = np.zeros((len(groups), width), dtype=np.intp)
+    real = np.zeros((len(groups), width))
+    for i, rows in enumerate(groups):
+        table[i, : len(rows)] = rows
+        real[i, : len(rows)] = 1.0
+    return table[subsets].reshape(len(subsets), -1), real[subsets].reshape(len(subsets), -1)
+
+
+def solve_subsets(
+    lines: LineSet, rows: Indices, real: Floats, start: Pose, settings: PoseSettings
+) -> tuple[Floats, Floats]:
+    """Poses (k, 3, 3), (k, 3) of least E1 on k padded subsets ``rows`` (k, w), weights ``real``, all from ``start``."""
+    rotations = np.tile(start.rotation, (len(rows), 1, 1))
+    translations = np.tile(start.translation, (len(rows), 1))
+    poses: tuple[Floats, Floats] = kernels.solve_subsets(
+        lines.arrays, rows, real, rotations, translations, settings.subset_iterations
+    )
+    return poses
+
+
+def concentrate(
+    lines: LineSet, rotations: Floats, translations: Floats, keep: int, settings: PoseSettings
+) -> tuple[Floats, Floats]:
+    """Poses (k, 3, 3), (k, 3), each solved again, round by round, on the ``keep`` lines that fit it best.
+
+    Rousseeuw's concentration steps: a minimal subset amplifies the noise; half of all lines do not.
+    """
+    for _ in range(settings.concentration_rounds):
+        errors = compute_squared_distances(lines, rotations, translations)
+        rows = np.ascontiguousarray(np.argsort(errors, axis=1, kind="stable")[:, :keep])
+        rotations, translations = kernels.solve_subsets(
+            lines.arrays, rows, np.ones(rows.shape), rotations, translations, settings.concentration_iterations
+        )
+    return rotations, translations
+
+
+def compute_squared_distances(lines: LineSet, rotations: Floats, translations: Floats) -> Floats:
+    """(k, n), or (n,) for one pose, squared image distance of each line, over its variance."""
+    many = kernels.compute_squared_distances(
+        lines.arrays, np.array(rotations).reshape(-1, 3, 3), np.array(translations).reshape(-1, 3)
+    )
+    return np.asarray(many if rotations.ndim == 3 else many[0])

@@ -9,16 +9,25 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
-from knowledge_sources.methods.pose.displacements import compute_sigmas_px
-from knowledge_sources.methods.pose.estimate import BEHIND, DISTANCE, PlanarEstimate
-from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, build_line_set, group_by_landmark
-from knowledge_sources.methods.pose.marginal_likelihood import maximise_marginal
-from knowledge_sources.methods.pose.numerics import kernels
-from knowledge_sources.methods.pose.numerics.discrepancy_principle import compute_max_chi2, solve_near_prior
-from knowledge_sources.methods.pose.numerics.finish import find_rejections
-from knowledge_sources.methods.pose.numerics.image_error import measure_lines
-from knowledge_sources.methods.pose.numerics.kernels import FloorArrays
-from knowledge_sources.methods.pose.numerics.levenberg_marquardt import invert_information
+from knowledge_sources.methods.pose import kernels
+from knowledge_sources.methods.pose.displacements import compute_sigmas_px, maximise_marginal
+from knowledge_sources.methods.pose.estimate import (
+    BEHIND,
+    DISTANCE,
+    PlanarEstimate,
+    compute_max_chi2,
+    find_rejections,
+    solve_near_prior,
+)
+from knowledge_sources.methods.pose.kernels import FloorArrays
+from knowledge_sources.methods.pose.levenberg_marquardt import invert_information
+from knowledge_sources.methods.pose.line_set import (
+    LandmarkIds,
+    LineSet,
+    build_line_set,
+    group_by_landmark,
+    measure_lines,
+)
 from knowledge_sources.methods.pose.planar import (
     FEW,
     NOT_BETTER,
@@ -68,7 +77,7 @@ def planar_from_lines(
         landmark_ids: n names; pairs within one landmark are not tried as candidates.
         sigma_px: of the segment ends across the line, one number or (n,).
         robust: False takes every line as right.
-        errors: of the model's lines, one row a pair; they are integrated out (:mod:`.marginal_likelihood`), and
+        errors: of the model's lines, one row a pair; they are integrated out (:mod:`.displacements`), and
             ``sigma_px`` is one number. ``None``: the model is exact.
 
     Raises:
@@ -152,7 +161,7 @@ class _Floor:
         return costs
 
     def measure_lines(self, state: Floats) -> tuple[Floats, Mask, Mask]:
-        """See :func:`image_error.measure_lines`."""
+        """See :func:`.line_set.measure_lines`."""
         rotation, translation = compute_camera_poses(state, self.mount)
         return measure_lines(self.lines, rotation, translation, self.settings.max_beside_px)
 

@@ -7,7 +7,27 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Mask
-from knowledge_sources.methods.pose.estimate import BEHIND, PoseEstimate
+from knowledge_sources.methods.pose import kernels
+from knowledge_sources.methods.pose.estimate import (
+    BEHIND,
+    FEW_LINES,
+    NOT_BETTER,
+    UNDECIDED,
+    PoseEstimate,
+    build_estimate,
+    build_prior_estimate,
+    check_in_front,
+    compute_covariance,
+    compute_max_chi2,
+    compute_weak_information,
+    find_doubt,
+    has_open_direction,
+    is_mostly_in_front,
+    reject_behind,
+    solve_near_prior,
+)
+from knowledge_sources.methods.pose.kernels import IMAGE
+from knowledge_sources.methods.pose.levenberg_marquardt import Minimum, invert_information
 from knowledge_sources.methods.pose.line_set import (
     LandmarkIds,
     LineSet,
@@ -16,25 +36,7 @@ from knowledge_sources.methods.pose.line_set import (
     check_matched_arrays,
     check_sigma,
 )
-from knowledge_sources.methods.pose.numerics import kernels
-from knowledge_sources.methods.pose.numerics.discrepancy_principle import compute_max_chi2, solve_near_prior
-from knowledge_sources.methods.pose.numerics.finish import (
-    FEW_LINES,
-    NOT_BETTER,
-    UNDECIDED,
-    build_estimate,
-    build_prior_estimate,
-    check_in_front,
-    compute_covariance,
-    compute_weak_information,
-    find_doubt,
-    has_open_direction,
-    is_mostly_in_front,
-    reject_behind,
-)
-from knowledge_sources.methods.pose.numerics.kernels import IMAGE
-from knowledge_sources.methods.pose.numerics.levenberg_marquardt import Minimum, invert_information
-from knowledge_sources.methods.pose.numerics.subsets import compute_squared_distances
+from knowledge_sources.methods.pose.med_r_and_t import compute_squared_distances
 from knowledge_sources.methods.pose.r_and_t import MIN_LINES, PoseState, minimise_compiled, minimise_e1
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.pose import PoseSettings

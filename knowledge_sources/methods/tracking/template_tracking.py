@@ -20,8 +20,7 @@ from knowledge_sources.methods.features.correlation import (
     measure_corner_strengths,
 )
 from knowledge_sources.methods.features.picture import read_picture
-from knowledge_sources.methods.pose.planar import compute_point_jacobian
-from knowledge_sources.methods.pose.planar_from_points import planar_from_points
+from knowledge_sources.methods.pose.planar import compute_point_jacobian, planar_from_points
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.features import FeaturesSettings
 from knowledge_sources.settings.tracking import TrackingSettings

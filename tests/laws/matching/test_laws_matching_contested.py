@@ -16,10 +16,17 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching import Peak, match_lines
-from knowledge_sources.methods.matching.fit import POSE_STEP, Fitting
 from knowledge_sources.methods.matching.kernels import RIGID, SCALED
-from knowledge_sources.methods.matching.objective import Terms, build_likelihood_terms, build_paper_terms
-from knowledge_sources.methods.matching.search import PairSpace, evaluate_state, search_pairs
+from knowledge_sources.methods.matching.search import (
+    POSE_STEP,
+    Fitting,
+    PairSpace,
+    Terms,
+    build_likelihood_terms,
+    build_paper_terms,
+    evaluate_state,
+    search_pairs,
+)
 from knowledge_sources.settings.matching import PAPER_MATCHING, MatchingSettings
 
 Array = NDArray[np.float64]

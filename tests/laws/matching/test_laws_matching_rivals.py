@@ -10,7 +10,7 @@ from experiments.perception.locate_camera import PoseVerdict
 from experiments.perception.repeats_scenes import CAMERA, RepeatScene, draw_scene
 from experiments.perception.repeats_trials import locate
 from experiments.perception.rivals import compute_pose_score, find_rivals, find_self_motions, group_lines
-from knowledge_sources.methods.matching.pose_parameters import build_camera_parameters
+from knowledge_sources.methods.matching.pose_pairs import build_camera_parameters
 from world_models.frames import Pose
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import lomax, norm
 
-from knowledge_sources.methods.matching.hough import _suppress_non_maxima, build_line_table, find_hough_peaks
-from knowledge_sources.methods.matching.objective import build_likelihood_terms
+from knowledge_sources.methods.matching.image_pairs import _suppress_non_maxima, build_line_table, find_hough_peaks
+from knowledge_sources.methods.matching.search import build_likelihood_terms
 from knowledge_sources.settings import DEFAULT
 
 TUNING = DEFAULT.matching

@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching.fit import compute_step_fits
-from knowledge_sources.methods.matching.pose_pairs import build_scene, linearise_pairs
-from knowledge_sources.methods.matching.pose_parameters import (
+from knowledge_sources.methods.matching.pose_pairs import (
     PoseParameters,
     build_camera_parameters,
     build_floor_parameters,
+    build_scene,
+    linearise_pairs,
 )
-from knowledge_sources.methods.pose.line_set import build_line_set
-from knowledge_sources.methods.pose.numerics.image_error import compute_image_jacobian
+from knowledge_sources.methods.matching.search import compute_step_fits
+from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian
 from knowledge_sources.methods.pose.planar import compute_line_jacobian
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera, CameraMount

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
-from knowledge_sources.methods.pose.line_set import build_line_set
-from knowledge_sources.methods.pose.numerics.finish import compute_weak_information
-from knowledge_sources.methods.pose.numerics.image_error import compute_image_jacobian, find_in_front
-from knowledge_sources.methods.pose.numerics.plane_error import (
+from knowledge_sources.methods.pose.estimate import compute_weak_information
+from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian, find_in_front
+from knowledge_sources.methods.pose.r_and_t import (
     compute_camera_ends,
     compute_plane_distances,
     compute_plane_jacobian,

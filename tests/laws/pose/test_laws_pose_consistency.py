@@ -26,7 +26,7 @@ from knowledge_sources.methods.pose import (
     r_then_t,
     trunc_r_and_t,
 )
-from knowledge_sources.methods.pose.numerics.trimmed_noise import compute_mean_square, compute_spread
+from knowledge_sources.methods.pose.estimate import compute_mean_square, compute_spread
 from knowledge_sources.methods.pose.with_camera import estimate_camera_and_pose
 from knowledge_sources.settings import DEFAULT
 from world_models.building.model_errors import LineErrors

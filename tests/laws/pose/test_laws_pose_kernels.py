@@ -13,9 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.pose.line_set import LineSet, build_line_set
-from knowledge_sources.methods.pose.numerics import kernels
-from knowledge_sources.methods.pose.numerics.image_error import compute_image_distances, compute_image_jacobian
+from knowledge_sources.methods.pose import kernels
+from knowledge_sources.methods.pose.line_set import (
+    LineSet,
+    build_line_set,
+    compute_image_distances,
+    compute_image_jacobian,
+)
 from knowledge_sources.methods.pose.planar import (
     compute_camera_poses,
     compute_line_jacobian,

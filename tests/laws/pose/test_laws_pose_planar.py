@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from knowledge_sources.methods.pose import planar_from_lines, planar_from_points
-from knowledge_sources.methods.pose.line_set import LineSet, build_line_set
-from knowledge_sources.methods.pose.numerics.image_error import compute_image_distances
+from knowledge_sources.methods.pose.line_set import LineSet, build_line_set, compute_image_distances
 from knowledge_sources.methods.pose.planar import build_planar_prior, compute_camera_poses, compute_line_jacobian
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle

@@ -13,8 +13,7 @@ from scipy.stats import chi2
 
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, fragment
 from knowledge_sources.methods.pose import PoseEstimate, r_and_t, r_and_t_ml, r_then_t
-from knowledge_sources.methods.pose.line_set import build_line_set
-from knowledge_sources.methods.pose.numerics.image_error import compute_image_distances, compute_image_jacobian
+from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_distances, compute_image_jacobian
 
 SIGMA_PX = 0.5
 TRIALS = 150

@@ -1,6 +1,6 @@
 """The inner loops of the pose solvers, compiled by numba.
 
-The same residuals and derivatives are written in plain numpy in `image_error`, `plane_error` and `planar`, and the
+The same residuals and derivatives are written in plain numpy in `line_set`, `r_and_t` and `planar`, and the
 tests compare the two. The file is long because compiled functions must only call functions of their own file: numba's
 cache checks a function's own file, so that after a change in another one the old machine code would be used without a
 warning (numba 0.68). In this order: line preparation, minimisation, six unknowns, subsets, three unknowns on the floor

@@ -1,1 +1,0 @@
-"""Inside the pose solvers: residuals, Jacobians, Levenberg-Marquardt, subsets, last checks."""
