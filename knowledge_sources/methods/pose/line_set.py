@@ -180,6 +180,14 @@ def compute_distance_slopes(lines: LineSet, planes: Floats) -> tuple[Floats, Flo
     return distances, slopes
 
 
+def compute_squared_distances(lines: LineSet, rotations: Floats, translations: Floats) -> Floats:
+    """(k, n), or (n,) for one pose, squared image distance of each line, over its variance."""
+    many = kernels.compute_squared_distances(
+        lines.arrays, np.array(rotations).reshape(-1, 3, 3), np.array(translations).reshape(-1, 3)
+    )
+    return np.asarray(many if rotations.ndim == 3 else many[0])
+
+
 def measure_lines(
     lines: LineSet, rotation: Floats, translation: Floats, max_beside_px: float = 0.0
 ) -> tuple[Floats, Mask, Mask]:

@@ -27,6 +27,7 @@ from knowledge_sources.methods.pose.line_set import (
     LineSet,
     build_line_set,
     compute_image_jacobian,
+    compute_squared_distances,
     group_by_landmark,
 )
 from knowledge_sources.methods.pose.r_and_t import NO_INFORMATION, PoseState
@@ -360,11 +361,3 @@ def concentrate(
             lines.arrays, rows, np.ones(rows.shape), rotations, translations, settings.concentration_iterations
         )
     return rotations, translations
-
-
-def compute_squared_distances(lines: LineSet, rotations: Floats, translations: Floats) -> Floats:
-    """(k, n), or (n,) for one pose, squared image distance of each line, over its variance."""
-    many = kernels.compute_squared_distances(
-        lines.arrays, np.array(rotations).reshape(-1, 3, 3), np.array(translations).reshape(-1, 3)
-    )
-    return np.asarray(many if rotations.ndim == 3 else many[0])

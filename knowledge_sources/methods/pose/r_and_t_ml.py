@@ -35,8 +35,8 @@ from knowledge_sources.methods.pose.line_set import (
     check_landmarks,
     check_matched_arrays,
     check_sigma,
+    compute_squared_distances,
 )
-from knowledge_sources.methods.pose.med_r_and_t import compute_squared_distances
 from knowledge_sources.methods.pose.r_and_t import MIN_LINES, PoseState, minimise_compiled, minimise_e1
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.pose import PoseSettings
