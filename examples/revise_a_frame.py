@@ -7,8 +7,8 @@ import harvey
 from harvey import Change, Effect, Level, Posted, Revise, View, Watch
 from knowledge_sources.questions import find_building, find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.building.locale_frame import CHANGED, FrameChange, LocaleFrame
 from world_models.entries.body import MotionReport
-from world_models.entries.locale_frame import CHANGED, FrameChange, LocaleFrame
 from world_models.entries.task import PlanSketch
 
 MISSION = """

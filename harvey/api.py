@@ -48,9 +48,9 @@ from knowledge_sources.settings import Settings
 from logs.reader import read_true_track
 from sim.scenario import FORMAT, Scenario, ScenarioError, load_scenario, with_settings
 from sim.stage import build_stage
+from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
 from world_models.entries.body import Frame
-from world_models.entries.locale_frame import LocaleFrame
 from world_models.entries.location import Hypothesis
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import load_world, read_world

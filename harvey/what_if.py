@@ -19,8 +19,8 @@ from harvey.errors import BadInput
 from harvey.robot_settings import build_believed
 from harvey.run_files.records import WHAT_IF
 from world_models.building.changes.removals import element_names
+from world_models.building.locale_frame import FrameChange, FrameRequest, LocaleFrame
 from world_models.building.world import World
-from world_models.entries.locale_frame import FrameChange, FrameRequest, LocaleFrame
 from world_models.entries.robot import CameraState, Footprint, Wheels
 from world_models.frame_store import FrameStore
 
@@ -97,7 +97,7 @@ def _is_in_its_locale(name: str, store: FrameStore) -> bool:
 
 
 def _list_elements(world: World) -> frozenset[str]:
-    return element_names(tuple(world.locale_source.all_geometry()))
+    return element_names(world.parts)
 
 
 def _suggest(name: str, sources: Sequence[str], elements: Set[str]) -> str:

@@ -10,9 +10,9 @@ from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from knowledge_sources.methods.doors.opening import is_in_view
 from knowledge_sources.questions import find_frames, find_robot_in
+from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.building.locales import Doorway
 from world_models.entries.door_state import DoorState
-from world_models.entries.locale_frame import FrameChange, LocaleFrame
 from world_models.entries.location import Hypothesis
 from world_models.frame_building import FrameBuilding
 

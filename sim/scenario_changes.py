@@ -37,7 +37,7 @@ def find_changed_locales(scenario: Scenario, world: World) -> list[str]:
     """The locales whose doors or things are otherwise. Raises ScenarioError for an unknown one."""
     rooms = [extra.locale for extra in scenario.truth.extra]
     for i, name in enumerate(rooms):
-        if name not in world.locales or not world.is_room(name):
+        if name not in world.frames or not world.is_room(name):
             near = suggest_keys(name, world.rooms)
             raise scenario.refused(("truth", "extra", i, "locale"), f"expected a room, {near}, got {name!r}")
     open_doors = {doorway.name: doorway for doorway in world.doorways} if scenario.truth.doors else {}

@@ -41,8 +41,8 @@ def check_names(scenario: Scenario, world: World) -> None:
     """Check the locales and rides that faults and helpers name. Raises ScenarioError for an unknown one."""
     for i, fault in enumerate(scenario.faults):
         for key, name in _locale_keys(fault):
-            if name not in world.locales:
-                near = suggest_keys(name, world.locales)
+            if name not in world.frames:
+                near = suggest_keys(name, world.frames)
                 raise scenario.refused(("faults", i, key), f"expected {near}, got {name!r}")
     for i, telling in enumerate(scenario.told):
         if why := telling.find_fault(world):

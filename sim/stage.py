@@ -76,7 +76,7 @@ class Stage:
         """Score a run's true track; a difference in height to the goal's floor counts as distance."""
         found = score(track, self.start_world, self.goal_world, heading_matters=self.scenario.arrival.matters)
         there = track[-1].locale
-        up_m = self.world.floor_m(there) - self.goal_floor_m if there in self.world.locales else 0.0
+        up_m = self.world.floor_m(there) - self.goal_floor_m if there in self.world.frames else 0.0
         return replace(found, position_error_m=math.hypot(found.position_error_m, up_m)) if up_m else found
 
     def going_to(self, place: Place) -> Stage:
@@ -165,7 +165,7 @@ def _put_down(scenario: Scenario, world: World, start: Place) -> Place:
     true = scenario.truth.start
     if true == AS_TOLD:
         return replace(start, heading_rad=scenario.start.heading_rad)
-    if true.locale not in world.locales:
+    if true.locale not in world.frames:
         raise scenario.refused(("truth", "start", "locale"), f"expected a room of the world, got {true.locale!r}")
     return Place(true.locale, true.x_m, true.y_m, true.heading_rad)
 
@@ -218,7 +218,7 @@ def _lights(scenario: Scenario, world: World, around: str) -> Lights | None:
 def _lit_rooms(world: World, around: str) -> tuple[Room, ...]:
     """The rooms in a locale and those beyond their doorways: whose faces are built."""
     inside = tuple(world.rooms_in(around))
-    beyond = [doorway.other(room) for room in inside for doorway in world.locale_source.doorways(room)]
+    beyond = [doorway.other(room) for room in inside for doorway in world.doorways_of(room)]
     return tuple(
         Room(world.outline(name), world.floor_m(name), world.floor_m(name) + world.locale(name).height_m)
         for name in dict.fromkeys((*inside, *beyond)))

@@ -13,8 +13,7 @@ import numpy as np
 
 from world_models.building.building import Building
 from world_models.building.geometry.outlines import distance_to_border, inside_polygon
-from world_models.building.memory_locales import words_of
-from world_models.building.world import World
+from world_models.building.world import World, words_of
 from world_models.entries.location import Place
 from world_models.ptrans import parse_place, parse_ptrans
 
@@ -138,7 +137,7 @@ def _find_containers(words: str, world: World) -> list[str]:
 def _find_named(words: str, world: World) -> Sequence[str]:
     """The locales that answer to all of these words but stop words; none where there are no others."""
     asked = " ".join(sorted(words_of(words) - STOP_WORDS))
-    return world.locale_source.named(asked) if asked else ()
+    return world.named(asked) if asked else ()
 
 
 def _find_room_in(room_words: str, words: str, world: World, containers: Sequence[str]) -> str:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from blackboard.board import View
 from blackboard.effect import MissingEntryError
-from world_models.building.building import FLOOR_MARGIN_M, Building
-from world_models.building.extents import LocaleExtent
-from world_models.building.locale_source import LocaleGeometry, PassageEdge
-from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.things import Thing
-from world_models.entries.locale_frame import ANSWERED, CHANGED, FRAME_OF, ROOT, FrameAnswer, FrameRequest, LocaleFrame
+from world_models.building.building import Building
+from world_models.building.locale_frame import ANSWERED, CHANGED, FRAME_OF, ROOT, FrameAnswer, FrameRequest, LocaleFrame
+from world_models.building.locales import Doorway
 
 T = TypeVar("T")
 
@@ -33,18 +30,18 @@ class FrameBuilding(Building):
     are the current revisions, whatever else comes or changes.
     """
 
-    locale_source: FrameLocales
+    frames: BoardFrames
 
     def __init__(self, view: View, instead: Iterable[LocaleFrame] = (), variant: str = "") -> None:
         """``instead``: of the frames on the board, to ask what would be if they were otherwise.
 
         Results of one ``variant`` do not take the place of those of another.
         """
-        super().__init__(FrameLocales(view, instead))
+        super().__init__(BoardFrames(view, instead))
         self._variant = variant
 
     def cached(self, name: str, max_items: int, key: Hashable, compute: Callable[[], T]) -> T:
-        frames = self.locale_source
+        frames = self.frames
         results: dict[Hashable, _Kept] = frames.root().memo.setdefault(name + self._variant, {})
         kept = results.get(key)
         if kept is not None and frames.are_current(kept.frames):
@@ -58,28 +55,28 @@ class FrameBuilding(Building):
         results[key] = _Kept(result, tuple(used.values()))
         return result
 
-    @property
-    def root(self) -> str:
-        return self.locale_source.root().name
+    def root_frame(self) -> LocaleFrame:
+        return self.frames.root()
 
-    def locale(self, name: str) -> Locale:
-        return self.locale_source.frame(name).locale
+    def frame(self, name: str) -> LocaleFrame:
+        return self.frames[name]
 
     def shut_doorways(self) -> tuple[Doorway, ...]:
-        return self.locale_source.shut_doorways()
+        """The doorways that are believed shut; a frame that says so never leaves the board."""
+        return tuple({door.name: door for frame in self.frames.changed() for door in frame.shut_doorways}.values())
 
     def require(self, names: Iterable[str]) -> None:
         """Ask for the frames of several locales at once, where any is not there. Raises MissingEntryError."""
-        self.locale_source.require(names)
+        self.frames.require(names)
 
     def list_rooms_in(self, name: str, height_m: float, margin_m: float) -> list[str]:
         """The rooms within a locale that reach a height within a margin, in the order of the hierarchy."""
-        here = self.locale_source.extent(name)
-        if here.is_room:
-            return [name] if _reaches_height(here, height_m, margin_m) else []
+        here = self.frame(name)
+        if here.extent.is_room:
+            return [name] if here.extent.reaches_height(height_m, margin_m) else []
         rooms: list[str] = []
-        for child in self.locale_source.extents_in(name):
-            if not _reaches_height(child, height_m, margin_m):
+        for child in here.children:
+            if not child.reaches_height(height_m, margin_m):
                 continue
             rooms += [child.name] if child.is_room else self.list_rooms_in(child.name, height_m, margin_m)
         return rooms
@@ -90,7 +87,14 @@ class FrameBuilding(Building):
         Raises:
             MissingEntryError: the world was not asked yet; ValueError: no room, or more than one, answers to one.
         """
-        return self.locale_source.find_rooms(phrases)
+        answers = self.frames.answers("called")
+        unknown = tuple(phrase for phrase in phrases if phrase not in answers)
+        if unknown:
+            raise MissingEntryError(FrameRequest(called=unknown))
+        for phrase in phrases:
+            if answers[phrase].error:
+                raise ValueError(answers[phrase].error)
+        return tuple(answers[phrase].locales[0] for phrase in phrases)
 
     def find_elements(self, name: str) -> tuple[str, ...]:
         """The locales that have a door, elevator, thing, landmark or face of a name.
@@ -98,7 +102,16 @@ class FrameBuilding(Building):
         Raises:
             MissingEntryError: the world was not asked yet; ValueError: there is none.
         """
-        return self.locale_source.find_elements(name)
+        extra = tuple(frame.name for frame in self.frames.changed()
+                      if ("extra", name) in {(c.what, c.name) for c in frame.changes})
+        if extra:  # no file knows it
+            return extra
+        answer = self.frames.answers("elements").get(name)
+        if answer is None:
+            raise MissingEntryError(FrameRequest(elements=(name,)))
+        if answer.error:
+            raise ValueError(answer.error)
+        return answer.locales
 
     def is_walkable(self, origin: str, destination: str, max_rooms: int) -> bool:
         """Whether people can walk there by doors and stairs, as far as a search of ``max_rooms`` rooms tells."""
@@ -114,15 +127,15 @@ class FrameBuilding(Building):
         return destination in reached
 
 
-class FrameLocales:
-    """A :class:`world_models.building.locale_source.LocaleSource` of the frames on a board."""
+class BoardFrames(Mapping[str, LocaleFrame]):
+    """The frames on a board, by the name of their locale; those that are not there are asked for."""
 
     def __init__(self, view: View, instead: Iterable[LocaleFrame] = ()) -> None:
         self._view = view
         self._instead = {frame.name: frame for frame in instead}
         self._notes: list[dict[str, LocaleFrame]] = []
 
-    def frame(self, name: str) -> LocaleFrame:
+    def __getitem__(self, name: str) -> LocaleFrame:
         """The frame of a locale.
 
         Raises:
@@ -132,6 +145,12 @@ class FrameLocales:
         if found is None:
             raise self._missing((name,))
         return self._note(found)
+
+    def __iter__(self) -> Iterator[str]:
+        return (entry.value.name for entry in self._view.all(LocaleFrame))
+
+    def __len__(self) -> int:
+        return len(self._view.all(LocaleFrame))
 
     def _find(self, name: str) -> LocaleFrame | None:
         if name in self._instead:
@@ -146,29 +165,22 @@ class FrameLocales:
             raise MissingEntryError(FrameRequest(("",)))
         return self._note(entry.value)
 
+    def changed(self) -> list[LocaleFrame]:
+        """The frames that say otherwise than the file."""
+        return [self._note(entry.value) for entry in self._view.having(CHANGED, True)]
+
     def require(self, names: Iterable[str]) -> None:
         """Raises MissingEntryError for all of these frames that are not on the board."""
         missing = tuple(name for name in names if self._view.newest(FRAME_OF, name) is None)
         if missing:
             raise self._missing(missing)
 
-    def find_rooms(self, phrases: tuple[str, ...]) -> tuple[str, ...]:
-        """See :meth:`FrameBuilding.find_rooms`."""
-        answers = self._answers("called")
-        unknown = tuple(phrase for phrase in phrases if phrase not in answers)
-        if unknown:
-            raise MissingEntryError(FrameRequest(called=unknown))
-        for phrase in phrases:
-            if answers[phrase].error:
-                raise ValueError(answers[phrase].error)
-        return tuple(answers[phrase].locales[0] for phrase in phrases)
-
     def _missing(self, names: tuple[str, ...]) -> Exception:
-        answers = self._answers("locales")
+        answers = self.answers("locales")
         errors = [answers[name].error for name in names if name in answers]
         return ValueError(errors[0]) if errors else MissingEntryError(FrameRequest(names))
 
-    def _answers(self, question: Literal["locales", "called", "elements"]) -> dict[str, FrameAnswer]:
+    def answers(self, question: Literal["locales", "called", "elements"]) -> dict[str, FrameAnswer]:
         """What the world said to one kind of question, by what was asked; to ``locales`` only that there are none."""
         return {answer.asked: answer for request in self._view.having(ANSWERED, True)
                 for answer in request.value.answers if answer.asked in getattr(request.value, question)}
@@ -196,84 +208,3 @@ class FrameLocales:
                 return False
             self._note(frame)
         return True
-
-    # -- locale source ---------------------------------------------------------------------------------------------
-
-    def locale(self, name: str) -> Locale | None:
-        return self.frame(name).locale
-
-    def children(self, name: str) -> tuple[str, ...]:
-        return tuple(child.name for child in self.frame(name).children)
-
-    def is_room(self, name: str) -> bool:
-        return self.frame(name).extent.is_room
-
-    def number(self, name: str) -> int:
-        return self.extent(name).number
-
-    def extent(self, name: str) -> LocaleExtent:
-        return self.frame(name).extent
-
-    def extents_in(self, name: str) -> tuple[LocaleExtent, ...]:
-        return self.frame(name).children
-
-    def near(self, x_m: float, y_m: float, margin_m: float, z_m: float | None = None) -> Sequence[str]:
-        """From the root down, into each locale that reaches the point."""
-        found: list[LocaleExtent] = []
-        todo = [self.root().extent]
-        while todo:
-            here = todo.pop()
-            if not here.reaches(x_m, y_m, margin_m):
-                continue
-            if z_m is not None and not _reaches_height(here, z_m, FLOOR_MARGIN_M):
-                continue
-            if here.is_near(x_m, y_m, margin_m):
-                found.append(here)
-            if not here.is_room:
-                todo += self.extents_in(here.name)
-        return [extent.name for extent in sorted(found, key=_number)]
-
-    def doorways(self, locale: str) -> tuple[Doorway, ...]:
-        return self.frame(locale).doorways
-
-    def links(self, locale: str) -> tuple[Link, ...]:
-        return self.frame(locale).links
-
-    def geometry(self, locale: str) -> tuple[LocaleGeometry, ...]:
-        return self.frame(locale).parts
-
-    def things(self, locale: str) -> tuple[Thing, ...]:
-        return self.frame(locale).things
-
-    def passage_edges(self, container: str) -> tuple[PassageEdge, ...]:
-        return self.frame(container).edges
-
-    def components(self, locale: str) -> tuple[int, ...]:
-        return self.frame(locale).components
-
-    def shut_doorways(self) -> tuple[Doorway, ...]:
-        """The doorways that are believed shut; a frame that says so never leaves the board."""
-        frames = (self._note(entry.value) for entry in self._view.having(CHANGED, True))
-        return tuple({doorway.name: doorway for frame in frames for doorway in frame.shut_doorways}.values())
-
-    def find_elements(self, name: str) -> tuple[str, ...]:
-        """See :meth:`FrameBuilding.find_elements`."""
-        changed = (self._note(entry.value) for entry in self._view.having(CHANGED, True))
-        extra = tuple(frame.name for frame in changed if ("extra", name) in {(c.what, c.name) for c in frame.changes})
-        if extra:  # no file knows it
-            return extra
-        answer = self._answers("elements").get(name)
-        if answer is None:
-            raise MissingEntryError(FrameRequest(elements=(name,)))
-        if answer.error:
-            raise ValueError(answer.error)
-        return answer.locales
-
-
-def _reaches_height(extent: LocaleExtent, z_m: float, margin_m: float) -> bool:
-    """Whether a locale, with all that it contains, reaches a height within a margin [m, world]."""
-    return extent.reach[2] - margin_m <= z_m <= extent.reach[5] + margin_m
-
-
-def _number(extent: LocaleExtent) -> int:
-    return extent.number

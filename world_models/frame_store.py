@@ -7,9 +7,9 @@ from dataclasses import replace
 from difflib import get_close_matches
 
 from world_models.building.changes.removals import element_names
+from world_models.building.locale_frame import FrameAnswer, FrameReference, FrameRequest, LocaleFrame
 from world_models.building.world import World
 from world_models.commands import find_room
-from world_models.entries.locale_frame import FrameAnswer, FrameReference, FrameRequest, LocaleFrame
 
 MAX_FRAMES = 4096
 """So many frames are kept as they are, so that results computed from them serve the next mission too."""
@@ -33,19 +33,7 @@ class FrameStore:
         return self.world.cached("frames", MAX_FRAMES, (self.fingerprint, name), lambda: self._build(name))
 
     def _build(self, name: str) -> LocaleFrame:
-        locale, source = self.world.locale(name), self.world.locale_source
-        return LocaleFrame(
-            world=self.fingerprint,
-            locale=locale,
-            extent=source.extent(name),
-            children=source.extents_in(name),
-            doorways=source.doorways(name),
-            links=source.links(name),
-            parts=source.geometry(name),
-            things=source.things(name),
-            edges=source.passage_edges(name),
-            components=source.components(name),
-        )
+        return replace(self.world.frame(name), world=self.fingerprint, memo={})
 
     def answer(self, request: FrameRequest) -> tuple[tuple[LocaleFrame, ...], FrameRequest]:
         """The frames that a request asks for, and the request with the answers to its other questions."""
@@ -67,7 +55,7 @@ class FrameStore:
 
     def _find_element(self, name: str) -> FrameAnswer:
         """The locales that have a door, elevator, thing, landmark or face of this name."""
-        passage = self.world.locale_source.passage(name)
+        passage = self.world.find_passage(name)
         if passage is not None:
             return FrameAnswer(name, passage.between)
         locale = name.partition("/")[0]

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from blackboard.knowledge_source import KnowledgeSource
 from harvey.wiring import KNOWLEDGE_SOURCES, foreign_sources
-from world_models.entries.locale_frame import FrameRequest
+from world_models.building.locale_frame import FrameRequest
 
 EVERYBODY_WRITES = (FrameRequest,)
 """Left out of the table: each knowledge source of a robot may ask for a locale frame."""

@@ -14,9 +14,9 @@ from blackboard.journal import Decision
 from experiments.differences.obstacles_truth import Lacking, count_stops, find_shortest_m, judge
 from experiments.generated.missions import write_cluttered_mission
 from harvey.campaign.campaign import Task, run_task
+from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
 from world_models.entries.body import Look, MotorCommand
-from world_models.entries.locale_frame import LocaleFrame
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.touch import Contact

@@ -88,7 +88,7 @@ def run(quick: bool, seed: int) -> Report:
 
 
 def _plan_afresh(known: World, scenario: Scenario) -> Clock:
-    return plan(World(known.locale_source), scenario)  # results are kept with the frames of a world
+    return plan(World(known.frames), scenario)  # results are kept with the frames of a world
 
 
 def plan(world: World, scenario: Scenario) -> Clock:

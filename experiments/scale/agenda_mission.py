@@ -19,8 +19,8 @@ from harvey.wiring import knowledge_sources, servoing
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import Scenario, load_scenario
 from sim.stage import build_stage
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.kinds import KINDS
-from world_models.entries.locale_frame import LocaleFrame
 from world_models.files.world_files import load_world
 from world_models.frame_store import FrameStore
 

@@ -21,7 +21,7 @@ from tqdm import tqdm
 
 from experiments.report import Cell, Report
 from experiments.scale.worlds.campus import Campus, write_campus
-from world_models.files.compiled.schema import FORMAT
+from world_models.files.packed import FORMAT
 
 SIZES, QUICK_SIZES = (12, 1_000, 100_000), (12, 1_000)
 OPENINGS, QUICK_OPENINGS = 20, 3

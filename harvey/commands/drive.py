@@ -89,7 +89,7 @@ def run_checks(dry: Preflight) -> bool:
 
 def _mission(args: Namespace, more: dict[str, Any]) -> HardwareMission:
     from harvey.hardware.mission import load_mission
-    from world_models.files.compiled.schema import SUFFIXES
+    from world_models.files.packed import SUFFIXES
 
     given = {OPTIONS[name][0]: value for name in OPTIONS if (value := getattr(args, name)) is not None}
     settings: dict[str, Any] = {**more, **given}

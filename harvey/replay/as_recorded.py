@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 from harvey.run_files.records import WHAT_IF, DecisionRecord, as_line, decision_of
-from world_models.entries.locale_frame import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 
 REF = re.compile(r'"([A-Za-z]+-\d+)\.(\d+)"')
 """A revision, where it is the whole of a text of a journal's line."""

@@ -15,7 +15,7 @@ from harvey.errors import BadInput
 from harvey.run_files.decoding import decode
 from harvey.run_files.records import EntryRecord
 from logs.camera_file import Pictures
-from world_models.entries.locale_frame import FrameReference, LocaleFrame
+from world_models.building.locale_frame import FrameReference, LocaleFrame
 
 if TYPE_CHECKING:  # an explanation starts fast only where no world is imported that it does not need
     from world_models.frame_store import FrameStore

@@ -10,9 +10,9 @@ from typing import Any
 from blackboard.change import Posted
 from blackboard.journal import Decision
 from logs.turning_points import TurningPoint, TurningPointFinder
+from world_models.building.locale_frame import FrameRequest
 from world_models.camera_lessons import CameraLesson, find_camera_lessons
 from world_models.entries.body import Frame, Look, MotionReport
-from world_models.entries.locale_frame import FrameRequest
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot import CameraState
 from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch

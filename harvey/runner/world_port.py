@@ -9,8 +9,8 @@ from blackboard.change import Change, Posted
 from blackboard.effect import Effect, Post, Revise
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Port, Scheduler
+from world_models.building.locale_frame import FrameRequest
 from world_models.building.world import World
-from world_models.entries.locale_frame import FrameRequest
 from world_models.frame_store import FrameStore
 from world_models.robot import RobotModel
 

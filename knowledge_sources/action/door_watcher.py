@@ -33,9 +33,9 @@ from knowledge_sources.questions import (
     is_up_to_date,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.body import Frame
 from world_models.entries.door_state import DoorPicture, DoorState
-from world_models.entries.locale_frame import LocaleFrame
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Milestone
 

@@ -12,7 +12,7 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.questions import find_building, find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.locale_frame import UNDONE, FrameChange, LocaleFrame
+from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
 from world_models.entries.told import DOOR_STATES, Told
 
 

@@ -48,11 +48,11 @@ from knowledge_sources.questions import (
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings.action import ActionSettings
 from world_models.building.building import Building
+from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.building.locales import Doorway
 from world_models.building.things import EXTRA_KIND
 from world_models.entries.body import MotorCommand
 from world_models.entries.floor import FloorThing, FreeFloor
-from world_models.entries.locale_frame import FrameChange, LocaleFrame
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
 from world_models.entries.task import Certificate, Leg

@@ -17,7 +17,7 @@ from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.questions import active_goal, find_belief, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import Settings
-from world_models.entries.locale_frame import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.percepts import Tracks
 from world_models.entries.task import Milestone, PlanSketch

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from blackboard.change import Change, Retracted, Revised
 from world_models import words
-from world_models.entries.locale_frame import FrameRequest, LocaleFrame, has_answer
+from world_models.building.locale_frame import FrameRequest, LocaleFrame, has_answer
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot import Drift
 from world_models.entries.task import Leg, Milestone

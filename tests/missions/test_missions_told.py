@@ -23,8 +23,8 @@ from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
 from two_doors import two_doors
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.body import Course
-from world_models.entries.locale_frame import LocaleFrame
 from world_models.entries.task import PlanSketch
 from world_models.entries.told import Told
 

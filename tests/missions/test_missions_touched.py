@@ -22,9 +22,9 @@ from knowledge_sources.action.obstacle_finder import ObstacleFinder
 from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario, parse_scenario
 from sim.stage import build_stage
+from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
 from world_models.entries.body import MotorCommand
-from world_models.entries.locale_frame import LocaleFrame
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.touch import Contact

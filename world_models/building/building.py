@@ -1,21 +1,21 @@
 """A building (§3.4) as it is asked about one locale at a time: hierarchy, coordinate frames, places, routes, scenes.
 
-Locale data come from a :class:`~world_models.building.locale_source.LocaleSource`, only when asked for. So a robot in a
-room reads that room.
+All that it knows are locale frames by name, and a frame comes only when it is asked for. So a robot in a room reads
+that room.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometry.scene import Scene, build_scene, concatenate_scenes
-from world_models.building.locale_source import LocaleGeometry, LocaleSource
-from world_models.building.locales import Doorway, Link, Locale
+from world_models.building.geometry.scene import LocaleGeometry, Scene, build_scene, concatenate_scenes
+from world_models.building.locale_frame import LocaleFrame
+from world_models.building.locales import Doorway, Link, Locale, LocaleExtent
 from world_models.building.passages import Route, find_route
 from world_models.building.things import Thing
 from world_models.frames import Pose, frozen
@@ -24,6 +24,9 @@ T = TypeVar("T")
 
 FLOOR_MARGIN_M = 0.5
 """A camera this far above a room's ceiling or below its floor may still be in its doorway."""
+
+MAX_SHOWN = 12
+"""An error names at most so many locales."""
 
 MAX_POSES = 4096
 MAX_SCENES = 32
@@ -34,11 +37,11 @@ class Building(ABC):
     """A building; the root locale's coordinate frame is the world frame.
 
     Attributes:
-        locale_source: where locale data come from.
+        frames: of its locales, by name; one that is not at hand is fetched, or says how it can be had.
     """
 
-    def __init__(self, locale_source: LocaleSource) -> None:
-        self.locale_source = locale_source
+    def __init__(self, frames: Mapping[str, LocaleFrame]) -> None:
+        self.frames = frames
 
     @abstractmethod
     def cached(self, name: str, max_items: int, key: Hashable, compute: Callable[[], T]) -> T:
@@ -48,28 +51,38 @@ class Building(ABC):
             name: of the function; the last ``max_items`` of its results are kept.
         """
 
-    @property
     @abstractmethod
+    def root_frame(self) -> LocaleFrame:
+        """The frame of the locale that contains all others."""
+
+    @property
     def root(self) -> str:
         """Name of the locale that contains all others."""
+        return self.root_frame().name
 
     # -- one locale ------------------------------------------------------------------------------------------------
 
+    def frame(self, name: str) -> LocaleFrame:
+        """The frame of a locale. Raises ValueError where there is none."""
+        try:
+            return self.frames[name]
+        except KeyError:
+            names = list(self.frames)
+            shown = ", ".join(names[:MAX_SHOWN])
+            more = f" and {len(names) - MAX_SHOWN} more" if len(names) > MAX_SHOWN else ""
+            raise ValueError(f"expected a locale of {self.root} ({shown}{more}), got {name!r}") from None
+
     def locale(self, name: str) -> Locale:
         """A locale by name. Raises ValueError where there is none."""
-        found = self.locale_source.locale(name)
-        if found is None:
-            raise ValueError(f"expected a locale of {self.root}, got {name!r}")
-        return found
+        return self.frame(name).locale
 
     def is_room(self, name: str) -> bool:
         """Whether this is a locale that contains no other."""
-        return self.locale_source.is_room(name)
+        return self.frame(name).extent.is_room
 
     def children_of(self, name: str) -> tuple[str, ...]:
         """The locales that this one contains directly."""
-        self.locale(name)
-        return self.locale_source.children(name)
+        return tuple(child.name for child in self.frame(name).children)
 
     def rooms_in(self, name: str) -> Iterator[str]:
         """The rooms within a locale, or the locale itself where it is a room."""
@@ -113,19 +126,16 @@ class Building(ABC):
         return pose, pose.inverse()
 
     def doorways_of(self, locale: str) -> tuple[Doorway, ...]:
-        """The open doorways of a locale."""
-        self.locale(locale)
-        return self.locale_source.doorways(locale)
+        """The open doorways of a locale, in the order of the file."""
+        return self.frame(locale).doorways
 
     def links_of(self, locale: str) -> tuple[Link, ...]:
         """The elevators and stairs that stop in a locale."""
-        self.locale(locale)
-        return self.locale_source.links(locale)
+        return self.frame(locale).links
 
     def things_of(self, locale: str) -> tuple[Thing, ...]:
         """The things that stand in a locale."""
-        self.locale(locale)
-        return self.locale_source.things(locale)
+        return self.frame(locale).things
 
     def outline(self, locale: str) -> NDArray[np.float64]:
         """(k, 2) free extent of a locale on the floor, counter-clockwise [m, world]."""
@@ -158,9 +168,29 @@ class Building(ABC):
         rooms = (name for name in self._near(p, margin_m) if self.is_room(name))
         return tuple(name for name in rooms if p.size == 2 or self._reaches(name, float(p[2])))
 
-    def _near(self, point: NDArray[np.float64], margin_m: float) -> Sequence[str]:
+    def _near(self, point: NDArray[np.float64], margin_m: float) -> list[str]:
         z_m = float(point[2]) if point.size == 3 else None
-        return self.locale_source.near(float(point[0]), float(point[1]), margin_m, z_m)
+        return self.near(float(point[0]), float(point[1]), margin_m, z_m)
+
+    def near(self, x_m: float, y_m: float, margin_m: float, z_m: float | None = None) -> list[str]:
+        """Locales whose bounding rectangle, grown by a margin, holds a point [m, world]; in the order of the file.
+
+        It goes from the root down, into each locale that reaches the point; with ``z_m`` those on other floors than
+        that height are left out.
+        """
+        found: list[LocaleExtent] = []
+        todo = [self.root_frame().extent]
+        while todo:
+            here = todo.pop()
+            if not here.reaches(x_m, y_m, margin_m):
+                continue
+            if z_m is not None and not here.reaches_height(z_m, FLOOR_MARGIN_M):
+                continue
+            if here.is_near(x_m, y_m, margin_m):
+                found.append(here)
+            if not here.is_room:
+                todo += self.frames[here.name].children
+        return [extent.name for extent in sorted(found, key=lambda extent: extent.number)]
 
     def _reaches(self, name: str, z_m: float) -> bool:
         """Whether a height is between floor and ceiling of a locale, within FLOOR_MARGIN_M."""
@@ -175,7 +205,7 @@ class Building(ABC):
         """
         for name in (origin, destination):
             self.locale(name)
-        return find_route(self.locale_source, origin, destination, (*self.shut_doorways(), *avoided))
+        return find_route(self.frames, origin, destination, (*self.shut_doorways(), *avoided))
 
     def shut_doorways(self) -> tuple[Doorway, ...]:
         """The doorways that the file has open and that are believed shut."""
@@ -188,11 +218,11 @@ class Building(ABC):
         names = tuple(sorted(locales))
         return self.cached("scenes", MAX_SCENES, names, lambda: self._join(names))
 
-    def _join(self, locales: Sequence[str]) -> Scene:
-        parts = self._geometry_of(locales)
+    def _join(self, locales: Iterable[str]) -> Scene:
+        parts = self.parts_of(locales)
         scenes = [parts[key].scene for key in sorted(parts, key=str)]
         return concatenate_scenes(scenes) if scenes else build_scene((), ())
 
-    def _geometry_of(self, locales: Iterable[str]) -> dict[tuple[str, str | None], LocaleGeometry]:
+    def parts_of(self, locales: Iterable[str]) -> dict[tuple[str, str | None], LocaleGeometry]:
         """The geometry of several locales, each part once, by (locale, neighbour)."""
-        return {(part.locale, part.neighbour): part for name in locales for part in self.locale_source.geometry(name)}
+        return {(part.locale, part.neighbour): part for name in locales for part in self.frame(name).parts}

@@ -4,26 +4,49 @@ A locale need not be connected within itself: two flats on one storey may meet o
 components, numbered from 0, within which one can move without leaving it. A container's passage graph joins the
 components of the locales directly in it. So a route found at a high level can always be refined at the lower ones, and
 a search looks at one container, however large the campus is.
+
+Components were computed with all passages open. With some of them shut, components of the container that holds a shut
+passage may split, and so may those of the containers above it; all others are as they were. Only these containers are
+looked at, when a route asks for them: their edges, and the locales between them and the rooms at the ends of their
+edges.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import networkx as nx
 
-from world_models.building.changes.open_passages import Component, OpenEdge, OpenPassages
-from world_models.building.locale_source import PassageEdge
 from world_models.building.locales import Doorway, Link
 
 if TYPE_CHECKING:
-    from world_models.building.locale_source import LocaleSource
+    from world_models.building.locale_frame import LocaleFrame
 
 Numbered = tuple[str, int]
 """A locale and the number of one of its components, all passages open."""
+
+Component = tuple[str, Hashable]
+"""A locale and one of its components: its number, or the first component within it where a passage in it is shut."""
+
+
+@dataclass(frozen=True, slots=True)
+class PassageEdge:
+    """An edge of a container's passage graph (Figure 8).
+
+    A node is (locale, component): a locale that cannot be crossed between all of its doorways has several components.
+
+    Attributes:
+        passage: name of the doorway or link.
+        between: the two nodes.
+        rooms: the two rooms that the passage joins, each within the locale of its node.
+    """
+
+    passage: str
+    between: tuple[tuple[str, int], tuple[str, int]]
+    rooms: tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,28 +160,29 @@ class Route:
 
 
 def find_route(
-    source: LocaleSource, origin: str, destination: str, shut: Collection[Doorway | Link] = ()
+    frames: Mapping[str, LocaleFrame], origin: str, destination: str, shut: Collection[Doorway | Link] = ()
 ) -> Route | None:
     """The route with the fewest passages in the smallest locale that holds one; None where no passage leads there.
 
     Args:
+        frames: of the locales, by name; those that are needed are asked for.
         shut: passages that cannot be used.
     """
     if origin == destination:
         return Route(origin, ())
-    passages = OpenPassages(source, shut)
+    passages = OpenPassages(frames, shut)
     up, down = passages.components_above(origin), passages.components_above(destination)
     for depth, component in enumerate(up):
         if depth and component in down:
             start, goal = up[depth - 1], down[down.index(component) - 1]
             path = _shortest_path(passages.edges(component[0]), start, goal)
-            return Route(component[0], tuple(_build_step(source, edge, side) for edge, side in path))
+            return Route(component[0], tuple(_build_step(frames, edge, side) for edge, side in path))
     return None
 
 
-def _build_step(source: LocaleSource, edge: PassageEdge, side: int) -> Step:
+def _build_step(frames: Mapping[str, LocaleFrame], edge: PassageEdge, side: int) -> Step:
     room = edge.rooms[side]
-    passages: tuple[Doorway | Link, ...] = (*source.doorways(room), *source.links(room))
+    passages: tuple[Doorway | Link, ...] = (*frames[room].doorways, *frames[room].links)
     return Step(next(p for p in passages if p.name == edge.passage), room, edge.rooms[1 - side])
 
 
@@ -184,3 +208,78 @@ def _shortest_path(edges: Iterable[OpenEdge], start: Component, goal: Component)
         goal, edge, side = came[goal]
         path.append((edge, side))
     return path[::-1]
+
+
+@dataclass(frozen=True, slots=True)
+class OpenEdge:
+    """An edge of a container's passage graph, with the components that it joins while some passages are shut."""
+
+    edge: PassageEdge
+    between: tuple[Component, Component]
+
+
+class OpenPassages:
+    """The passage graphs of the locales with these frames, with some passages shut."""
+
+    def __init__(self, frames: Mapping[str, LocaleFrame], shut: Collection[Doorway | Link] = ()) -> None:
+        """``shut``: doorways and links that cannot be used; each names the two rooms that it would join."""
+        self._frames = frames
+        self._shut = frozenset(passage.name for passage in shut)
+        above = [[set(self._containers_of(room)) for room in passage.between] for passage in shut]
+        self._changed: frozenset[str] = frozenset().union(*(first & second for first, second in above))
+        self._edges: dict[str, tuple[OpenEdge, ...]] = {}
+        self._groups: dict[str, dict[Component, Component]] = {}
+
+    def edges(self, container: str) -> tuple[OpenEdge, ...]:
+        """The open passages between the locales directly in a container, in order."""
+        if container not in self._edges:
+            self._edges[container] = tuple(
+                OpenEdge(edge, (self._find_end(container, edge, 0), self._find_end(container, edge, 1)))
+                for edge in self._frames[container].edges if edge.passage not in self._shut)
+        return self._edges[container]
+
+    def components_above(self, room: str) -> list[Component]:
+        """The components that a room belongs to, from itself up to the root."""
+        return list(self._climb(room))
+
+    def _climb(self, room: str) -> Iterator[Component]:
+        component: Component | None = (room, 0)
+        while component is not None:
+            yield component
+            component = self._component_above(component)
+
+    def _component_above(self, component: Component) -> Component | None:
+        """The component of its container that a component belongs to; None for the root's."""
+        name, number = component
+        parent = self._frames[name].locale.parent
+        if parent is None:
+            return None
+        if parent in self._changed:
+            return parent, self._first_of(parent, component)
+        assert isinstance(number, int)
+        return parent, self._frames[name].components[number]
+
+    def _first_of(self, container: str, component: Component) -> Component:
+        """The component by which all are named that open passages of a container join with this one."""
+        if container not in self._groups:
+            graph: nx.Graph = nx.Graph(edge.between for edge in self.edges(container))
+            groups: dict[Component, Component] = {}
+            for first in graph:
+                if first not in groups:
+                    groups |= dict.fromkeys(nx.node_connected_component(graph, first), first)
+            self._groups[container] = groups
+        return self._groups[container].get(component, component)
+
+    def _find_end(self, container: str, edge: PassageEdge, side: int) -> Component:
+        """The component directly in a container in which an edge ends."""
+        known = edge.between[side]
+        if known[0] not in self._changed:
+            return known
+        return next(found for found in self._climb(edge.rooms[side]) if found[0] == known[0])
+
+    def _containers_of(self, room: str) -> list[str]:
+        """The locales that contain a room, from the smallest to the root."""
+        out = [room]
+        while (parent := self._frames[out[-1]].locale.parent) is not None:
+            out.append(parent)
+        return out[1:]

@@ -1,11 +1,11 @@
 """All kinds of entries that come with the project; a knowledge source of another package brings its own."""
 
 from blackboard.kinds import kinds_in
+from world_models.building import locale_frame
 from world_models.entries import (
     body,
     door_state,
     floor,
-    locale_frame,
     location,
     obstacle,
     obstruction,

@@ -5,7 +5,7 @@ In reading order:
 * :mod:`.world_files`: load a world from TOML or a compiled file, compile one, compute its digest.
 * :mod:`.toml`: TOML with file and line for every error: worlds, missions, cameras, settings.
 * :mod:`.construction`: from a description to faces and model lines.
-* :mod:`.compiled`: worlds in one SQLite file, read one locale at a time.
+* :mod:`.packed`: compiled worlds: a table of packed locale frames in one SQLite file.
 * :mod:`.importers`: IFC, IndoorGML, GeoJSON and ROS maps made into world files.
 * :mod:`.exporters`: a world for other programs: ROS map, SVG, GeoJSON, glTF.
 * :mod:`.first_world`: the text of a first world file to change.

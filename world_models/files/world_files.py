@@ -9,11 +9,9 @@ from os import PathLike
 from pathlib import Path
 
 from world_models.building.world import World
-from world_models.files.compiled.schema import SUFFIXES
-from world_models.files.compiled.sqlite_locales import SqliteLocales
-from world_models.files.compiled.writer import compile_world
 from world_models.files.construction.builder import build_world
 from world_models.files.construction.specs import WorldSpec
+from world_models.files.packed import SUFFIXES, PackedFrames, PackedWorld, compile_world
 from world_models.files.toml.includes import WORLDS, compute_digest
 from world_models.files.toml.settings import suggest_keys
 from world_models.files.toml.source import Source, WorldError
@@ -44,7 +42,7 @@ def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[st
             raise WorldError(f"{path}: expected a TOML file where closed doors are opened, got a compiled world")
         if altered is not None:
             raise WorldError(f"{path}: expected a TOML file where the description is altered, got a compiled world")
-        return World(SqliteLocales(path, [Path(detail).stem for detail in details]))
+        return PackedWorld(PackedFrames(path, [Path(detail).stem for detail in details]))
     files = (path, *map(Path, details))
     if altered is not None:
         return _read_files(files, opened, altered)
@@ -70,7 +68,7 @@ def _read_files(files: Sequence[Path], opened: Collection[str],
 def fingerprint(path: str | PathLike[str]) -> str:
     """SHA-256 of a world file with its includes, or of a compiled world's contents. Raises OSError or WorldError."""
     path = Path(path)
-    return SqliteLocales(path).sha256 if path.suffix in SUFFIXES else compute_digest(path)
+    return PackedFrames(path).sha256 if path.suffix in SUFFIXES else compute_digest(path)
 
 
 def compile_file(path: str | PathLike[str], out: str | PathLike[str],

@@ -7,12 +7,9 @@ Research Center lies at the origin, as in its own file, so that the robot's numb
 
 from __future__ import annotations
 
-import json
 import os
-import sqlite3
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,14 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from world_models.building.build_frames import iterate_frames
 from world_models.building.geometry.faces import Face, build_barrier
 from world_models.building.geometry.landmarks import Edges, Landmark
 from world_models.building.geometry.regions import Finish, expected_brightness
-from world_models.building.locale_source import LocaleGeometry
+from world_models.building.geometry.scene import LocaleGeometry
+from world_models.building.locale_frame import LocaleFrame
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.world import World
-from world_models.files.compiled.serialization import pack_array, pack_geometry
-from world_models.files.compiled.writer import WorldWriter
+from world_models.files.packed import write_frames
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose
 
@@ -59,167 +57,125 @@ def write_campus(locales: int, folder: Path) -> Campus:
     path = folder / f"campus-{buildings}.world"
     if not path.is_file():
         folder.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(f"{path.name}.{os.getpid()}")
-        try:
-            with closing(sqlite3.connect(partial)) as file:
-                _CampusWriter(WorldWriter(file, "campus", [DETAILS.stem])).write(buildings)
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)
-    frames = load_world(path).locale_source
-    return Campus(path, frames.counts()["locale"], frames.counts()["face"])
-
-
-class _CampusWriter:
-    """Writes a campus."""
-
-    def __init__(self, writer: WorldWriter) -> None:
-        self._writer = writer
-        self._counts = {"locale": 0, "room": 0, "open doorway": 0, "thing": 0, "face": 0, "landmark": 0}
-
-    def write(self, buildings: int) -> None:
+        own = path.with_name(f"{path.name}.{os.getpid()}")
         layers = [load_world(WORLDS / "research_center.toml"),
                   load_world(WORLDS / "research_center.toml", details=[DETAILS])]
+        plan = _Plan(layers[0], buildings)
+        write_frames(own, [plan.frames(layers[0]), plan.frames(layers[1])], [plan.counts(w) for w in layers],
+                     [DETAILS.stem])
+        os.replace(own, path)
+    world = load_world(path)
+    return Campus(path, len(world.frames), world.counts()["face"])
+
+
+class _Plan:
+    """Locales and passages of a campus; its geometry is made building by building."""
+
+    def __init__(self, center: World, buildings: int) -> None:
+        self._center, self._buildings = center, buildings
+        self._locales: dict[str, Locale] = {}
+        self._doorways: list[Doorway] = list(center.doorways)
+        self._links: list[Link] = []
+        self._places: dict[str, tuple[int, float, float]] = {}
         side = FIRST_M + BUILDING_M[0] * ROW
         deep = FIRST_M + BUILDING_M[1] * (buildings // ROW + 2)
         self._add(Locale("campus", "campus", None, Pose.identity(),
                          _rectangle(-FIRST_M, -FIRST_M, side + FIRST_M, deep), 50.0))
-        self._research_center(layers)
-        rows = [range(first, min(first + ROW, buildings)) for first in range(0, buildings, ROW)]
-        template = _Template()
-        with tqdm(total=buildings, desc="writing the campus", unit="building", file=sys.stderr, leave=False,
-                  disable=not sys.stderr.isatty()) as bar:
-            before = "hallway"
-            for number, row in enumerate(rows):
-                before = self._district(number, row, before, template, bar)
-        detailed = dict(self._counts)
-        more = layers[1].counts()
-        for key in ("thing", "face", "landmark"):
-            detailed[key] += more[key] - layers[0].counts()[key]
-        self._writer.count(0, self._counts)
-        self._writer.count(1, detailed)
-        self._writer.finish()
+        for name, locale in center.locales.items():  # as it is, one level further down
+            self._add(replace(locale, parent="campus") if name == center.root else locale)
+        before = "hallway"
+        for number, first in enumerate(range(0, buildings, ROW)):
+            before = self._district(number, range(first, min(first + ROW, buildings)), before)
 
-    def _add(self, locale: Locale, *, room: bool = False) -> None:
-        self._writer.add_locale(locale)
-        self._counts["locale"] += 1
-        self._counts["room"] += room
+    def counts(self, center: World) -> dict[str, int]:
+        """How much there is, with the Research Center's model or details."""
+        packets = _packets("", 0.0, 0.0, 0) if self._buildings else ()
+        containers = {locale.parent for locale in self._locales.values()}
+        more = {"room": sum(name not in containers for name in self._locales) - len(center.rooms),
+                "open doorway": len(self._doorways) - len(center.doorways),
+                "face": self._buildings * sum(len(packet.faces) for packet in packets),
+                "landmark": self._buildings * sum(len(packet.landmarks) for packet in packets)}
+        return {key: count + more.get(key, 0) for key, count in center.counts().items()}
 
-    def _research_center(self, layers: Sequence[World]) -> None:
-        """Write the Research Center and its details as they are, one level further down."""
-        model, detailed = layers
-        for name, locale in model.locales.items():
-            self._add(replace(locale, parent="campus") if name == model.root else locale, room=model.is_room(name))
-        for doorway in model.doorways:
-            self._writer.add_doorway(doorway)
-        faces, marks = len(model.faces), len(model.landmarks)
-        for layer, world in enumerate((model, detailed)):
-            for packet in world.locale_source.all_geometry():
-                kept = packet if layer == 0 else replace(
-                    packet, faces=tuple(p for p in packet.faces if p[0] >= faces),
-                    landmarks=tuple(p for p in packet.landmarks if p[0] >= marks))
-                self._writer.add_geometry(kept, layer)
-            for thing in world.things[len(model.things) if layer else 0 :]:
-                self._writer.add_thing(thing, layer)
-        for key in ("open doorway", "thing", "face", "landmark"):
-            self._counts[key] += model.counts()[key]
+    def frames(self, center: World) -> Iterator[LocaleFrame]:
+        """The frames of all locales, with the Research Center's model or details."""
+        made: dict[str, dict[str, list[LocaleGeometry]]] = {}
 
-    def _district(self, number: int, row: range, before: str, template: _Template, bar: tqdm) -> str:
-        """Write a row of buildings; returns the name of its grounds, which follow those of ``before``."""
+        def parts_of(name: str) -> tuple[LocaleGeometry, ...]:
+            if name in center.frames:
+                return center.frames[name].parts
+            prefix = name.partition("-")[0]
+            if prefix not in self._places:
+                return ()
+            if prefix not in made:
+                made.clear()
+                made[prefix] = self._geometry(prefix)
+            return tuple(made[prefix].get(name, ()))
+
+        frames = iterate_frames(self._locales, self._doorways, self._links, center.things, parts_of)
+        yield from tqdm(frames, total=len(self._locales), desc="writing the campus", unit="locale", file=sys.stderr,
+                        leave=False, disable=not sys.stderr.isatty())
+
+    def _add(self, locale: Locale) -> None:
+        self._locales[locale.name] = locale
+
+    def _district(self, number: int, row: range, before: str) -> str:
+        """Add a row of buildings; returns the name of its grounds, which follow those of ``before``."""
         y = FIRST_M + number * BUILDING_M[1]
         name, grounds = f"district-{number}", f"grounds-{number}"
         width = BUILDING_M[0] * ROW
         self._add(Locale(name, "district", "campus", Pose(np.eye(3), np.array([FIRST_M, y, 0.0])),
                          _rectangle(0.0, 0.0, width, BUILDING_M[1]), 40.0))
-        self._add(Locale(grounds, "grounds", name, Pose.identity(), _rectangle(0.0, 0.0, width, 6.0), 40.0), room=True)
+        self._add(Locale(grounds, "grounds", name, Pose.identity(), _rectangle(0.0, 0.0, width, 6.0), 40.0))
         self._link(f"path-{number}", before, grounds, (FIRST_M + 1.0, y + 1.0))
         for place, building in enumerate(row):
             x = FIRST_M + place * BUILDING_M[0]
             prefix = f"b{building}"
-            for locale in template.locales(prefix, name, x - FIRST_M, 8.0):
-                self._add(locale, room=locale.kind in ("office", "corridor"))
+            self._places[prefix] = building, x, y + 8.0
+            for locale in _locales(prefix, name, x - FIRST_M, 8.0):
+                self._add(locale)
             corridor = f"{prefix}-f0-corridor"
             self._link(f"{prefix}-entrance", grounds, corridor, (x + 2.0, y + 2.0))
             for floor in range(1, FLOORS):
                 self._link(f"{prefix}-elevator-{floor}", corridor, f"{prefix}-f{floor}-corridor", (x + 3.0, y + 12.0))
-            for doorway in template.doorways(prefix, x, y + 8.0):
-                self._writer.add_doorway(doorway)
-                self._counts["open doorway"] += 1
-            self._geometry(template, prefix, x, y + 8.0, building)
-            bar.update()
+            self._doorways += _doorways(prefix, x, y + 8.0)
         return grounds
 
     def _link(self, name: str, a: str, b: str, at: tuple[float, float]) -> None:
-        self._writer.add_link(Link(name, "elevator", (a, b), np.array([(*at, 0.0)] * 2)))
+        self._links.append(Link(name, "elevator", (a, b), np.array([(*at, 0.0)] * 2)))
 
-    def _geometry(self, template: _Template, prefix: str, x: float, y: float, building: int) -> None:
-        first = 10_000 + building * (template.faces + template.landmarks)
-        for packet in template.packets:
-            neighbour = packet.neighbour and f"{prefix}-{packet.neighbour}"
-            self._writer.add_packed_geometry(f"{prefix}-{packet.locale}", neighbour,
-                                             packet.words_for(prefix, first), packet.numbers_at(x, y))
-        self._counts["face"] += template.faces
-        self._counts["landmark"] += template.landmarks
-
-
-@dataclass(frozen=True, eq=False)
-class _TemplatePacket:
-    """A packet of the template building; buildings differ in names, numbers and places."""
-
-    locale: str
-    neighbour: str | None
-    faces: list[list[object]]
-    landmarks: list[list[object]]
-    numbers: NDArray[np.float64]
-    moves_x: NDArray[np.float64]
-    moves_y: NDArray[np.float64]
-
-    def words_for(self, prefix: str, first: int) -> str:
-        rows = [[[first + int(str(row[0])), *row[1:]] for row in part] for part in (self.faces, self.landmarks)]
-        return json.dumps(rows, separators=(",", ":")).replace('"@', f'"{prefix}-')
-
-    def numbers_at(self, x: float, y: float) -> bytes:
-        return pack_array(self.numbers + x * self.moves_x + y * self.moves_y)
+    def _geometry(self, prefix: str) -> dict[str, list[LocaleGeometry]]:
+        """The geometry of the locales of a building."""
+        building, x, y = self._places[prefix]
+        known: dict[str, list[LocaleGeometry]] = {}
+        for packet in _packets(prefix, x, y, 10_000 + 10_000 * building):
+            for name in (packet.locale, *([packet.neighbour] if packet.neighbour else [])):
+                known.setdefault(name, []).append(packet)
+        return known
 
 
-class _Template:
-    """One generated building at the origin."""
+def _locales(prefix: str, district: str, x: float, y: float) -> Iterator[Locale]:
+    yield Locale(prefix, "building", district, Pose(np.eye(3), np.array([x, y, 0.0])),
+                 _rectangle(-1.0, -1.0, ROOMS // 2 * (ROOM_M + WALL_M) + 1.0, FLOORS * FLOOR_PITCH_M), 30.0,
+                 {"owner": f"Department {prefix[1:]}"})
+    for floor in range(FLOORS):
+        name = f"{prefix}-f{floor}"
+        outline = _rectangle(-0.5, -0.5, ROOMS // 2 * (ROOM_M + WALL_M) + 0.5, 2 * ROOM_M + CORRIDOR_M + 1.0)
+        yield Locale(name, "floor", prefix, Pose(np.eye(3), np.array([0.0, floor * FLOOR_PITCH_M, 0.0])), outline,
+                     3.0, {"elevation_m": 3.5 * floor})
+        for room in _rooms():
+            frame = Pose(np.eye(3), np.array([room.x, room.y, 0.0]))
+            yield Locale(f"{name}-{room.name}", "corridor" if room.name == "corridor" else "office", name, frame,
+                         _rectangle(0.0, 0.0, room.width, room.depth), HEIGHT_M)
 
-    def __init__(self) -> None:
-        places = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
-        here, east, north = ([pack_geometry(p) for p in _packets(x, y)] for x, y in places)
-        self.packets = []
-        for packet, (words, numbers), (_, moved_x), (_, moved_y) in zip(
-                _packets(0.0, 0.0), here, east, north, strict=True):
-            base = np.frombuffer(numbers, "<f8")
-            faces, landmarks = json.loads(words)
-            self.packets.append(_TemplatePacket(
-                packet.locale[1:], packet.neighbour and packet.neighbour[1:], faces, landmarks, base,
-                np.round(np.frombuffer(moved_x, "<f8") - base), np.round(np.frombuffer(moved_y, "<f8") - base)))
-        self.faces = sum(len(p.faces) for p in self.packets)
-        self.landmarks = sum(len(p.landmarks) for p in self.packets)
 
-    def locales(self, prefix: str, district: str, x: float, y: float) -> Iterator[Locale]:
-        yield Locale(prefix, "building", district, Pose(np.eye(3), np.array([x, y, 0.0])),
-                     _rectangle(-1.0, -1.0, ROOMS // 2 * (ROOM_M + WALL_M) + 1.0, FLOORS * FLOOR_PITCH_M), 30.0,
-                     {"owner": f"Department {prefix[1:]}"})
-        for floor in range(FLOORS):
+def _doorways(prefix: str, x: float, y: float) -> Iterator[Doorway]:
+    for floor in range(FLOORS):
+        for room in _rooms()[1:]:
+            inner, outer = room.threshold(x, y + floor * FLOOR_PITCH_M)
             name = f"{prefix}-f{floor}"
-            outline = _rectangle(-0.5, -0.5, ROOMS // 2 * (ROOM_M + WALL_M) + 0.5, 2 * ROOM_M + CORRIDOR_M + 1.0)
-            yield Locale(name, "floor", prefix, Pose(np.eye(3), np.array([0.0, floor * FLOOR_PITCH_M, 0.0])), outline,
-                         3.0, {"elevation_m": 3.5 * floor})
-            for room in _rooms():
-                frame = Pose(np.eye(3), np.array([room.x, room.y, 0.0]))
-                yield Locale(f"{name}-{room.name}", "corridor" if room.name == "corridor" else "office", name, frame,
-                             _rectangle(0.0, 0.0, room.width, room.depth), HEIGHT_M)
-
-    def doorways(self, prefix: str, x: float, y: float) -> Iterator[Doorway]:
-        for floor in range(FLOORS):
-            for room in _rooms()[1:]:
-                inner, outer = room.threshold(x, y + floor * FLOOR_PITCH_M)
-                name = f"{prefix}-f{floor}"
-                yield Doorway(f"{name}-{room.name}-door", (f"{name}-{room.name}", f"{name}-corridor"),
-                              np.array([inner, outer[::-1]]), DOOR_HEIGHT_M)
+            yield Doorway(f"{name}-{room.name}-door", (f"{name}-{room.name}", f"{name}-corridor"),
+                          np.array([inner, outer[::-1]]), DOOR_HEIGHT_M)
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,19 +208,20 @@ def _rooms() -> list[_Room]:
     return rooms
 
 
-def _packets(x: float, y: float) -> list[LocaleGeometry]:
-    """The faces and landmarks of the template with its corner at (x, y); names begin with @ for the building's."""
-    packets, faces, marks = [], 0, 0
+def _packets(prefix: str, x: float, y: float, first: int) -> list[LocaleGeometry]:
+    """The faces and landmarks of a building with its corner at (x, y), numbered from ``first``."""
+    packets, faces, marks = [], first, first
     for floor in range(FLOORS):
         base = y + floor * FLOOR_PITCH_M
         for room in _rooms():
-            own = _shell(f"@f{floor}-{room.name}", room, x, base)
+            own = _shell(f"{prefix}-f{floor}-{room.name}", room, x, base)
             mark = Landmark(f"{own[0].locale}/corners", own[0].locale, "wall", _corners(room, x, base))
             packets.append(LocaleGeometry(own[0].locale, None, tuple(enumerate(own, faces)), ((marks, mark),)))
             faces, marks = faces + len(own), marks + 1
             if room.name != "corridor":
-                door = _door(f"@f{floor}", room, x, base)
-                packets.append(LocaleGeometry(own[0].locale, f"@f{floor}-corridor", tuple(enumerate(door, faces)), ()))
+                door = _door(f"{prefix}-f{floor}", room, x, base)
+                corridor = f"{prefix}-f{floor}-corridor"
+                packets.append(LocaleGeometry(own[0].locale, corridor, tuple(enumerate(door, faces)), ()))
                 faces += len(door)
     return packets
 

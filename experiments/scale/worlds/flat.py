@@ -20,10 +20,8 @@ def main(path: str) -> None:
     began = time.perf_counter()
     graph = nx.Graph()
     with closing(sqlite3.connect(f"{Path(path).resolve().as_uri()}?mode=ro", uri=True)) as file:
-        graph.add_nodes_from(name for (name,) in file.execute("select name from locale where leaf order by id"))
-        for table in ("doorway", "link"):
-            graph.add_edges_from(file.execute(
-                f"select a.name, b.name from {table} p join locale a on a.id = p.a join locale b on b.id = p.b"))
+        graph.add_nodes_from(name for (name,) in file.execute("select name from frame where layer = 0 order by number"))
+        graph.add_edges_from(file.execute("select locale, other from passage"))
     load_ms = 1000.0 * (time.perf_counter() - began)
     last = list(graph)[-1]
     began = time.perf_counter()

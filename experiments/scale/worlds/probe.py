@@ -26,7 +26,7 @@ from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from world_models.building.world import World
 from world_models.entries.kinds import KINDS
-from world_models.files.compiled.sqlite_locales import SqliteLocales
+from world_models.files.packed import PackedFrames
 from world_models.files.world_files import load_world
 
 SCENARIO = """
@@ -91,9 +91,7 @@ def _open(stage: Stage) -> dict[str, Any]:
 
 def _time_far_route_ms(world: World) -> float:
     """Time to find the route to the last locale and refine its first and last step."""
-    frames = world.locale_source
-    assert isinstance(frames, SqliteLocales)
-    last = frames.last_room()
+    last = list(world.frames)[-1]
     began = time.process_time()
     route = world.route("robot-laboratory", last)
     if route is not None and route.steps:
@@ -110,8 +108,8 @@ def _drive(stage: Stage, seed: int) -> dict[str, Any]:
         kinds=KINDS)
     scheduler.tell([Post(stage.scenario.command)], "user")
     outcome = run_to_outcome(scheduler)
-    frames = world.locale_source
-    assert isinstance(frames, SqliteLocales)
+    frames = world.frames
+    assert isinstance(frames, PackedFrames)
     return {"outcome": outcome.kind, "journal": watcher.journal, "decisions": watcher.decisions,
             "touched": len(frames.touched), "frames": frames.touched}
 

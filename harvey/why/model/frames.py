@@ -11,7 +11,7 @@ from harvey.why.history import History
 from harvey.why.links import reason
 from harvey.why.model.world_file import WorldFile
 from harvey.why.sentences import value_of
-from world_models.entries.locale_frame import FrameReference
+from world_models.building.locale_frame import FrameReference
 from world_models.entries.percepts import PoseFix
 from world_models.words import landmark, listed
 

@@ -12,7 +12,7 @@ from harvey.errors import BadInput
 from harvey.run_files.run_directory import RunDirectory
 
 if TYPE_CHECKING:  # a world is loaded only for an answer that needs it, and so is what loads it
-    from world_models.entries.locale_frame import LocaleFrame
+    from world_models.building.locale_frame import LocaleFrame
     from world_models.frame_store import FrameStore
 
 MAX_NEAR, MIN_SIMILARITY = 4, 0.5
@@ -50,10 +50,11 @@ class WorldFile:
         """What a name means; None where the world has nothing of that name, or cannot be asked."""
         if isinstance(self._store, str):
             return None
-        source = self._store.world.locale_source
-        if (locale := source.locale(name)) is not None:
+        world = self._store.world
+        if name in world.frames:
+            locale = world.locale(name)
             return Element(name, locale.kind, (name,), _brief(locale.source))
-        if (passage := source.passage(name)) is not None:
+        if (passage := world.find_passage(name)) is not None:
             kind = getattr(passage, "kind", "open door")
             return Element(name, kind, tuple(passage.between), _brief(passage.source))
         frame = self._frame(name)
@@ -66,13 +67,13 @@ class WorldFile:
         from world_models.frame_store import elements_of
 
         frame = self._frame(name)
-        known = sorted(elements_of(frame)) if frame is not None else list(self._store.world.locale_source.names())
+        known = sorted(elements_of(frame)) if frame is not None else list(self._store.world.frames)
         return difflib.get_close_matches(name, known, MAX_NEAR, MIN_SIMILARITY)
 
     def _frame(self, name: str) -> LocaleFrame | None:
         """Of the locale that an element's name begins with."""
         locale, slash, _ = name.partition("/")
-        if isinstance(self._store, str) or not slash or self._store.world.locale_source.locale(locale) is None:
+        if isinstance(self._store, str) or not slash or locale not in self._store.world.frames:
             return None
         return self._store.frame(locale)
 

@@ -15,7 +15,7 @@ from knowledge_sources.settings.verification import VerificationSettings
 from world_models.building.building import Building
 from world_models.building.geometry.faces import area_vector
 from world_models.building.geometry.regions import Finish, expected_brightness
-from world_models.building.locale_source import LocaleGeometry
+from world_models.building.geometry.scene import LocaleGeometry
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
@@ -81,7 +81,7 @@ def cast_rays(
         its depth (n,) [m].
     """
     rooms = sorted(find_visible_locales(world, window, camera_from_world))
-    packets = {(p.locale, p.neighbour or ""): p for room in rooms for p in world.locale_source.geometry(room)}
+    packets = {(p.locale, p.neighbour or ""): p for room in rooms for p in world.frames[room].parts}
     if not packets:
         return np.zeros((0, 3)), np.zeros((0, 3)), np.full(len(rays), -1), np.full(len(rays), np.inf)
     parts = [_find_surfaces(packets[key]) for key in sorted(packets)]

@@ -36,9 +36,9 @@ from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from strategies import Note
 from without_frames import list_decided
+from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
 from world_models.entries.kinds import KINDS
-from world_models.entries.locale_frame import LocaleFrame
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.told import Told
 from world_models.files.toml.source import Source

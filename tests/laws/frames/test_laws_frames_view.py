@@ -15,7 +15,7 @@ from harvey.run_files.run_head import RunHead
 from harvey.runner.replay import open_originals, replay
 from rebuilt_board import rebuild, recorded_act
 from world_models.building.changes.removals import element_names
-from world_models.entries.locale_frame import FrameChange, LocaleFrame
+from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.frame_building import FrameBuilding
 
 
@@ -48,7 +48,7 @@ def test_decisions_are_the_same_where_nothing_is_ever_kept(
     cached = FrameBuilding.cached
 
     def compute_anew(self: FrameBuilding, *more: Any) -> Any:
-        self.locale_source.root().memo.clear()
+        self.root_frame().memo.clear()
         return cached(self, *more)
 
     monkeypatch.setattr(FrameBuilding, "cached", compute_anew)

@@ -20,7 +20,7 @@ from harvey.simulation.run import SimulatedRun, build_head
 from harvey.what_if import WhatIf
 from sim.stage import Stage
 from two_doors import two_doors
-from world_models.entries.locale_frame import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.percepts import Tracks
 from world_models.entries.task import Milestone, Outcome, PlanSketch
 from world_models.entries.told import Told

@@ -23,10 +23,10 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.questions import find_building_without_finds
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
+from world_models.building.locale_frame import FRAME_OF, LocaleFrame
 from world_models.building.world import World
 from world_models.entries.body import MotorCommand
 from world_models.entries.floor import FloorThing, FreeFloor
-from world_models.entries.locale_frame import FRAME_OF, LocaleFrame
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Certificate, Goal, MilestoneVerdict

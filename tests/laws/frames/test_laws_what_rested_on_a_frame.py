@@ -13,7 +13,7 @@ from blackboard.change import Revised
 from blackboard.effect import Post, Revise
 from blackboard.entry import Entry
 from knowledge_sources.action.withdrawer import Withdrawer
-from world_models.entries.locale_frame import FrameChange, LocaleFrame
+from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.entries.task import Milestone, MilestoneStatus, PlanSketch
 
 THINGS = ("study/table-1", "study/table-10", "study/rack-1")

@@ -21,8 +21,8 @@ from logs.recording.palette import KNOWN, REVISED
 from logs.recording.paths import FRAME_LIST
 from logs.recording.stream import RecordingStream
 from scripted_mission import CAMERA, MOUNT, house
+from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.building.world import World
-from world_models.entries.locale_frame import FrameChange, LocaleFrame
 from world_models.frame_store import FrameStore
 
 ROOMS = ("kitchen", "parlour")

@@ -35,7 +35,7 @@ def test_a_building_is_kept_until_two_others_were_read(tmp_path: Path) -> None:
 @given(st.integers(0, 10_000))
 def test_surfaces_of_a_locale_are_computed_once_and_go_with_it(seed: int) -> None:
     world = read_world(Source.parse(generate_house(np.random.default_rng(seed)), "house.toml"))
-    packets = [packet for name in world.rooms for packet in world.locale_source.geometry(name)]
+    packets = [packet for name in world.rooms for packet in world.frame(name).parts]
     assert packets
     for packet in packets:
         found = _find_surfaces(packet)

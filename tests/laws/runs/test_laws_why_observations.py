@@ -22,9 +22,9 @@ from harvey.run_files.observations import Originals, effect_of, value_of
 from harvey.run_files.records import EntryRecord
 from scripted_mission import HOUSE
 from world_models.actuator import ActuatorModel
+from world_models.building.locale_frame import FrameAnswer, FrameChange, FrameRequest, LocaleFrame
 from world_models.entries.body import Frame, MotionReport, RideReport
 from world_models.entries.kinds import KINDS
-from world_models.entries.locale_frame import FrameAnswer, FrameChange, FrameRequest, LocaleFrame
 from world_models.entries.robot import Footprint, Wheels
 from world_models.entries.task import Command, Outcome
 from world_models.files.toml.source import Source

@@ -24,7 +24,7 @@ from world_models.robot import RobotModel
 FLOOR = generated_floor(3, 4)
 WORLD = FLOOR.world
 ROBOT = RobotModel(WORLD, Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1), ActuatorModel())
-SOLID = Obstacles.of_faces(face for part in WORLD.locale_source.all_geometry() for _, face in part.faces)
+SOLID = Obstacles.of_faces(face for part in WORLD.parts for _, face in part.faces)
 SIGMA_M = 0.02
 
 

@@ -1,6 +1,7 @@
 """Laws of shut doors: a camera sees nothing through them, and everything else as before."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,9 +14,7 @@ from knowledge_sources.methods.verification.predicted_colors import predict_face
 from world_models.actuator import ActuatorModel
 from world_models.building.changes.shut_doors import build_shut_faces, shut_door
 from world_models.building.geometry.outlines import inside_polygon
-from world_models.building.locale_source import LocaleGeometry
 from world_models.building.locales import Doorway
-from world_models.building.memory_locales import MemoryLocales
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.source import Source
@@ -36,26 +35,15 @@ SLACK_M = 1e-3
 Floats = NDArray[np.float64]
 
 
-class ShutDoors(MemoryLocales):
-    """The locales of a world with a door shut; its doorway is still there, but for the geometry."""
-
-    def with_door(self, doorway: Doorway, floor_m: float) -> "ShutDoors":
-        object.__setattr__(self, "door", (doorway, floor_m))
-        return self
-
-    def geometry(self, locale: str) -> tuple[LocaleGeometry, ...]:
-        doorway, floor_m = self.__dict__["door"]
-        parts = super().geometry(locale)
-        return shut_door(parts, doorway, floor_m) if locale in doorway.between else parts
-
-
 def shut(world: World, doorway: Doorway, *, portal: bool) -> World:
-    """The world with a door shut; ``portal``: one still looks for what is behind it."""
-    source = world.locale_source
-    assert isinstance(source, MemoryLocales)
-    doorways = tuple(d for d in source.every_doorway if portal or d is not doorway)
-    locales = ShutDoors(source.name, source.locales, doorways, source.every_face, source.every_landmark)
-    return World(locales.with_door(doorway, world.floor_m(doorway.between[0])))
+    """The world with a door shut; ``portal``: its doorway is still there, so that one looks for what is behind it."""
+    floor_m = world.floor_m(doorway.between[0])
+    frames = dict(world.frames)
+    for name in doorway.between:
+        frame = frames[name]
+        doorways = tuple(d for d in frame.doorways if portal or d is not doorway)
+        frames[name] = replace(frame, doorways=doorways, parts=shut_door(frame.parts, doorway, floor_m), memo={})
+    return World(frames)
 
 
 @st.composite

@@ -1,6 +1,6 @@
 """Laws of routes with passages shut, in random hierarchies: as if the world had been built without these passages."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -9,8 +9,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from world_models.building.build_frames import build_frames
+from world_models.building.locale_frame import LocaleFrame
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.memory_locales import MemoryLocales
 from world_models.building.passages import Route, find_route
 from world_models.frames import Pose
 
@@ -18,13 +19,14 @@ SQUARE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 THRESHOLDS = np.zeros((2, 2, 2))
 
 Passages = tuple[Doorway | Link, ...]
+Frames = Mapping[str, LocaleFrame]
 
 
-def build_source(parents: dict[str, str | None], passages: Sequence[Doorway | Link]) -> MemoryLocales:
+def build_source(parents: dict[str, str | None], passages: Sequence[Doorway | Link]) -> Frames:
     locales = {name: Locale(name, "place", parent, Pose.identity(), SQUARE, 3.0) for name, parent in parents.items()}
     doorways = tuple(passage for passage in passages if isinstance(passage, Doorway))
     links = tuple(passage for passage in passages if isinstance(passage, Link))
-    return MemoryLocales("world", locales, doorways, (), (), (), links)
+    return build_frames(locales, doorways, links=links)
 
 
 @st.composite
@@ -54,7 +56,7 @@ def steps_of(route: Route | None) -> tuple[str, list[tuple[str, str, str]]] | No
     return route and (route.container, [(s.passage.name, s.origin, s.destination) for s in route.steps])
 
 
-def refine_route(source: MemoryLocales, origin: str, destination: str, shut: Passages, depth: int = 0) -> Any:
+def refine_route(source: Frames, origin: str, destination: str, shut: Passages, depth: int = 0) -> Any:
     """(room, passage, room, ..., room) of a refined route; None where there is none."""
     route = find_route(source, origin, destination, shut)
     if route is None:
@@ -105,19 +107,32 @@ def test_a_route_exists_where_a_chain_of_open_passages_does(
             assert usable[passage] == {here, there}
 
 
-class Watched:
-    """Locale data that note of whom what was asked."""
+class WatchedFrame:
+    """A frame that notes what was asked of it."""
 
-    def __init__(self, source: MemoryLocales) -> None:
-        self._source = source
-        self.asked: set[tuple[str, str]] = set()
+    def __init__(self, frame: LocaleFrame, asked: set[tuple[str, str]]) -> None:
+        self._frame, self._asked = frame, asked
 
     def __getattr__(self, name: str) -> Any:
-        def ask(locale: str) -> Any:
-            self.asked.add((name, locale))
-            return getattr(self._source, name)(locale)
+        self._asked.add((name, self._frame.name))
+        return getattr(self._frame, name)
 
-        return ask
+
+class Watched(Mapping[str, Any]):
+    """Frames that note of which what was asked."""
+
+    def __init__(self, frames: Frames) -> None:
+        self._frames = frames
+        self.asked: set[tuple[str, str]] = set()
+
+    def __getitem__(self, name: str) -> Any:
+        return WatchedFrame(self._frames[name], self.asked)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._frames)
+
+    def __len__(self) -> int:
+        return len(self._frames)
 
 
 @settings(deadline=None, max_examples=200)
@@ -138,12 +153,12 @@ def test_only_containers_above_shut_passages_and_what_their_edges_join_are_read(
         return chain
 
     changed = {name for passage in shut for name in set(above(passage.between[0])[1:]) & set(above(passage.between[1]))}
-    ends = {room for name in changed for edge in source.passage_edges(name) for room in edge.rooms}
+    ends = {room for name in changed for edge in source[name].edges for room in edge.rooms}
     read = {name for room in {a, b, *ends, *(end for p in shut for end in p.between)} for name in above(room)}
     searched = changed | ({route.container} if route is not None else set())
     stops = {step.origin for step in route.steps} if route is not None else set()
     for question, name in watched.asked:
-        allowed = {"locale": read, "components": read, "passage_edges": searched, "doorways": stops, "links": stops}
+        allowed = {"locale": read, "components": read, "edges": searched, "doorways": stops, "links": stops}
         assert name in allowed[question], (question, name)
 
 

@@ -7,13 +7,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from world_models.building.extents import LocaleExtent
-from world_models.building.locale_source import WorldSource
+from world_models.building.build_frames import build_frames
 from world_models.building.locales import Locale
-from world_models.building.memory_locales import MemoryLocales
 from world_models.building.world import World
-from world_models.files.compiled.sqlite_locales import SqliteLocales
-from world_models.files.compiled.writer import compile_world
+from world_models.files.packed import PackedFrames, PackedWorld, compile_world
 from world_models.files.world_files import WORLDS, compile_file, load_world
 from world_models.frames import Pose
 
@@ -30,7 +27,7 @@ def hierarchies(draw: st.DrawFn) -> World:
         above = draw(st.integers(-1, index - 1))
         locales.append(draw_locale(draw, f"l{index}", "root" if above < 0 else f"l{above}"))
     rest = draw(st.permutations(locales[1:]))
-    return World(MemoryLocales("root", {each.name: each for each in (locales[0], *rest)}, (), (), ()))
+    return World(build_frames({each.name: each for each in (locales[0], *rest)}))
 
 
 def draw_locale(draw: st.DrawFn, name: str, parent: str | None) -> Locale:
@@ -41,57 +38,44 @@ def draw_locale(draw: st.DrawFn, name: str, parent: str | None) -> Locale:
     return Locale(name, "room", parent, frame, outline, draw(st.floats(2.0, 4.0)), floor_m=draw(st.floats(-1.0, 1.0)))
 
 
-def descend(source: WorldSource, x_m: float, y_m: float, margin_m: float) -> list[str]:
-    """The locales near a point, found from the root down."""
-    found: list[LocaleExtent] = []
-    todo = [source.extent(source.name)]
-    while todo:
-        extent = todo.pop()
-        if extent.reaches(x_m, y_m, margin_m):
-            found += [extent] if extent.is_near(x_m, y_m, margin_m) else []
-            todo += source.extents_in(extent.name)
-    return [extent.name for extent in sorted(found, key=lambda extent: extent.number)]
+def list_near(world: World, x_m: float, y_m: float, margin_m: float) -> list[str]:
+    """The locales near a point, found by asking each."""
+    return [name for name, frame in world.frames.items() if frame.extent.is_near(x_m, y_m, margin_m)]
 
 
-def check_extents(one: WorldSource, other: WorldSource) -> None:
-    names = list(one.names())
-    assert names == list(other.names())
-    world = World(one)
+def check_extents(one: World, other: World) -> None:
+    names = list(one.frames)
+    assert names == list(other.frames)
+    parents = {locale.parent for locale in one.locales.values()}
     for number, name in enumerate(names):
-        extent = one.extent(name)
-        assert extent == other.extent(name)
-        assert (extent.name, extent.number, extent.is_room) == (name, number, one.is_room(name))
-        assert number == one.number(name) == other.number(name)
-        assert one.components(name) == other.components(name)
-        assert bool(one.components(name)) == (name != one.name)
-        assert tuple(each.name for each in one.extents_in(name)) == one.children(name)
-        assert one.extents_in(name) == other.extents_in(name) == tuple(map(one.extent, one.children(name)))
-        base, locale = world.floor_m(name), world.locale(name)
+        extent, children = one.frame(name).extent, one.frame(name).children
+        assert extent == other.frame(name).extent
+        assert (extent.name, extent.number, extent.is_room) == (name, number, name not in parents)
+        assert one.is_room(name) == other.is_room(name) == extent.is_room
+        assert one.frame(name).components == other.frame(name).components
+        assert bool(one.frame(name).components) == (name != one.name)
+        assert tuple(each.name for each in children) == one.children_of(name)
+        assert one.children_of(name) == tuple(each for each in names if one.locale(each).parent == name)
+        assert children == other.frame(name).children == tuple(one.frame(each).extent for each in one.children_of(name))
+        base, locale = one.floor_m(name), one.locale(name)
         inside = [(*extent.rectangle[:2], base + locale.floor_m, *extent.rectangle[2:], base + locale.height_m),
-                  *(child.reach for child in one.extents_in(name))]
+                  *(child.reach for child in children)]
         assert extent.reach == (*np.min(inside, axis=0)[:3], *np.max(inside, axis=0)[3:])
-
-
-def check_near(source: WorldSource, x_m: float, y_m: float, margin_m: float, expected: list[str]) -> None:
-    assert list(source.near(x_m, y_m, margin_m)) == expected
-    assert descend(source, x_m, y_m, margin_m) == expected
 
 
 @settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(world=hierarchies(), data=st.data())
 def test_a_descent_finds_what_is_near_in_any_world(world: World, data: st.DataObject, tmp_path: Path) -> None:
-    memory = world.locale_source
     compile_world([world], tmp_path / "w.world")
-    compiled = SqliteLocales(tmp_path / "w.world")
-    check_extents(memory, compiled)
+    compiled = PackedWorld(PackedFrames(tmp_path / "w.world"))
+    check_extents(world, compiled)
     for _ in range(4):
         margin_m = data.draw(MARGINS)
-        x0, y0, x1, y1 = memory.extent(data.draw(st.sampled_from(list(memory.names())))).rectangle
+        x0, y0, x1, y1 = world.frame(data.draw(st.sampled_from(list(world.frames)))).extent.rectangle
         x_m = data.draw(COORDINATES | st.sampled_from([x0, x1, x0 - margin_m, x1 + margin_m]))
         y_m = data.draw(COORDINATES | st.sampled_from([y0, y1, y0 - margin_m, y1 + margin_m, (y0 + y1) / 2]))
-        expected = [name for name in memory.names() if memory.extent(name).is_near(x_m, y_m, margin_m)]
-        check_near(memory, x_m, y_m, margin_m, expected)
-        check_near(compiled, x_m, y_m, margin_m, expected)
+        expected = list_near(world, x_m, y_m, margin_m)
+        assert world.near(x_m, y_m, margin_m) == expected == compiled.near(x_m, y_m, margin_m)
 
 
 @pytest.fixture(scope="module", params=["research_center", "campus"])
@@ -101,23 +85,22 @@ def shipped(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
 
 
 def test_both_sources_of_a_shipped_world_agree(shipped: tuple[World, World]) -> None:
-    check_extents(shipped[0].locale_source, shipped[1].locale_source)
+    check_extents(*shipped)
 
 
 @settings(deadline=None, max_examples=60)
 @given(data=st.data())
 def test_a_descent_finds_what_is_near_in_a_shipped_world(shipped: tuple[World, World], data: st.DataObject) -> None:
-    memory, compiled = (world.locale_source for world in shipped)
-    x0, y0, _, x1, y1, _ = memory.extent(memory.name).reach
+    built, compiled = shipped
+    x0, y0, _, x1, y1, _ = built.root_frame().extent.reach
     x_m, y_m = data.draw(st.floats(x0 - 5.0, x1 + 5.0)), data.draw(st.floats(y0 - 5.0, y1 + 5.0))
     margin_m = data.draw(MARGINS)
-    expected = list(memory.near(x_m, y_m, margin_m))
-    check_near(memory, x_m, y_m, margin_m, expected)
-    check_near(compiled, x_m, y_m, margin_m, expected)
+    expected = list_near(built, x_m, y_m, margin_m)
+    assert built.near(x_m, y_m, margin_m) == expected == compiled.near(x_m, y_m, margin_m)
 
 
-def test_the_extent_of_an_unknown_locale_is_refused(shipped: tuple[World, World]) -> None:
+def test_an_unknown_locale_is_refused(shipped: tuple[World, World]) -> None:
     for world in shipped:
         with pytest.raises(ValueError, match=r"expected a locale of .*, got 'attic'"):
-            world.locale_source.extent("attic")
-        assert world.locale_source.extents_in("attic") == () == world.locale_source.components("attic")
+            world.frame("attic")
+        assert "attic" not in world.frames

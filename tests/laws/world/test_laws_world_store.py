@@ -13,12 +13,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from world_models.building.checks import check_world
-from world_models.building.locale_source import LocaleGeometry
+from world_models.building.geometry.scene import LocaleGeometry
 from world_models.building.passages import find_route
 from world_models.building.world import World
-from world_models.files.compiled.schema import FORMAT
-from world_models.files.compiled.sqlite_locales import SqliteLocales
-from world_models.files.compiled.writer import compile_world
+from world_models.files.packed import FORMAT, PackedFrames, compile_world
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import WORLDS, compile_file, load_world, read_world
 
@@ -45,8 +43,8 @@ def check_same(one: World, other: World) -> None:
         assert one.locale(name).properties == other.locale(name).properties
         assert [d.name for d in one.doorways_of(name)] == [d.name for d in other.doorways_of(name)]
         assert [t.name for t in one.things_of(name)] == [t.name for t in other.things_of(name)]
-        assert one.locale_source.passage_edges(name) == other.locale_source.passage_edges(name)
-        assert one.locale_source.components(name) == other.locale_source.components(name)
+        assert one.frames[name].edges == other.frames[name].edges
+        assert one.frames[name].components == other.frames[name].components
 
 
 @pytest.mark.parametrize("details", [[], [DETAILS]])
@@ -56,14 +54,14 @@ def test_a_compiled_world_answers_as_its_text(compiled: Path, details: list[Path
 
 def test_a_robot_in_a_room_touches_the_room(compiled: Path) -> None:
     world = load_world(compiled)
-    frames = world.locale_source
-    assert isinstance(frames, SqliteLocales) and frames.touched == []
+    frames = world.frames
+    assert isinstance(frames, PackedFrames) and frames.touched == []
     world.scene_of(["mail-room"])
     world.obstacles("mail-room")
-    assert {name for _, name in frames.touched} == {"mail-room"}
+    assert frames.touched == ["mail-room"]
     route = world.route("mail-room", "library")
     assert route is not None and [step.passage.name for step in route.steps] == ["mail-door", "library-door"]
-    assert not [item for item in frames.touched if item == ("faces", "library")]
+    assert set(frames.touched) == {"mail-room", "hallway", "library", "second-floor", "research-center"}
 
 
 def test_what_is_no_compiled_world_is_told(compiled: Path, tmp_path: Path) -> None:
@@ -83,7 +81,7 @@ def test_what_is_no_compiled_world_is_told(compiled: Path, tmp_path: Path) -> No
 
 def load_everything(world: World) -> list[LocaleGeometry]:
     check_world(world)
-    return list(world.locale_source.all_geometry())
+    return list(world.parts)
 
 
 @settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -122,7 +120,7 @@ def networks(draw: st.DrawFn) -> World:
 
 def refine_route(world: World, origin: str, destination: str, depth: int = 0) -> list[str] | None:
     """The rooms of a route, refined until nothing is left to refine."""
-    route = find_route(world.locale_source, origin, destination)
+    route = find_route(world.frames, origin, destination)
     if route is None or depth > 20:
         return None
     rooms, here = [origin], origin

@@ -7,7 +7,7 @@ import pytest
 from harvey.errors import BadInput
 from harvey.run_files.run_head import load_known_world
 from harvey.what_if import check_removals
-from world_models.building.locale_source import LocaleGeometry
+from world_models.building.geometry.scene import LocaleGeometry
 from world_models.files.toml.includes import WORLDS
 from world_models.frame_store import FrameStore
 
@@ -23,7 +23,7 @@ def test_what_its_locale_has_is_found_without_reading_the_others(
     def read_all(_source: object) -> tuple[LocaleGeometry, ...]:
         raise AssertionError("expected one locale to be read, got all of them")
 
-    monkeypatch.setattr(type(store.world.locale_source), "all_geometry", read_all)
+    monkeypatch.setattr(type(store.world), "parts", property(read_all))
     check_removals(["allens-office/desk", "allens-door", "hallway/pillar-1"], store, ["motor"])
 
 

@@ -16,7 +16,7 @@ from harvey.why.sentences import sentence
 from harvey.why.story import story
 from harvey.why.trace import Trace
 from harvey.why.why_not import Fate, in_run
-from world_models.entries.locale_frame import FrameChange, FrameReference, FrameRequest
+from world_models.building.locale_frame import FrameChange, FrameReference, FrameRequest
 from world_models.entries.robot import Footprint
 from world_models.entries.task import Milestone
 from world_models.entries.told import Told

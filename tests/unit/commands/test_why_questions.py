@@ -12,9 +12,9 @@ from harvey.errors import BadInput
 from harvey.run_files.records import DecisionRecord, EntryRecord
 from harvey.why.history import MemoryHistory
 from harvey.why.questions import answers, is_question
+from world_models.building.locale_frame import FrameChange, FrameReference
 from world_models.entries.body import Frame
 from world_models.entries.door_state import DoorPicture, DoorState
-from world_models.entries.locale_frame import FrameChange, FrameReference
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Outcome, PlanSketch
 

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from logs.recording.loggers.surroundings.building import _meshes
+from world_models.building.build_frames import build_frames
 from world_models.building.changes.removals import element_names, remove_element, remove_thing
 from world_models.building.changes.shut_doors import build_shut_faces, shut_door
 from world_models.building.geometry.faces import area_vector
 from world_models.building.geometry.regions import UNKNOWN, expected_brightness
-from world_models.building.memory_locales import MemoryLocales
 from world_models.building.world import World
 from world_models.files.world_files import WORLDS, load_world
 
 WORLD = load_world(WORLDS / "research_center.toml", details=[])
-OFFICE = WORLD.locale_source.geometry("allens-office")
-HALLWAY = WORLD.locale_source.geometry("hallway")
+OFFICE = WORLD.frame("allens-office").parts
+HALLWAY = WORLD.frame("hallway").parts
 (DOOR,) = WORLD.doorways_of("allens-office")
 
 
@@ -105,9 +105,6 @@ def test_one_landmark_or_one_face_is_removed() -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_a_surface_of_unknown_colour_is_recorded_grey() -> None:
-    source = WORLD.locale_source
-    assert isinstance(source, MemoryLocales)
-    shut = (*source.every_face, *build_shut_faces(DOOR, 0.0))
-    ((_, mesh),) = _meshes(World(MemoryLocales(source.name, source.locales, source.every_doorway, shut,
-                                             source.every_landmark)))
+    shut = (*WORLD.faces, *build_shut_faces(DOOR, 0.0))
+    ((_, mesh),) = _meshes(World(build_frames(WORLD.locales, WORLD.doorways, shut, WORLD.landmarks)))
     assert mesh is not None

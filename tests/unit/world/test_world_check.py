@@ -1,13 +1,12 @@
 """What ``World.check`` finds wrong with worlds that can be read."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from world_models.building.build_frames import build_frames
 from world_models.building.checks import check_world
-from world_models.building.memory_locales import MemoryLocales
 from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world
@@ -82,9 +81,8 @@ def test_who_waits_for_a_large_world_sees_how_far_it_is() -> None:
 
 def test_a_room_with_a_hole_is_not_closed() -> None:
     world = read_world(Source.parse(HOUSE, "house.toml"))
-    frames = world.locale_source
-    assert isinstance(frames, MemoryLocales)
-    leaky = World(replace(frames, every_face=tuple(f for f in world.faces if f.name != "kitchen/north-wall")))
+    faces = [face for face in world.faces if face.name != "kitchen/north-wall"]
+    leaky = World(build_frames(world.locales, world.doorways, faces, world.landmarks, world.things))
     assert [str(f) for f in check_world(leaky)] == [
         "house.toml:7: kitchen: expected a room closed by floor, ceiling, walls and doors, got a gap"]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from world_models.building.geometry.faces import Face, build_barrier
 from world_models.building.geometry.regions import UNKNOWN
-from world_models.building.locale_source import LocaleGeometry
+from world_models.building.geometry.scene import LocaleGeometry
 
 MIN_AREA_M2 = 1e-6
 """A smaller footprint hides nothing."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from world_models.building.geometry.landmarks import Edges
-from world_models.building.locale_source import LocaleGeometry
+from world_models.building.geometry.scene import LocaleGeometry
 from world_models.building.things import Thing
 
 Parts = tuple[LocaleGeometry, ...]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from world_models.building.geometry.faces import Face, build_barrier
 from world_models.building.geometry.regions import UNKNOWN
-from world_models.building.locale_source import LocaleGeometry
+from world_models.building.geometry.scene import LocaleGeometry
 from world_models.building.locales import Doorway
 
 SAME_PLACE_M = 1e-3

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,27 @@ class Scene:
     surface_locales: Ints
     locales: tuple[str, ...]
     marks: Mapping[int, Landmark]
+
+
+@dataclass(frozen=True, eq=False)
+class LocaleGeometry:
+    """The faces and landmarks of a locale, or those that it shares with one neighbour (around an open door).
+
+    Attributes:
+        locale: the locale that they belong to.
+        neighbour: the second locale from which they are seen; None for those of one locale only.
+        faces, landmarks: each with its number in the world, ascending.
+    """
+
+    locale: str
+    neighbour: str | None
+    faces: tuple[tuple[int, Face], ...]
+    landmarks: tuple[tuple[int, Landmark], ...]
+
+    @cached_property
+    def scene(self) -> Scene:
+        """Its model lines and surfaces as arrays; cached."""
+        return build_scene(self.faces, self.landmarks)
 
 
 def build_scene(faces: Sequence[tuple[int, Face]], landmarks: Sequence[tuple[int, Landmark]]) -> Scene:

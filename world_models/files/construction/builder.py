@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from world_models.building.build_frames import build_frames
 from world_models.building.geometry.faces import Face
 from world_models.building.geometry.landmarks import Landmark
 from world_models.building.geometry.solids import Solid
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.memory_locales import MemoryLocales
 from world_models.building.things import ROBOT_TOP_M, Finding, Thing
 from world_models.building.world import World
 from world_models.files.construction.doors import LEAF_DEPTH_M, DoorSide, build_closed_door, build_open_door
@@ -36,16 +35,11 @@ def build_world(spec: WorldSpec) -> World:
     builder.build_rooms()
     builder.build_doors()
     builder.place_things()
-    return World(MemoryLocales(
-        name=spec.name,
-        locales=MappingProxyType(_build_locales(spec, builder.poses)),
-        every_doorway=tuple(builder.doorways),
-        every_face=tuple(builder.faces),
-        every_landmark=tuple(mark for mark in builder.landmarks if len(mark.edges)),
-        every_thing=tuple(builder.things),
-        every_link=tuple(_build_link(link, builder.poses) for link in spec.links),
-        building_faults=tuple(builder.faults),
-    ))
+    landmarks = [mark for mark in builder.landmarks if len(mark.edges)]
+    links = [_build_link(link, builder.poses) for link in spec.links]
+    locales = _build_locales(spec, builder.poses)
+    frames = build_frames(locales, builder.doorways, builder.faces, landmarks, builder.things, links)
+    return World(frames, builder.faults)
 
 
 def compute_world_poses(locales: Mapping[str, LocaleSpec], root: str) -> dict[str, Pose]:

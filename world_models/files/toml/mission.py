@@ -18,7 +18,7 @@ from world_models.commands import check_command, check_destination, parse_destin
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command
 from world_models.entries.told import DOOR_STATES, Redirection, Told, ToldState
-from world_models.files.compiled.schema import SUFFIXES
+from world_models.files.packed import SUFFIXES
 from world_models.files.toml.includes import WORLDS
 from world_models.files.toml.settings import (
     MAX_NUMBER,

@@ -22,9 +22,9 @@ from world_models import words
 from world_models.building.changes.extra_things import add_extra
 from world_models.building.changes.removals import remove_element, remove_thing
 from world_models.building.changes.shut_doors import shut_door
-from world_models.building.extents import LocaleExtent
-from world_models.building.locale_source import LocaleGeometry, PassageEdge
-from world_models.building.locales import Doorway, Link, Locale
+from world_models.building.geometry.scene import LocaleGeometry
+from world_models.building.locales import Doorway, Link, Locale, LocaleExtent
+from world_models.building.passages import PassageEdge
 from world_models.building.things import EXTRA_KIND, ROBOT_TOP_M, Thing
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, PlanSketch
