@@ -160,6 +160,6 @@ def test_the_walk_finds_what_must_not_be_held(way: str, tmp_path: Path) -> None:
     world = robot.world
     assert isinstance(world, World)
     with (tmp_path / "file").open("w") as file:
-        for thing in (world, world.frames, FrameStore(world), robot, robot.camera, robot.mount, robot.actuator,
+        for thing in (world, world.root_frame(), FrameStore(world), robot, robot.camera, robot.mount, robot.actuator,
                       tmp_path, file):
             assert any(found is thing for found in find_alien(WAYS[way](thing))), type(thing).__name__
