@@ -2,8 +2,8 @@
 
 ============================  ==========================================================================
 ``harvey.knowledge_sources``  a class under ``blackboard.knowledge_source.KnowledgeSource``
-``harvey.bases``              a ``harvey.hardware.drivers.bases.base.BaseKind``
-``harvey.emulators``          a ``sim.emulators.registry.EmulatorKind``
+``harvey.bases``              a ``harvey.hardware.drivers.base.BaseKind``
+``harvey.emulators``          a ``sim.emulators.emulator.EmulatorKind``
 ``harvey.faults``             a class under ``sim.faults.fault.Fault``
 ``harvey.loggers``            a class under ``logs.recording.logger.Logger``
 ``harvey.commands``           a ``harvey.commands.command.Command``; of a verb: ``world.import``
@@ -23,7 +23,11 @@ SOURCES_GROUP = "harvey.knowledge_sources"
 """The group of knowledge sources: named in ``run.json`` and put round the board, so it is said once, here."""
 
 COMMANDS_GROUP = "harvey.commands"
-EXTRAS: Mapping[str, Mapping[str, str]] = {COMMANDS_GROUP: {}}
+EXTRAS: Mapping[str, Mapping[str, str]] = {
+    COMMANDS_GROUP: {},
+    "harvey.bases": {"p2os": "harvey-bases", "create2": "harvey-bases"},
+    "harvey.emulators": {"p2os": "harvey-bases", "create2": "harvey-bases"},
+}
 """By group: the names that extras of this project have, each with its extra."""
 
 

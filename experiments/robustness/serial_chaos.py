@@ -11,6 +11,8 @@ from tqdm import tqdm
 from experiments.report import Cell, Report
 from experiments.robustness.serial.findings import BOUNDS, PROTOCOLS, Findings
 from experiments.robustness.serial.trial import Trial
+from harvey.errors import BadInput
+from harvey.hardware.base import base_kinds, say_what_to_install
 
 FRAMES, QUICK_FRAMES = 1_000_000, 15_000
 NOISES = (0.0, 0.02, 0.05, 0.1, 0.2)
@@ -20,6 +22,8 @@ COMMANDS = 8
 
 def run(quick: bool = False, seed: int = 0) -> Report:
     """Send at least a million messages (quick: 15,000), a third of them over each protocol."""
+    if absent := next((kind for kind in PROTOCOLS if kind not in base_kinds()), ""):
+        raise BadInput(f"serial-chaos: expected drivers of {', '.join(PROTOCOLS)}{say_what_to_install(absent)}")
     total = QUICK_FRAMES if quick else FRAMES
     findings = {protocol: Findings() for protocol in PROTOCOLS}
     with tqdm(total=total, file=sys.stderr, disable=not sys.stderr.isatty(), unit="message", leave=False) as bar:

@@ -15,8 +15,9 @@ from pathlib import Path
 from blackboard.journal import Decision
 from experiments.report import Cell, Report
 from experiments.wrappers import WrappedBody
-from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
-from harvey.hardware.drivers.cameras.video_file import write_video
+from harvey.hardware.drivers.camera import VideoCamera
+from harvey.hardware.drivers.capture import CameraFault
+from harvey.hardware.drivers.video_file import write_video
 from harvey.runner.ports import Body
 from harvey.simulation.run import run_mission
 from sim.scenario import load_scenario, with_settings

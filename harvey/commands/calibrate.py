@@ -15,7 +15,7 @@ from harvey.errors import BadInput
 
 if TYPE_CHECKING:
     from harvey.hardware.calibration import Grey, Mounted
-    from harvey.hardware.drivers.cameras.video_camera import VideoCamera
+    from harvey.hardware.drivers.camera import VideoCamera
     from knowledge_sources.methods.calibration.chessboard import Pattern
     from knowledge_sources.methods.calibration.intrinsics import Calibration
 
@@ -128,7 +128,7 @@ def _pictures(args: Namespace, pattern: Pattern) -> Iterator[tuple[str, Grey]]:
 
 def _live_place(args: Namespace) -> Grey:
     """A picture that is taken when the user says so."""
-    from harvey.hardware.drivers.cameras.video_camera import CameraFault
+    from harvey.hardware.drivers.capture import CameraFault
     from knowledge_sources.methods.features.picture import read_picture
 
     where = "flat on the floor" if args.mount_board == "floor" else "upright on the floor"
@@ -144,7 +144,8 @@ def _live_place(args: Namespace) -> Grey:
 
 
 def _open_camera(source: str) -> VideoCamera:
-    from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
+    from harvey.hardware.drivers.camera import VideoCamera
+    from harvey.hardware.drivers.capture import CameraFault
 
     began_s = time.monotonic()
     try:

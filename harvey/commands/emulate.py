@@ -15,8 +15,7 @@ from harvey.errors import BadInput
 if TYPE_CHECKING:
     from sim.body.simulated_body import SimulatedBody
     from sim.emulators.camera_server import CameraServer
-    from sim.emulators.emulator import Emulator
-    from sim.emulators.ground import Ground
+    from sim.emulators.emulator import Emulator, Ground
 
 MAX_PORT = 65535
 TELL_S = 1.0
@@ -24,8 +23,8 @@ TELL_S = 1.0
 
 
 def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("kind", metavar="KIND", help="which protocol it speaks: denning, p2os, create2, or one that"
-                        " another installed package brings")
+    parser.add_argument("kind", metavar="KIND", help="which protocol it speaks: denning; with harvey-bases p2os or"
+                        " create2; or one that another installed package brings")
     parser.add_argument("--scenario", metavar="NAME",
                         help="put it where a scenario begins, with the scenario's walls, wheels and faults; else on an"
                              " endless floor")
@@ -56,7 +55,7 @@ def _factor(text: str) -> float:
 
 
 def _run(args: Namespace) -> int:
-    from sim.emulators.pseudo_terminal import PseudoTerminal
+    from sim.emulators.line import PseudoTerminal
 
     if args.scenario is None and not (args.camera_port is None and args.calibration is None):
         raise BadInput("--camera-port and --calibration: expected a --scenario to look at, got none")
@@ -95,19 +94,21 @@ def _base(args: Namespace) -> tuple[Emulator, Callable[[], tuple[float, str]], S
 
     With a scenario the line fails when the scenario's faults say so.
     """
-    from sim.emulators.faulty_line import FaultyLine
+    from harvey.hardware.base import say_what_to_install
+    from sim.emulators.line import FaultyLine
     from sim.emulators.registry import emulator_kinds
 
     kinds = emulator_kinds()
     if args.kind not in kinds:
-        raise BadInput(f"expected a kind of base, one of {', '.join(kinds)}, got {args.kind!r}")
+        raise BadInput(f"expected a kind of base, one of {', '.join(kinds)}, got {args.kind!r}"
+                       f"{say_what_to_install(args.kind)}")
     ground, where, body = _ground(args)
     emulator = kinds[args.kind].on_ground(ground)
     return emulator if body is None else FaultyLine(emulator, body), where, body
 
 
 def _ground(args: Namespace) -> tuple[Ground, Callable[[], tuple[float, str]], SimulatedBody | None]:
-    from sim.emulators.ground import IdealGround, SimulatedGround
+    from sim.emulators.emulator import IdealGround, SimulatedGround
 
     if args.scenario is None:
         floor = IdealGround()

@@ -61,8 +61,7 @@ def _on_hardware(
     from harvey.commands.drive import follow, run_checks, summary, tell_how_to_stop
     from harvey.hardware.mission import rebuild_mission
     from harvey.hardware.preflight import Preflight
-    from harvey.hardware.resume import time_of_last_observation
-    from harvey.hardware.run import resume
+    from harvey.hardware.run import resume, time_of_last_observation
     from harvey.what_if import WhatIf
 
     mission, began_s = rebuild_mission(head, moved), time.monotonic() - time_of_last_observation(run)

@@ -31,7 +31,7 @@ def _arguments(parser: ArgumentParser) -> None:
                              " believes of itself, not what is true; may be repeated")
     parser.add_argument("--body", metavar="BODY", default="simulated",
                         help="how the simulated body is reached: simulated, or over an emulated serial line as"
-                             " serial:denning, serial:p2os or serial:create2 (simulated)")
+                             " serial:denning; with harvey-bases serial:p2os or serial:create2 (simulated)")
     parser.add_argument("--go-on", action="store_true",
                         help="keep the runs that are there already; one that was cut off is resumed, of several seeds"
                              " it is driven anew, so that the results are as if nothing had been")

@@ -9,10 +9,9 @@ from functools import cache
 from pathlib import Path
 
 from harvey.errors import BadInput
-from harvey.hardware.drivers.bases import create2, denning, p2os
-from harvey.hardware.drivers.bases.base import Base, BaseKind
-from harvey.hardware.drivers.bases.link import SerialLink
-from world_models.plugins import load_plugins
+from harvey.hardware.drivers import denning
+from harvey.hardware.drivers.base import Base, BaseKind, SerialLink
+from world_models.plugins import list_absent, load_plugins
 
 WHY: Mapping[int, str] = {
     errno.ENOENT: "there is no such port",
@@ -25,9 +24,6 @@ WHY: Mapping[int, str] = {
 }
 
 
-BUILT_IN = (denning.KIND, p2os.KIND, create2.KIND)
-
-
 @cache
 def base_kinds() -> Mapping[str, BaseKind]:
     """Every kind of base by its name: the project's, then those of other installed packages.
@@ -35,7 +31,13 @@ def base_kinds() -> Mapping[str, BaseKind]:
     Raises:
         PluginError: one of another package cannot be loaded.
     """
-    return {kind.name: kind for kind in BUILT_IN} | dict(load_plugins("harvey.bases", BaseKind))
+    return {denning.KIND.name: denning.KIND} | dict(load_plugins("harvey.bases", BaseKind))
+
+
+def say_what_to_install(name: str) -> str:
+    """The end of a message that refuses a kind of base: which extra brings it; "" where none does."""
+    needs = list_absent("harvey.bases").get(name)
+    return f"; {name} needs {needs}" if needs else ""
 
 
 def kind_of(port: str) -> tuple[BaseKind, str]:
@@ -44,7 +46,8 @@ def kind_of(port: str) -> tuple[BaseKind, str]:
     kinds = base_kinds()
     if name not in kinds or not colon or not url:
         forms = " or ".join(f"{kind}:PORT" for kind in kinds)
-        raise BadInput(f"base: expected {forms}, as {next(iter(kinds))}:/dev/ttyUSB0, got {port!r}")
+        raise BadInput(f"base: expected {forms}, as {next(iter(kinds))}:/dev/ttyUSB0, got {port!r}"
+                       f"{say_what_to_install(name)}")
     return kinds[name], url
 
 

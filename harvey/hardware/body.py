@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Protocol
 
-from harvey.hardware.drivers.bases.base import Base, BaseFault
-from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
+from harvey.hardware.drivers.base import Base, BaseFault
+from harvey.hardware.drivers.camera import VideoCamera
+from harvey.hardware.drivers.capture import CameraFault
 from world_models.entries.body import (
     STOP_KEY,
     BodyFault,

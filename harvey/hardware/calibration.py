@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harvey.errors import BadInput
-from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
+from harvey.hardware.drivers.camera import VideoCamera
+from harvey.hardware.drivers.capture import CameraFault
 from knowledge_sources.methods.calibration.chessboard import Pattern, find_corners
 from knowledge_sources.methods.calibration.intrinsics import PARAMETERS, BoardView, Calibration, calibrate
 from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting

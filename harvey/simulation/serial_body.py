@@ -30,8 +30,10 @@ def body_kind(text: str) -> str:
     head, _, kind = text.partition(":")
     if text == IN_PROCESS or (head == "serial" and kind in body_kinds()):
         return text if text == IN_PROCESS else kind
+    from harvey.hardware.base import say_what_to_install
+
     expected = ", ".join([IN_PROCESS, *(f"serial:{kind}" for kind in body_kinds())])
-    raise BadInput(f"--body: expected one of {expected}, got {text!r}")
+    raise BadInput(f"--body: expected one of {expected}, got {text!r}{say_what_to_install(kind)}")
 
 
 @contextmanager
@@ -43,8 +45,7 @@ def open_body(body: SimulatedBody, kind: str) -> Iterator[Body]:
     # Drivers and emulators are loaded when they are asked for: most missions have neither.
     from harvey.hardware.base import base_kinds
     from harvey.hardware.body import HardwareBody
-    from sim.emulators.faulty_line import FaultyLine
-    from sim.emulators.pseudo_terminal_link import PseudoTerminalLink
+    from sim.emulators.line import FaultyLine, PseudoTerminalLink
     from sim.emulators.registry import emulator_kinds
 
     emulator = emulator_kinds()[kind]

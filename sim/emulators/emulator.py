@@ -1,8 +1,14 @@
-"""What a serial line needs of an emulated base."""
+"""What an emulated base is: bytes in, bytes out, and time that passes; and the ground that its wheels roll on."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
+
+from sim.body.simulated_body import SimulatedBody
+from world_models.frames import Pose2
 
 
 class Emulator(Protocol):
@@ -24,3 +30,101 @@ class Emulator(Protocol):
     def moving(self) -> bool:
         """Whether the motors run."""
         ...
+
+
+class Ground(Protocol):
+    """What wheels roll on, with the clock of the base."""
+
+    @property
+    def time_s(self) -> float:
+        """Time of the base [s]."""
+        ...
+
+    @property
+    def touching_rad(self) -> float | None:
+        """The direction, from the heading, in which the base touches something; None where it touches nothing."""
+        ...
+
+    def echo(self, sensor: Pose2) -> float | None:
+        """What a sonar hears, from the sensor [m]; None without an echo. Its pose is in the robot's frame."""
+        ...
+
+    def roll(self, turn_rad: float, move_m: float, duration_s: float) -> tuple[float, float]:
+        """Roll for a while: a turn in place or a move. Returns what was done, (turn [rad], move [m])."""
+        ...
+
+
+class IdealGround:
+    """An endless plane on which wheels do exactly what they are commanded.
+
+    Attributes:
+        pose: of the robot, from where it began.
+        turned_rad, moved_m: sums of all turns and moves, signed.
+        rolled_s: time of its last motion [s].
+        held: whether something holds the wheels; touching_rad: in which direction something is touched.
+        wall_m: how far all round it every sonar has an echo, from its axis; None: nowhere.
+    """
+
+    def __init__(self) -> None:
+        self._time_s = 0.0
+        self.pose = Pose2(0.0, 0.0, 0.0)
+        self.turned_rad = self.moved_m = 0.0
+        self.rolled_s = -math.inf
+        self.held = False
+        self.touching_rad: float | None = None
+        self.wall_m: float | None = None
+
+    @property
+    def time_s(self) -> float:
+        return self._time_s
+
+    def echo(self, sensor: Pose2) -> float | None:
+        return None if self.wall_m is None else self.wall_m - math.hypot(sensor.x_m, sensor.y_m)
+
+    def roll(self, turn_rad: float, move_m: float, duration_s: float) -> tuple[float, float]:
+        self._time_s += duration_s
+        if self.held or turn_rad == move_m == 0.0:
+            return 0.0, 0.0
+        self.pose = self.pose @ Pose2(move_m, 0.0, turn_rad)
+        self.turned_rad += turn_rad
+        self.moved_m += move_m
+        self.rolled_s = self._time_s
+        return turn_rad, move_m
+
+
+class SimulatedGround:
+    """The floor of a simulated building; the wheels have the errors of the simulated body."""
+
+    def __init__(self, body: SimulatedBody) -> None:
+        self._body = body
+
+    @property
+    def time_s(self) -> float:
+        return self._body.truth.time_s
+
+    @property
+    def touching_rad(self) -> float | None:
+        return self._body.touching_rad
+
+    def echo(self, sensor: Pose2) -> float | None:
+        return self._body.echo(sensor)
+
+    def roll(self, turn_rad: float, move_m: float, duration_s: float) -> tuple[float, float]:
+        return self._body.roll(turn_rad, move_m, duration_s)
+
+
+@dataclass(frozen=True, slots=True)
+class EmulatorKind:
+    """A kind of emulated base.
+
+    Attributes:
+        name: of its protocol, as its driver's ``BaseKind`` has it.
+        on_ground: one whose wheels roll on a ground in real time, for ``harvey emulate``.
+        on_body: one under which a simulated body moves, for missions over ``--body serial:NAME``.
+        keeps_time: whether its driver waits by the base's time; else a motion is over at once.
+    """
+
+    name: str
+    on_ground: Callable[[Ground], Emulator]
+    on_body: Callable[[SimulatedBody], Emulator]
+    keeps_time: bool = True

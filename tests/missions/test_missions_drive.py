@@ -21,11 +21,9 @@ import pytest
 from harvey.cli import main
 from sim.body.simulated_body import SimulatedBody
 from sim.emulators.camera_server import CameraServer
-from sim.emulators.denning import DenningEmulator
-from sim.emulators.denning_motion import ConstantSpeedMotion
-from sim.emulators.faulty_line import FaultyLine
-from sim.emulators.ground import SimulatedGround
-from sim.emulators.pseudo_terminal import PseudoTerminal
+from sim.emulators.denning import ConstantSpeedMotion, DenningEmulator
+from sim.emulators.emulator import SimulatedGround
+from sim.emulators.line import FaultyLine, PseudoTerminal
 from sim.faults.base_faults import LinkLost
 from sim.faults.camera_faults import CameraUnplugged
 from sim.faults.fault import Fault

@@ -6,8 +6,7 @@
 
 from __future__ import annotations
 
-from harvey.hardware.drivers.bases.base import BaseKind
-from harvey.hardware.drivers.bases.driver import Driver
+from harvey.hardware.drivers.base import BaseKind, Driver
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
 from world_models.frames import Pose2
 

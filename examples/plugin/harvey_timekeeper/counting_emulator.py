@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from sim.emulators.ground import Ground, SimulatedGround
-from sim.emulators.registry import EmulatorKind
+from sim.emulators.emulator import EmulatorKind, Ground, SimulatedGround
 
 TURN_RAD_PER_S, SPEED_M_PER_S = 0.6, 0.4
 

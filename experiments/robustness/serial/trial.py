@@ -11,15 +11,11 @@ import numpy as np
 from experiments.robustness.serial.findings import BOUNDS, Findings
 from experiments.robustness.serial.line_noise import Noise
 from experiments.robustness.serial.noisy_line import Killed, NoisyLine
-from harvey.hardware.drivers.bases.base import Base, BaseFault
-from harvey.hardware.drivers.bases.create2 import Create2Base
-from harvey.hardware.drivers.bases.denning import DenningBase
-from harvey.hardware.drivers.bases.p2os import P2osBase
-from sim.emulators.create2 import Create2Emulator
-from sim.emulators.denning import DenningEmulator
-from sim.emulators.denning_motion import ConstantSpeedMotion
-from sim.emulators.ground import IdealGround
-from sim.emulators.p2os import P2osEmulator
+from harvey.hardware.base import base_kinds
+from harvey.hardware.drivers.base import Base, BaseFault
+from harvey.hardware.drivers.denning import DenningBase
+from sim.emulators.emulator import IdealGround
+from sim.emulators.registry import emulator_kinds
 from world_models.entries.body import MotionReport, MotorCommand
 
 
@@ -207,16 +203,18 @@ class Trial:
         self._found.violations.append(f"{self._protocol}: {how}")
 
     def _emulator(self) -> Any:
-        if self._protocol == "denning":
-            return DenningEmulator(ConstantSpeedMotion(self._floor))
+        end: Any = emulator_kinds()[self._protocol].on_ground(self._floor)
         if self._protocol == "p2os":
-            return P2osEmulator(self._floor, on_command=lambda request: self._accepted.append(request.raw))
-        return Create2Emulator(self._floor, count=int(self._rng.integers(0, 65536)), on_command=self._accepted.append)
+            end.on_command = lambda request: self._accepted.append(request.raw)
+        elif self._protocol == "create2":
+            end.on_command, end.first_count = self._accepted.append, int(self._rng.integers(0, 65536))
+            end.power_cycle()
+        return end
 
     def _driver(self) -> Base:
         if self._protocol == "denning":
             return DenningBase(self.line, nonce=f"{int(self._rng.integers(1 << 32)):08X}")
-        return P2osBase(self.line) if self._protocol == "p2os" else Create2Base(self.line)
+        return base_kinds()[self._protocol].connect_to_emulator(self.line)
 
 
 def _beyond(done: float, asked: float) -> float:

@@ -80,7 +80,7 @@ def said(capsys: pytest.CaptureFixture[str], argv: list[str]) -> tuple[int, str]
     (["run", "bump", "--check", "--live"], "--check: expected it without --live"),
     (["run", "bump", "--check", "--go-on"], "--check: expected it without --go-on"),
     (["run", "."], "scenario: expected a name or a TOML file, got the directory ."),
-    (["emulate", "p2os", "--scenario", "bump", "--camera-port", "99999"], "expected a port from 0 to 65535"),
+    (["emulate", "denning", "--scenario", "bump", "--camera-port", "99999"], "expected a port from 0 to 65535"),
     (["calibrate", "--camera", "999999999999"], "expected a device's number from 0 to 255, got 999999999999"),
     (["view", "nowhere"], "does not exist"),
     (["why", "nowhere"], "does not exist"),
@@ -116,7 +116,7 @@ def test_a_picture_of_one_pixel_shows_no_board(tmp_path: Path, capsys: pytest.Ca
 def test_a_port_in_use_is_named_before_a_base_is_there(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])
-        assert main(["emulate", "p2os", "--scenario", "bump", "--camera-port", port]) == 2
+        assert main(["emulate", "denning", "--scenario", "bump", "--camera-port", port]) == 2
     out, err = capsys.readouterr()
     told = f"harvey: --camera-port {port}: expected a free port, got: Address already in use\n"
     assert out == "" and err.endswith(told)

@@ -18,12 +18,12 @@ from harvey.hardware import base as hardware_base
 from harvey.hardware.base import open_base
 from harvey.hardware.mission import load_mission
 from harvey.hardware.preflight import Preflight
-from harvey.hardware.stop_key import stop_key
+from harvey.hardware.stopping import stop_key
 from harvey.simulation.serial_body import body_kind
-from sim.emulators.denning import DenningEmulator
-from sim.emulators.denning_motion import ConstantSpeedMotion
-from sim.emulators.ground import IdealGround
-from sim.emulators.pseudo_terminal import PseudoTerminal
+from sim.emulators.denning import ConstantSpeedMotion, DenningEmulator
+from sim.emulators.emulator import IdealGround
+from sim.emulators.line import PseudoTerminal
+from world_models import plugins
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.camera_file import camera_text
 
@@ -96,7 +96,7 @@ def test_everything_that_is_not_ready_is_told_at_once_with_what_to_do(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main([
-        "drive", "--world", str(tmp_path / "flat.toml"), "--goal", GOAL, "--base", "create2:/dev/ttyUSB97",
+        "drive", "--world", str(tmp_path / "flat.toml"), "--goal", GOAL, "--base", "denning:/dev/ttyUSB97",
         "--camera", str(tmp_path / "none.avi"), "--calibration", str(tmp_path / "none.toml"),
         "--out", str(tmp_path / "run"),
     ]) == 2
@@ -121,8 +121,22 @@ def test_that_a_base_cannot_be_steered_on_the_move_is_found_out_before_anything_
 
 @pytest.mark.parametrize("port", ["", "denning", "denning:", "roomba:/dev/ttyUSB0", "/dev/ttyUSB0"])
 def test_a_base_is_named_by_its_protocol_and_its_port(port: str) -> None:
-    with pytest.raises(BadInput, match="expected denning:PORT or p2os:PORT or create2:PORT"):
+    with pytest.raises(BadInput, match="expected denning:PORT"):
         open_base(port)
+
+
+@pytest.mark.parametrize("absent", ["p2os", "create2"])
+def test_of_an_absent_extra_it_is_told_what_to_install(absent: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plugins, "entry_points", lambda group: ())
+    hardware_base.base_kinds.cache_clear()
+    try:
+        with pytest.raises(BadInput, match=f"{absent} needs harvey-bases: pip install ./extras/harvey-bases"):
+            open_base(f"{absent}:/dev/ttyUSB0")
+        with pytest.raises(BadInput, match=f"{absent} needs harvey-bases: pip install ./extras/harvey-bases"):
+            body_kind(f"serial:{absent}")
+        assert main(["emulate", absent]) == 2
+    finally:
+        hardware_base.base_kinds.cache_clear()
 
 
 @pytest.mark.parametrize(("number", "told"), [
@@ -143,15 +157,22 @@ def test_a_file_is_no_serial_port(tmp_path: Path) -> None:
         open_base(f"denning:{tmp_path / 'file'}")
 
 
+class Chatterer(DenningEmulator):
+    """A base that does not speak the protocol that it is driven by."""
+
+    def take(self) -> bytes:
+        return b"\xfa\xfb\x03\x00\x00\x00" if super().take() else b""
+
+
 def test_a_base_of_another_kind_and_a_wall_for_a_goal_are_found_out_before_anything_moves(tmp_path: Path) -> None:
-    emulator = DenningEmulator(ConstantSpeedMotion(IdealGround()))
+    emulator = Chatterer(ConstantSpeedMotion(IdealGround()))
     terminal, over = PseudoTerminal(emulator), threading.Event()
     server = threading.Thread(target=terminal.serve, kwargs={"until": over.is_set})
     server.start()
     (tmp_path / "camera.toml").write_text(camera_text(Camera.from_field_of_view(1.1), CameraMount(1.0)))
     mission = load_mission(None, {
         "world": "research_center", "goal": "(ptrans (hallway (4,4,0)) (hallway (400,4,0)))",
-        "base.port": f"p2os:{terminal.name}", "camera.calibration": str(tmp_path / "camera.toml"),
+        "base.port": f"denning:{terminal.name}", "camera.calibration": str(tmp_path / "camera.toml"),
     })
     try:
         with Preflight(mission, tmp_path / "run", lambda: 0.0) as dry:
@@ -168,7 +189,7 @@ def test_a_base_of_another_kind_and_a_wall_for_a_goal_are_found_out_before_anyth
 
 @pytest.mark.parametrize("text", ["serial", "serial:", "serial:roomba", "denning", ""])
 def test_a_body_that_is_none_is_refused_with_those_there_are(text: str) -> None:
-    with pytest.raises(BadInput, match="expected one of simulated, serial:denning, serial:p2os, serial:create2"):
+    with pytest.raises(BadInput, match="expected one of simulated, serial:denning"):
         body_kind(text)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from experiments.perception import lens
 from experiments.robustness import video_stream
-from harvey.hardware.drivers.cameras.video_camera import VideoCamera
+from harvey.hardware.drivers.camera import VideoCamera
 from world_models.entries.body import BodyFault, Frame, MotionReport, MotorCommand
 
 JPEG = cv2.imencode(".jpg", np.full((48, 64, 3), 90, np.uint8))[1].tobytes()

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import pytest
 
-from harvey.hardware.drivers.bases.base import BaseFault
-from harvey.hardware.drivers.bases.denning import DenningBase
+from harvey.hardware.drivers.base import BaseFault
+from harvey.hardware.drivers.denning import DenningBase
 from world_models.entries.body import MotorCommand
 from world_models.entries.touch import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD
 

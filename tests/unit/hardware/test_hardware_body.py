@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 from harvey.hardware.body import BASE_WORDS, CAMERA_WORDS, HardwareBody, Watching
-from harvey.hardware.drivers.bases.base import BaseFault, FaultKind
-from harvey.hardware.drivers.cameras.video_camera import CameraFault, CameraFaultKind, Health, VideoCamera
-from harvey.hardware.heartbeat import Heartbeat
+from harvey.hardware.drivers.base import BaseFault, FaultKind
+from harvey.hardware.drivers.camera import Health, VideoCamera
+from harvey.hardware.drivers.capture import CameraFault, CameraFaultKind
 from harvey.hardware.mission import load_mission
+from harvey.hardware.stopping import Heartbeat
 from world_models.entries.body import STOP_KEY, BodyFault, Frame, MotionReport, MotorCommand, Odometry
 from world_models.entries.touch import Ranges
 from world_models.files.toml.mission import ROOT

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from harvey.errors import BadInput
-from harvey.hardware.resume import count_pictures, time_of_last_observation
+from harvey.hardware.run import count_pictures, time_of_last_observation
 from harvey.run_files.run_directory import RunDirectory
 from harvey.simulation.run import run_mission
 from sim.stage import Stage

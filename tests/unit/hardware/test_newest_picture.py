@@ -17,11 +17,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey.hardware.drivers.cameras import capture as captures
-from harvey.hardware.drivers.cameras.capture import CameraFault, Picture, is_file, open_in_time, picture_of, prepare
-from harvey.hardware.drivers.cameras.newest_picture import Health, Newest, _Pace
-from harvey.hardware.drivers.cameras.video_camera import VideoCamera, _Video
-from harvey.hardware.drivers.cameras.video_file import write_video
+from harvey.hardware.drivers import capture as captures
+from harvey.hardware.drivers.camera import Health, Newest, VideoCamera, _Pace, _Video
+from harvey.hardware.drivers.capture import CameraFault, Picture, is_file, open_in_time, picture_of, prepare
+from harvey.hardware.drivers.video_file import write_video
 
 MAIN = threading.main_thread()
 

@@ -13,10 +13,9 @@ import cv2
 import numpy as np
 import pytest
 
-from harvey.hardware.drivers.cameras.capture import open_capture, picture_of
-from harvey.hardware.drivers.cameras.newest_picture import Newest, _Pace
-from harvey.hardware.drivers.cameras.video_camera import CameraFault, VideoCamera
-from harvey.hardware.drivers.cameras.video_file import write_video
+from harvey.hardware.drivers.camera import Newest, VideoCamera, _Pace
+from harvey.hardware.drivers.capture import CameraFault, open_capture, picture_of
+from harvey.hardware.drivers.video_file import write_video
 
 SIZE = (64, 48)
 
@@ -158,7 +157,7 @@ def test_faults_of_pictures(live: Callable[..., VideoCamera], picture: bytes, ki
 
 
 def test_an_unplugged_camera_is_found_again(live: Callable[..., VideoCamera], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("harvey.hardware.drivers.cameras.newest_picture.REOPEN_S", 0.0)
+    monkeypatch.setattr("harvey.hardware.drivers.camera.REOPEN_S", 0.0)
     gone = FakeCapture([jpeg(50), jpeg(50)], endless=False)
     camera = live(gone, FakeCapture([], opened=False), FakeCapture([jpeg(77)]))
     seen = b""

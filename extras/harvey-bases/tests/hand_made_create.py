@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from harvey.hardware.drivers.bases.create2 import Create2Base
+from harvey_bases.create2 import Create2Base
 
 TICK_MS = 20
 M_PER_COUNT = math.pi * 0.072 / 508.8

@@ -10,12 +10,12 @@ import math
 from typing import Any
 
 import pytest
+from hand_made_pioneer import HandMadePioneer, connect
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey.hardware.drivers.bases.base import BaseFault
-from harvey.hardware.drivers.bases.p2os import P2osBase
-from tests.hand_made_pioneer import HandMadePioneer, connect
+from harvey.hardware.drivers.base import BaseFault
+from harvey_bases.p2os import P2osBase
 
 TURN = 4096
 COUNTS = st.integers(0, 32767)

@@ -1,7 +1,7 @@
 """An emulated iRobot Create 2, written from the Open Interface Specification: no frames, no checksum, no watchdog.
 
 The host sends an opcode, then the bytes that belong to it. Where the manual says nothing, a byte that is no opcode is
-ignored. Clean, Spot, Max and Dock make it drive about by itself.
+ignored. Clean, Spot, Max and Dock make it drive about by itself. No code of the driver is used.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from sim.emulators.ground import Ground
+from sim.emulators.emulator import EmulatorKind, Ground, SimulatedGround
 from world_models.frames import Pose2
 
 STREAM_S = 0.015
@@ -44,11 +44,12 @@ class Create2Emulator:
         on_command: called with the bytes of every command that was executed, if given.
         mode: 0 off, 1 passive, 2 safe, 3 full.
         deaf: whether it was set to another baud rate, so that nothing is understood in either direction.
+        first_count: the count of its encoders after it was switched on.
     """
 
     def __init__(self, ground: Ground, *, count: int = 0, on_command: Callable[[bytes], None] | None = None) -> None:
-        """``count``: the first count of its encoders."""
-        self._ground, self._count, self.on_command = ground, count, on_command
+        """``count``: see ``first_count``."""
+        self._ground, self.first_count, self.on_command = ground, count, on_command
         self.stops = 0
         self.power_cycle()
 
@@ -61,7 +62,7 @@ class Create2Emulator:
         self._stream: tuple[int, ...] = ()
         self._streaming = False
         self._since_s = 0.0
-        self._right = self._left = float(self._count)
+        self._right = self._left = float(self.first_count)
 
     @property
     def moving(self) -> bool:
@@ -205,3 +206,6 @@ def _wheel_speeds(speed: int, radius: int) -> tuple[int, int]:
 
 def _limit(speed: int) -> int:
     return max(-MAX_SPEED_MM_PER_S, min(MAX_SPEED_MM_PER_S, speed))
+
+
+KIND = EmulatorKind("create2", Create2Emulator, lambda body: Create2Emulator(SimulatedGround(body)))

@@ -9,8 +9,8 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from harvey.hardware.drivers.bases.p2os import P2osBase
-from sim.emulators.p2os_packets import PacketReader, build_packet, build_status
+from harvey_bases.p2os import P2osBase
+from harvey_bases.p2os_emulator import PacketReader, build_packet, build_status
 
 TICK_MS = 100
 SYNC0, OPEN, CLOSE, ENABLE, MOVE, HEAD, ESTOP = 0, 1, 2, 4, 8, 12, 55

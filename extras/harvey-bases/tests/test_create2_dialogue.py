@@ -8,12 +8,12 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
+from hand_made_create import M_PER_COUNT, STREAMED, HandMadeCreate, connect
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey.hardware.drivers.bases.base import BaseFault
-from harvey.hardware.drivers.bases.create2 import Create2Base
-from tests.hand_made_create import M_PER_COUNT, STREAMED, HandMadeCreate, connect
+from harvey.hardware.drivers.base import BaseFault
+from harvey_bases.create2 import Create2Base
 from world_models.entries.body import MotorCommand
 from world_models.entries.touch import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD
 

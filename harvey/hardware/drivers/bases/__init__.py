@@ -1,1 +1,0 @@
-"""Drivers of robot bases over serial lines."""

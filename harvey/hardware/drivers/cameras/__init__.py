@@ -1,1 +1,0 @@
-"""Drivers of cameras and video files."""
