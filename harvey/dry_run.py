@@ -22,12 +22,9 @@ from harvey.runner.world_port import build_scheduler
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.verification.color_check import predict_color_check
-from knowledge_sources.methods.verification.line_check import check_lines
-from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
-from knowledge_sources.methods.verification.pose_evidence import compute_evidence
+from knowledge_sources.methods.verification.line_check import check_lines, compute_view_quality, predict_lines
+from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, compute_evidence
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from knowledge_sources.methods.verification.predicted_lines import predict_lines
-from knowledge_sources.methods.verification.view_quality import compute_view_quality
 from knowledge_sources.plan.milestone_selector import CHECK_TOLERANCE_M, MAX_SIGMA_PART, MAX_SIGMA_RAD, MIN_LINES
 from knowledge_sources.questions import find_belief, find_robot
 from knowledge_sources.settings import DEFAULT, Settings

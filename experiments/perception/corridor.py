@@ -26,7 +26,7 @@ from experiments.report import Cell, Report
 from experiments.shared_data import CORRIDOR, describe_absence
 from experiments.trials import campaign_folder, run_trials
 from knowledge_sources.methods.features.lines import find_lines
-from knowledge_sources.methods.verification.agreement import compute_coverage
+from knowledge_sources.methods.verification.line_check import compute_coverage
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from harvey.runner.world_port import build_scheduler
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.verification.color_check import check_colors
 from knowledge_sources.methods.verification.line_check import check_lines
-from knowledge_sources.methods.verification.pose_evidence import compute_evidence
+from knowledge_sources.methods.verification.pose_confidence import compute_evidence
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.plan.matcher import Matcher
 from knowledge_sources.plan.med_r_and_t import MedRAndT
@@ -50,7 +50,7 @@ class JudgedCase:
         doubted: whether a second hypothesis was on the board.
         is_wrong: whether the pose is; is_same: whether wrong and believed place are indistinguishable.
         sigma_m: largest standard deviation of the position. error_m: infinite on another floor.
-        evidence: of the pose (:class:`knowledge_sources.methods.verification.pose_evidence.PoseEvidence`).
+        evidence: of the pose (:class:`knowledge_sources.methods.verification.pose_confidence.PoseEvidence`).
     """
 
     floor: int

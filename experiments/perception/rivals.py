@@ -18,7 +18,7 @@ from numba import njit
 from knowledge_sources.methods.arrays import Floats, Indices
 from knowledge_sources.methods.matching.pose_matching import refine_pose
 from knowledge_sources.methods.matching.pose_pairs import PoseParameters
-from knowledge_sources.methods.verification.agreement import compute_coverage
+from knowledge_sources.methods.verification.line_check import compute_coverage
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose

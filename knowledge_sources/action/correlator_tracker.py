@@ -30,7 +30,7 @@ from knowledge_sources.methods.tracking.template_tracking import (
     follow_landmarks,
     select_landmarks,
 )
-from knowledge_sources.methods.verification.predicted_lines import find_errors
+from knowledge_sources.methods.verification.line_check import find_errors
 from knowledge_sources.questions import (
     find_belief,
     find_building,

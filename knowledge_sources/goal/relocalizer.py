@@ -16,7 +16,6 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.camera_knowledge import find_camera
-from knowledge_sources.methods.localization.far_views import choose_far_action
 from knowledge_sources.methods.localization.global_localization import (
     Candidate,
     LocalizationResult,
@@ -24,11 +23,9 @@ from knowledge_sources.methods.localization.global_localization import (
     localize,
     make_alias_test,
 )
-from knowledge_sources.methods.localization.hypotheses import make_view_predictor
-from knowledge_sources.methods.localization.next_view import SensingAction
-from knowledge_sources.methods.localization.obstructions import update_obstruction
+from knowledge_sources.methods.localization.next_view import SensingAction, choose_far_action, make_view_predictor
 from knowledge_sources.methods.localization.place_odds import ToldPlace, compute_prior, weigh_told
-from knowledge_sources.methods.localization.views import CameraView, propagate_pose
+from knowledge_sources.methods.localization.views import CameraView, propagate_pose, update_obstruction
 from knowledge_sources.questions import (
     active_goal,
     find_belief,

@@ -19,10 +19,12 @@ from knowledge_sources.camera_knowledge import add_yaw, compute_camera_covarianc
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.localization.aliasing import find_strongest_alias
 from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors
-from knowledge_sources.methods.verification.line_check import LineCheck, check_lines
-from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
-from knowledge_sources.methods.verification.pose_evidence import compute_evidence, compute_motion_tolerance_px
-from knowledge_sources.methods.verification.predicted_lines import find_errors, predict_lines
+from knowledge_sources.methods.verification.line_check import LineCheck, check_lines, find_errors, predict_lines
+from knowledge_sources.methods.verification.pose_confidence import (
+    POSE_CONFIDENCE,
+    compute_evidence,
+    compute_motion_tolerance_px,
+)
 from knowledge_sources.questions import find_belief, find_robot, find_robot_in, has_followed, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Frame
@@ -96,12 +98,12 @@ class Verdict:
 class MilestoneJudge(RobotKnowledgeSource):
     """Certifies a milestone from a pose fix, and posts how far the picture differs from what was expected.
 
-    The evidence are lines and the colours of faces
-    (:class:`knowledge_sources.methods.verification.pose_evidence.PoseEvidence`), weighted as fitted on rendered floors.
-    The largest deviation is what the wheels can do since the belief was sure, for a place that is surely seen at least
-    the matcher's window (§6.1.4); where the belief is in doubt, it is that window. Before the first milestone it is
-    what the mission says of how the robot is put down. That landmarks were followed speaks for the place only where the
-    belief leaves little open in the picture: a place one door further on has much the same landmarks.
+    The evidence are lines and the colours of faces (:mod:`knowledge_sources.methods.verification.pose_confidence`),
+    weighted as fitted on rendered floors. The largest deviation is what the wheels can do since the belief was sure,
+    for a place that is surely seen at least the matcher's window (§6.1.4); where the belief is in doubt, it is that
+    window. Before the first milestone it is what the mission says of how the robot is put down. That landmarks were
+    followed speaks for the place only where the belief leaves little open in the picture: a place one door further on
+    has much the same landmarks.
     """
 
     level = Level.PLAN

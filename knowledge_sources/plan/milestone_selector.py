@@ -17,9 +17,13 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.localization.aliasing import precompute_views
+from knowledge_sources.methods.verification.line_check import (
+    ViewQuality,
+    compute_view_quality,
+    find_errors,
+    predict_lines,
+)
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from knowledge_sources.methods.verification.predicted_lines import find_errors, predict_lines
-from knowledge_sources.methods.verification.view_quality import ViewQuality, compute_view_quality
 from knowledge_sources.questions import (
     deepest_sketch,
     find_belief,

@@ -12,8 +12,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, to_say
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.methods.localization.obstructions import update_obstruction
-from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.methods.localization.views import CameraView, update_obstruction
 from knowledge_sources.questions import active_goal, find_robot, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import Settings

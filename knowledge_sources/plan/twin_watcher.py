@@ -14,11 +14,11 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.methods.localization.aliasing import find_repetitions
 from knowledge_sources.methods.localization.global_localization import make_alias_test
-from knowledge_sources.methods.localization.log_likelihood import compute_pose_likelihood
 from knowledge_sources.methods.localization.place_odds import compute_prior, compute_twin_odds
 from knowledge_sources.methods.localization.pose_candidates import are_distinct
-from knowledge_sources.methods.localization.repetition import find_repetitions
+from knowledge_sources.methods.localization.refinement import compute_pose_likelihood
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.questions import find_belief, find_building, find_robot_in, is_over, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource

@@ -11,11 +11,9 @@ from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.matching import match_on_floor
 from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.methods.verification.color_check import check_colors
-from knowledge_sources.methods.verification.line_check import check_lines
-from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
-from knowledge_sources.methods.verification.pose_evidence import compute_evidence
+from knowledge_sources.methods.verification.line_check import check_lines, predict_lines
+from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, compute_evidence
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

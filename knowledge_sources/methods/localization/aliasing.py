@@ -1,7 +1,8 @@
 """Aliases of a known pose: is the robot perhaps at the next door?
 
-A pose is compared with others of its room: those at which the plan repeats itself, and those at which the picture fits
-as well. Lines that both views show support both; what tells them apart are the lines that only one of them shows.
+Poses that lie to their room, or to their door, as a pose lies to its own look alike by walls and doors. A pose is
+compared with these, and with others of its room at which the picture fits as well. Lines that both views show support
+both; what tells them apart are the lines that only one of them shows.
 
 Visible lines are computed on a grid of poses and kept; only their projection is of the exact pose. So they can be
 computed beforehand, while the robot has yet to look.
@@ -10,7 +11,7 @@ computed beforehand, while the robot has yet to look.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,15 +19,46 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.localization.pose_candidates import are_distinct, find_pose_candidates
 from knowledge_sources.methods.localization.refinement import refine_pose
-from knowledge_sources.methods.localization.repetition import find_repetitions
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.pose.displacements import fit_displacements
-from knowledge_sources.methods.verification.agreement import compute_coverage
-from knowledge_sources.methods.verification.predicted_lines import find_errors, predict_lines
+from knowledge_sources.methods.verification.line_check import compute_coverage, find_errors, predict_lines
 from knowledge_sources.settings import DEFAULT, Settings
+from knowledge_sources.settings.localization import LocalizationSettings
+from world_models.building.building import Building
 from world_models.building.model_errors import LineErrors
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
+
+
+def find_repetitions(
+    building: Building, room: str, pose: Pose2, rooms: Sequence[str],
+    settings: LocalizationSettings = DEFAULT.localization,
+) -> Iterator[tuple[str, Pose2]]:
+    """Yield room and pose of every place in ``rooms`` that looks like ``pose`` in ``room`` by walls and doors alone.
+
+    Rooms of the same size are laid on each other, turned by right angles, also a room on itself; and the door nearest
+    to the pose is laid on every other door.
+    """
+    middle, size = _find_box(building, room)
+    own = Pose2(pose.x_m - float(middle[0]), pose.y_m - float(middle[1]), pose.heading_rad)
+    for other in rooms:
+        there, sides = _find_box(building, other)
+        for quarter in range(4):
+            turned = size if quarter % 2 == 0 else size[::-1]
+            if np.all(np.abs(turned - sides) < settings.max_size_difference_m) and (quarter or other != room):
+                yield other, Pose2(float(there[0]), float(there[1]), quarter * 0.5 * math.pi) @ own
+    doors = [(name, doorway.pose_from(name)) for name in (room, *(r for r in rooms if r != room))
+             for doorway in building.doorways_of(name)]
+    nearest = min((door for name, door in doors if name == room), key=pose.distance_to, default=None)
+    if nearest is not None:
+        yield from ((name, door @ (nearest.inverse() @ pose)) for name, door in doors if door is not nearest)
+
+
+def _find_box(building: Building, room: str) -> tuple[Floats, Floats]:
+    """Middle and sides of the rectangle around a room [m, world]."""
+    corners = building.outline(room)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return 0.5 * (low + high), high - low
 
 
 class Alias(NamedTuple):

@@ -11,7 +11,7 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.matching.image_matching import Match
 from knowledge_sources.methods.matching.pose_matching import PoseMatch, match_in_space
 from knowledge_sources.methods.pose.with_camera import CameraEstimate, estimate_camera_and_pose
-from knowledge_sources.methods.verification.agreement import compute_coverage
+from knowledge_sources.methods.verification.line_check import compute_coverage
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, move_camera
 from world_models.frames import Pose, Pose2

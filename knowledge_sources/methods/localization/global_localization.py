@@ -12,25 +12,27 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.localization.hypotheses import (
-    PoseHypothesis,
-    are_distinguishable,
-    make_view_predictor,
-    normalize_log_likelihoods,
-)
-from knowledge_sources.methods.localization.log_likelihood import PoseLikelihood, compute_pose_likelihood
+from knowledge_sources.methods.localization.aliasing import find_repetitions
 from knowledge_sources.methods.localization.next_view import (
+    PoseHypothesis,
     SensingAction,
+    are_distinguishable,
     can_distinguish,
     choose_sensing_action,
     find_widest_gap,
     make_safety_check,
+    make_view_predictor,
+    normalize_log_likelihoods,
 )
 from knowledge_sources.methods.localization.pose_candidates import are_distinct, find_pose_candidates
-from knowledge_sources.methods.localization.refinement import refine_pose, refine_view_motions
-from knowledge_sources.methods.localization.repetition import find_repetitions
+from knowledge_sources.methods.localization.refinement import (
+    PoseLikelihood,
+    compute_pose_likelihood,
+    refine_pose,
+    refine_view_motions,
+)
 from knowledge_sources.methods.localization.views import CameraView, align_headings
-from knowledge_sources.methods.verification.predicted_lines import predict_lines
+from knowledge_sources.methods.verification.line_check import predict_lines
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.localization import LocalizationSettings
 from world_models.frames import Pose2, wrap_angle

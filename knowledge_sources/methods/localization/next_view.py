@@ -1,23 +1,105 @@
-"""Active localization: the next turn or short move whose view separates the pose hypotheses best."""
+"""Active localization: which view tells the pose hypotheses apart, near by or at the end of a way.
+
+Tried first are turns and short moves. Where none of them tells, the robot drives to the nearest view that would, on
+floor that is free whichever hypothesis is true.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
+
+import networkx as nx
+import numpy as np
+import shapely
+from shapely import affinity
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.localization.hypotheses import (
-    PoseHypothesis,
-    PredictView,
-    are_distinguishable,
-    compute_view_difference,
-)
-from knowledge_sources.methods.motion.routes import find_free_space, is_clear
+from knowledge_sources.methods.floor.lookout import find_floor
+from knowledge_sources.methods.motion.routes import SLACK_M, find_bends, find_free_space, is_clear
+from knowledge_sources.methods.verification.line_check import compute_coverage, predict_lines
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.localization import LocalizationSettings
+from world_models.building.building import Building
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
+
+PredictView = Callable[[Pose2], Floats]
+"""Returns the lines (n, 2, 2) that should be visible from a pose [px]."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseHypothesis:
+    """A pose in a room, and its weight among the hypotheses (they sum to one)."""
+
+    room: str
+    world_from_robot: Pose2
+    weight: float
+
+
+def normalize_log_likelihoods(log_likelihoods: Sequence[float]) -> tuple[float, ...]:
+    """Turn log likelihoods into weights that sum to one (softmax)."""
+    if not log_likelihoods:
+        return ()
+    best = max(log_likelihoods)
+    parts = [math.exp(value - best) for value in log_likelihoods]
+    total = math.fsum(parts)
+    return tuple(part / total for part in parts)
+
+
+def make_view_predictor(robot: RobotModel, settings: Settings = DEFAULT) -> PredictView:
+    """Return a function that predicts the long and clear lines visible from a pose."""
+    def predict(pose: Pose2) -> Floats:
+        lines = predict_lines(robot, pose, settings.verification).segments_px
+        length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
+        return np.asarray(lines[length >= settings.localization.min_compared_length_px])
+
+    return predict
+
+
+def compute_view_difference(one: Floats, other: Floats, settings: Settings = DEFAULT) -> float:
+    """Compute by how many lines two views (n, 2, 2) and (m, 2, 2) differ: those of either that the other lacks."""
+    return math.fsum(_count_missing(a, b, settings) for a, b in ((one, other), (other, one)))
+
+
+def are_distinguishable(
+    ones: Sequence[Floats], others: Sequence[Floats], settings: Settings = DEFAULT, *, clearly: float = 1.0
+) -> bool:
+    """Whether the views from one pose differ from those from another: all of them together, or one or two clearly.
+
+    A few lines always differ: those just long, near or clear enough to be predicted from one pose only. Of many views
+    that are alike and one that is not, all together are alike; so the one or two that differ most count by themselves.
+
+    Args:
+        clearly: by how many times as much as is needed they are to differ.
+    """
+    differ = [compute_view_difference(one, other, settings) for one, other in zip(ones, others, strict=True)]
+    lines = [len(one) + len(other) for one, other in zip(ones, others, strict=True)]
+    most = sorted(range(len(differ)), key=lambda k: -differ[k])
+    clear = settings.localization.clear_difference
+    return _is_difference(differ, lines, clearly, settings) or any(
+        _is_difference([differ[k] for k in most[:n]], [lines[k] for k in most[:n]], clear, settings) for n in (1, 2))
+
+
+def _is_difference(differ: Sequence[float], lines: Sequence[int], clearly: float, settings: Settings) -> bool:
+    tuning = settings.localization
+    least = max(tuning.min_different_lines, tuning.min_different_fraction * math.fsum(lines))
+    return math.fsum(differ) >= clearly * least
+
+
+def _count_missing(one: Floats, other: Floats, settings: Settings) -> float:
+    """Number of lines of a view that are not in another; a line that is half there counts half."""
+    if not len(one):
+        return 0.0
+    if not len(other):
+        return float(len(one))
+    tuning = settings.localization
+    covered = compute_coverage(one, other, tuning.same_line_px, tuning.same_line_rad, settings.verification)
+    return float(np.sum(1.0 - np.nan_to_num(covered)))
+
 
 HERE = Pose2(0.0, 0.0, 0.0)
 
@@ -118,3 +200,121 @@ def _list_actions(looked: Sequence[Pose2], settings: LocalizationSettings) -> li
              if all(abs(wrap_angle(turn - h)) >= settings.min_new_view_rad for h in here)]
     moves = [SensingAction(turn, move, 0.0) for turn in settings.turns_before_move_rad]
     return [*(SensingAction(turn, 0.0, 0.0) for turn in turns), *moves]
+
+
+MAX_FLOORS = 4
+"""Size of the cache of floors, one for each set of rooms."""
+
+
+class _Way(NamedTuple):
+    """A way over the common floor: its length, and its points after the first, which is here."""
+
+    length_m: float
+    points: Floats
+
+
+def choose_far_action(
+    robot: RobotModel, hypotheses: Sequence[PoseHypothesis], looked: Sequence[Pose2], rooms: Sequence[str],
+    predict: PredictView, settings: Settings = DEFAULT,
+) -> SensingAction | None:
+    """Choose the first leg of the shortest way to a view that tells two hypotheses apart; None where there is none.
+
+    Args:
+        hypotheses: the likeliest first; the way is free floor whichever of them is true.
+        looked: poses of the views so far: what they did not tell they will not tell.
+        rooms: of the floor.
+        predict: the lines that should be visible from a pose, world.
+    """
+    tuning = settings.localization
+    free = find_common_floor(robot, hypotheses, rooms, settings)
+    compared = hypotheses[:tuning.far_hypotheses]
+    weights = [h.weight for h in compared]
+    for way in _list_ways(free, tuning.far_step_m):
+        x_m, y_m = way.points[-1].tolist()
+        arriving = _find_last_heading(way)
+        for turn in (0.0, 0.5 * math.pi, -0.5 * math.pi, math.pi):
+            look = Pose2(x_m, y_m, wrap_angle(arriving + turn))
+            if _was_looked(look, looked, settings):
+                continue
+            views = [predict(h.world_from_robot @ look) for h in compared]
+            if any(are_distinguishable([one], [other], settings, clearly=tuning.clear_difference)
+                   for one, other in combinations(views, 2)):
+                return _begin(way, look, compute_separation(views, weights, settings), settings)
+    return None
+
+
+def find_common_floor(
+    robot: RobotModel, hypotheses: Sequence[PoseHypothesis], rooms: Sequence[str], settings: Settings = DEFAULT
+) -> shapely.Geometry:
+    """Find where the robot's centre may be, in its frame now, whichever hypothesis is true: the part that is here.
+
+    Empty where the robot stands too near something in one of them.
+    """
+    tuning, building = settings.localization, robot.world
+    clearance_m = robot.radius_m + tuning.move_clearance_m
+    whole = building.cached("floors for the robot's centre", MAX_FLOORS, (tuple(rooms), clearance_m),
+                            lambda: _shrink(building, rooms, clearance_m, tuning.far_coarse_m))
+    common: shapely.Geometry = shapely.Point(0.0, 0.0).buffer(tuning.far_reach_m)
+    for hypothesis in hypotheses:
+        pose = hypothesis.world_from_robot
+        near = shapely.intersection(whole, shapely.Point(pose.position).buffer(tuning.far_reach_m))
+        here = pose.inverse()
+        c, s = math.cos(here.heading_rad), math.sin(here.heading_rad)
+        common = shapely.intersection(common, affinity.affine_transform(near, [c, -s, s, c, here.x_m, here.y_m]))
+    at = shapely.Point(0.0, 0.0)
+    return next((part for part in shapely.get_parts(common) if part.distance(at) <= SLACK_M), shapely.Polygon())
+
+
+def _shrink(building: Building, rooms: Sequence[str], clearance_m: float, coarse_m: float) -> shapely.Geometry:
+    """The floor on which the robot's centre may be, with few corners."""
+    return shapely.buffer(find_floor(building, rooms), -clearance_m, join_style="mitre").simplify(coarse_m)
+
+
+def _list_ways(free: shapely.Geometry, step_m: float) -> Iterator[_Way]:
+    """The shortest ways to points on a grid over the free floor, the shortest first (visibility graph, Dijkstra)."""
+    if free.is_empty:
+        return
+    yield _Way(0.0, np.zeros((1, 2)))
+    low, high = np.ceil(np.divide(free.bounds[:2], step_m)), np.floor(np.divide(free.bounds[2:], step_m))
+    axes = (np.arange(a, b + 1.0) * step_m for a, b in zip(low, high, strict=True))
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    grid = grid[shapely.contains_xy(free, grid) & (np.linalg.norm(grid, axis=1) > 0.5 * step_m)]
+    inner = np.concatenate([np.zeros((1, 2)), find_bends(free)])
+    nodes = np.concatenate([inner, grid])
+    first, second = np.triu_indices(len(inner), 1)
+    grid_pairs = np.indices((len(inner), len(grid))).reshape(2, -1) + np.array([[0], [len(inner)]])
+    pairs = np.column_stack([np.concatenate([first, grid_pairs[0]]), np.concatenate([second, grid_pairs[1]])])
+    slack = free.buffer(SLACK_M)
+    shapely.prepare(slack)
+    pairs = pairs[shapely.covers(slack, shapely.linestrings(nodes[pairs]))]
+    graph: nx.Graph = nx.Graph()
+    lengths = np.linalg.norm(nodes[pairs[:, 0]] - nodes[pairs[:, 1]], axis=1)
+    graph.add_weighted_edges_from(zip(*pairs.T.tolist(), lengths.tolist(), strict=True))
+    if 0 not in graph:
+        return
+    away, routes = nx.single_source_dijkstra(graph, 0)
+    for node in sorted((k for k in away if k >= len(inner)), key=lambda k: (away[k], k)):
+        yield _Way(float(away[node]), nodes[routes[node][1:]])
+
+
+def _find_last_heading(way: _Way) -> float:
+    """The direction in which the last part of a way leads [rad]; ahead where there is none."""
+    leg = way.points[-1] - (way.points[-2] if len(way.points) > 1 else np.zeros(2))
+    return math.atan2(float(leg[1]), float(leg[0]))
+
+
+def _was_looked(look: Pose2, looked: Sequence[Pose2], settings: Settings) -> bool:
+    """Whether a view like this was taken."""
+    tuning = settings.localization
+    return any(look.distance_to(old) < 0.5 * tuning.move_m
+               and abs(wrap_angle(look.heading_rad - old.heading_rad)) < tuning.min_new_view_rad for old in looked)
+
+
+def _begin(way: _Way, look: Pose2, separation: float, settings: Settings) -> SensingAction:
+    """The first leg of a way, or the turn to the look where it ends."""
+    tuning = settings.localization
+    if way.length_m < tuning.far_arrived_m:
+        return SensingAction(look.heading_rad, 0.0, separation)
+    first = next(p for p in way.points if float(np.linalg.norm(p)) > 0.5 * tuning.far_arrived_m)
+    move_m = min(float(np.linalg.norm(first)), tuning.far_leg_m)
+    return SensingAction(math.atan2(float(first[1]), float(first[0])), move_m, separation)

@@ -14,15 +14,16 @@ from shapely import Geometry, LineString, Point
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.lookout import find_floor
-from knowledge_sources.methods.motion.doorways import compute_free_passage, find_line_through
 from knowledge_sources.methods.motion.footprints import build_polygon
-from knowledge_sources.methods.motion.lookouts import list_lookouts
 from knowledge_sources.methods.motion.routes import (
+    compute_free_passage,
     compute_free_space,
     find_free_space,
+    find_line_through,
     find_nearest,
     find_shortest_route,
     is_clear,
+    list_lookouts,
     list_obstacles,
 )
 from knowledge_sources.settings.plan import PlanSettings

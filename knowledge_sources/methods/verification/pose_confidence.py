@@ -1,4 +1,7 @@
-"""The probability that a pose is wrong, from the evidence for it, by logistic regression.
+"""The evidence for a pose, and the probability that the pose is wrong, by logistic regression.
+
+The evidence is eight numbers, each of which is better the larger it is. A covariance looks the same in the wrong
+corridor; these numbers do not. They follow from sets of lines, segments and faces, so their order does not matter.
 
 The log odds of a right pose are a sum of the evidence, each part with a weight that is never negative: more evidence
 never makes a pose less certain. The weights in ``verification_weights.toml`` were fitted on rendered pictures of
@@ -8,17 +11,151 @@ less often, so that the probability is not too small.
 
 from __future__ import annotations
 
+import math
 import tomllib
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Mask
-from knowledge_sources.methods.verification.pose_evidence import EVIDENCE_NAMES, PoseEvidence
+from knowledge_sources.methods.pose.planar import compute_point_jacobian
+from knowledge_sources.methods.verification.color_check import ColorCheck
+from knowledge_sources.methods.verification.line_check import LineCheck, compute_coverage
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.verification import VerificationSettings
+from world_models.frames import Pose2, wrap_angle
+from world_models.robot import RobotModel
+
+NEAR_M = 0.1
+"""Lines with an end nearer to the camera than this have no defined motion in the picture."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseEvidence:
+    """What supports a pose; :mod:`knowledge_sources.methods.verification.pose_confidence` weighs it.
+
+    Attributes:
+        coverage: covered part of the lines' length in view.
+        weakest_coverage: the same, lines weighted by their motion in the picture along the least constrained of five
+            directions of pose error.
+        sharpness: part of the covered length that is covered within a pixel.
+        significance: how improbable such agreement is by chance, on a log scale: 0 (p = 1) to 1 (p = 1e-12).
+        line_count: log2(1 + n) of the n matched lines.
+        proximity: 1 at the belief, 0 from a Mahalanobis distance of 6.
+        color_agreement: part of the faces with the model's color, beyond chance; 0 where colors are not testable.
+        color_count: log2(1 + n) of the n compared faces; 0 where colors are not testable.
+    """
+
+    coverage: float
+    weakest_coverage: float
+    sharpness: float
+    significance: float
+    line_count: float
+    proximity: float
+    color_agreement: float
+    color_count: float
+
+    @property
+    def values(self) -> Floats:
+        """(k,) in the order of the attributes."""
+        return np.array(astuple(self))
+
+
+EVIDENCE_NAMES = tuple(field.name for field in fields(PoseEvidence))
+
+
+def compute_evidence(
+    robot: RobotModel, lines_world: Floats, segments_px: Floats, pose: Pose2, covariance: Floats, belief: Pose2,
+    belief_covariance: Floats, lines: LineCheck, colors: ColorCheck,
+    settings: VerificationSettings = DEFAULT.verification,
+) -> PoseEvidence:
+    """Compute the evidence for a pose.
+
+    Args:
+        lines_world: (m, 2, 3) predicted lines [m, world].
+        segments_px: (k, 2, 2) found in the picture.
+        pose, covariance: the pose in question, world; (3, 3) over (x, y, heading).
+        belief, belief_covariance: the pose that was believed before, in the same form.
+        lines, colors: the checks of the picture at the pose.
+    """
+    agreement, projected = lines.agreement, lines.projected_px
+    covered = np.nan_to_num(agreement.coverage)
+    span = np.linalg.norm(projected[:, 1] - projected[:, 0], axis=1)
+    length = np.minimum(np.nan_to_num(span), settings.max_line_weight_px)
+    sharp = np.nan_to_num(compute_coverage(
+        projected, segments_px, settings.sharp_tolerance_px, settings.line_tolerance_rad, settings))
+    directions = _error_directions(settings.probe_turn_rad)
+    motion = length[:, None] * _compute_motion(robot, lines_world, pose, directions, settings.max_line_motion_px)
+    sigmas = min(_mahalanobis(pose, belief, covariance + belief_covariance), settings.max_belief_sigmas)
+    return PoseEvidence(
+        coverage=_ratio(length * covered, length),
+        weakest_coverage=min(_ratio(motion[:, k] * covered, motion[:, k]) for k in range(len(directions))),
+        sharpness=_ratio(length * sharp, length * covered),
+        significance=math.log10(max(agreement.p_false, settings.min_p_false)) / math.log10(settings.min_p_false),
+        line_count=math.log2(1.0 + agreement.matched),
+        proximity=1.0 - sigmas / settings.max_belief_sigmas,
+        color_agreement=max(colors.agreeing - colors.chance, 0.0) if colors.is_testable else 0.0,
+        color_count=math.log2(1.0 + colors.count) if colors.is_testable else 0.0,
+    )
+
+
+def compute_motion_tolerance_px(
+    robot: RobotModel, lines_world: Floats, pose: Pose2, covariance: Floats,
+    settings: VerificationSettings = DEFAULT.verification,
+) -> float:
+    """Compute how far lines (m, 2, 3) may lie from where they are expected, by a pose covariance (3, 3) [px].
+
+    The median over the lines of so many standard deviations across each; 0 without lines.
+    """
+    if not len(lines_world):
+        return 0.0
+    _, across = _compute_slopes(robot, lines_world, pose)
+    middle = across.mean(axis=1)
+    sigmas = np.sqrt(np.einsum("nk,kl,nl->n", middle, covariance, middle))
+    return settings.motion_tolerance_sigmas * float(np.median(sigmas))
+
+
+def _ratio(part: Floats, whole: Floats) -> float:
+    total = float(np.sum(whole))
+    return float(np.sum(part)) / total if total > 1e-9 else 0.0
+
+
+def _error_directions(turn_rad: float) -> Floats:
+    """(5, 3) pose errors (x, y [m], heading [rad]) in the robot's frame: ahead, left, both diagonals, and a turn."""
+    return np.array([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.7, 0.7, 0.0), (0.7, -0.7, 0.0), (0.0, 0.0, turn_rad)])
+
+
+def _compute_motion(robot: RobotModel, lines_world: Floats, pose: Pose2, directions: Floats, max_px: float) -> Floats:
+    """(m, d) by how much each line moves across itself in the picture for each pose error (d, 3), bounded [px]."""
+    if not len(lines_world):
+        return np.zeros((0, len(directions)))
+    ahead, across = _compute_slopes(robot, lines_world, pose)
+    c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    in_world = directions @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    motion = np.abs(across @ in_world.T).max(axis=1)
+    motion[~ahead] = 0.0
+    return np.asarray(np.minimum(motion, max_px))
+
+
+def _compute_slopes(robot: RobotModel, lines_world: Floats, pose: Pose2) -> tuple[Mask, Floats]:
+    """Which lines (m,) lie before the camera, and how their ends (m, 2, 3) move across them by (x, y, heading) [px]."""
+    state, focal = np.array([pose.x_m, pose.y_m, pose.heading_rad]), np.array([robot.camera.fx, robot.camera.fy])
+    mount = robot.mount.camera_from_robot
+    points, pixels, slopes = compute_point_jacobian(lines_world.reshape(-1, 3), focal, state, mount)
+    ends = pixels.reshape(-1, 2, 2)
+    along = ends[:, 1] - ends[:, 0]
+    normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
+    across = np.einsum("nj,nejk->nek", normal, slopes.reshape(-1, 2, 2, 3))
+    return np.all(points[:, 2].reshape(-1, 2) > NEAR_M, axis=1), np.asarray(across)
+
+
+def _mahalanobis(pose: Pose2, belief: Pose2, covariance: Floats) -> float:
+    """The distance of two poses in standard deviations of a covariance (3, 3)."""
+    off = np.array([pose.x_m - belief.x_m, pose.y_m - belief.y_m, wrap_angle(pose.heading_rad - belief.heading_rad)])
+    return math.sqrt(max(0.0, float(off @ np.linalg.solve(covariance + 1e-12 * np.eye(3), off))))
+
 
 PRODUCTS = (("coverage", "sharpness"), ("coverage", "color_agreement"), ("sharpness", "color_agreement"))
 """Parts of the evidence that are stronger together: their products are terms too."""

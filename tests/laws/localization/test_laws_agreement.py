@@ -9,10 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization.chamfer import compute_chamfer_maps, compute_chamfer_scores
+from knowledge_sources.methods.localization.pose_candidates import compute_chamfer_maps, compute_chamfer_scores
 from knowledge_sources.methods.localization.visibility_map import sample_lines
-from knowledge_sources.methods.verification.agreement import compute_agreement, compute_coverage
-from knowledge_sources.methods.verification.view_quality import compute_view_quality
+from knowledge_sources.methods.verification.line_check import compute_agreement, compute_coverage, compute_view_quality
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 

@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.localization import aliasing
 from knowledge_sources.methods.localization.aliasing import (
+    find_repetitions,
     find_strongest_alias,
     precompute_views,
     predict_views_on_grid,
     score_view,
 )
-from knowledge_sources.methods.localization.repetition import find_repetitions
-from knowledge_sources.methods.verification.agreement import compute_coverage
-from knowledge_sources.methods.verification.predicted_lines import predict_lines
+from knowledge_sources.methods.verification.line_check import compute_coverage, predict_lines
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount

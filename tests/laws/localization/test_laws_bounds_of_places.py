@@ -22,7 +22,6 @@ from knowledge_sources.methods.localization.global_localization import (
     decide,
     rank_candidates,
 )
-from knowledge_sources.methods.localization.log_likelihood import PoseLikelihood
 from knowledge_sources.methods.localization.next_view import SensingAction
 from knowledge_sources.methods.localization.place_odds import (
     ToldPlace,
@@ -31,6 +30,7 @@ from knowledge_sources.methods.localization.place_odds import (
     is_within_reach,
     weigh_told,
 )
+from knowledge_sources.methods.localization.refinement import PoseLikelihood
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount

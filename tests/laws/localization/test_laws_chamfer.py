@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.localization.chamfer import ChamferMaps, compute_chamfer_scores
+from knowledge_sources.methods.localization.pose_candidates import ChamferMaps, compute_chamfer_scores
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2

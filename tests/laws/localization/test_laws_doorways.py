@@ -7,7 +7,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.motion.doorways import compute_free_passage, find_line_through
+from knowledge_sources.methods.motion.routes import compute_free_passage, find_line_through
 
 CLEARANCE_M = 0.38
 DISTANCES_M, OFFSETS_M = (0.65, 0.55, 0.47, 0.40), (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)

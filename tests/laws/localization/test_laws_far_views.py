@@ -12,11 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.generated.floors import Floor, generated_floor
-from knowledge_sources.methods.localization.far_views import choose_far_action, find_common_floor
-from knowledge_sources.methods.localization.hypotheses import (
+from knowledge_sources.methods.localization.next_view import (
     PoseHypothesis,
     PredictView,
     are_distinguishable,
+    choose_far_action,
+    find_common_floor,
     make_view_predictor,
 )
 from knowledge_sources.settings import DEFAULT

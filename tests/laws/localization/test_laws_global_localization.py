@@ -14,24 +14,21 @@ from numpy.typing import NDArray
 from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
 from knowledge_sources.methods.localization.global_localization import LocalizationStatus, find_aliases, localize
-from knowledge_sources.methods.localization.hypotheses import (
-    PoseHypothesis,
-    compute_view_difference,
-    normalize_log_likelihoods,
-)
-from knowledge_sources.methods.localization.log_likelihood import PoseLikelihood
 from knowledge_sources.methods.localization.next_view import (
+    PoseHypothesis,
     SensingAction,
     choose_sensing_action,
     compute_separation,
+    compute_view_difference,
     find_widest_gap,
     make_safety_check,
+    normalize_log_likelihoods,
 )
 from knowledge_sources.methods.localization.pose_candidates import are_distinct
-from knowledge_sources.methods.localization.refinement import refine_pose, refine_view_motions
+from knowledge_sources.methods.localization.refinement import PoseLikelihood, refine_pose, refine_view_motions
 from knowledge_sources.methods.localization.views import CameraView, align_headings, propagate_pose
 from knowledge_sources.methods.localization.visibility_map import get_visibility_map
-from knowledge_sources.methods.verification.predicted_lines import predict_lines
+from knowledge_sources.methods.verification.line_check import predict_lines
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world

@@ -9,7 +9,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.motion.lookouts import list_lookouts
+from knowledge_sources.methods.motion.routes import list_lookouts
 
 ROOM = shapely.box(0.0, 0.0, 6.0, 5.0)
 RADIUS_M, DISTANCES_M, SHORT_M = 0.47, (1.8, 2.4, 3.0), 0.4

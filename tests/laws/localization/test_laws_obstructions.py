@@ -9,15 +9,15 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization.obstructions import (
+from knowledge_sources.methods.localization.views import (
+    CameraView,
     find_obstruction,
     has_counterpart,
     is_opaque,
     update_obstruction,
 )
-from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.methods.verification.line_check import predict_lines
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from knowledge_sources.methods.verification.predicted_lines import predict_lines
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount

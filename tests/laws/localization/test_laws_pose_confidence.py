@@ -19,17 +19,15 @@ from knowledge_sources.methods.verification.color_check import (
 )
 from knowledge_sources.methods.verification.line_check import check_lines
 from knowledge_sources.methods.verification.pose_confidence import (
+    EVIDENCE_NAMES,
     POSE_CONFIDENCE,
     TERMS,
-    compute_terms,
-    fit_weights,
-    remove_colors,
-)
-from knowledge_sources.methods.verification.pose_evidence import (
-    EVIDENCE_NAMES,
     PoseEvidence,
     compute_evidence,
     compute_motion_tolerance_px,
+    compute_terms,
+    fit_weights,
+    remove_colors,
 )
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from knowledge_sources.plan.milestone_selector import predict_milestone

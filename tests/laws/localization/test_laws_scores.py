@@ -13,9 +13,12 @@ from scipy.stats import bernoulli, binom
 
 from experiments.perception import rivals
 from experiments.perception.rivals import compute_line_odds, compute_pose_score, group_lines
-from knowledge_sources.methods.localization.log_likelihood import compute_log_ratio
-from knowledge_sources.methods.verification.agreement import compute_coverage
-from knowledge_sources.methods.verification.view_quality import EPSILON_INFORMATION, compute_view_quality
+from knowledge_sources.methods.localization.refinement import compute_log_ratio
+from knowledge_sources.methods.verification.line_check import (
+    EPSILON_INFORMATION,
+    compute_coverage,
+    compute_view_quality,
+)
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2

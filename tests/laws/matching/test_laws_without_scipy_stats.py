@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom, norm, qmc
 
 from knowledge_sources.methods.matching.pose_pairs import _spread_normal
-from knowledge_sources.methods.verification.agreement import compute_p_false
+from knowledge_sources.methods.verification.line_check import compute_p_false
 from knowledge_sources.settings import DEFAULT
 
 
