@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
 
-from harvey.tables import table
+from logs.tables import table
 
 WIDTH = 120
 Cell = str | int | float | None

@@ -18,7 +18,7 @@ from harvey.campaign.case_work import Killed
 from harvey.campaign.engine import Campaign, run_campaign
 from harvey.campaign.results_file import RESULTS
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RUNS
+from logs.run_directory import RUNS
 
 __all__ = ["RESULTS", "campaign_folder", "run_trials"]
 

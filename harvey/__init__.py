@@ -14,7 +14,7 @@ The Python interface. Everything below is loaded when it is first used:
 
 Importing it sets environment variables that are not set yet, because the libraries read them when they are first
 imported: OPENBLAS_NUM_THREADS, OMP_NUM_THREADS, MKL_NUM_THREADS and OPENCV_FOR_THREADS_NUM to 1 and, on a processor
-with AVX2, those that keep numpy, OpenBLAS and OpenCV from using more (:mod:`harvey.arithmetic` says which and why). So
+with AVX2, those that keep numpy, OpenBLAS and OpenCV from using more (:mod:`logs.decided_by` says which and why). So
 the same run is decided the same on every such machine. A variable that is set already stays as it is.
 """
 
@@ -24,8 +24,8 @@ import importlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from harvey.arithmetic import settle
 from harvey.packages import check_packages
+from logs.decided_by import settle
 
 settle()
 check_packages()

@@ -17,11 +17,11 @@ from blackboard.servoing import Servoing
 from harvey.agent_settings import build_settings
 from harvey.errors import BadInput
 from harvey.hidden_segments import SegmentHider, is_segment, parse_segments
-from harvey.run_files.run_head import RunHead
 from harvey.what_if import WhatIf, check_removals
 from harvey.wiring import build, foreign_sources, knowledge_sources, servoing
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import Settings
+from logs.run_head import RunHead
 from world_models.building.world import World
 from world_models.entries.kinds import KINDS
 from world_models.files.toml.settings import parse_value, suggest_keys

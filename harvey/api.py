@@ -30,22 +30,21 @@ from harvey import wiring
 from harvey.agent import Sources, build_agent
 from harvey.agent_settings import split_settings
 from harvey.errors import BadInput
-from harvey.run_files import run_directory
-from harvey.run_files.observations import entry_of
-from harvey.run_files.records import DecisionRecord, EntryRecord, read_records
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import RunHead
-from harvey.runner.replay import open_originals, open_pictures
+from harvey.runner.replay import open_originals
 from harvey.runner.replay import replay as replay_run
 from harvey.runner.result import MissionResult
 from harvey.simulation.run import build_head, run_mission
-from harvey.why.journal import JournalHistory
-from harvey.why.model.element import stories_of
-from harvey.why.model.world_file import WorldFile
-from harvey.why.sentences import knowing
-from harvey.why.story import Story, lines_of
 from knowledge_sources.settings import Settings
+from logs import run_directory
+from logs.explain.model import WorldFile
+from logs.explain.subjects import stories_of
+from logs.explain.why import Story, lines_of
+from logs.pictures import open_pictures
 from logs.reader import read_true_track
+from logs.records import DecisionRecord, EntryRecord, entry_of, knowing, read_records
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
+from logs.timeline import Timeline
 from sim.scenario import FORMAT, Scenario, ScenarioError, load_scenario, with_settings
 from sim.stage import build_stage
 from world_models.building.locale_frame import LocaleFrame
@@ -198,7 +197,7 @@ class RecordedRun:
         """Every decision, in order: what was seen, who could act, who was chosen, what changed. Raises BadInput."""
         return read_records(self._files.journal)
 
-    def records(self) -> Iterator[EntryRecord]:
+    def records(self) -> Iterator[EntryRecord[Any]]:
         """Every change of every entry, in order, observed ones too. Raises BadInput."""
         for decision in self.decisions():
             yield from (*decision.observed, *decision.made)
@@ -215,16 +214,16 @@ class RecordedRun:
             BadInput: a value is of a kind, or of a version of it, that is not known here.
         """
         for record in self.records():
-            if record.change != "Retracted" and (kind is None or record.type == kind.__name__):
-                store = self._store if record.type == LocaleFrame.__name__ else None
+            if not record.is_gone and (kind is None or record.kind is kind):
+                store = self._store if record.kind is LocaleFrame else None
                 yield entry_of(record, self._kinds, store)
 
     def pictures(self) -> Iterator[Picture]:
         """The camera's pictures, in order. Raises BadInput where they are missing."""
         jpegs = open_pictures(self._files)
         for record in self.records():
-            if record.type == Frame.__name__ and record.change == "Posted":
-                value = record.value
+            if record.kind is Frame and record.is_new:
+                value = record.fields
                 yield Picture(record.id, record.cycle, float(value["sim_time_s"]), jpegs[value["number"]])
 
     def believed_track(self) -> Sequence[TrackPoint]:
@@ -257,7 +256,7 @@ class RecordedRun:
 
     def stories(self, what: str | int | None = None) -> Sequence[Story]:
         """The same as data: headline, decision and reasons with the entries that say so."""
-        history = JournalHistory(self._files.journal)
+        history = Timeline(self._files.journal)
         with knowing(self._kinds):
             return list(stories_of(history, what, WorldFile(self._files)))
 

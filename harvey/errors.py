@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from logs.errors import BadInput
 
-class BadInput(ValueError):
-    """Something the user gave cannot be used: says what was expected and what came. Exit code 2."""
+__all__ = ["BadInput", "Terminated", "terminable"]
 
 
 class Terminated(BaseException):

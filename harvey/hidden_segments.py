@@ -12,9 +12,10 @@ from blackboard.board import View
 from blackboard.change import Change
 from blackboard.effect import Effect, Post
 from harvey.errors import BadInput
-from harvey.run_files.records import DecisionRecord
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import Settings
+from logs.records import DecisionRecord
+from world_models.entries.body import Frame
 from world_models.entries.percepts import Segments
 from world_models.frames import frozen
 from world_models.words import listed
@@ -65,7 +66,7 @@ def check_segments(records: Sequence[DecisionRecord], names: Sequence[str], hidd
     wanted = parse_segments(names)
     if not wanted:
         return
-    frames = [entry.id for decision in records for entry in decision.observed if entry.type == "Frame"]
+    frames = [entry.id for decision in records for entry in decision.observed if entry.kind is Frame]
     counts, already = _count_segments(records), parse_segments(hidden)
     for frame, segment in wanted:
         name = f"Frame-{frame}"
@@ -88,7 +89,7 @@ def _hide(found: Segments, hidden: Sequence[int]) -> Segments:
 
 def _count_segments(records: Sequence[DecisionRecord]) -> Mapping[str, int]:
     """Frame by id -> how many segments were found in it."""
-    made = (entry.value for decision in records for entry in decision.made if entry.type == "Segments")
+    made = (entry.fields for decision in records for entry in decision.made if entry.kind is Segments)
     whole = (v for v in made if isinstance(v, dict) and isinstance(v.get("segments_px"), list))
     return {str(v.get("frame")): len(v["segments_px"]) for v in whole}
 

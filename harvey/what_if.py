@@ -17,7 +17,7 @@ from blackboard.entry import Entry
 from blackboard.scheduler import Scheduler
 from harvey.errors import BadInput
 from harvey.robot_settings import build_believed
-from harvey.run_files.records import WHAT_IF
+from logs.records import WHAT_IF
 from world_models.building.changes.removals import element_names
 from world_models.building.locale_frame import FrameChange, FrameRequest, LocaleFrame
 from world_models.building.world import World

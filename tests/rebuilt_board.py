@@ -14,13 +14,21 @@ from blackboard.entry import Entry, Ref
 from blackboard.journal import change_record
 from blackboard.kinds import kind_of
 from harvey.agent import build_agent
-from harvey.run_files.observations import Originals, cycle_of_writing, effect_of, ref_of
-from harvey.run_files.records import DecisionRecord, EntryRecord, as_line, read_records
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import RunHead
 from harvey.runner.replay import open_originals
 from harvey.wiring import KNOWLEDGE_SOURCES, load_kinds
 from knowledge_sources.settings import DEFAULT
+from logs.records import (
+    DecisionRecord,
+    EntryRecord,
+    Originals,
+    as_line,
+    cycle_of_writing,
+    effect_of,
+    read_records,
+    ref_of,
+)
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
 
 KINDS = load_kinds()
 TRACED = frozenset(kind for kind in KINDS.values() if kind_of(kind).traced)

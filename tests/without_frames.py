@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from harvey.run_files.records import as_line
+from logs.records import as_line
 
 FRAMES = ("LocaleFrame", "FrameRequest")
 

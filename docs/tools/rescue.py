@@ -15,8 +15,8 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from harvey.report.page import build_page
-from harvey.run_files.run_directory import RunDirectory
-from harvey.why.journal import JournalHistory
+from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 
 WIDTH, HEIGHT = 1000, 505
 BEFORE, AFTER, FRAMES = 24, 10, 22
@@ -32,7 +32,7 @@ body { max-width: none; padding: 0 0.8rem; } h1 { font-size: 1.3rem; margin: 0.6
 def draw(run: Path, out: Path) -> None:
     """Draw the moving picture of a run in which the robot was lost and found."""
     files = RunDirectory(run)
-    page_text = build_page(files, JournalHistory(files.journal))
+    page_text = build_page(files, Timeline(files.journal))
     with TemporaryDirectory() as folder, sync_playwright() as driver:
         file = Path(folder) / "report.html"
         file.write_text(page_text, encoding="utf-8")

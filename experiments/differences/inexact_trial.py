@@ -13,8 +13,8 @@ from blackboard.journal import Decision
 from experiments.generated.missions import WHEELS_WORSE, write_inexact_mission
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task
-from harvey.run_files.run_recorder import RunRecorder
 from harvey.simulation.run import SimulatedRun, build_head
+from logs.run_recorder import RunRecorder
 from sim.body.simulated_body import SimulatedBody
 from sim.differences.inexact import TrueInexact
 from world_models.entries.percepts import PoseFix

@@ -13,7 +13,7 @@ from experiments.chart import OURS, PAPER, PEER, chart
 from experiments.paper.table1_drives import INCREMENTS, Drive, DriveResult, run_drive, run_open_loop
 from experiments.report import Cell, Report
 from experiments.trials import RESULTS, campaign_folder, run_trials
-from harvey.run_files.run_directory import check_vacant
+from logs.run_directory import check_vacant
 
 Floats = NDArray[np.float64]
 

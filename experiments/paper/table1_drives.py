@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from blackboard.journal import Decision
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_recorder import RunRecorder
 from harvey.simulation.run import SimulatedRun, build_head
+from logs.run_directory import RunDirectory
+from logs.run_recorder import RunRecorder
 from sim.stage import Stage
 from sim.truth import Truth
 from world_models.entries.body import MotionReport, MotorCommand

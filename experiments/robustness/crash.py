@@ -21,8 +21,8 @@ import numpy as np
 from experiments.generated.short_missions import HALLWAY, OFFICE, fault
 from experiments.report import Cell, Report
 from experiments.trials import campaign_folder, run_trials
-from harvey.run_files.records import read_records
 from harvey.simulation.body_replay import find_interrupted
+from logs.records import read_records
 
 CHILD = (sys.executable, "-m", "experiments.robustness.crash_child")
 MAX_CHILD_S = 600.0
@@ -201,7 +201,7 @@ def _compare(journal: Path, logs: Sequence[Path]) -> tuple[int, str]:
     interrupted: set[str] = set()
     for decision in read_records(journal):
         interrupted |= find_interrupted(decision.observed)
-        commands += [(record.ref, [record.value["turn_rad"], record.value["move_m"]])
+        commands += [(record.ref, [record.fields["turn_rad"], record.fields["move_m"]])
                      for record in decision.made if record.type == "MotorCommand"]
     lines = (line for log in logs if log.exists() for line in log.read_text("utf-8").splitlines())
     done = [item["begun"] for item in map(json.loads, lines) if "begun" in item]

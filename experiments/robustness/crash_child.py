@@ -14,12 +14,12 @@ from pathlib import Path
 from experiments.wrappers import WrappedBody
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import RunHead
 from harvey.runner.ports import Body
 from harvey.runner.replay import open_originals, replay
 from harvey.runner.resume import find_remains
 from harvey.simulation.run import Around, resume_mission, run_mission
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
 from world_models.entries.body import BodyFault, MotionReport, MotorCommand
 
 MOTION_S = 0.05

@@ -19,9 +19,9 @@ from experiments.report import Report
 from experiments.scale.long_journal import HOUR_CYCLES, write_hour
 from experiments.trials import campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
-from harvey.run_files.run_directory import RunDirectory
-from harvey.why.journal import JournalHistory
-from harvey.why.reach import GOAL, KINDS, MODEL, SENSOR, check
+from logs.explain.web import GOAL, KINDS, MODEL, SENSOR, check
+from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from sim.scenario_names import list_scenarios
 
 MISSIONS = 100
@@ -85,7 +85,7 @@ def explain_mission(task: Task) -> Explanation:
         raise ValueError("expected a task that keeps its run, got one that keeps nothing")
     result = run_task(task)
     run = RunDirectory(task.out)
-    found = check(JournalHistory(run.journal))
+    found = check(Timeline(run.journal))
     return Explanation(
         task.scenario, task.seed, result.outcome, found.decisions, found.reached, found.by_kind[GOAL],
         found.by_kind[MODEL], found.by_kind[SENSOR], _time_why(run.path)[0], _count_same(run),
@@ -95,8 +95,8 @@ def explain_mission(task: Task) -> Explanation:
 def _count_same(run: RunDirectory) -> int:
     """Count the decisions that a replay decides the same."""
     from harvey.agent import build_agent
-    from harvey.run_files.run_head import RunHead
     from harvey.runner.replay import open_originals, replay
+    from logs.run_head import RunHead
 
     agent = build_agent(RunHead.read(run.path))
     return sum(1 for step in replay(run, open_originals(run, agent.store), agent.scheduler()) if step.same)
@@ -121,7 +121,7 @@ def _measure_hour(task: Task) -> Hour:
         raise ValueError("expected a task that keeps its run, got one that keeps nothing")
     folder = task.out.parent / "an-hour"
     length = write_hour(task.out / "journal.jsonl", folder / "journal.jsonl")
-    history = JournalHistory(folder / "journal.jsonl")
+    history = Timeline(folder / "journal.jsonl")
     motions = [ref for ref in history.refs if ref.startswith("MotorCommand-")] or [history.refs[-1]]
     questions = ((), (motions[len(motions) // 2],), ("--at", str(history.cycles[-1] // 2)))
     best = [min(_time_why(folder, *question) for _ in range(REPEATS)) for question in questions]

@@ -19,7 +19,7 @@ from experiments.report import Report
 from experiments.scale.questions_asked import KINDS, Question, ask
 from experiments.trials import campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
-from harvey.run_files.run_directory import RunDirectory
+from logs.run_directory import RunDirectory
 
 MISSIONS: Mapping[str, str] = {
     "office": OFFICE,

@@ -22,20 +22,19 @@ from blackboard.journal import decision_record, plain
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Scheduler
 from harvey.agent import Agent, build_agent
-from harvey.run_files.records import WHAT_IF, DecisionRecord, EntryRecord, decision_of
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import RunHead
 from harvey.runner.replay import open_originals, replay
-from harvey.why.ask import why_absent
-from harvey.why.decisions import describe_decision
-from harvey.why.history import History
-from harvey.why.journal import JournalHistory
-from harvey.why.why_not import Fate, in_cycle
+from harvey.why_not import why_absent
+from logs.explain.phrases import describe_decision
+from logs.explain.why_not import Fate, in_cycle
+from logs.records import WHAT_IF, DecisionRecord, EntryRecord, decision_of
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
+from logs.timeline import Timeline
 
 KINDS = ("what next", "why", "why not", "what if", "since when", "rested on", "did not rest on")
 WOKEN = re.compile(r"woken by ([\w-]+\.\d+)")
 COULD = "could have acted"
-"""How :mod:`harvey.why.ask` says that a knowledge source would have acted."""
+"""How :mod:`harvey.why_not` says that a knowledge source would have acted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +60,7 @@ class Question:
 
 def ask(run: RunDirectory, number: int, rng: np.random.Generator) -> Iterator[Question]:
     """So many questions about a run, each kind as often as the others, as far as the run has occasions for it."""
-    history, agent = JournalHistory(run.journal), build_agent(RunHead.read(run.path))
+    history, agent = Timeline(run.journal), build_agent(RunHead.read(run.path))
     deciding = [one for one in history.decisions() if one.chosen is not None and one.made and one.asks is None]
     chosen: dict[int, list[str]] = {}
     for n in range(number):
@@ -84,7 +83,7 @@ def ask(run: RunDirectory, number: int, rng: np.random.Generator) -> Iterator[Qu
 class _Asker:
     """Asks about the cycle that the scheduler comes to next."""
 
-    def __init__(self, history: History, agent: Agent, scheduler: Scheduler, rng: np.random.Generator) -> None:
+    def __init__(self, history: Timeline, agent: Agent, scheduler: Scheduler, rng: np.random.Generator) -> None:
         self._history, self._agent, self._scheduler, self._rng = history, agent, scheduler, rng
         self._sources = {source.name: source for source in agent.sources if agent.servoing.allows(source.closes)}
 
@@ -193,7 +192,7 @@ def _id(ref: str) -> str:
     return ref.rpartition(".")[0]
 
 
-def _below(history: History, refs: Collection[str]) -> set[str]:
+def _below(history: Timeline, refs: Collection[str]) -> set[str]:
     """All that some revisions rest on, and they."""
     found: set[str] = set()
     ahead = list(refs)
@@ -205,7 +204,7 @@ def _below(history: History, refs: Collection[str]) -> set[str]:
     return found
 
 
-def _act(chosen: Any, made: Sequence[EntryRecord]) -> str:
+def _act(chosen: Any, made: Sequence[EntryRecord[Any]]) -> str:
     return f"{chosen.source} on {chosen.trigger}: {', '.join(f'{one.change} {one.ref}' for one in made)}"
 
 

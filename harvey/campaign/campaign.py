@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from blackboard.journal import Sink
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RunDirectory, prepare_directory
+from logs.run_directory import RunDirectory, prepare_directory
 
 if TYPE_CHECKING:
     from harvey.agent_settings import Pairs
@@ -158,10 +158,10 @@ def find_finished(task: Task, stage: Stage) -> MissionResult | None:
     """The result of the task's run, if it has ended. Raises BadInput where another mission is there."""
     if task.out is None or not (task.out / "run.json").exists():
         return None
-    from harvey.run_files.run_head import RunHead
     from harvey.runner.result import MissionResult
     from harvey.runner.resume import find_remains
     from harvey.simulation.run import build_head
+    from logs.run_head import RunHead
 
     run = RunDirectory(task.out)
     if not RunHead.read(run.path).is_like(build_head(stage, task.seed, task.body, task.agent_settings)):

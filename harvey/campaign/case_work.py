@@ -13,9 +13,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from harvey.arithmetic import arithmetic
 from harvey.campaign.origin import code_digest
 from harvey.errors import BadInput
+from logs.decided_by import arithmetic
 
 MOST_KILLS = 3
 """So often may a worker end while it works on a case; then the case is given up."""

@@ -17,7 +17,7 @@ from typing import Any
 from scipy.stats import binomtest
 
 from harvey.errors import BadInput
-from harvey.tables import table
+from logs.tables import table
 
 CONFIDENCE = 0.95
 SHOWN = 10

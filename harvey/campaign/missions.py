@@ -15,7 +15,7 @@ from harvey.campaign.campaign import Task, find_finished, run_task
 from harvey.campaign.case_work import Killed
 from harvey.campaign.engine import CAMPAIGN, Campaign, run_campaign
 from harvey.campaign.results_file import RESULTS, TIMES, open_results
-from harvey.run_files.deciding_code import DIGITS
+from logs.decided_by import DIGITS
 
 if TYPE_CHECKING:
     from harvey.runner.result import MissionResult
@@ -58,7 +58,7 @@ def drive_missions(
 def drive_kept(task: Task, keep: Keep) -> MissionResult:
     """Drive a mission, or take the result of its finished run, and keep its run directory or not."""
     if task.go_on and (found := find_finished(task, task.stage())) is not None and task.out is not None:
-        from harvey.run_files.run_head import RunHead
+        from logs.run_head import RunHead
 
         if not RunHead.read(task.out).decided_elsewhere():
             return found

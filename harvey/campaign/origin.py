@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from harvey.arithmetic import arithmetic
-from harvey.run_files.deciding_code import digest_of, files_in
+from logs.decided_by import arithmetic, digest_of, files_in
 
 PACKAGES = ("blackboard", "world_models", "knowledge_sources", "sim", "logs", "harvey")
 

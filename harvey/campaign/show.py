@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from harvey.campaign.engine import CAMPAIGN
 from harvey.campaign.results_file import KILLED, RESULT, RESULTS, read_results, read_times
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RUNS
-from harvey.tables import table
+from logs.run_directory import RUNS
+from logs.tables import table
 from world_models.words import count
 
 if TYPE_CHECKING:

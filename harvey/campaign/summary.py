@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harvey.tables import table
+from logs.tables import table
 from world_models.units import FOOT_M, INCH_M
 from world_models.words import count, degrees
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from blackboard.journal import Decision
-from logs.turning_points import TurningPoint, TurningPointFinder
+from logs.explain.turning_points import TurningPoint, TurningPointFinder
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, Milestone
 

@@ -6,10 +6,9 @@ from argparse import ArgumentParser, Namespace
 from itertools import islice
 
 from harvey.commands.command import Command
-from harvey.diff.cause import apart, because, opening, settings
-from harvey.diff.first_difference import describe, first_difference
-from harvey.run_files.run_directory import RunDirectory, open_run
-from harvey.why.journal import JournalHistory
+from logs.explain.diff import agreement, apart, because, describe, first_difference, settings
+from logs.run_directory import RunDirectory, open_run
+from logs.timeline import Timeline
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -19,11 +18,11 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.run_files.run_head import RunHead
+    from logs.run_head import RunHead
 
     first, second = open_run(args.first), open_run(args.second)
     heads = RunHead.read(first.path), RunHead.read(second.path)
-    ours, theirs = JournalHistory(first.journal), JournalHistory(second.journal)
+    ours, theirs = Timeline(first.journal), Timeline(second.journal)
     print(f"first:  {_title(first)}\nsecond: {_title(second)}")
     for name, head in zip(("first", "second"), heads, strict=True):
         if elsewhere := head.decided_elsewhere():
@@ -37,7 +36,7 @@ def _run(args: Namespace) -> int:
     if one is None or other is None or args.fields:
         print("\n".join(describe(agreed, one, other)))
     else:
-        print("\n".join([opening(agreed), "", *because(ours, theirs, agreed, set_differently)]))
+        print("\n".join([agreement(agreed), "", *because(ours, theirs, agreed, set_differently)]))
     if one is None and other is None:
         return 0
     print(f"\nHow they went:\n{apart(first, second, ours, theirs)}")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from harvey.commands.command import Command
 from harvey.commands.serve import PORT, check_installed
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RUNS, check_vacant
+from logs.run_directory import RUNS, check_vacant
 
 if TYPE_CHECKING:
     from blackboard.journal import Decision
@@ -128,10 +128,10 @@ def _drive_served(start: Callable[..., MissionResult], mission: HardwareMission,
                   ) -> MissionResult:
     """Drive, and show it on a page, which may pause and stop it."""
     from harvey.hardware.body import HardwareBody
-    from harvey.run_files.run_head import load_known_world
     from harvey.serve.gate import Gate
     from harvey.serve.page import open_page
     from harvey.serve.server import bind
+    from logs.run_head import load_known_world
 
     gate, world = Gate(), load_known_world(mission.world)
     with open_page(bind("127.0.0.1", port), world, robot.lens, mission.name, gate=gate) as page:
@@ -152,7 +152,7 @@ def tell_how_to_stop() -> None:
 
 def summary(result: MissionResult, out: Path) -> str:
     """How a mission on hardware went, and what to do with its run."""
-    from harvey.story.story import first_lines
+    from logs.explain.story import first_lines
 
     m, told = result.milestones, "\n".join(first_lines(out))
     return (f"{result.outcome}: {result.reason}\n"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import open_run
+from logs.run_directory import open_run
 from world_models.words import count
 
 
@@ -21,12 +21,11 @@ def _run(args: Namespace) -> int:
     wanted = {kind: Path(folder) for kind in ("csv", "parquet") if (folder := getattr(args, kind)) is not None}
     if not wanted:
         raise BadInput("expected --csv DIR or --parquet DIR, got neither")
-    from harvey.export.files import write_tables
-    from harvey.export.tables import read_tables
-    from harvey.why.journal import JournalHistory
+    from logs.export import read_tables, write_tables
+    from logs.timeline import Timeline
 
     run = open_run(args.run)
-    history = JournalHistory(run.journal)
+    history = Timeline(run.journal)
     if not history.cycles:
         history.verify()
         raise BadInput(f"{run.journal}: expected at least one decision, got none")

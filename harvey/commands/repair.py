@@ -6,7 +6,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 
 from harvey.commands.command import Command
-from harvey.run_files.run_directory import open_run
+from logs.run_directory import open_run
 from world_models.words import count
 
 
@@ -17,7 +17,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     from tqdm import tqdm
 
-    from harvey.replay.repair import redraw
+    from harvey.repair import redraw
 
     run = open_run(args.run)
     with tqdm(unit=" decisions", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 from harvey.campaign.campaign import parse_pairs
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RunDirectory, check_vacant, open_run
+from logs.run_directory import RunDirectory, check_vacant, open_run
 from world_models.words import count
 
 if TYPE_CHECKING:
-    from harvey.run_files.run_head import RunHead
     from harvey.runner.replay import ReplayedDecision
+    from logs.run_head import RunHead
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -46,9 +46,9 @@ def _run(args: Namespace) -> int:
 
 def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, str], ...]) -> int:
     """Decide it again with a changed agent."""
-    from harvey.replay.counterfactual import what_if
-    from harvey.replay.counterfactual_words import describe_answer
-    from harvey.run_files.run_head import RunHead
+    from harvey.counterfactual import what_if
+    from harvey.counterfactual_words import describe_answer
+    from logs.run_head import RunHead
 
     out = RunDirectory(check_vacant(Path(args.out))) if args.out else None
     if out is not None and out.path.resolve() == run.path.resolve():
@@ -67,9 +67,10 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
 def _again(run: RunDirectory) -> int:
     """Decide it again as it was."""
     from harvey.agent import build_agent
-    from harvey.run_files.observations import Originals
-    from harvey.run_files.run_head import RunHead
-    from harvey.runner.replay import open_pictures, replay
+    from harvey.runner.replay import replay
+    from logs.pictures import open_pictures
+    from logs.records import Originals
+    from logs.run_head import RunHead
 
     agreed, head = 0, RunHead.read(run.path)
     elsewhere = head.decided_elsewhere()
@@ -106,8 +107,8 @@ def _perhaps(head: RunHead, elsewhere: str) -> str:
 
 def _difference(agreed: int, decision: ReplayedDecision) -> str:
     from blackboard.journal import decision_record
-    from harvey.diff.first_difference import describe
-    from harvey.run_files.records import decision_of
+    from logs.explain.diff import describe
+    from logs.records import decision_of
 
     now = None if decision.now is None else decision_of(decision_record(decision.now))
     return "\n".join(["first: as recorded; second: as decided now", *describe(agreed, decision.recorded, now)])

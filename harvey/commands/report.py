@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RunDirectory
+from logs.run_directory import RunDirectory
 
 if TYPE_CHECKING:
-    from harvey.report.several.missions import Mission
+    from harvey.report.several import Mission
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -26,7 +26,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.report.several.missions import find_runs, read_missions
+    from harvey.report.several import find_runs, read_missions
 
     found = [find_runs(text) for text in dict.fromkeys(args.run)]
     first = found[0] if isinstance(found[0], Path) else found[0][0].path
@@ -44,18 +44,18 @@ def _run(args: Namespace) -> int:
         missions = read_missions(found)
         if args.each:
             _write_each(missions, out)
-        from harvey.report.several.page import build_page
+        from harvey.report.several import build_page_of_several
 
-        _write(out, build_page(missions, _title(args.run, missions), out))
+        _write(out, build_page_of_several(missions, _title(args.run, missions), out))
     print(f"{out}: {out.stat().st_size / 1e6:.1f} MB; opens in any browser, without network")
     return 0
 
 
 def _page_of(run: RunDirectory) -> str:
     from harvey.report.page import build_page
-    from harvey.why.journal import JournalHistory
+    from logs.timeline import Timeline
 
-    return build_page(run, JournalHistory(run.journal))
+    return build_page(run, Timeline(run.journal))
 
 
 def _title(named: Sequence[str], missions: Sequence[Mission]) -> str:
@@ -66,7 +66,7 @@ def _write_each(missions: Sequence[Mission], out: Path) -> None:
     """The report of each run that was kept; one that cannot be read is named, and left out."""
     from tqdm import tqdm
 
-    from harvey.report.several.page import report_path
+    from harvey.report.several import report_path
 
     kept = [(mission, mission.run) for mission in missions if mission.run is not None]
     for mission, run in tqdm(kept, unit=" reports", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False):

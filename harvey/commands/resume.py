@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RunDirectory, open_run
+from logs.run_directory import RunDirectory, open_run
 from world_models.words import count
 
 if TYPE_CHECKING:
-    from harvey.run_files.run_head import RunHead
     from harvey.runner.resume import Remains
+    from logs.run_head import RunHead
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -30,8 +30,8 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     run = open_run(args.run, "run.json")
     from harvey.campaign.summary import format_result
-    from harvey.run_files.run_head import HARDWARE, RunHead
     from harvey.runner.resume import find_remains
+    from logs.run_head import HARDWARE, RunHead
 
     remains = find_remains(run)
     if remains.outcome is not None and run.read_result().get("outcome") == remains.outcome.kind:
@@ -45,7 +45,7 @@ def _run(args: Namespace) -> int:
         raise BadInput(f"--base and --camera: expected a run on hardware, and {run.path} is one of the simulator")
     _print_start(run, remains, head)
     from harvey.simulation.run import resume_mission
-    from harvey.story.story import first_lines
+    from logs.explain.story import first_lines
 
     result = resume_mission(run, remains, live=args.live)
     print(format_result(result, run.path, first_lines(run.path)))

@@ -11,7 +11,7 @@ from harvey.campaign.campaign import Task, parse_pairs, parse_seeds, run_task
 from harvey.campaign.workers import add_worker_arguments, choose_workers, parse_workers
 from harvey.commands.command import Command
 from harvey.errors import BadInput, Terminated
-from harvey.run_files.run_directory import RUNS, check_vacant
+from logs.run_directory import RUNS, check_vacant
 
 if TYPE_CHECKING:
     from harvey.campaign.missions import Keep
@@ -97,8 +97,8 @@ def _check(task: Task) -> int:
 def _one(task: Task, args: Namespace) -> int:
     from harvey.campaign.progress import following
     from harvey.campaign.summary import format_result
-    from harvey.story.story import first_lines
-    from harvey.why.trace import printing
+    from logs.explain.story import first_lines
+    from logs.explain.web import printing
 
     sinks = (printing(sys.stdout),) if args.trace else ()
     task.load()  # what is wrong with it is said first

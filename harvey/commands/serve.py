@@ -11,7 +11,7 @@ from pathlib import Path
 from harvey.campaign.campaign import Task, make_room, parse_pairs, parse_seeds
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RUNS, check_vacant
+from logs.run_directory import RUNS, check_vacant
 
 PORT = 8750
 
@@ -59,7 +59,7 @@ def _serve(task: Task, args: Namespace, wanted: Path) -> int:
     from harvey.serve.page import open_page
     from harvey.serve.server import bind
     from harvey.simulation.run import build_head, run_mission
-    from harvey.story.story import first_lines
+    from logs.explain.story import first_lines
 
     listening = bind(args.host, args.port)
     stage = task.stage()
@@ -78,11 +78,11 @@ def _serve(task: Task, args: Namespace, wanted: Path) -> int:
 
 
 def _follow(path: Path, args: Namespace) -> int:
-    from harvey.run_files.run_directory import RunDirectory
-    from harvey.run_files.run_head import RunHead
     from harvey.serve.follow import Follower, how_it_ended
     from harvey.serve.page import open_page
     from harvey.serve.server import bind
+    from logs.run_directory import RunDirectory
+    from logs.run_head import RunHead
 
     run = RunDirectory(path)
     head = RunHead.read(run.path)

@@ -7,8 +7,8 @@ from argparse import ArgumentParser, Namespace
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import open_run
 from logs.disk import is_being_written
+from logs.run_directory import open_run
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -17,14 +17,14 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.run_files.records import read_records
-    from harvey.story.story import story_lines, tell_run
-    from harvey.why.journal import JournalHistory
+    from logs.explain.story import story_lines, tell_run
+    from logs.records import read_records
+    from logs.timeline import Timeline
 
     run = open_run(args.run)
     for _ in read_records(run.journal):
         pass  # a line that is no decision is said first, also where the story has no need of it
-    history = JournalHistory(run.journal)
+    history = Timeline(run.journal)
     story = tell_run(run, history)
     print(json.dumps(story.record(), indent=2) if args.json else "\n".join(story_lines(story)))
     if history.cut_off is not None and not is_being_written(run.journal):

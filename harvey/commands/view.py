@@ -14,7 +14,7 @@ from pathlib import Path
 
 from harvey.commands.command import Command, whole
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RunDirectory, find_directory, open_run
+from logs.run_directory import RunDirectory, find_directory, open_run
 
 OVERVIEW = "overview.rrd"
 LOOPBACK = ("--bind", "127.0.0.1")
@@ -54,14 +54,14 @@ def _run(args: Namespace) -> int:
 
 
 def _write_picture(run: RunDirectory, cycle: int, name: str | None) -> int:
-    from harvey.export.picture import find_picture, write_picture
+    from logs.pictures import find_picture, write_picture
 
     out = Path(name or f"{run.path.resolve().name}-{cycle}.png")
     if out.suffix != ".png":
         raise BadInput(f"--save: expected a name that ends in .png, got {str(out)!r}")
     record = find_picture(run, cycle)
     width, height = write_picture(run, record, out)
-    print(f"{out}: {record.id}, seen in cycle {record.cycle}, taken at {record.value['sim_time_s']:.1f} s; "
+    print(f"{out}: {record.id}, seen in cycle {record.cycle}, taken at {record.fields['sim_time_s']:.1f} s; "
           f"{width} x {height} px")
     return 0
 

@@ -10,17 +10,15 @@ from typing import Any
 
 from harvey.commands.command import Command, whole
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RunDirectory, open_run
-from harvey.story.story import opening
-from harvey.why.history import History
-from harvey.why.journal import JournalHistory
-from harvey.why.model.element import stories_of
-from harvey.why.model.world_file import WorldFile
-from harvey.why.questions import answers, is_question
-from harvey.why.story import LEGEND, Story, lines_of
-from harvey.why.trace import cycle_lines
-from harvey.why.walk import explain
 from logs.disk import is_being_written
+from logs.explain.model import WorldFile
+from logs.explain.questions import answers, is_question
+from logs.explain.story import opening
+from logs.explain.subjects import stories_of
+from logs.explain.web import cycle_lines, explain
+from logs.explain.why import LEGEND, Story, lines_of
+from logs.run_directory import RunDirectory, open_run
+from logs.timeline import Timeline
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -48,7 +46,7 @@ def _run(args: Namespace) -> int:
         raise BadInput("expected one of NAME, --at, --milestone, --not and --check; --not and a question also go with"
                        " --at")
     run = open_run(args.run)
-    history = JournalHistory(run.journal)
+    history = Timeline(run.journal)
     if args.check:
         return _print_check(history, args.json)
     if args.not_ is not None:
@@ -75,10 +73,10 @@ def _describe_unfinished(run: RunDirectory, cycle: int) -> str:
             "The last thing that its journal tells of:\n")
 
 
-def _stories(run: RunDirectory, history: History, args: Namespace) -> Iterator[Story]:
+def _stories(run: RunDirectory, history: Timeline, args: Namespace) -> Iterator[Story]:
     world = WorldFile(run)
     if args.entry is not None and is_question(args.entry):
-        from harvey.story.questions import answers as answers_of_the_run
+        from logs.explain.questions import answers_of_the_run as answers_of_the_run
 
         of_the_run = answers_of_the_run(run, history, args.entry, args.at)
         yield from answers(history, args.entry, args.at) if of_the_run is None else of_the_run
@@ -86,12 +84,12 @@ def _stories(run: RunDirectory, history: History, args: Namespace) -> Iterator[S
     if args.milestone is None:
         yield from stories_of(history, args.entry if args.at is None else args.at, world)
         return
-    from harvey.why.milestone import milestone_story, milestones
+    from logs.explain.subjects import milestone_story, milestones
 
     yield from (milestone_story(history, id, world) for id in milestones(history, args.milestone))
 
 
-def _paragraphs(history: History, args: Namespace, stories: list[Story]) -> Iterator[str]:
+def _paragraphs(history: Timeline, args: Namespace, stories: list[Story]) -> Iterator[str]:
     if args.at is not None and args.entry is None:
         yield from cycle_lines(history.decision(args.at), history.candidates(args.at))
         yield ""
@@ -110,8 +108,8 @@ def _record(one: Story) -> dict[str, Any]:
     return {"entry": one.ref, "headline": one.headline, "decided": one.decided, "steps": steps}
 
 
-def _print_check(history: History, as_json: bool) -> int:
-    from harvey.why.reach import KINDS, check, ground_names
+def _print_check(history: Timeline, as_json: bool) -> int:
+    from logs.explain.web import KINDS, check, ground_names
 
     found = check(history)
     if not found.decisions:
@@ -128,8 +126,8 @@ def _print_check(history: History, as_json: bool) -> int:
     return 0 if not found.failing else 1
 
 
-def _print_not(run: RunDirectory, history: History, args: Namespace) -> None:
-    from harvey.why.why_not_answers import answers
+def _print_not(run: RunDirectory, history: Timeline, args: Namespace) -> None:
+    from harvey.why_not import answers
 
     lines = list(answers(run, history, args.not_, args.at))
     print(json.dumps({"not": args.not_, "at": args.at, "because": lines}, indent=2) if args.json else "\n".join(lines))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from harvey.errors import BadInput
-from harvey.run_files.run_head import RunHead
+from logs.run_head import RunHead
 from world_models.actuator import ActuatorModel
 from world_models.files.toml.mission import TABLES, Mission, MissionFormat
 from world_models.files.toml.source import Source, WorldError

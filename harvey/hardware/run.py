@@ -24,16 +24,16 @@ from harvey.hardware.drivers.base import Base
 from harvey.hardware.drivers.camera import VideoCamera
 from harvey.hardware.mission import HardwareMission
 from harvey.hardware.stopping import Heartbeat, stop_key
-from harvey.run_files.records import EntryRecord, read_records
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import HARDWARE, RunHead
-from harvey.run_files.run_recorder import Extent, RunRecorder
 from harvey.runner.ports import Body
 from harvey.runner.replay import Live, ignore
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import Remains, continue_run
 from harvey.runner.run import Run
 from harvey.runner.teller import Tell, tell_nothing
+from logs.records import EntryRecord, read_records
+from logs.run_directory import RunDirectory
+from logs.run_head import HARDWARE, RunHead
+from logs.run_recorder import Extent, RunRecorder
 from world_models.entries.body import BodyFault, Frame
 from world_models.robot import RobotModel
 
@@ -109,7 +109,7 @@ def time_of_last_observation(files: RunDirectory) -> float:
 
 def count_pictures(files: RunDirectory) -> int:
     """How many pictures of a run were numbered. Raises BadInput."""
-    frames = (seen for seen in _observations(files) if seen.type == Frame.__name__)
+    frames = (seen for seen in _observations(files) if seen.kind is Frame)
     return max((_number(files, frame) + 1 for frame in frames), default=0)
 
 
@@ -147,25 +147,25 @@ class UnknownMotion:
         yield Post(BodyFault("base", "link lost", what, request.id, self._clock()), (request,))
 
 
-def _observations(files: RunDirectory) -> Iterator[EntryRecord]:
+def _observations(files: RunDirectory) -> Iterator[EntryRecord[Any]]:
     for record in read_records(files.journal) if files.journal.is_file() else ():
         yield from record.observed
 
 
-def _time_s(files: RunDirectory, seen: EntryRecord) -> float:
-    value = seen.value if isinstance(seen.value, dict) else {}
+def _time_s(files: RunDirectory, seen: EntryRecord[Any]) -> float:
+    value = seen.fields if isinstance(seen.fields, dict) else {}
     try:
         return max(float(value.get(key, 0.0)) for key in ("sim_time_s", "when_s"))
     except (TypeError, ValueError):
         raise _build_error(files, seen, "when it was observed") from None
 
 
-def _number(files: RunDirectory, frame: EntryRecord) -> int:
+def _number(files: RunDirectory, frame: EntryRecord[Any]) -> int:
     try:
-        return int(frame.value["number"])
+        return int(frame.fields["number"])
     except (KeyError, TypeError, ValueError):
         raise _build_error(files, frame, "a picture's number") from None
 
 
-def _build_error(files: RunDirectory, seen: EntryRecord, expected: str) -> BadInput:
-    return BadInput(f"{files.journal}: {seen.ref}: expected {expected}, got {seen.value!r}")
+def _build_error(files: RunDirectory, seen: EntryRecord[Any], expected: str) -> BadInput:
+    return BadInput(f"{files.journal}: {seen.ref}: expected {expected}, got {seen.fields!r}")

@@ -13,22 +13,20 @@ from typing import Any
 
 from harvey.errors import BadInput
 from harvey.report import data
-from harvey.report.errors import draw_errors
-from harvey.report.pictures import read_pictures
-from harvey.report.plan import draw_plans
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import SIMULATOR, RunHead
-from harvey.runner.replay import open_pictures
-from harvey.story.head import run_name
-from harvey.story.story import RunStory, tell_run
-from harvey.story.truth import read_errors
-from harvey.why.history import History
+from harvey.report.data import draw_plans, read_pictures
+from harvey.report.drawing import draw_errors
+from logs.explain.questions import read_errors
+from logs.explain.story import RunStory, run_name, tell_run
+from logs.pictures import open_pictures
 from logs.reader import read_true_track
+from logs.run_directory import RunDirectory
+from logs.run_head import SIMULATOR, RunHead
+from logs.timeline import Timeline
 from world_models.building.world import World
 from world_models.camera import Camera
 
 
-def build_page(run: RunDirectory, history: History) -> str:
+def build_page(run: RunDirectory, history: Timeline) -> str:
     """The whole file.
 
     Raises:
@@ -82,7 +80,7 @@ def packed(contents: Any) -> str:
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
 
 
-def lost_spans(story: RunStory, history: History) -> Iterator[tuple[int, int]]:
+def lost_spans(story: RunStory, history: Timeline) -> Iterator[tuple[int, int]]:
     """From each cycle in which it was lost to that in which it was found, or to the end."""
     since: int | None = None
     for point in story.turning_points:

@@ -7,25 +7,24 @@ robot; and a run that was cut off gets its board, its agenda and all that is pen
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from blackboard.change import Change
 from blackboard.journal import Decision, decision_line
 from blackboard.scheduler import Scheduler
 from harvey.errors import BadInput
-from harvey.run_files.observations import Originals, effect_of
-from harvey.run_files.records import DecisionRecord, EntryRecord, read_records
-from harvey.run_files.run_directory import RunDirectory
-from logs.camera_file import Pictures
-from logs.reader import read_frames
+from logs.pictures import open_pictures
+from logs.records import DecisionRecord, EntryRecord, Originals, effect_of, read_records
+from logs.run_directory import RunDirectory
 from world_models.frame_store import FrameStore
 
-Live = Callable[[Sequence[Change], Sequence[EntryRecord]], None]
+Live = Callable[[Sequence[Change], Sequence[EntryRecord[Any]]], None]
 """Hears of the changes that a decision made and of what was observed next."""
 
 
-def ignore(_made: Sequence[Change], _observed: Sequence[EntryRecord]) -> None:
+def ignore(_made: Sequence[Change], _observed: Sequence[EntryRecord[Any]]) -> None:
     """No body lives through the replay."""
 
 
@@ -82,40 +81,6 @@ def check_same(run: RunDirectory, decision: ReplayedDecision) -> ReplayedDecisio
 def open_originals(run: RunDirectory, store: FrameStore) -> Originals:
     """What the journal of a run names only by reference. Raises BadInput and RecordingError as for its pictures."""
     return Originals(open_pictures(run), store)
-
-
-def open_pictures(run: RunDirectory) -> Mapping[int, bytes]:
-    """The pictures of a run: from its camera file or, where it has none, from its recording.
-
-    Raises:
-        BadInput: the journal cannot be read, or the camera file is shorter than what it tells of.
-        RecordingError: there is no camera file, and the recording cannot be read.
-    """
-    sizes = list(_sizes(read_records(run.journal)))
-    if sizes and not run.camera.is_file():
-        return read_frames(run.recording)
-    pictures, there = Pictures(run.camera, sizes), camera_bytes(run)
-    if there < pictures.end:
-        raise BadInput(
-            f"{run.camera}: expected {pictures.end} bytes of pictures that the journal tells of, got {there}")
-    return pictures
-
-
-def camera_bytes(run: RunDirectory) -> int:
-    """Length of the camera file; 0 where there is none."""
-    return run.camera.stat().st_size if run.camera.is_file() else 0
-
-
-def _sizes(decisions: Iterable[DecisionRecord]) -> Iterator[tuple[int, int]]:
-    """(number, bytes) of every picture that was seen, in the order in which they came."""
-    for decision in decisions:
-        for record in decision.observed:
-            if record.type == "Frame":
-                try:
-                    yield int(record.value["number"]), int(record.value["jpeg"]["bytes"])
-                except (KeyError, TypeError, ValueError):
-                    raise BadInput(f"{record.ref}: expected a picture's number and length, got {record.value!r}"
-                                   ) from None
 
 
 def _lines(run: RunDirectory) -> Iterator[bytes]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from blackboard.change import Posted
 from blackboard.journal import Decision
-from logs.turning_points import TurningPoint, TurningPointFinder
+from logs.explain.turning_points import Collision, TurningPoint, TurningPointFinder
 from world_models.building.locale_frame import FrameRequest
 from world_models.camera_lessons import CameraLesson, find_camera_lessons
 from world_models.entries.body import Frame, Look, MotionReport
@@ -23,23 +23,6 @@ PROBE = "probe"
 """The purpose of a picture that is to tell where the robot is."""
 UNFINISHED = "unfinished"
 """The outcome in ``result.json`` of a run that has none yet."""
-
-
-@dataclass(frozen=True, slots=True)
-class Contact:
-    """A collision, by the truth.
-
-    Attributes:
-        cycle: the first that began after it.
-        locale: where the robot was, "" outside all locales; x_m, y_m: in the frame of the locale, else of the world.
-        speed_m_per_s: how fast it moved; None in the results of older versions.
-    """
-
-    cycle: int
-    locale: str
-    x_m: float
-    y_m: float
-    speed_m_per_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +64,7 @@ class MissionResult:
     collisions: int | None
     max_cross_track_m: float | None
     amiss: Sequence[str] = ()
-    contacts: Sequence[Contact] = ()
+    contacts: Sequence[Collision] = ()
     turning_points: Sequence[TurningPoint] = ()
     waits: int = 0
     camera: Sequence[CameraLesson] = ()
@@ -110,7 +93,7 @@ class MissionResult:
     @staticmethod
     def of_record(record: Mapping[str, Any]) -> MissionResult:
         """From JSON types. Raises TypeError where they are not those of a result."""
-        contacts = tuple(Contact(**one) for one in record.get("contacts", ()))
+        contacts = tuple(Collision(**one) for one in record.get("contacts", ()))
         turning_points = tuple(TurningPoint(**one) for one in record.get("turning_points", ()))
         camera = tuple(CameraLesson(**one) for one in record.get("camera", ()))
         return MissionResult(

@@ -18,12 +18,13 @@ from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from blackboard.journal import Decision
 from harvey.errors import BadInput
-from harvey.run_files.records import read_records
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_recorder import Extent
-from harvey.runner.replay import Live, camera_bytes, check_same, open_originals, open_pictures, replay
+from harvey.runner.replay import Live, check_same, open_originals, replay
 from harvey.runner.run import Run
 from logs.camera_file import Pictures
+from logs.pictures import camera_bytes, open_pictures
+from logs.records import read_records
+from logs.run_directory import RunDirectory
+from logs.run_recorder import Extent
 from world_models.entries.body import Course, MotorCommand
 from world_models.entries.task import Outcome, Resumed
 
@@ -142,7 +143,7 @@ def _count_decisions(run: RunDirectory) -> tuple[int, Outcome | None]:
     decisions, seen, outcome = 0, False, None
     for record in read_records(run.journal):
         decisions += 1
-        ends = [entry.value for entry in (*record.observed, *record.made) if entry.type == Outcome.__name__]
+        ends = [entry.fields for entry in record.changes if entry.kind is Outcome]
         outcome = Outcome(str(ends[0].get("kind")), str(ends[0].get("reason"))) if ends else outcome
         seen = seen or any(ref.startswith(f"{Outcome.__name__}-") for ref in record.seen)
     return decisions, outcome if seen else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import time
 from collections.abc import Callable, Sequence
@@ -15,18 +16,20 @@ from blackboard.journal import Decision, Sink
 from blackboard.scheduler import RAISED, Scheduler
 from harvey.agent import Agent
 from harvey.errors import BadInput
-from harvey.run_files.learnt_camera import build_camera_text
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import RunHead
-from harvey.run_files.run_recorder import RunRecorder
 from harvey.runner.ports import Body, BodyPort
 from harvey.runner.result import UNFINISHED, MissionResult, RunCounts
 from harvey.runner.teller import Tell, Teller, tell_nothing
 from harvey.runner.world_port import WorldPort, tell_robot
 from logs.disk import CannotWriteError
 from logs.errors import RecordingError
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
+from logs.run_recorder import RunRecorder
+from world_models.camera import CameraDeviation
 from world_models.entries.location import Hypothesis
+from world_models.entries.robot import CameraState
 from world_models.entries.task import Goal, Outcome
+from world_models.files.toml.camera_file import camera_text
 from world_models.files.toml.mission import Limits, Telling
 
 MIN_FREE_BYTES = 1 << 18
@@ -218,3 +221,13 @@ def _build_outcome(files: RunDirectory | None, error: Exception) -> Outcome:
     why = f"{error} (the disk is full)" if full else str(error)
     go_on = "" if files is None else f"; harvey resume {files.path} goes on with it"
     return Outcome("failed", f"stopped, because nothing more can be written down: {why}{go_on}")
+
+
+def build_camera_text(camera: CameraState, mission: str) -> str:
+    """The text of a camera file with what was learnt, and its standard deviations: for the next mission."""
+    if not camera.covariance:
+        raise ValueError("expected a camera of which something was learnt, got one as told")
+    tilt, roll, yaw, height, focal, _, _ = (math.sqrt(row[i]) for i, row in enumerate(camera.covariance))
+    deviation = CameraDeviation(tilt, height, camera.sigma_forward_m, focal, roll, yaw)
+    notes = (f"learnt in the mission {mission}, by {len(camera.counted)} pictures", )
+    return camera_text(camera.lens, camera.mount, notes, deviation)

@@ -19,8 +19,8 @@ from starlette.responses import HTMLResponse, PlainTextResponse, Response, Strea
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from harvey.report.data import draw_blank_plans
 from harvey.report.page import embedded, fill_in
-from harvey.report.plan import draw_blank_plans
 from harvey.serve.gate import Gate, Order
 from harvey.serve.live_state import LiveState
 from world_models.building.world import World

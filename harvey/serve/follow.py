@@ -5,16 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from blackboard.change import Change, Posted, Retracted, Revised
 from harvey.errors import BadInput
-from harvey.run_files.observations import entry_of, refs_of
-from harvey.run_files.records import DecisionRecord, EntryRecord, decision_of
-from harvey.run_files.run_directory import RunDirectory
 from harvey.runner.result import UNFINISHED
 from harvey.serve.live_state import LiveState, Shown
-from harvey.why.links import words
-from harvey.why.sentences import kinds_for
+from logs.records import DecisionRecord, EntryRecord, decision_of, entry_of, kinds_for, refs_of
+from logs.run_directory import RunDirectory
+from world_models import words
 from world_models.entries.body import Frame
 
 PERIOD_S = 0.2
@@ -57,14 +56,14 @@ class Follower:
     def _shown(self, record: DecisionRecord) -> Shown:
         chosen = record.chosen
         return Shown(
-            record.cycle, record.focus, "" if chosen is None else words(chosen.source),
+            record.cycle, record.focus, "" if chosen is None else words.source(chosen.source),
             "" if chosen is None else chosen.trigger, record.refused,
             tuple(self._change(entry) for entry in (*record.observed, *record.made)))
 
-    def _change(self, record: EntryRecord) -> Change:
-        entry = entry_of(record, kinds_for(record))
+    def _change(self, record: EntryRecord[Any]) -> Change:
+        entry = entry_of(record, kinds_for(record.type))
         if isinstance(entry.value, Frame):
-            size = record.value["jpeg"]["bytes"]
+            size = record.fields["jpeg"]["bytes"]
             with self._run.camera.open("rb") as file:
                 file.seek(self._pictures)
                 entry = entry._replace(value=replace(entry.value, jpeg=file.read(size)))

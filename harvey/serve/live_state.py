@@ -10,10 +10,8 @@ from typing import Any, NamedTuple
 from blackboard.change import Change, Retracted
 from blackboard.entry import Entry
 from blackboard.journal import Decision
-from harvey.report.data import placed
-from harvey.report.pictures import Lenses, shrink
-from harvey.why.links import words
-from world_models import words as plain_words
+from harvey.report.data import Lenses, placed, shrink
+from world_models import words
 from world_models.building.world import World
 from world_models.camera import Camera
 from world_models.entries.body import Frame
@@ -162,7 +160,7 @@ class LiveState:
 def _shown(decision: Decision) -> Shown:
     chosen = decision.chosen
     return Shown(
-        decision.cycle, str(decision.focus), "" if chosen is None else words(chosen.source.name),
+        decision.cycle, str(decision.focus), "" if chosen is None else words.source(chosen.source.name),
         "" if chosen is None else chosen.trigger, decision.refused, (*decision.observed, *decision.made))
 
 
@@ -177,4 +175,4 @@ def _row(shown: Shown) -> dict[str, Any]:
 
 def _says(change: Change) -> str:
     gone = "; no longer believed" if isinstance(change, Retracted) else ""
-    return f"{change.entry.ref}: {plain_words.sentence(change.entry.value)}{gone}"
+    return f"{change.entry.ref}: {words.sentence(change.entry.value)}{gone}"

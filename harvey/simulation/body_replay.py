@@ -19,8 +19,8 @@ from blackboard.entry import Entry
 from blackboard.journal import plain
 from blackboard.scheduler import Port
 from harvey.errors import BadInput
-from harvey.run_files.records import EntryRecord, as_line
 from harvey.runner.replay import Live
+from logs.records import EntryRecord, as_line
 from sim.body.actuator import ActuatorParameters
 from sim.body.simulated_body import SimulatedBody
 from world_models.entries.body import Course, MotorCommand
@@ -47,12 +47,12 @@ class BodyReplay:
         """What the wheels claim of a command that was cut off."""
         return self.answer(Posted(request), True)
 
-    def __call__(self, made: Sequence[Change], observed: Sequence[EntryRecord]) -> None:
+    def __call__(self, made: Sequence[Change], observed: Sequence[EntryRecord[Any]]) -> None:
         """Let the body do what the changes asked for. Raises BadInput where it answers otherwise than ``observed``."""
         broken_off = find_interrupted(observed)
         answers = [effect for change in made for effect in self.answer(change, str(change.entry.ref) in broken_off)]
         now = [as_line(plain(effect.value)) for effect in answers if not isinstance(effect, Retract)]
-        then = [as_line(record.value) for record in observed if record.author == self._port.name]
+        then = [as_line(record.fields) for record in observed if record.author == self._port.name]
         if now != then:
             number, pair = next((i, p) for i, p in enumerate(zip([*now, "nothing"], [*then, "nothing"], strict=False))
                                 if p[0] != p[1])
@@ -89,7 +89,7 @@ def part_of(command: MotorCommand, part: float, actuator: ActuatorParameters) ->
     return MotorCommand(command.turn_rad * turned, command.move_m * min(1.0, moved))
 
 
-def find_interrupted(observed: Sequence[EntryRecord]) -> frozenset[str]:
+def find_interrupted(observed: Sequence[EntryRecord[Any]]) -> frozenset[str]:
     """The refs of the commands that a run, when it went on, was told not to have been answered."""
-    told = (record.value for record in observed if record.type == Resumed.__name__ and isinstance(record.value, dict))
+    told = (record.fields for record in observed if record.kind is Resumed and isinstance(record.fields, dict))
     return frozenset(str(ref) for value in told for ref in value.get("interrupted", ()))

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from blackboard.journal import Decision
-from harvey.runner.result import Contact, MissionResult
+from harvey.runner.result import MissionResult
 from harvey.simulation.contacts import ContactWatch
+from logs.explain.turning_points import Collision
 from sim.body.simulated_body import SimulatedBody
 from sim.stage import Stage
 from sim.truth import cross_track_m
@@ -34,7 +35,7 @@ class Referee:
         self._fix: Pose2 | None = None
         self._followed = 0
         self._contact_watch = ContactWatch(world, body)
-        self._contacts: list[Contact] = []
+        self._contacts: list[Collision] = []
 
     def __call__(self, decision: Decision) -> None:
         self._follow()
@@ -79,7 +80,7 @@ class Referee:
     def _note_contacts(self, cycle: int) -> None:
         for contact in self._contact_watch.new_contacts():
             place = contact.place
-            self._contacts.append(Contact(cycle, place.locale, place.x_m, place.y_m, contact.speed_m_per_s))
+            self._contacts.append(Collision(cycle, place.locale, place.x_m, place.y_m, contact.speed_m_per_s))
 
     def _follow(self) -> None:
         """How far the robot truly strayed from the leg that it was driving since the last decision."""

@@ -10,9 +10,6 @@ from blackboard.journal import Sink
 from harvey.agent import Agent, Sources, build_agent
 from harvey.agent_settings import Pairs
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import HARDWARE, SIMULATOR, RunHead, load_known_world
-from harvey.run_files.run_recorder import RunRecorder
 from harvey.runner.ports import Body
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import Remains, continue_run
@@ -23,6 +20,9 @@ from harvey.simulation.contacts import ContactWatch
 from harvey.simulation.referee import Referee
 from harvey.simulation.serial_body import IN_PROCESS, open_body
 from harvey.wiring import knowledge_sources
+from logs.run_directory import RunDirectory
+from logs.run_head import HARDWARE, SIMULATOR, RunHead, load_known_world
+from logs.run_recorder import RunRecorder
 from sim.scenario import Scenario, ScenarioError, scenario_from_tables
 from sim.stage import Stage, build_stage
 from world_models.actuator import ActuatorModel
@@ -57,7 +57,7 @@ def run_mission(
     """Run a scenario's mission to its outcome.
 
     Args:
-        out: directory for the files of :mod:`harvey.run_files.run_directory`; None keeps nothing.
+        out: directory for the files of :mod:`logs.run_directory`; None keeps nothing.
         sinks: called with every decision.
         live: let a viewer watch.
         sources: makes the knowledge sources.

@@ -12,8 +12,8 @@ from browser_pages import TELEPHONE
 from experiments.generated.short_missions import OFFICE, fault
 from harvey.campaign.campaign import Task, run_task
 from harvey.report.page import build_page
-from harvey.run_files.run_directory import RunDirectory
-from harvey.why.journal import JournalHistory
+from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from report_contents import read_contents
 
 
@@ -25,7 +25,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
         OFFICE + fault("kidnap", "allens-office", 3.0, distance_m=0.8, turn_deg=30.0), encoding="utf-8")
     assert run_task(Task(str(folder / "kidnapped.toml"), (), 0, folder / "run")).outcome == "reached"
     run = RunDirectory(folder / "run")
-    (folder / "report.html").write_text(build_page(run, JournalHistory(run.journal)), encoding="utf-8")
+    (folder / "report.html").write_text(build_page(run, Timeline(run.journal)), encoding="utf-8")
     return folder / "report.html"
 
 

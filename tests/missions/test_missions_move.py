@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from harvey.agent import build_agent
-from harvey.run_files.records import read_records
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import RunHead
 from harvey.runner.replay import open_originals, replay
 from harvey.runner.resume import find_remains
 from harvey.simulation.run import resume_mission, run_mission
+from logs.records import read_records
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
 from sim.scenario import parse_scenario, with_settings
 from sim.stage import Stage, build_stage
 
@@ -60,8 +60,8 @@ def test_each_picture_on_the_move_corrects_the_course_and_all_of_it_is_decided_a
     records = list(read_records(run.journal))
     courses = [e for r in records for e in r.made if e.type == "Course"]
     assert courses[0].change == "Posted" and len(courses) > 60
-    assert len({e.value["curvature_per_m"] for e in courses}) > 0.9 * (len(courses) - 2)
-    taken = [e.value["sim_time_s"] for r in records for e in r.observed
+    assert len({e.fields["curvature_per_m"] for e in courses}) > 0.9 * (len(courses) - 2)
+    taken = [e.fields["sim_time_s"] for r in records for e in r.observed
              if e.type == "Frame" and e.because[0].startswith("Course-1.")]
     steps = [b - a for a, b in itertools.pairwise(taken)][:-1]
     assert all(abs(step - 1.0 / 30.0) < 1e-9 for step in steps)
@@ -79,7 +79,7 @@ def test_a_run_that_is_cut_off_on_the_move_goes_on(run: RunDirectory, stage: Sta
     cut.journal.write_bytes(b"".join(lines[: rolling[30]]))
     assert resume_mission(cut, find_remains(cut), stage=stage).outcome == "reached"
     told = next(e for r in read_records(cut.journal) for e in r.observed if e.type == "Resumed")
-    assert told.value["interrupted"] == [next(
+    assert told.fields["interrupted"] == [next(
         e.ref for r in read_records(cut.journal) if r.cycle == rolling[30] for e in r.made if e.type == "Course")]
     assert decided_again(cut)
 
@@ -93,9 +93,9 @@ def test_who_is_carried_off_on_the_move_stops_at_once(tmp_path: Path) -> None:
     assert result.camera == (), "the camera was not turned: somebody carried the robot"
     records = list(read_records(run.journal))
     at = next(i for i, r in enumerate(records) for e in r.made if e.type == "Discrepancy" and e.author
-              == "correlator_tracker" and e.value["magnitude"] in ("inf", float("inf")))
+              == "correlator_tracker" and e.fields["magnitude"] in ("inf", float("inf")))
     after = [e for r in records[at + 1: at + 4] for e in r.made if e.type in ("Course", "MotorCommand")]
-    assert [(e.type, e.value["speed_m_per_s"], e.author) for e in after] == [("Course", 0.0, "path_follower")]
+    assert [(e.type, e.fields["speed_m_per_s"], e.author) for e in after] == [("Course", 0.0, "path_follower")]
 
 
 def test_it_is_a_setting_like_any_other() -> None:

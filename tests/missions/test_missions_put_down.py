@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from harvey.run_files.records import read_records
 from harvey.simulation.run import run_mission
 from knowledge_sources.settings import DEFAULT
+from logs.records import read_records
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
 
@@ -29,7 +29,7 @@ def test_a_first_milestone_far_from_where_expected_is_verified(
 ) -> None:
     run_mission(roughly_put_down, seed, out=tmp_path)
     made = [entry for record in read_records(tmp_path / "journal.jsonl") for entry in record.made]
-    first = next(entry.value for entry in made if entry.type == "Certificate")
+    first = next(entry.fields for entry in made if entry.type == "Certificate")
     assert first["deviation_px"] > DEFAULT.plan.max_deviation_px
     assert first["verdict"] == "verified", first["reason"]
     assert first["deviation_px"] < first["tolerance_px"]

@@ -12,13 +12,13 @@ from blackboard.change import Retracted
 from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from harvey.cli import main
-from harvey.replay.counterfactual import what_if
-from harvey.run_files.records import read_records
-from harvey.run_files.run_directory import RunDirectory
+from harvey.counterfactual import what_if
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
 from harvey.runner.teller import PAGE, LiveTeller
 from harvey.simulation.run import resume_mission, run_mission
+from logs.records import read_records
+from logs.run_directory import RunDirectory
 from sim.scenario import ScenarioError
 from sim.stage import Stage
 from two_doors import two_doors
@@ -89,7 +89,7 @@ def test_by_the_missions_file_it_is_asked_at_its_time_and_once_after_a_crash(tmp
     result, _ = drive(stage, Asks(12, "Go to the attic"), tmp_path / "whole")
     assert result.outcome == "reached" and result.error_m < 0.0254
     whole, run = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "cut")
-    told = [entry.value for record in read_records(whole.journal) for entry in record.observed
+    told = [entry.fields for record in read_records(whole.journal) for entry in record.observed
             if entry.type in ("Told", "Redirection")]
     assert [one.get("text", one.get("what")) for one in told] == ["Go to the attic", "north-door", BACK]
     run.path.mkdir()
@@ -100,7 +100,7 @@ def test_by_the_missions_file_it_is_asked_at_its_time_and_once_after_a_crash(tmp
     lines = whole.journal.read_bytes().splitlines(keepends=True)
     run.journal.write_bytes(b"".join(lines[:cycles[0] + 2]))
     assert resume_mission(run, find_remains(run), stage=stage).outcome == "reached"
-    again = [entry.value for record in read_records(run.journal) for entry in record.observed
+    again = [entry.fields for record in read_records(run.journal) for entry in record.observed
              if entry.type in ("Told", "Redirection")]
     assert again == told
 
@@ -114,7 +114,7 @@ def test_what_if_it_had_been_otherwise_hears_the_page_again(tmp_path: Path, caps
     assert answer.result is not None and answer.result.outcome == "reached" and answer.result.error_m < 0.1
     out = RunDirectory(tmp_path / "other")
     what_if(RunDirectory(tmp_path / "run"), ["parlour/picture-1"], (), out=out)
-    told = [(entry.author, entry.value["text"]) for record in read_records(out.journal) for entry in record.observed
+    told = [(entry.author, entry.fields["text"]) for record in read_records(out.journal) for entry in record.observed
             if entry.type == "Redirection"]
     assert told == [(PAGE, BACK)]
 

@@ -12,15 +12,15 @@ from rerun.chunk import RrdReader
 
 from experiments.generated.short_missions import OFFICE
 from harvey.cli import main
-from harvey.run_files.records import EntryRecord, read_records
-from harvey.run_files.run_directory import RunDirectory
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
 from harvey.simulation.run import build_head, resume_mission, run_mission
-from harvey.story.turns import read_turning_points
-from harvey.why.journal import JournalHistory
-from harvey.why.story import tell_stories
+from logs.explain.turning_points import read_turning_points
+from logs.explain.why import tell_stories
 from logs.recording.paths import CONTACTS, RANGES
+from logs.records import EntryRecord, read_records
+from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 
@@ -68,12 +68,12 @@ def test_ranges_come_with_each_picture(touched: tuple[MissionResult, Path]) -> N
     _, out = touched
     frames, ranges = observed(out, "Frame"), observed(out, "Ranges")
     assert [frame.because for frame in frames] == [reading.because for reading in ranges]
-    nearest_m = min(d for reading in ranges for d in reading.value["distances_m"] if d is not None)
+    nearest_m = min(d for reading in ranges for d in reading.fields["distances_m"] if d is not None)
     assert nearest_m == pytest.approx(0.35, abs=0.08)  # the radius: it touches something
 
 
 def test_why_it_stopped_walks_to_what_it_touched(touched: tuple[MissionResult, Path]) -> None:
-    history = JournalHistory(RunDirectory(touched[1]).journal)
+    history = Timeline(RunDirectory(touched[1]).journal)
     stopped = [entry for ref in history.refs if ref.startswith("Discrepancy-") and ref.endswith(".0")
                and (entry := history.entry(ref)) is not None and entry.author == "dead_reckoner"]
     assert stopped

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import rerun as rr
 
+from logs.explain.turning_points import TurningPoint, TurningPointFinder
 from logs.recording.board_mirror import Moment
 from logs.recording.logger import Logger, Subject
 from logs.recording.palette import BELIEVED, DONE, LEVELS, MATCHED, PLANNED, REJECTED, REVISED, TRUE, VERDICTS, Colour
 from logs.recording.panel import Panel, log_view
 from logs.recording.paths import CHAPTERS
 from logs.recording.stream import RecordingStream
-from logs.turning_points import TurningPoint, TurningPointFinder
 from world_models import words
 from world_models.frames import Pose2
 

@@ -20,8 +20,8 @@ from blackboard.journal import Decision, decision_line, entry_record
 from blackboard.kinds import Kind, Role
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
-from harvey.why.journal import JournalHistory
 from logs.journal_file import JournalFile
+from logs.timeline import Timeline
 from strategies import Note, Scripted, Tally, levels, ratings, run
 
 MOST_CYCLES = 40
@@ -210,5 +210,5 @@ def test_every_revision_can_be_read_back_from_the_journal(program: list[Rule]) -
         scheduler.tell([Post(Note("a")), Post(Tally(1))], "user")
         run(scheduler, 24)
         journal.close()
-        history = JournalHistory(path)
-        assert {ref: history.entry(ref).value for ref in written} == written
+        history = Timeline(path)
+        assert {ref: history.entry(ref).fields for ref in written} == written

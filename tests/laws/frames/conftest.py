@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from experiments.generated.short_missions import OFFICE, fault
-from harvey.run_files.run_directory import RunDirectory
 from harvey.simulation.run import run_mission
+from logs.run_directory import RunDirectory
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from two_doors import two_doors

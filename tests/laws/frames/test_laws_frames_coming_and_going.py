@@ -21,10 +21,6 @@ from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 from experiments.generated.short_missions import HALLWAY
 from harvey.agent import build_agent
-from harvey.run_files.observations import effect_of
-from harvey.run_files.records import EntryRecord, decision_of, read_records
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import RunHead
 from harvey.runner.replay import open_originals
 from harvey.runner.world_port import WorldPort
 from harvey.simulation.run import run_mission
@@ -32,6 +28,9 @@ from harvey.wiring import load_kinds
 from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.questions import find_building, find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from logs.records import EntryRecord, decision_of, effect_of, read_records
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from strategies import Note
@@ -63,13 +62,13 @@ def check_asked_for(decisions: Iterable[Mapping[str, Any]], left: Mapping[int, I
         for entry in decision.observed:
             if entry.type != LocaleFrame.__name__ or entry.change != "Posted":
                 continue
-            name = entry.value["locale"]
+            name = entry.fields["locale"]
             (reason,) = entry.because
             assert name in requests[reason]["locales"] or (name in ROOTS and "" in requests[reason]["locales"])
             assert entry.author == "world" and name not in there.values()
             there[entry.id] = name
             came += 1
-        requests |= {entry.ref: entry.value for entry in decision.made if entry.type == "FrameRequest"}
+        requests |= {entry.ref: entry.fields for entry in decision.made if entry.type == "FrameRequest"}
         for id in left.get(decision.cycle, ()):
             there.pop(id, None)
     return came

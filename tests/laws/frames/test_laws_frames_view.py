@@ -10,9 +10,9 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from harvey.agent import build_agent
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import RunHead
 from harvey.runner.replay import open_originals, replay
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
 from rebuilt_board import rebuild, recorded_act
 from world_models.building.changes.removals import element_names
 from world_models.building.locale_frame import FrameChange, LocaleFrame

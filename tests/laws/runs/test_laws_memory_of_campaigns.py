@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from experiments.generated.scenes import generate_house
 from harvey.campaign.case_work import return_memory
-from harvey.run_files.run_head import load_known_world
 from knowledge_sources.methods.verification.predicted_colors import _build_surfaces, _find_surfaces
+from logs.run_head import load_known_world
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world
 

@@ -17,18 +17,16 @@ from blackboard.change import Change, Posted, Retracted, Revised
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.journal import Decision, decision_line
 from blackboard.scheduler import Scheduler
-from harvey.diff.first_difference import describe, differing_leaves, first_difference
 from harvey.errors import BadInput
-from harvey.run_files.records import Candidate, DecisionRecord, EntryRecord, as_line, decision_of
-from harvey.why.history import MemoryHistory
-from harvey.why.journal import JournalHistory
-from harvey.why.reach import SENSOR, explained_by, reaches, trace_grounds
-from harvey.why.sentences import sentence
-from harvey.why.story import lines_of, story
-from harvey.why.trace import Trace
-from harvey.why.walk import explain, walk
-from harvey.why.why_not import Fate, in_cycle, in_run, of_entry
 from harvey.wiring import load_kinds
+from logs.explain.diff import describe, differing_leaves, first_difference
+from logs.explain.phrases import sentence
+from logs.explain.web import SENSOR, Trace, explain, explained_by, reaches, trace_grounds, walk
+from logs.explain.why import lines_of, story
+from logs.explain.why_not import Fate, in_cycle, in_run, of_entry
+from logs.records import Candidate, DecisionRecord, EntryRecord, as_line, decision_of
+from logs.timeline import Timeline
+from memory_timeline import MemoryTimeline
 from strategies import Note, Scripted, Tally
 
 LAWS = settings(deadline=None, max_examples=60)
@@ -105,7 +103,7 @@ def within(known: dict[str, EntryRecord], ref: str, steps: int) -> set[str]:
 @given(journals(), st.integers(0, 10**6))
 def test_the_whole_walk_is_the_closure_and_tells_each_entry_once(lines: list[str], pick: int) -> None:
     decisions = read(lines)
-    known, history = entries(decisions), MemoryHistory(decisions)
+    known, history = entries(decisions), MemoryTimeline(decisions)
     ref = sorted(known)[pick % len(known)]
     reasons = list(walk(history, [ref], depth=10**6))
     told = [r.ref for r in reasons if not r.known]
@@ -120,7 +118,7 @@ def test_a_short_walk_is_the_beginning_of_the_whole_and_says_what_it_leaves_out(
     lines: list[str], pick: int, depth: int
 ) -> None:
     decisions = read(lines)
-    known, history = entries(decisions), MemoryHistory(decisions)
+    known, history = entries(decisions), MemoryTimeline(decisions)
     ref = sorted(known)[pick % len(known)]
     reasons = list(walk(history, [ref], depth))
     assert max(r.depth for r in reasons) <= depth
@@ -168,11 +166,11 @@ def test_diff_finds_the_first_line_that_differs(ours: list[str], theirs: list[st
 @LAWS
 @given(journals(), st.binary(max_size=30).filter(lambda tail: b"\n" not in tail), st.integers(0, 10**6))
 def test_a_file_that_is_swept_tells_what_a_file_that_is_read_tells(lines: list[str], tail: bytes, pick: int) -> None:
-    told = MemoryHistory(read(lines))
+    told = MemoryTimeline(read(lines))
     with NamedTemporaryFile() as file:
         file.write("".join(line + "\n" for line in lines).encode() + tail)
         file.flush()
-        swept = JournalHistory(Path(file.name))
+        swept = Timeline(Path(file.name))
     assert swept.refs == told.refs
     assert swept.newest == told.newest
     assert swept.cycles == told.cycles
@@ -187,11 +185,11 @@ def test_a_file_that_is_swept_tells_what_a_file_that_is_read_tells(lines: list[s
 @LAWS
 @given(journals())
 def test_an_oddly_written_file_tells_the_same(lines: list[str]) -> None:
-    told = MemoryHistory(read(lines))
+    told = MemoryTimeline(read(lines))
     with NamedTemporaryFile("w") as file:
         file.write("".join(json.dumps(json.loads(line)) + "\n" for line in lines))
         file.flush()
-        swept = JournalHistory(Path(file.name))
+        swept = Timeline(Path(file.name))
     assert swept.refs == told.refs
     assert list(swept.decisions()) == list(told.decisions())
 
@@ -205,7 +203,7 @@ def sensed(record: EntryRecord) -> str | None:
 @given(journals())
 def test_a_decision_is_explained_exactly_if_the_closure_of_each_effect_has_a_ground(lines: list[str]) -> None:
     decisions = read(lines)
-    known, told = entries(decisions), MemoryHistory(decisions)
+    known, told = entries(decisions), MemoryTimeline(decisions)
     for one in trace_grounds(decisions, sensed):
         assert tuple(one.grounds) == explained_by(one.decision)
         for ref, found in one.grounds.items():
@@ -236,7 +234,7 @@ def test_a_walk_ends_on_any_graph_and_names_what_is_lacking(graph: dict[int, lis
 @given(journals())
 def test_candidates_are_those_that_the_trace_keeps(lines: list[str]) -> None:
     decisions = read(lines)
-    told, pending = MemoryHistory(decisions), dict[int, Candidate]()
+    told, pending = MemoryTimeline(decisions), dict[int, Candidate]()
     for d in decisions:
         pending |= {c.number: c for c in d.activated}
         for c in d.obviated:
@@ -251,7 +249,7 @@ def test_candidates_are_those_that_the_trace_keeps(lines: list[str]) -> None:
 @given(journals(), st.sampled_from(["wilful", "second"]))
 def test_why_not_agrees_with_a_plain_reading(lines: list[str], source: str) -> None:
     decisions = read(lines)
-    told = MemoryHistory(decisions)
+    told = MemoryTimeline(decisions)
     activated = [c.number for d in decisions for c in d.activated if c.source == source]
     acted = [d.cycle for d in decisions if d.chosen is not None and d.chosen.source == source and not d.refused]
     dropped = [d.cycle for d in decisions for c in d.obviated if c.source == source]
@@ -278,7 +276,7 @@ def test_a_broken_byte_is_told_by_file_and_line_or_does_not_matter(
         file.write(data)
         file.flush()
         try:
-            history = JournalHistory(Path(file.name))
+            history = Timeline(Path(file.name))
             for ref in history.refs:
                 list(explain(history, [ref]))
                 list(of_entry(history, ref))
@@ -321,7 +319,7 @@ def test_the_story_of_any_web_of_entries_ends_and_tells_each_thing_once(
     made = [EntryRecord("Posted", ref, type, "source", tuple(refs[k % len(refs)] for k in below), value, 1, False)
             for ref, (type, value, below) in zip(refs, web, strict=True)]
     decision = DecisionRecord(1, "plan", (), (), (), (), None, None, 0, tuple(made), "", {})
-    history = MemoryHistory([decision])
+    history = MemoryTimeline([decision])
     for record in made:
         told = story(history, record)
         assert len({(step.text, step.refs) for step in told.steps}) == len(told.steps)

@@ -18,8 +18,7 @@ from blackboard.entry import Ref
 from blackboard.journal import change_record, plain
 from blackboard.scheduler import registry_of
 from harvey.errors import BadInput
-from harvey.run_files.observations import Originals, effect_of, value_of
-from harvey.run_files.records import EntryRecord
+from logs.records import EntryRecord, Originals, effect_of, original_of
 from scripted_mission import HOUSE
 from world_models.actuator import ActuatorModel
 from world_models.building.locale_frame import FrameAnswer, FrameChange, FrameRequest, LocaleFrame
@@ -82,7 +81,7 @@ def originals_of(value: Any) -> Originals:
 @settings(deadline=None, max_examples=200)
 @given(observations)
 def test_an_observation_comes_back_as_it_was(value: Any) -> None:
-    again = value_of(recorded(value), originals_of(value), KNOWN)
+    again = original_of(recorded(value), originals_of(value), KNOWN)
     assert type(again) is type(value)
     assert json.dumps(plain(again)) == json.dumps(plain(value))
     effect = effect_of(recorded(value), originals_of(value), Blackboard().view, KNOWN)
@@ -94,21 +93,21 @@ def test_an_observation_comes_back_as_it_was(value: Any) -> None:
 @given(observations, st.data())
 def test_a_value_of_other_fields_is_refused(value: Any, data: st.DataObject) -> None:
     record = recorded(value)
-    key = data.draw(st.sampled_from(sorted(record.value)))
+    key = data.draw(st.sampled_from(sorted(record.fields)))
     other = data.draw(st.sampled_from([{}, [1, 2], [[1]]]))
-    lacking = {k: v for k, v in record.value.items() if k != key}
-    for broken in (lacking, {**record.value, key: other}, {**record.value, "x": 1}):
+    lacking = {k: v for k, v in record.fields.items() if k != key}
+    for broken in (lacking, {**record.fields, key: other}, {**record.fields, "x": 1}):
         with pytest.raises(BadInput, match="expected"):
-            value_of(replace(record, value=broken), originals_of(value), KNOWN)
+            original_of(replace(record, fields=broken), originals_of(value), KNOWN)
 
 
 @given(st.binary(max_size=9), st.binary(max_size=9))
 def test_a_picture_must_be_the_one_that_was_seen(seen: bytes, kept: bytes) -> None:
     record = recorded(Frame(seen, 7, 0.5))
     if hashlib.sha256(seen).digest() == hashlib.sha256(kept).digest():
-        assert value_of(record, originals(Frame(kept, 7, 0.5)), KNOWN).jpeg == seen
+        assert original_of(record, originals(Frame(kept, 7, 0.5)), KNOWN).jpeg == seen
         return
     with pytest.raises(BadInput, match="another one"):
-        value_of(record, originals(Frame(kept, 7, 0.5)), KNOWN)
+        original_of(record, originals(Frame(kept, 7, 0.5)), KNOWN)
     with pytest.raises(BadInput, match="picture 7"):
-        value_of(record, originals(Frame(seen, 8, 0.5)), KNOWN)
+        original_of(record, originals(Frame(seen, 8, 0.5)), KNOWN)

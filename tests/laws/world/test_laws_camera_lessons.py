@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harvey.run_files.learnt_camera import build_camera_text
+from harvey.runner.run import build_camera_text
 from knowledge_sources.camera_knowledge import compute_camera_covariance, has_counted, learn
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from harvey.cli import main
+from harvey.counterfactual import what_if
 from harvey.errors import BadInput
-from harvey.replay.counterfactual import what_if
-from harvey.run_files.records import DecisionRecord, read_records
-from harvey.run_files.run_directory import RunDirectory
 from harvey.simulation.run import build_head, run_mission
 from knowledge_sources.settings.table import list_rows
+from logs.records import DecisionRecord, read_records
+from logs.run_directory import RunDirectory
 from sim.stage import Stage
 
 SEEN, BEHIND, FAR = "allens-office/desk", "allens-office/bookshelf-1", "robot-laboratory/long-bench"
@@ -30,7 +30,7 @@ def run(short_stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDire
 
 def rests_on(records: list[DecisionRecord], landmark: str) -> int:
     """How many decisions come before the first that makes something which names the landmark."""
-    made = (json.dumps([entry.value for entry in record.made]) for record in records)
+    made = (json.dumps([entry.fields for entry in record.made]) for record in records)
     return next((n for n, text in enumerate(made) if json.dumps(landmark) in text), len(records))
 
 
@@ -107,7 +107,7 @@ def test_without_an_expert_the_simulated_robot_goes_on_by_itself(
 def test_without_a_segment(run: RunDirectory) -> None:
     answer = what_if(run, ["Frame-1 segment 3"], (), go_on=False)
     assert answer.then is not None and answer.now is not None
-    then, now = (next(e.value for e in d.made if e.type == "Segments") for d in (answer.then, answer.now))
+    then, now = (next(e.fields for e in d.made if e.type == "Segments") for d in (answer.then, answer.now))
     assert now["segments_px"] == [s for n, s in enumerate(then["segments_px"]) if n != 3]
 
 
@@ -116,7 +116,7 @@ def test_a_segment_has_the_number_that_it_had_before_another_was_taken(run: RunD
     fewer = RunDirectory(tmp_path / "fewer")
     answer = what_if(run, ["Frame-1 segment 3"], (), out=fewer, go_on=False)
     assert answer.then is not None
-    last = len(next(e.value for e in answer.then.made if e.type == "Segments")["segments_px"]) - 1
+    last = len(next(e.fields for e in answer.then.made if e.type == "Segments")["segments_px"]) - 1
     assert what_if(fewer, [f"Frame-1 segment {last}"], (), go_on=False).agreed == answer.agreed
     with pytest.raises(BadInput, match=f"0 to {last}, got {last + 1}"):
         what_if(fewer, [f"Frame-1 segment {last + 1}"], (), go_on=False)
@@ -142,7 +142,7 @@ def test_where_it_parts_the_record_no_longer_answers(run: RunDirectory) -> None:
     assert answer.outcome.kind == "unfinished"
     assert answer.parting is not None and answer.parting.now is not None and answer.parting.then is not None
     parted = answer.parting.then, answer.parting.now
-    then, now = ([e.value for e in d.made if e.type == "MotorCommand"] for d in parted)
+    then, now = ([e.fields for e in d.made if e.type == "MotorCommand"] for d in parted)
     assert then != now
 
 

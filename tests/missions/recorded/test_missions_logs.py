@@ -9,11 +9,11 @@ from jsonschema import Draft202012Validator
 
 from docs.tools.site.journal import SCHEMA
 from experiments.generated.short_missions import HALLWAY, fault
-from harvey.run_files.run_directory import RunDirectory
 from harvey.simulation.run import run_mission
 from logs.journal_file import read_journal
 from logs.reader import read_decisions, read_frames, read_series
 from logs.recording.paths import CHAPTERS, HARVEY, TABLE, WHY
+from logs.run_directory import RunDirectory
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 

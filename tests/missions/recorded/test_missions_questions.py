@@ -10,7 +10,7 @@ import pytest
 from experiments import trials
 from experiments.scale import questions, questions_asked
 from experiments.scale.questions_asked import KINDS, ask
-from harvey.run_files.run_directory import RunDirectory
+from logs.run_directory import RunDirectory
 
 
 @pytest.fixture(scope="module")

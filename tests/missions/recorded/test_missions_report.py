@@ -11,9 +11,10 @@ import pytest
 from experiments.generated.short_missions import OFFICE, fault
 from harvey.campaign.campaign import Task, run_task
 from harvey.report.page import build_page
-from harvey.run_files.run_directory import RunDirectory
-from harvey.why.journal import JournalHistory
+from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from report_contents import read_contents
+from world_models.entries.body import Frame
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
 
 @pytest.fixture(scope="module")
 def page(run: RunDirectory) -> str:
-    return build_page(run, JournalHistory(run.journal))
+    return build_page(run, Timeline(run.journal))
 
 
 def test_it_asks_the_network_for_nothing(page: str) -> None:
@@ -38,11 +39,11 @@ def test_it_asks_the_network_for_nothing(page: str) -> None:
 
 
 def test_it_holds_the_run(page: str, run: RunDirectory) -> None:
-    history, data = JournalHistory(run.journal), read_contents(page)
+    history, data = Timeline(run.journal), read_contents(page)
     assert [one["cycle"] for one in data["cycles"]] == list(history.cycles)
     assert data["entries"].keys() == set(history.refs)
     assert all(set(entry["because"]) <= data["entries"].keys() for entry in data["entries"].values())
-    assert len(data["pictures"]) == len([*history.of_kind("Frame")])
+    assert len(data["pictures"]) == len([*history.of_kind(Frame)])
     judged = [one for one in data["pictures"] if "expected" in one]
     assert judged and all(len(line) == 4 for one in judged for line in (*one["expected"], *one["agreed"]))
     assert data["candidates"] and data["track"] and data["plans"][0]["rooms"]
@@ -50,13 +51,13 @@ def test_it_holds_the_run(page: str, run: RunDirectory) -> None:
 
 
 def test_it_is_the_same_each_time(page: str, run: RunDirectory) -> None:
-    assert build_page(run, JournalHistory(run.journal)) == page
+    assert build_page(run, Timeline(run.journal)) == page
 
 
 def test_without_the_recording_it_tells_no_truth(run: RunDirectory, tmp_path: Path) -> None:
     shutil.copytree(run.path, tmp_path / "run")
     bare = RunDirectory(tmp_path / "run")
     bare.recording.unlink()
-    data = read_contents(build_page(bare, JournalHistory(bare.journal)))
+    data = read_contents(build_page(bare, Timeline(bare.journal)))
     assert data["track"] == [] and data["errors"] == [] and data["beliefs"]
 

@@ -15,16 +15,17 @@ import pytest
 from experiments.robustness import crash
 from harvey.agent import build_agent
 from harvey.cli import main
-from harvey.replay.repair import redraw
-from harvey.run_files.records import DecisionRecord, read_records
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import RunHead
-from harvey.runner.replay import open_originals, open_pictures, replay
+from harvey.repair import redraw
+from harvey.runner.replay import open_originals, replay
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
 from harvey.simulation.run import resume_mission, run_mission
 from logs import disk
+from logs.pictures import open_pictures
 from logs.reader import damage_of, read_decisions, read_frames
+from logs.records import DecisionRecord, read_records
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
 from sim.stage import Stage
 
 SEED = 3
@@ -82,7 +83,7 @@ def test_where_no_motion_was_broken_off_it_is_as_if_nothing_had_been(
     assert first[:before] == second[:before]
     assert first[before + 1:] == second[before + 1:]
     told = [e for e in read_records(run.journal) for e in e.observed if e.type == "Resumed"]
-    assert [(e.cycle, e.author, e.value["interrupted"]) for e in told] == [(before + 1, "resume", [])]
+    assert [(e.cycle, e.author, e.fields["interrupted"]) for e in told] == [(before + 1, "resume", [])]
     assert run.camera.read_bytes() == whole.camera.read_bytes()
     assert decided_again(run)
     assert damage_of(run.recording) is None
@@ -99,9 +100,9 @@ def test_a_motion_that_nobody_reported_on_is_not_carried_out_again(
     records = list(read_records(run.journal))
     command = next(e for e in records[before - 1].made if e.type == "MotorCommand")
     resumed, report = records[before].observed
-    assert (resumed.type, resumed.value["interrupted"], resumed.because) == ("Resumed", [command.ref], (command.ref,))
+    assert (resumed.type, resumed.fields["interrupted"], resumed.because) == ("Resumed", [command.ref], (command.ref,))
     assert (report.type, report.because) == ("MotionReport", (command.ref,))
-    claimed, asked = (abs(v["turn_rad"]) + v["move_m"] for v in (report.value, command.value))
+    claimed, asked = (abs(v["turn_rad"]) + v["move_m"] for v in (report.fields, command.fields))
     assert claimed < asked
     assert len(answered(run)) == len(set(answered(run)))
     assert decided_again(run)

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from harvey.agent import build_agent
-from harvey.run_files.records import DecisionRecord, read_records
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import RunHead
 from harvey.runner.replay import open_originals, replay
 from harvey.runner.resume import find_remains
 from harvey.simulation.run import resume_mission, run_mission
+from logs.records import DecisionRecord, read_records
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
 from sim.stage import Stage
 from two_doors import two_doors
 
@@ -37,7 +37,7 @@ def records_of(run: RunDirectory) -> list[DecisionRecord]:
 
 
 def told_in(records: list[DecisionRecord]) -> list[tuple[int, str]]:
-    return [(record.cycle, entry.value["what"]) for record in records for entry in record.observed
+    return [(record.cycle, entry.fields["what"]) for record in records for entry in record.observed
             if entry.type == "Told"]
 
 

@@ -9,7 +9,7 @@ import pytest
 from blackboard.journal import Decision
 from blackboard.kinds import Registry
 from harvey.simulation.run import run_mission
-from harvey.why.journal import JournalHistory
+from logs.timeline import Timeline
 from sim.stage import Stage
 from world_models.entries.body import Frame
 
@@ -24,5 +24,5 @@ def test_the_decisions_are_the_same_with_it_and_without(
     run_mission(short_stage, 3, out=without)
     assert (with_it / "journal.jsonl").read_bytes() == (without / "journal.jsonl").read_bytes()
     first = next(c.entry for d in decisions for c in d.observed if isinstance(c.entry.value, Frame))
-    record = JournalHistory(with_it / "journal.jsonl").entry(str(first.ref))  # out of memory for long, and still there
-    assert record is not None and record.value["number"] == 0 and record.type == "Frame"
+    record = Timeline(with_it / "journal.jsonl").entry(str(first.ref))  # out of memory for long, and still there
+    assert record is not None and record.fields["number"] == 0 and record.type == "Frame"

@@ -17,19 +17,21 @@ from experiments.generated.short_missions import OFFICE, fault
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
-from harvey.run_files.observations import Originals
-from harvey.run_files.records import decision_of
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import RunHead
-from harvey.runner.replay import open_pictures, replay
-from harvey.story.story import RunStory, story_lines, tell_run
-from harvey.story.truth import error_at, read_errors
-from harvey.story.turns import read_turning_points
-from harvey.why.history import MemoryHistory
-from harvey.why.journal import JournalHistory
+from harvey.runner.replay import replay
 from logs.errors import RecordingError
+from logs.explain.questions import error_at, read_errors
+from logs.explain.story import RunStory, story_lines, tell_run
+from logs.explain.turning_points import read_turning_points
+from logs.pictures import open_pictures
 from logs.reader import read_series
 from logs.recording.paths import POSITION
+from logs.records import Originals, decision_of
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
+from logs.timeline import Timeline
+from memory_timeline import MemoryTimeline
+from world_models.entries.task import Certificate
+from world_models.entries.touch import Contact
 
 TOLD_SHUT = """
 description = "To Allen's office; that its door is shut is told at once."
@@ -70,12 +72,12 @@ def told(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 
 
 @pytest.fixture(scope="module")
-def history(told: tuple[str, Path]) -> JournalHistory:
-    return JournalHistory(told[1] / "journal.jsonl")
+def history(told: tuple[str, Path]) -> Timeline:
+    return Timeline(told[1] / "journal.jsonl")
 
 
 @pytest.fixture(scope="module")
-def story(told: tuple[str, Path], history: JournalHistory) -> RunStory:
+def story(told: tuple[str, Path], history: Timeline) -> RunStory:
     return tell_run(RunDirectory(told[1]), history)
 
 
@@ -103,7 +105,7 @@ def test_it_tells_how_the_run_went(told: tuple[str, Path], story: RunStory) -> N
 
 
 def test_each_sentence_has_a_cycle_of_the_journal_and_entries_that_it_made(
-    story: RunStory, history: JournalHistory
+    story: RunStory, history: Timeline
 ) -> None:
     sentences = [sentence for section in story.sections for sentence in section.sentences]
     known = set(history.refs)
@@ -117,7 +119,7 @@ def test_each_sentence_has_a_cycle_of_the_journal_and_entries_that_it_made(
     assert {point.cycle for point in story.turning_points} <= set(history.cycles)
 
 
-def test_the_turning_points_are_those_that_the_run_found(told: tuple[str, Path], history: JournalHistory) -> None:
+def test_the_turning_points_are_those_that_the_run_found(told: tuple[str, Path], history: Timeline) -> None:
     kept = RunDirectory(told[1]).read_result()["turning_points"]
     read = [point for point in read_turning_points(history) if point.is_told]
     assert read == [*read_turning_points(history, told=True)]
@@ -125,16 +127,16 @@ def test_the_turning_points_are_those_that_the_run_found(told: tuple[str, Path],
         (p["cycle"], p["kind"], p["text"], p["time_s"]) for p in kept]
 
 
-def test_every_verdict_of_the_journal_is_a_row(story: RunStory, history: JournalHistory) -> None:
-    certificates = [record for record in history.of_kind("Certificate") if record.change == "Posted"]
+def test_every_verdict_of_the_journal_is_a_row(story: RunStory, history: Timeline) -> None:
+    certificates = [record for record in history.of_kind(Certificate) if record.change == "Posted"]
     judged = [row for row in story.milestones if row.p_false is not None]
-    assert [(row.cycle, row.verdict) for row in judged] == [(r.cycle, r.value["verdict"]) for r in certificates]
+    assert [(row.cycle, row.verdict) for row in judged] == [(r.cycle, r.fields["verdict"]) for r in certificates]
     ids = {ref.rpartition(".")[0] for row in story.milestones for ref in row.refs if ref.startswith("Milestone-")}
     assert ids == {id for id in history.newest if id.startswith("Milestone-")}
 
 
-def test_each_contact_is_told_with_its_cycle(told: tuple[str, Path], story: RunStory, history: JournalHistory) -> None:
-    felt = [record.cycle for record in history.of_kind("Contact")]
+def test_each_contact_is_told_with_its_cycle(told: tuple[str, Path], story: RunStory, history: Timeline) -> None:
+    felt = [record.cycle for record in history.of_kind(Contact)]
     truly = [contact["cycle"] for contact in RunDirectory(told[1]).read_result()["contacts"]]
     (section,) = (section for section in story.sections if section.title == "What it touched")
     assert [s.cycle for s in section.sentences if s.cycle is not None] == [*felt, *truly]
@@ -154,7 +156,7 @@ def test_the_story_of_a_replayed_run_is_the_same(told: tuple[str, Path], story: 
     again = replay(run, Originals(open_pictures(run), agent.store), agent.scheduler())
     decided = [decision.now for decision in again]
     lines = [json.loads(decision_line(now)) for now in decided if now is not None]
-    assert tell_run(run, MemoryHistory(map(decision_of, lines))) == story
+    assert tell_run(run, MemoryTimeline(map(decision_of, lines))) == story
 
 
 def test_as_json_it_is_whole(told: tuple[str, Path], story: RunStory, capsys: pytest.CaptureFixture[str]) -> None:
@@ -166,7 +168,7 @@ def test_what_it_says_of_the_truth_comes_from_the_result_alone(told: tuple[str, 
     shutil.copytree(told[1], tmp_path / "run")
     run = RunDirectory(tmp_path / "run")
     run.result.unlink()
-    page = "\n".join(story_lines(tell_run(run, JournalHistory(run.journal))))
+    page = "\n".join(story_lines(tell_run(run, Timeline(run.journal))))
     assert "In truth" not in page and "collision" not in page and "there is no result of the simulator" in page
 
 
@@ -186,7 +188,7 @@ def test_a_run_that_was_cut_off_is_told_and_is_one_error(
 
 
 
-def test_how_far_off_it_was_is_what_the_recording_has_drawn(told: tuple[str, Path], history: JournalHistory) -> None:
+def test_how_far_off_it_was_is_what_the_recording_has_drawn(told: tuple[str, Path], history: Timeline) -> None:
     run = RunDirectory(told[1])
     drawn = dict(read_series(run.recording, POSITION, "Measurements:values"))
     errors = {error.cycle: error for error in read_errors(run, history)}
@@ -198,7 +200,7 @@ def test_how_far_off_it_was_is_what_the_recording_has_drawn(told: tuple[str, Pat
 
 
 def test_the_questions_after_a_bad_run_are_answered_without_the_viewer(
-    told: tuple[str, Path], history: JournalHistory, story: RunStory, capsys: pytest.CaptureFixture[str]
+    told: tuple[str, Path], history: Timeline, story: RunStory, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run = str(told[1])
     for question, kind in (("when was it lost?", "lost"), ("where did it touch anything?", "contact")):

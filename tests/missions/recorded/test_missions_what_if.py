@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from harvey.cli import main
-from harvey.replay.counterfactual import Answer, what_if
-from harvey.run_files.records import EntryRecord, read_records
-from harvey.run_files.run_directory import RunDirectory
+from harvey.counterfactual import Answer, what_if
 from harvey.runner.resume import find_remains
 from harvey.simulation.run import build_head, resume_mission, run_mission
+from logs.records import EntryRecord, read_records
+from logs.run_directory import RunDirectory
 from sim.stage import Stage
 
 DESK = "allens-office/desk"
@@ -52,12 +52,12 @@ def test_a_landmark_that_is_taken_away_is_a_revision_of_its_locales_frame(
     frame, _, number = revision.ref.rpartition(".")
     assert (revision.type, revision.change, number) == ("LocaleFrame", "Revised", "1")
     assert revision.because == (f"{frame}.0",) and answer.revised == (revision.ref,)
-    assert revision.value["locale"] == "allens-office"
-    assert revision.value["changes"] == [
+    assert revision.fields["locale"] == "allens-office"
+    assert revision.fields["changes"] == [
         {"what": "removed", "name": DESK, "by": "what if", "footprint": [], "height_m": 0.0}]
     observed = next(r.observed for r in read_records(other.journal) if revision in r.observed)
     assert f"{frame}.0" in [entry.ref for entry in observed]
-    expects = [json.dumps(e.value) for r in read_records(other.journal) for e in r.made if e.type == "Milestone"]
+    expects = [json.dumps(e.fields) for r in read_records(other.journal) for e in r.made if e.type == "Milestone"]
     assert expects and not any(DESK in text for text in expects)
     assert not told(run)
 
@@ -82,7 +82,7 @@ def test_it_is_resumed(
     """Cut off before the frame was there, after it was asked for, and long after that."""
     whole, cut = without[0], RunDirectory(tmp_path / "cut")
     cut.path.mkdir()
-    pictures = sum(entry.value["jpeg"]["bytes"] for record in list(read_records(whole.journal))[:decisions]
+    pictures = sum(entry.fields["jpeg"]["bytes"] for record in list(read_records(whole.journal))[:decisions]
                    for entry in record.observed if entry.type == "Frame")
     (cut.path / "run.json").write_bytes((whole.path / "run.json").read_bytes())
     (cut.path / "camera.mjpeg").write_bytes((whole.path / "camera.mjpeg").read_bytes()[:pictures])
@@ -119,7 +119,7 @@ def test_a_camera_that_is_believed_to_be_tilted_makes_another_run(
     capsys.readouterr()
     (revision,) = told(out)
     assert (revision.ref, revision.cycle, revision.because) == ("CameraState-1.1", 1, ("CameraState-1.0",))
-    assert revision.value["mount"]["tilt_rad"] == pytest.approx(math.radians(0.3))
+    assert revision.fields["mount"]["tilt_rad"] == pytest.approx(math.radians(0.3))
     used = {ref for record in read_records(out.journal) for ref in record.used}
     assert "CameraState-1.1" in used and "CameraState-1.0" not in used
     assert json.loads((out.path / "run.json").read_text("utf-8"))["constants"] == [["camera.tilt_deg", "0.3"]]
@@ -142,5 +142,5 @@ def test_what_is_set_of_a_new_run_changes_what_is_believed_and_not_what_is_true(
     assert [entry.ref for entry in told(out)] == ["Wheels-1.1", "Footprint-1.1"]
     (then, now) = (json.loads((one.path / "run.json").read_text("utf-8")) for one in (run, out))
     assert (then["scenario"], then["robot"]) == (now["scenario"], now["robot"])
-    longest = max(e.value["move_m"] for r in read_records(out.journal) for e in r.made if e.type == "MotorCommand")
+    longest = max(e.fields["move_m"] for r in read_records(out.journal) for e in r.made if e.type == "MotorCommand")
     assert longest <= 0.5 / (228.3 / 240.0) + 1e-9

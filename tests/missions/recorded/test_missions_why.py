@@ -19,18 +19,17 @@ from experiments.scale.long_journal import write_hour
 from harvey.agent import Agent, build_agent
 from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
-from harvey.diff.cause import grounds, parting, same
-from harvey.run_files.run_head import RunHead
-from harvey.why.ask import AskedView, board_at, changes, why_absent
-from harvey.why.decisions import describe_decision
-from harvey.why.history import History
-from harvey.why.journal import JournalHistory
-from harvey.why.links import reason
-from harvey.why.milestone import milestone_story, milestones
-from harvey.why.reach import check
-from harvey.why.story import lines_of, story
-from harvey.why.why_not import in_cycle
+from harvey.why_not import AskedView, board_at, changes, why_absent
+from logs.explain.diff import grounds, parting, same
+from logs.explain.phrases import describe_decision
+from logs.explain.subjects import milestone_story, milestones
+from logs.explain.web import check
+from logs.explain.why import lines_of, story
+from logs.explain.why_not import in_cycle
+from logs.run_head import RunHead
+from logs.timeline import Timeline
 from world_models.entries.kinds import KINDS
+from world_models.entries.location import Hypothesis
 
 BUMPED = OFFICE + fault("bump", "allens-office", 3.0, left_m=0.3, turn_deg=10.0)
 KNOWN = registry_of((), KINDS)
@@ -53,8 +52,8 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 @pytest.fixture(scope="module")
-def history(runs: tuple[Path, Path]) -> History:
-    return JournalHistory(runs[0] / "journal.jsonl")
+def history(runs: tuple[Path, Path]) -> Timeline:
+    return Timeline(runs[0] / "journal.jsonl")
 
 
 @pytest.fixture(scope="module")
@@ -64,13 +63,13 @@ def agent(runs: tuple[Path, Path]) -> Agent:
 
 def test_every_decision_rests_on_something(runs: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     for run in runs:
-        found = check(JournalHistory(run / "journal.jsonl"))
+        found = check(Timeline(run / "journal.jsonl"))
         assert found.reached == found.decisions > 50
         assert main(["why", str(run), "--check"]) == 0
         assert f"{found.decisions} of {found.decisions} decisions rest on something" in capsys.readouterr().out
 
 
-def test_every_entry_has_a_story_that_tells_each_thing_once_and_names_its_sources(history: History) -> None:
+def test_every_entry_has_a_story_that_tells_each_thing_once_and_names_its_sources(history: Timeline) -> None:
     for ref in history.refs:
         record = history.entry(ref)
         assert record is not None
@@ -83,7 +82,7 @@ def test_every_entry_has_a_story_that_tells_each_thing_once_and_names_its_source
         assert not re.search(r"\bnan\b|\binf\b|None", "\n".join(lines_of(told)))
 
 
-def test_a_motion_is_told_in_one_sentence_down_to_segments_and_model(history: History) -> None:
+def test_a_motion_is_told_in_one_sentence_down_to_segments_and_model(history: Timeline) -> None:
     motions = [r for ref in history.refs if ref.startswith("MotorCommand") and (r := history.entry(ref))]
     heads = [story(history, r).headline for r in motions]
     assert all(" because " in head for head in heads)
@@ -93,11 +92,11 @@ def test_a_motion_is_told_in_one_sentence_down_to_segments_and_model(history: Hi
     assert sum(MOTION.match(h) is not None for h in tracked) >= 3
 
 
-def test_the_time_that_is_told_is_the_newest_that_was_observed(history: History) -> None:
+def test_the_time_that_is_told_is_the_newest_that_was_observed(history: Timeline) -> None:
     """Also where a decision rests on an older picture than the last."""
     now, told = None, 0
     for decision in history.decisions():
-        times = [r.value["sim_time_s"] for r in decision.observed if r.type in ("Frame", "MotionReport")]
+        times = [r.fields["sim_time_s"] for r in decision.observed if r.type in ("Frame", "MotionReport")]
         now = times[-1] if times else now
         for made in decision.made if now is not None else ():
             assert f", {now:.1f} s into the run," in describe_decision(history, made)
@@ -105,20 +104,20 @@ def test_the_time_that_is_told_is_the_newest_that_was_observed(history: History)
     assert told > 100
 
 
-def test_the_numbers_of_a_story_are_those_of_the_entries(history: History) -> None:
+def test_the_numbers_of_a_story_are_those_of_the_entries(history: Timeline) -> None:
     for ref in (ref for ref in history.refs if ref.startswith("Leg-")):
         leg = history.entry(ref)
-        belief = None if leg is None else reason(history, leg, "Hypothesis")
-        sketch = None if leg is None else history.entry(history.newest[leg.value["sketch"]])
-        if leg is None or belief is None or sketch is None or leg.value["to_go_m"] is None:
+        belief = None if leg is None else history.reason(leg, Hypothesis)
+        sketch = None if leg is None else history.entry(history.newest[leg.fields["sketch"]])
+        if leg is None or belief is None or sketch is None or leg.fields["to_go_m"] is None:
             continue
-        goal, here = sketch.value["subgoals"][leg.value["index"]]["destination"], belief.value["locale_from_robot"]
-        if goal["locale"] == belief.value["locale"]:
+        goal, here = sketch.fields["subgoals"][leg.fields["index"]]["destination"], belief.fields["locale_from_robot"]
+        if goal["locale"] == belief.fields["locale"]:
             away = ((goal["x_m"] - here["x_m"]) ** 2 + (goal["y_m"] - here["y_m"]) ** 2) ** 0.5
-            assert away**2 == pytest.approx(leg.value["to_go_m"] ** 2 + leg.value["left_m"] ** 2, abs=1e-6)
+            assert away**2 == pytest.approx(leg.fields["to_go_m"] ** 2 + leg.fields["left_m"] ** 2, abs=1e-6)
 
 
-def test_a_milestone_tells_what_was_expected_seen_and_judged_and_what_followed(history: History) -> None:
+def test_a_milestone_tells_what_was_expected_seen_and_judged_and_what_followed(history: Timeline) -> None:
     told = [milestone_story(history, id) for id in milestones(history, "M0")]
     assert told
     for one in told:
@@ -129,7 +128,7 @@ def test_a_milestone_tells_what_was_expected_seen_and_judged_and_what_followed(h
 
 
 def test_who_is_not_named_could_not_act_and_who_is_says_so_again(
-    history: History, agent: Agent
+    history: Timeline, agent: Agent
 ) -> None:
     """The journal and the sources, asked again on a board that is built from it, agree in every cycle."""
     asked = 0
@@ -149,7 +148,7 @@ def test_who_is_not_named_could_not_act_and_who_is_says_so_again(
 
 
 def test_why_not_is_answered_on_the_command_line(
-    runs: tuple[Path, Path], history: History, capsys: pytest.CaptureFixture[str]
+    runs: tuple[Path, Path], history: Timeline, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def said(*more: str) -> str:
         assert main(["why", str(runs[0]), *more]) == 0
@@ -171,13 +170,13 @@ def test_why_not_is_answered_on_the_command_line(
 
 
 def test_a_watch_whose_condition_did_not_hold_is_told_as_that(
-    runs: tuple[Path, Path], history: History, capsys: pytest.CaptureFixture[str]
+    runs: tuple[Path, Path], history: Timeline, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The relocalizer watches for beliefs moved by odometry; one that rests on landmarks does not wake it."""
     beliefs = ((d.cycle, history.entry(ref)) for d in history.decisions() for ref in d.seen
                if ref.startswith("Hypothesis-1."))
     cycle, ref = next((cycle, r.ref) for cycle, r in beliefs
-                      if r is not None and r.change == "Revised" and r.value["basis"] == "tracks")
+                      if r is not None and r.change == "Revised" and r.fields["basis"] == "tracks")
     assert main(["why", str(runs[0]), "--not", "relocalizer", "--at", str(cycle)]) == 0
     told = capsys.readouterr().out
     assert f"came what the relocalizer watches for, {ref} revised, but its watch has a condition" in told
@@ -199,9 +198,9 @@ def test_the_first_lines_tell_the_turning_points_that_the_result_keeps(
 
 
 def test_two_seeds_part_at_an_observation_and_each_later_difference_goes_back_to_one(
-    runs: tuple[Path, Path], history: History, capsys: pytest.CaptureFixture[str]
+    runs: tuple[Path, Path], history: Timeline, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    theirs = JournalHistory(runs[1] / "journal.jsonl")
+    theirs = Timeline(runs[1] / "journal.jsonl")
     assert main(["diff", str(runs[0]), str(runs[1])]) == 1
     out = capsys.readouterr().out
     where = parting(history, theirs, 0)
@@ -222,9 +221,9 @@ def test_the_same_run_does_not_differ(runs: tuple[Path, Path], capsys: pytest.Ca
     assert "agree in all" in capsys.readouterr().out
 
 
-def test_a_run_told_over_and_over_is_a_journal_too(runs: tuple[Path, Path], history: History, tmp_path: Path) -> None:
+def test_a_run_told_over_and_over_is_a_journal_too(runs: tuple[Path, Path], history: Timeline, tmp_path: Path) -> None:
     write_hour(runs[0] / "journal.jsonl", tmp_path / "journal.jsonl", cycles=3 * len(history.cycles))
-    longer = JournalHistory(tmp_path / "journal.jsonl")
+    longer = Timeline(tmp_path / "journal.jsonl")
     assert longer.cycles == tuple(range(1, 3 * len(history.cycles) + 1))
     assert len(longer.refs) == len(set(longer.refs)) == 3 * len(history.refs)
     found = check(longer)

@@ -12,14 +12,14 @@ import pytest
 
 from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
-from harvey.run_files.run_directory import RunDirectory
-from harvey.run_files.run_head import RunHead
-from harvey.why.decisions import describe_decision
-from harvey.why.journal import JournalHistory
-from harvey.why.model.world_file import WorldFile
-from harvey.why.reach import check
-from harvey.why.story import Step, Story, lines_of, story
-from harvey.why.why_not import Fate, in_cycle, in_run
+from logs.explain.model import WorldFile
+from logs.explain.phrases import describe_decision
+from logs.explain.web import check
+from logs.explain.why import Step, Story, lines_of, story
+from logs.explain.why_not import Fate, in_cycle, in_run
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
+from logs.timeline import Timeline
 from world_models.files.toml.mission import ROOT
 from world_models.frame_store import FrameStore, elements_of
 
@@ -35,8 +35,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
 
 
 @pytest.fixture(scope="module")
-def history(run: RunDirectory) -> JournalHistory:
-    return JournalHistory(run.journal)
+def history(run: RunDirectory) -> Timeline:
+    return Timeline(run.journal)
 
 
 @pytest.fixture(scope="module")
@@ -45,16 +45,16 @@ def store(run: RunDirectory) -> FrameStore:
     return FrameStore(head.load_world(), head.world_sha256)
 
 
-def told(history: JournalHistory, ref: str, run: RunDirectory | None = None) -> Story:
+def told(history: Timeline, ref: str, run: RunDirectory | None = None) -> Story:
     record = history.entry(ref)
     assert record is not None
     return story(history, record, None if run is None else WorldFile(run))
 
 
-def value_in(history: JournalHistory, ref: str) -> dict[str, Any]:
+def value_in(history: Timeline, ref: str) -> dict[str, Any]:
     record = history.entry(ref)
     assert record is not None
-    return dict(record.value)
+    return dict(record.fields)
 
 
 def step(of: Story, label: str) -> Step:
@@ -64,7 +64,7 @@ def step(of: Story, label: str) -> Step:
 
 
 def test_a_turn_goes_back_to_model_lines_their_frames_and_lines_of_the_file(
-    run: RunDirectory, history: JournalHistory, store: FrameStore
+    run: RunDirectory, history: Timeline, store: FrameStore
 ) -> None:
     turns = [ref for ref in history.refs if ref.startswith("MotorCommand-")]
     told_lines = 0
@@ -89,7 +89,7 @@ def elements_of_all(store: FrameStore, locales: set[str]) -> dict[str, str]:
     return {mark.name: mark.source for frame in frames for part in frame.parts for _, mark in part.landmarks}
 
 
-def test_a_story_says_by_which_frames_the_act_went(history: JournalHistory) -> None:
+def test_a_story_says_by_which_frames_the_act_went(history: Timeline) -> None:
     for decision in history.decisions():
         for record in decision.made:
             known = [one for one in told(history, record.ref).steps if one.label == "known"]
@@ -100,7 +100,7 @@ def test_a_story_says_by_which_frames_the_act_went(history: JournalHistory) -> N
             assert not any(ref.endswith(".0") and not ref.startswith("LocaleFrame-") for ref in frames)
 
 
-def test_an_act_that_asked_waits_and_comes_again(history: JournalHistory) -> None:
+def test_an_act_that_asked_waits_and_comes_again(history: Timeline) -> None:
     asked = [decision for decision in history.decisions() if decision.asks is not None]
     assert len(asked) >= 4
     for decision in asked:
@@ -115,7 +115,7 @@ def test_an_act_that_asked_waits_and_comes_again(history: JournalHistory) -> Non
         describe_decision(history, goal))
 
 
-def test_what_was_pending_is_known_where_acts_wait(history: JournalHistory) -> None:
+def test_what_was_pending_is_known_where_acts_wait(history: Timeline) -> None:
     for decision in history.decisions():
         found = history.candidates(decision.cycle)
         chosen = decision.chosen
@@ -125,7 +125,7 @@ def test_what_was_pending_is_known_where_acts_wait(history: JournalHistory) -> N
     assert [one.why for one in acted] == ["it made Hypothesis-1.0, Goal-1.0"]
 
 
-def test_a_sketch_drawn_anew_goes_back_to_what_was_told(run: RunDirectory, history: JournalHistory) -> None:
+def test_a_sketch_drawn_anew_goes_back_to_what_was_told(run: RunDirectory, history: Timeline) -> None:
     superseded = next(ref for ref in history.refs if ref.startswith("PlanSketch-")
                       and value_in(history, ref)["status"] == "superseded")
     for ref in (superseded, "PlanSketch-3.0"):
@@ -135,7 +135,7 @@ def test_a_sketch_drawn_anew_goes_back_to_what_was_told(run: RunDirectory, histo
     assert main(["why", str(run.path)]) == 0
 
 
-def test_every_line_of_every_explanation_ends_in_goal_model_or_sensor(history: JournalHistory) -> None:
+def test_every_line_of_every_explanation_ends_in_goal_model_or_sensor(history: Timeline) -> None:
     found = check(history)
     assert found.reached == found.decisions > 100
     assert found.by_kind["model"] > 100
@@ -147,7 +147,7 @@ def test_what_was_told_is_in_the_first_lines(run: RunDirectory, capsys: pytest.C
 
 
 def test_a_door_a_landmark_and_a_room_are_answered_by_name(
-    run: RunDirectory, history: JournalHistory, store: FrameStore, capsys: pytest.CaptureFixture[str]
+    run: RunDirectory, history: Timeline, store: FrameStore, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def said(name: str) -> str:
         assert main(["why", str(run.path), name]) == 0
@@ -159,7 +159,7 @@ def test_a_door_a_landmark_and_a_room_are_answered_by_name(
     assert "LocaleFrame-4.1" in door and "PlanSketch-1.0" in door
     milestone = history.entry("Milestone-1.0")
     assert milestone is not None
-    landmark = next(name for name in milestone.value["landmarks"] if "/" in name)
+    landmark = next(name for name in milestone.fields["landmarks"] if "/" in name)
     assert "[Milestone-1." in said(landmark)
     locale = landmark.partition("/")[0]
     line = store.world.locale(locale).source.rpartition(":")[2]
@@ -177,7 +177,7 @@ def test_a_name_that_nothing_has_is_answered_with_near_ones(
 
 @pytest.mark.parametrize("lost", ["the head", "the world"])
 def test_without_the_worlds_file_it_answers_and_says_so(
-    run: RunDirectory, history: JournalHistory, tmp_path: Path, capsys: pytest.CaptureFixture[str], lost: str
+    run: RunDirectory, history: Timeline, tmp_path: Path, capsys: pytest.CaptureFixture[str], lost: str
 ) -> None:
     copy = tmp_path / "copy"
     shutil.copytree(run.path, copy)

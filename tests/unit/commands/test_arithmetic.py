@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import harvey.arithmetic as subject
+import logs.decided_by as subject
 from elsewhere import ROOT
-from harvey.arithmetic import AVX2, COMMON, NO_AVX512, ONE_THREAD, arithmetic, instructions
+from logs.decided_by import AVX2, COMMON, NO_AVX512, ONE_THREAD, arithmetic, instructions
 
 FLAGS = st.frozensets(st.sampled_from(["sse4_2", "avx", "avx2", "fma", "avx512f", "avx512_fp16", "amx_tile", "asimd"]))
 ASKED = """
@@ -23,7 +23,7 @@ import harvey
 import cv2, numpy, scipy.linalg
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 from threadpoolctl import threadpool_info
-from harvey.arithmetic import arithmetic
+from logs.decided_by import arithmetic
 print(json.dumps({
     "blas": sorted({(of["architecture"], of["num_threads"]) for of in threadpool_info() if of["user_api"] == "blas"}),
     "numpy": [name for name in __cpu_dispatch__ if __cpu_features__[name]],
@@ -84,7 +84,7 @@ def test_what_the_environment_says_already_stays() -> None:
 
 
 def test_where_a_library_calculates_already_nothing_is_half_said() -> None:
-    done = asked("import numpy, harvey, os; from harvey.arithmetic import *\n"
+    done = asked("import numpy, harvey, os; from logs.decided_by import *\n"
                  "print(sorted({**AVX2, **NO_AVX512}.keys() & os.environ.keys()), arithmetic())\n"
                  "print(all(os.environ[name] == '1' for name in ONE_THREAD))")
     said, _, rest = done.stdout.partition("] ")

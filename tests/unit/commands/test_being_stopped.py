@@ -13,7 +13,7 @@ import pytest
 
 from harvey.cli import main
 from harvey.packages import MARKS
-from harvey.run_files.run_directory import RunDirectory
+from logs.run_directory import RunDirectory
 
 HARVEY = [sys.executable, "-m", "harvey.cli"]
 

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from harvey.arithmetic import arithmetic
 from harvey.campaign import missions
 from harvey.campaign.campaign import Task
 from harvey.campaign.case_work import Answer, check_origin
@@ -18,6 +17,7 @@ from harvey.campaign.show import read_progress
 from harvey.campaign.workers import Workers, choose_workers, chosen_workers
 from harvey.cli import main
 from harvey.errors import BadInput
+from logs.decided_by import arithmetic
 
 
 def campaign(folder: Path, outcomes: list[str], total: int = 40, killed: tuple[int, ...] = ()) -> str:

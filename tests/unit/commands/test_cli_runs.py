@@ -15,20 +15,18 @@ from typing import Any
 
 import pytest
 
-from harvey.arithmetic import arithmetic
 from harvey.campaign.campaign import Task, parse_pairs, parse_seeds, run_task
 from harvey.campaign.engine import map_cases
 from harvey.campaign.workers import Workers
 from harvey.cli import main
 from harvey.errors import BadInput, Terminated
-from harvey.run_files.deciding_code import deciding_code
-from harvey.run_files.observations import entry_of
-from harvey.run_files.records import read_records
-from harvey.why.sentences import sentence
 from harvey.wiring import load_kinds
+from logs.decided_by import arithmetic, deciding_code
 from logs.disk import Appended
+from logs.explain.phrases import sentence
 from logs.journal_file import read_journal
 from logs.reader import read_decisions
+from logs.records import entry_of, read_records
 from world_models import words
 from world_models.frames import Pose2
 
@@ -301,8 +299,8 @@ def test_the_check_foresees_the_milestones_that_come(run: Path, capsys: pytest.C
     rows = [line for line in out.splitlines() if line.endswith("clear")]
     assert len(rows) >= 10
     assert "ends: reached" in out
-    came = [r.value for d in read_records(run / "journal.jsonl") for r in d.made
-            if r.type == "Milestone" and r.value["status"] == "verified"]
+    came = [r.fields for d in read_records(run / "journal.jsonl") for r in d.made
+            if r.type == "Milestone" and r.fields["status"] == "verified"]
     assert len(came) >= 2
     for row, milestone in zip(rows, came, strict=False):
         assert row.startswith(f"{milestone['what']} ")

@@ -19,10 +19,10 @@ from experiments.scale.render_speed import measure_edge_offsets_px
 from harvey.campaign.summary import format_error, format_result, format_results, summarize_dry_run
 from harvey.dry_run import MilestonePreview
 from harvey.errors import BadInput
-from harvey.run_files.records import EntryRecord
 from harvey.runner.result import MissionResult
-from harvey.tables import table
-from harvey.why.sentences import sentence
+from logs.explain.phrases import sentence
+from logs.records import EntryRecord
+from logs.tables import table
 from world_models.entries.body import MotorCommand
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.percepts import Track, Tracks

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from harvey.run_files.deciding_code import DECIDING, DIGITS, WIRING, deciding_code, read_code_in
+from logs.decided_by import DECIDING, DIGITS, WIRING, deciding_code, read_code_in
 
 ROOT = Path(__file__).parents[3]
 

@@ -6,9 +6,9 @@ from collections.abc import Collection
 
 import pytest
 
-from harvey.diff.cause import grounds
-from harvey.run_files.records import DecisionRecord, EntryRecord
-from harvey.why.history import MemoryHistory
+from logs.explain.diff import grounds
+from logs.records import DecisionRecord, EntryRecord
+from memory_timeline import MemoryTimeline
 
 BECAUSE = {
     "Look-1.0": (), "Frame-1.0": ("Look-1.0",), "Belief-1.0": ("Frame-1.0",), "Frame-2.0": ("Look-1.0",),
@@ -16,11 +16,11 @@ BECAUSE = {
 }
 
 
-def build_history(otherwise: Collection[str]) -> MemoryHistory:
+def build_history(otherwise: Collection[str]) -> MemoryTimeline:
     """A run that makes one entry a cycle, some of them otherwise."""
     entries = [EntryRecord("Posted", ref, "Note", "somebody", because, int(ref in otherwise), cycle, False)
                for cycle, (ref, because) in enumerate(BECAUSE.items(), 1)]
-    return MemoryHistory(
+    return MemoryTimeline(
         DecisionRecord(e.cycle, "action", (), (), (), (), None, None, 0, (e,), "", {}) for e in entries)
 
 

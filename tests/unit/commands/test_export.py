@@ -14,10 +14,9 @@ from hypothesis import strategies as st
 
 from blackboard.journal import decision_line
 from harvey.cli import main
-from harvey.export.files import write_csv, write_parquet
-from harvey.export.tables import DECISIONS, MILESTONES, POSES, TURNS, Table, read_tables
-from harvey.run_files.run_directory import RunDirectory
-from harvey.why.journal import JournalHistory
+from logs.export import DECISIONS, MILESTONES, POSES, TURNS, Table, read_tables, write_csv, write_parquet
+from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from scripted_turns import HELD, decisions
 
 CELLS = {
@@ -61,7 +60,7 @@ def run(tmp_path: Path) -> RunDirectory:
 
 
 def test_the_tables_hold_what_the_journal_tells(run: RunDirectory) -> None:
-    decided, poses, milestones, turns = read_tables(run, JournalHistory(run.journal))
+    decided, poses, milestones, turns = read_tables(run, Timeline(run.journal))
     assert [row[0] for row in decided.rows] == list(range(1, 9))
     assert [dict(zip(POSES, row, strict=True))["entry"] for row in poses.rows] == ["Hypothesis-1.0", "Hypothesis-1.1"]
     first = dict(zip(poses.columns, poses.rows[0], strict=True))

@@ -16,8 +16,8 @@ from PIL import Image
 from blackboard.journal import decision_line
 from harvey.cli import main
 from harvey.errors import BadInput
+from harvey.report.data import WIDTH_PX, shrink
 from harvey.report.page import embedded, fill_in
-from harvey.report.pictures import WIDTH_PX, shrink
 from report_contents import read_contents
 from scripted_turns import decisions
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from blackboard.journal import decision_line
 from harvey.cli import main
-from harvey.report.several.fields import read_fields
+from harvey.report.drawing import read_fields
 from scripted_turns import decisions
 
 HOSTILE = "</script><b>lost</b> \u2028 {{rows}}"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from harvey.errors import BadInput
-from harvey.run_files.run_head import HARDWARE, RunHead
+from logs.run_head import HARDWARE, RunHead
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraDeviation, CameraMount
 from world_models.entries.location import diagonal

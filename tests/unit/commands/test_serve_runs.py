@@ -18,13 +18,13 @@ pytest.importorskip("uvicorn", reason="the extra 'serve' is not installed")
 
 from harvey.campaign.campaign import Task
 from harvey.cli import main
-from harvey.run_files.run_directory import RunDirectory
 from harvey.serve.app import build_app
 from harvey.serve.follow import Follower
 from harvey.serve.gate import Gate, GatedBody
 from harvey.serve.live_state import LiveState
 from harvey.serve.server import bind, serving
 from harvey.simulation.run import build_head, run_mission
+from logs.run_directory import RunDirectory
 
 SHORT = (("limits.max_time_s", "6"),)
 HOSTILE = (b"\x00\xff" * 4000, b"GET / HTTP/1.1\r\n" + b"X: y\r\n" * 20_000, b"POST /orders/stop HTTP/1.1\r\n\r\n",

@@ -13,12 +13,10 @@ from blackboard.journal import Decision, decision_line
 from blackboard.level import Level
 from harvey.cli import main
 from harvey.errors import BadInput
-from harvey.run_files.run_directory import RunDirectory
-from harvey.story.lost import tell_lost
-from harvey.story.milestones import MOST_ROWS, MilestoneRow, milestone_lines
-from harvey.story.questions import answers
-from harvey.story.story import story_lines, tell_run
-from harvey.why.journal import JournalHistory
+from logs.explain.questions import answers_of_the_run
+from logs.explain.story import MOST_ROWS, MilestoneRow, milestone_lines, story_lines, tell_lost, tell_run
+from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from scripted_turns import decisions
 
 LINES = tuple(decision_line(decision) + "\n" for decision in decisions())
@@ -57,7 +55,7 @@ def test_foreign_bytes_in_any_line_are_one_error_or_change_nothing_else(
     lines[line] = foreign.replace(b"\n", b"") + b"\n"
     run = run_of(tmp_path_factory.mktemp("foreign"), b"".join(lines))
     with pytest.raises(BadInput):
-        tell_run(run, JournalHistory(run.journal))
+        tell_run(run, Timeline(run.journal))
 
 
 @given(st.integers(1, len(LINES)), st.integers(0, 50))
@@ -66,7 +64,7 @@ def test_a_run_is_told_up_to_where_it_was_cut_off(
 ) -> None:
     rest = LINES[whole].encode()[:more] if whole < len(LINES) else b""
     run = run_of(tmp_path_factory.mktemp("cut"), "".join(LINES[:whole]).encode() + rest)
-    history = JournalHistory(run.journal)
+    history = Timeline(run.journal)
     story = tell_run(run, history)
     end = f"failed in cycle {whole}." if whole == len(LINES) else f"cut off in cycle {whole}."
     assert story.opening[0].endswith(end) and (history.cut_off is None) is (whole == len(LINES))
@@ -91,12 +89,12 @@ def test_an_older_run_with_other_fields_is_one_error(tmp_path: Path) -> None:
     lines[1]["made"][0]["value"] = {"verdict": "refuted"}
     run = run_of(tmp_path, "".join(json.dumps(line, separators=(",", ":")) + "\n" for line in lines).encode())
     with pytest.raises(BadInput):
-        tell_run(run, JournalHistory(run.journal))
+        tell_run(run, Timeline(run.journal))
 
 
 def test_lost_and_found_are_told_with_place_and_reason(tmp_path: Path) -> None:
     run = run_of(tmp_path, "".join(LINES).encode())
-    told = [sentence.text for sentence in tell_lost(JournalHistory(run.journal)).sentences]
+    told = [sentence.text for sentence in tell_lost(Timeline(run.journal)).sentences]
     assert told[0].startswith("It was lost: M2 is refuted. It believed that it stood at (1.00, 2.00) m of kitchen")
     assert told[-1].startswith("It found out where it was, 1 cycle later: at (3.00, 1.00) m of kitchen")
     assert "2.24 m from where it had believed" in told[-1]
@@ -115,7 +113,7 @@ def test_of_a_long_table_all_that_was_not_verified_is_shown() -> None:
 
 def test_the_page_has_every_section_once(tmp_path: Path) -> None:
     run = run_of(tmp_path, "".join(LINES).encode())
-    story = tell_run(run, JournalHistory(run.journal))
+    story = tell_run(run, Timeline(run.journal))
     lines = "\n".join(story_lines(story)).splitlines()
     for title in ("Milestones", *(section.title for section in story.sections)):
         assert lines.count(title) == 1
@@ -128,7 +126,7 @@ def test_the_page_has_every_section_once(tmp_path: Path) -> None:
 def test_a_question_of_the_run_is_known_by_its_words(tmp_path: Path, question: str, is_of_the_run: bool) -> None:
     run = run_of(tmp_path, "".join(LINES).encode())
     try:
-        found = answers(run, JournalHistory(run.journal), question)
+        found = answers_of_the_run(run, Timeline(run.journal), question)
     except BadInput as error:  # of a run without its head nobody knows the truth
         found = []
         assert "run.json" in str(error)

@@ -19,17 +19,15 @@ from harvey.campaign.progress import Lines
 from harvey.campaign.summary import format_result
 from harvey.campaign.tally import Tally
 from harvey.errors import BadInput
-from harvey.run_files.records import DecisionRecord, decision_of
-from harvey.run_files.run_directory import RunDirectory
-from harvey.runner.result import Contact as Collision
 from harvey.runner.result import MissionResult
 from harvey.simulation.contacts import ContactWatch
-from harvey.story.head import levels_off
-from harvey.story.turns import read_turning_points, turn_lines
-from harvey.why.decisions import describe_decision
-from harvey.why.history import MemoryHistory
-from harvey.why.story import headline, story
-from logs.turning_points import TurningPoint, TurningPointFinder
+from logs.explain.phrases import describe_decision
+from logs.explain.story import levels_off
+from logs.explain.turning_points import Collision, TurningPoint, TurningPointFinder, read_turning_points, turn_lines
+from logs.explain.why import headline, story
+from logs.records import DecisionRecord, decision_of
+from logs.run_directory import RunDirectory
+from memory_timeline import MemoryTimeline
 from scripted_mission import house
 from scripted_turns import HELD, decisions
 from sim.body.simulated_body import SimulatedBody
@@ -59,7 +57,7 @@ def test_what_must_be_told_is_found_with_cycle_and_place() -> None:
 
 def test_read_back_from_the_journal_they_are_the_same() -> None:
     finder = TurningPointFinder()
-    assert list(read_turning_points(MemoryHistory(records()))) == [
+    assert list(read_turning_points(MemoryTimeline(records()))) == [
         point for decision in decisions() for point in finder.find(decision)]
 
 
@@ -93,7 +91,7 @@ def test_a_contact_is_told_with_the_place_where_it_believed_to_be() -> None:
 
 def test_a_short_account_tells_them_with_the_collisions_that_the_simulator_knows_of() -> None:
     contact = {"cycle": 3, "locale": "kitchen", "x_m": 1.5, "y_m": 2.0}
-    told = list(turn_lines(MemoryHistory(records()), {"collisions": 1, "contacts": [contact]}))
+    told = list(turn_lines(MemoryTimeline(records()), {"collisions": 1, "contacts": [contact]}))
     assert told == [
         "On the way:",
         "  cycle 2  refuted    M2 of the route: 1 of 9 lines",
@@ -102,9 +100,9 @@ def test_a_short_account_tells_them_with_the_collisions_that_the_simulator_knows
         "  cycle 5  found      kitchen (3.00, 1.00) m; it knows again where it is",
         "  cycle 6  fault      camera: camera unplugged",
     ]
-    lines = list(turn_lines(MemoryHistory(records()[:1]), {"collisions": 2}))
+    lines = list(turn_lines(MemoryTimeline(records()[:1]), {"collisions": 2}))
     assert lines[-1] == "  2 collisions; this run does not say where"
-    assert "Nothing went wrong on the way" in next(turn_lines(MemoryHistory(records()[:1]), {}))
+    assert "Nothing went wrong on the way" in next(turn_lines(MemoryTimeline(records()[:1]), {}))
 
 
 @pytest.mark.parametrize("contact", [{"cycle": 3}, {"cycle": "3", "locale": "", "x_m": 0.0, "y_m": 0.0}, 7, {},
@@ -112,7 +110,7 @@ def test_a_short_account_tells_them_with_the_collisions_that_the_simulator_knows
                                      {"cycle": 3, "locale": "", "x_m": "here", "y_m": 0.0}])
 def test_a_collision_that_is_none_is_one_error(contact: Any) -> None:
     with pytest.raises(BadInput, match=r"result\.json: contacts: expected"):
-        list(turn_lines(MemoryHistory(records()), {"contacts": [contact]}))
+        list(turn_lines(MemoryTimeline(records()), {"contacts": [contact]}))
 
 
 def test_the_time_of_a_decision_is_in_the_clock_of_the_run_also_while_a_fault_lasts() -> None:
@@ -122,7 +120,7 @@ def test_the_time_of_a_decision_is_in_the_clock_of_the_run_also_while_a_fault_la
     seen = board.apply([Post(fault), Post(recovery)], author="body", cycle=1)
     made = board.apply([Post(Outcome("failed", "camera unplugged"))], author="fault_handler", cycle=1)
     line = decision_line(Decision(1, seen, seen, Level.ACTION, (), (), None, None, 0, made, ""))
-    history = MemoryHistory([decision_of(json.loads(line))])
+    history = MemoryTimeline([decision_of(json.loads(line))])
     outcome = history.entry("Outcome-1.0")
     assert outcome is not None
     assert describe_decision(history, outcome) == "Decided in cycle 1, 38.8 s into the run, by the fault handler."
@@ -130,7 +128,7 @@ def test_the_time_of_a_decision_is_in_the_clock_of_the_run_also_while_a_fault_la
 
 
 def test_finding_itself_is_headed_as_that() -> None:
-    history = MemoryHistory(records())
+    history = MemoryTimeline(records())
     found = history.entry("Hypothesis-1.1")
     assert found is not None
     assert headline(found).startswith("It found out where it is: at (3.00, 1.00) m of kitchen")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from harvey.errors import BadInput
-from harvey.run_files.run_head import load_known_world
 from harvey.what_if import check_removals
+from logs.run_head import load_known_world
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.files.toml.includes import WORLDS
 from world_models.frame_store import FrameStore

@@ -7,15 +7,14 @@ from typing import Any
 import pytest
 
 from blackboard.journal import plain
-from harvey.run_files.records import Candidate, DecisionRecord, EntryRecord
-from harvey.why.history import MemoryHistory
-from harvey.why.milestone import milestone_story
-from harvey.why.model.frames import tell_changes, tell_used
-from harvey.why.reach import MODEL, kind_of
-from harvey.why.sentences import sentence
-from harvey.why.story import story
-from harvey.why.trace import Trace
-from harvey.why.why_not import Fate, in_run
+from logs.explain.model import tell_changes, tell_used
+from logs.explain.phrases import sentence
+from logs.explain.subjects import milestone_story
+from logs.explain.web import MODEL, Trace, kind_of
+from logs.explain.why import story
+from logs.explain.why_not import Fate, in_run
+from logs.records import Candidate, DecisionRecord, EntryRecord
+from memory_timeline import MemoryTimeline
 from world_models.building.locale_frame import FrameChange, FrameReference, FrameRequest
 from world_models.entries.robot import Footprint
 from world_models.entries.task import Milestone
@@ -69,7 +68,7 @@ def test_what_an_act_went_by_is_told_shortly(used: tuple[str, ...], text: str | 
     seen = (frame("LocaleFrame-1.0", "hallway"), frame("LocaleFrame-2.1", "library", SHUT),
             frame("LocaleFrame-3.1", "study", SHUT), entry("Footprint-1.1", Footprint(0.36), author="robot"))
     made = entry("Note-1.0", 0)
-    found = list(tell_used(MemoryHistory([decision(made, observed=seen, used=used)]), made))
+    found = list(tell_used(MemoryTimeline([decision(made, observed=seen, used=used)]), made))
     assert found == ([] if text is None else [(f"The act went by {text}", refs)])
 
 
@@ -77,7 +76,7 @@ def test_equal_changes_of_two_frames_are_told_once() -> None:
     frames = (frame("LocaleFrame-1.1", "hallway", SHUT), frame("LocaleFrame-2.1", "library", SHUT),
               frame("LocaleFrame-3.0", "study"))
     made = entry("Note-1.0", 0, tuple(f.ref for f in frames))
-    assert list(tell_changes(MemoryHistory([decision(made, observed=frames)]), made)) == [
+    assert list(tell_changes(MemoryTimeline([decision(made, observed=frames)]), made)) == [
         ("It was known otherwise than in the world's file: library-door is shut (user).", frames[0])]
 
 
@@ -88,7 +87,7 @@ def test_a_withdrawn_milestone_says_what_it_rested_on() -> None:
     expected = entry("Milestone-1.0", value, (known.ref,))
     revised = frame("LocaleFrame-1.1", "hallway", SHUT, because=(said.ref, known.ref), cycle=2)
     gone = entry("Milestone-1.1", {**plain(value), "status": "withdrawn"}, (revised.ref,), author="withdrawer", cycle=3)
-    history = MemoryHistory([
+    history = MemoryTimeline([
         decision(expected, observed=(said, known)), decision(revised, cycle=2), decision(gone, cycle=3)])
     told = milestone_story(history, "Milestone-1")
     assert [step.label for step in told.steps] == ["expected", "withdrawn", "changed"]
@@ -107,7 +106,7 @@ def test_an_act_that_asked_is_pending_until_it_acts() -> None:
         decision(entry("Note-1.0", 0, cycle=2), cycle=2, chosen=other, pending=1),
         decision(entry("Note-2.0", 0, cycle=3), cycle=3, chosen=asking),
     ]
-    history = MemoryHistory(decisions)
+    history = MemoryTimeline(decisions)
     assert [[c.number for c in history.candidates(cycle)] for cycle in (1, 2, 3)] == [[1, 2], [2, 1], [1]]
     assert [(one.cycle, one.fate) for one in in_run(history, "sketcher")] == [(3, Fate.ACTED)]
     trace = Trace()

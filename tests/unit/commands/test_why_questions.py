@@ -9,9 +9,9 @@ import pytest
 
 from blackboard.journal import plain
 from harvey.errors import BadInput
-from harvey.run_files.records import DecisionRecord, EntryRecord
-from harvey.why.history import MemoryHistory
-from harvey.why.questions import answers, is_question
+from logs.explain.questions import answers, is_question
+from logs.records import DecisionRecord, EntryRecord
+from memory_timeline import MemoryTimeline
 from world_models.building.locale_frame import FrameChange, FrameReference
 from world_models.entries.body import Frame
 from world_models.entries.door_state import DoorPicture, DoorState
@@ -32,8 +32,8 @@ def entry(ref: str, value: Any, because: tuple[str, ...] = (), cycle: int = 1) -
     return EntryRecord(change, ref, ref.partition("-")[0], "source", because, plain(value), cycle, False)
 
 
-def history(*records: EntryRecord) -> MemoryHistory:
-    return MemoryHistory(DecisionRecord(
+def history(*records: EntryRecord) -> MemoryTimeline:
+    return MemoryTimeline(DecisionRecord(
         record.cycle, "plan", (), (), (), (), None, None, 0, (record,), "", {}, ()) for record in records)
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from harvey.errors import BadInput
 from harvey.hardware.run import count_pictures, time_of_last_observation
-from harvey.run_files.run_directory import RunDirectory
 from harvey.simulation.run import run_mission
+from logs.run_directory import RunDirectory
 from sim.stage import Stage
 
 

@@ -1,0 +1,318 @@
+"""Counterfactuals: what a run would have done without a knowledge source, a landmark or a segment, or set otherwise.
+
+The changed agent gets the recorded observations as long as it requests the same of its body: until then they are what
+it would have observed. From the first motion or picture that differs they no longer hold. A simulated body was replayed
+up to there and goes on by itself; a run on hardware ends there.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from blackboard.board import View
+from blackboard.change import Change
+from blackboard.effect import Post
+from blackboard.journal import Decision, decision_record, plain
+from blackboard.scheduler import Scheduler
+from harvey.agent import Agent, build_agent
+from harvey.campaign.campaign import make_room
+from harvey.hidden_segments import check_segments
+from harvey.runner.ports import BodyPort
+from harvey.runner.replay import Live, ignore, open_originals
+from harvey.runner.result import UNFINISHED, MissionResult
+from harvey.runner.resume import RESUME
+from harvey.runner.run import Over, run_to_outcome
+from harvey.runner.teller import PAGE, USER
+from harvey.runner.world_port import WorldPort, tell_robot
+from harvey.simulation.run import SimulatedRun, rebuild_stage
+from logs.records import WHAT_IF, DecisionRecord, EntryRecord, Originals, as_line, decision_of, effect_of, read_records
+from logs.run_directory import RunDirectory
+from logs.run_head import SIMULATOR, RunHead
+from logs.run_recorder import RunRecorder
+from world_models.building.locale_frame import LocaleFrame
+from world_models.entries.body import Frame, MotionReport, RideReport
+from world_models.entries.task import Outcome
+from world_models.entries.told import Redirection, Told
+
+
+@dataclass(frozen=True, slots=True)
+class Parting:
+    """Where the changed agent asked its body for something else; None where one of them asked for nothing any more.
+
+    ``requests`` names the kinds of entries that ask the body for something.
+    """
+
+    then: DecisionRecord | None
+    now: DecisionRecord | None
+    requests: tuple[type[Any], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What would have been.
+
+    Attributes:
+        agreed: how many decisions are the same, to the byte, before the first that is not. What was only told to ask
+            the question is no difference (:class:`AsRecorded`).
+        then, now: that one, as recorded and as decided; None where there is none.
+        revised: what was revised to ask the question, as ``LocaleFrame-3.1``.
+        answered: how many decisions had their requests to the body answered by the record.
+        parting: where the record could no longer answer; None where it could to the end.
+        outcome: how it ends; kind ``unfinished`` where it was left at the parting.
+        result: in the simulator: how it went, by the truth.
+    """
+
+    agreed: int
+    then: DecisionRecord | None
+    now: DecisionRecord | None
+    revised: tuple[str, ...]
+    answered: int
+    parting: Parting | None
+    outcome: Outcome
+    result: MissionResult | None
+
+
+class _PartedError(Exception):
+    """The run is to end where it parts from the record."""
+
+
+def what_if(
+    run: RunDirectory, without: Sequence[str], constants: Sequence[tuple[str, str]], *,
+    out: RunDirectory | None = None, go_on: bool = True,
+) -> Answer:
+    """Decide a run again with a changed agent.
+
+    Args:
+        without: knowledge sources, landmarks, faces, or ``Frame-88 segment 12``, to be taken away.
+        constants: (key, value) of servo levels and constants to be set.
+        out: where what would have been is kept, as a run; an older one there goes once it is clear what is asked.
+        go_on: in the simulator: go on where the record no longer answers.
+
+    Raises:
+        BadInput: the run cannot be used, or what is to be taken or set is not there.
+    """
+    then = RunHead.read(run.path)
+    head = replace(then.here(), without=(*then.without, *without), constants=(*then.constants, *constants))
+    agent = build_agent(head)
+    player = _Player(run, agent)
+    check_segments(player.records, without, then.without)
+    if out is not None:
+        make_room(out.path, head.name, head.seed)
+    recorder = RunRecorder(out, head, agent.world, agent.robot)
+    if head.kind != SIMULATOR:
+        ports, told = (WorldPort(agent.store),), Retelling(player.records, (USER, PAGE), player.originals)
+        scheduler = agent.scheduler(ports=ports, sinks=(*recorder.sinks, player.compare))
+        try:
+            outcome = player.play(scheduler, agent, head, recorder, before=lambda: _ask(scheduler, agent, told))
+            return player.answer(outcome, None)
+        finally:
+            recorder.close()
+    told = Retelling(player.records, (PAGE,), player.originals)
+    with SimulatedRun(rebuild_stage(head), head, agent, recorder, (player.compare,), tell=told.tell) as simulated:
+        result = simulated.drive(out, lambda: _run_changed(simulated, agent, player, go_on))
+    return player.answer(Outcome(result.outcome, result.reason), result)
+
+
+def _ask(scheduler: Scheduler, agent: Agent, told: Retelling) -> None:
+    """What comes before each cycle of a run on hardware that is decided again."""
+    agent.what_if(scheduler)
+    told.tell(scheduler)
+
+
+def _run_changed(run: SimulatedRun, agent: Agent, player: _Player, go_on: bool) -> Outcome:
+    """By the record as far as it answers; then by the simulated robot, if it is to go on."""
+    run.recorded_port.closed = True
+    with run.body_replay.replay(player.originals.pictures) as live:
+        outcome = player.play(
+            run.scheduler, agent, run.head, run.recorder, live=live, before=run.before_cycle, over=run.over)
+    if player.parting is None or not go_on:
+        return outcome
+    run.recorded_port.closed = False
+    for change in player.open:
+        run.scheduler.tell(run.recorded_port.answer(change), run.port.name)
+    return run.go_on(player.last)
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """What a recorded decision asked of the body, and what was observed then."""
+
+    decision: DecisionRecord
+    asked: tuple[str, ...]
+    answers: tuple[EntryRecord[Any], ...]
+
+
+class _Player:
+    """Answers an agent by the record of a run, as long as it requests the same."""
+
+    def __init__(self, run: RunDirectory, agent: Agent) -> None:
+        self.originals = open_originals(run, agent.store)
+        self.records = list(read_records(run.journal))
+        self._requests = tuple(BodyPort.acts_on)
+        self._steps = _steps(self.records, self._requests)
+        self._agreed = 0
+        self._as_recorded, self._as_decided = AsRecorded(), AsRecorded()
+        self._first: tuple[DecisionRecord | None, DecisionRecord] | None = None
+        self._answered = 0
+        self.last: Decision | None = None
+        self.open: tuple[Change, ...] = ()
+        self.parting: Parting | None = None
+
+    def compare(self, decision: Decision) -> None:
+        """Sink: compares with the record until the first difference."""
+        self.last, self.open = decision, tuple(change for change in decision.made if is_body_request(change))
+        if self._first is None:
+            then = self.records[self._agreed] if self._agreed < len(self.records) else None
+            then = None if then is None else self._as_recorded(then)
+            now = self._as_decided(decision_of(decision_record(decision)))
+            if then is not None and then.line == now.line:
+                self._agreed += 1
+            else:
+                self._first = then, now
+
+    def play(
+        self, scheduler: Scheduler, agent: Agent, head: RunHead, recorder: RunRecorder, *, live: Live = ignore,
+        before: Callable[[], None] = lambda: None, over: Over = lambda _scheduler: None,
+    ) -> Outcome:
+        """Decide until the end, or until the record no longer answers."""
+        tell_robot(scheduler, agent.robot)
+        scheduler.tell([Post(head.task())], "user")
+
+        def observe() -> None:
+            self._answer(scheduler, recorder, live)
+            before()
+
+        try:
+            return run_to_outcome(scheduler, over=over, before=observe)
+        except _PartedError:
+            return Outcome(UNFINISHED, "from here the recorded observations no longer hold")
+
+    def answer(self, outcome: Outcome, result: MissionResult | None) -> Answer:
+        """What was found."""
+        then, now = self._first or (None, None)
+        if self._first is None and self._agreed < len(self.records):
+            then = self.records[self._agreed]
+        return Answer(self._agreed, then, now, self._as_decided.revised, self._answered, self.parting, outcome, result)
+
+    def _answer(self, scheduler: Scheduler, recorder: RunRecorder, live: Live) -> None:
+        """What the record observed, if the last decision asked for what it asked for; ends the run if not."""
+        if not self.open:
+            return
+        made, self.open = self.open, ()
+        step = self._steps[self._answered] if self._answered < len(self._steps) else None
+        if step is None or step.asked != tuple(as_line(plain(change.entry.value)) for change in made):
+            self.open = made
+            now = decision_of(decision_record(self.last)) if self.last else None
+            self.parting = Parting(None if step is None else step.decision, now, self._requests)
+            raise _PartedError
+        self._answered += 1
+        live(made, step.answers)
+        for record in step.answers:
+            effect = effect_of(record, self.originals, scheduler.view, scheduler.kinds)
+            recorder.record_picture(effect)
+            scheduler.tell([effect], record.author)
+
+
+def is_body_request(change: Change) -> bool:
+    """Whether the body acts on a change. What is asked of the world is answered by the world, now as then."""
+    return isinstance(change.entry.value, BodyPort.acts_on)
+
+
+def _steps(records: Sequence[DecisionRecord], requests: Sequence[type[Any]]) -> list[_Step]:
+    steps = []
+    for decision, after in zip(records, [*records[1:], None], strict=True):
+        asked = tuple(as_line(entry.fields) for entry in decision.made if entry.kind in requests)
+        if asked and after is not None:
+            answers = tuple(entry for entry in after.observed if entry.author in (BodyPort.name, RESUME))
+            steps.append(_Step(decision, asked, answers))
+    return steps
+
+
+REF = re.compile(r'"([A-Za-z]+-\d+)\.(\d+)"')
+"""A revision, where it is the whole of a text of a journal's line."""
+
+
+class AsRecorded:
+    """Takes the decisions of a run in turn, and undoes the revisions with the author "what if".
+
+    They are not observed, and later revisions of the same entries have the number that they would have had.
+
+    Attributes:
+        revised: the revisions that were undone.
+    """
+
+    def __init__(self) -> None:
+        self.revised: tuple[str, ...] = ()
+        self._undone: dict[str, list[int]] = {}
+
+    def __call__(self, decision: DecisionRecord) -> DecisionRecord:
+        """The decision as it would stand in the journal."""
+        told = [entry for entry in decision.observed if entry.author == WHAT_IF]
+        for entry in told:
+            id, _, revision = entry.ref.rpartition(".")
+            self._undone.setdefault(id, []).append(int(revision))
+        refs = {entry.ref for entry in told}
+        self.revised += tuple(entry.ref for entry in told)
+        if not self._undone:
+            return decision
+        data = {**decision.data,
+                "observed": [_undo_changes(one) for one in decision.data["observed"] if one["entry"] not in refs],
+                "made": [_undo_changes(one) for one in decision.data["made"]],
+                "seen": [ref for ref in decision.seen if ref not in refs]}
+        return decision_of(json.loads(REF.sub(self._renumber, as_line(data))))
+
+    def _renumber(self, ref: re.Match[str]) -> str:
+        undone = self._undone.get(ref[1], ())
+        return f'"{ref[1]}.{int(ref[2]) - sum(number <= int(ref[2]) for number in undone)}"'
+
+
+def _undo_changes(record: dict[str, Any]) -> dict[str, Any]:
+    """An entry without what its frame has of that author, where somebody else revised it since."""
+    if record["type"] != LocaleFrame.__name__:
+        return record
+    changes = [change for change in record["value"]["changes"] if change["by"] != WHAT_IF]
+    return {**record, "value": {**record["value"], "changes": changes}}
+
+
+TIMED: tuple[type[Any], ...] = (Frame, MotionReport, RideReport)
+"""Kinds of observations that have the body's time."""
+TOLD: tuple[type[Any], ...] = (Told, Redirection)
+
+
+class Retelling:
+    """Tells again, in its cycle, what some authors had told; later where the changed agent needs fewer cycles.
+
+    By the body's time it is as late as it was; a cycle takes none.
+    """
+
+    def __init__(self, records: Sequence[DecisionRecord], authors: Sequence[str], originals: Originals) -> None:
+        """``records``: of the run as it was; ``originals``: what they name only by reference."""
+        self._originals, self._left = originals, list[tuple[int, float, EntryRecord[Any]]]()
+        now_s = 0.0
+        for record in records:
+            for entry in record.observed:
+                now_s = entry.fields["sim_time_s"] if entry.kind in TIMED else now_s
+                if entry.author in authors and entry.kind in TOLD:
+                    self._left.append((record.cycle - 1, now_s, entry))
+
+    def tell(self, scheduler: Scheduler) -> None:
+        """Tell what is due."""
+        while self._left and self._is_due(scheduler):
+            _, _, entry = self._left.pop(0)
+            effect = effect_of(entry, self._originals, scheduler.view, scheduler.kinds)
+            scheduler.tell([effect], entry.author)
+
+    def _is_due(self, scheduler: Scheduler) -> bool:
+        cycle, when_s, _ = self._left[0]
+        now_s = _find_time_s(scheduler.view)
+        return now_s > when_s or (now_s == when_s and scheduler.cycle >= cycle)
+
+
+def _find_time_s(view: View) -> float:
+    """The body's time of the newest observation on the board; 0 before the first."""
+    newest = [entry.value.sim_time_s for kind in TIMED if (entry := view.latest(kind)) is not None]
+    return max(newest, default=0.0)

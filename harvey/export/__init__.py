@@ -1,4 +1,0 @@
-"""Export: a run as tables for other programs.
-
-In reading order: ``tables`` (what they hold), ``files`` (CSV and Parquet).
-"""

@@ -1,0 +1,250 @@
+"""``harvey why RUN --not NAME``: the answers about a knowledge source or an entry; and asking a knowledge source again:
+could it have acted in a cycle, and if not, what did it find on the board?
+
+The board as it stood is rebuilt from the journal, and ``rate`` is asked once more. That is honest as far as ``rate`` is
+what it has to be, a pure function of the board; no act is repeated and no picture is looked at.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from blackboard.board import Blackboard, View
+from blackboard.change import Change, Posted, Retracted, Revised
+from blackboard.effect import Effect, MissingEntryError, Post, Retract, Revise
+from blackboard.entry import Entry
+from blackboard.entry_store import Index
+from blackboard.kinds import Registry, always
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from harvey.errors import BadInput
+from logs.explain.why_not import Fate, in_cycle, in_run, of_entry, tell_fates
+from logs.records import EntryRecord, cycle_of_writing, entry_of, refs_of
+from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
+from world_models import words
+from world_models.frame_store import FrameStore
+from world_models.words import sentence
+
+
+def answers(run: RunDirectory, history: Timeline, name: str, cycle: int | None) -> Iterator[str]:
+    """Why a knowledge source did not act (in a cycle), or why an entry did not stay.
+
+    Raises:
+        BadInput: the run has no such entry and no such knowledge source; near ones are named.
+    """
+    if "-" in name:
+        yield from of_entry(history, history.resolve(name))
+        return
+    source = name.lower().replace(" ", "_")
+    if cycle is None:
+        occasions = in_run(history, source)
+        if not occasions:
+            yield from _never(run, source)
+        yield from tell_fates(source, occasions)
+        return
+    found = in_cycle(history, source, cycle)
+    if found:
+        for one in found:
+            yield f"In cycle {cycle} the {words.source(source)} {one.fate.value} on {one.trigger}: {one.why}."
+    else:
+        yield from _ask_again(run, history, source, cycle)
+    yield from _instead(history, cycle, any(one.fate in (Fate.ACTED, Fate.ASKED) for one in found))
+
+
+def _instead(history: Timeline, cycle: int, acted: bool) -> Iterator[str]:
+    decision = history.decision(cycle)
+    chosen = decision.chosen
+    if chosen is None:
+        yield f"Nobody acted in cycle {cycle}."
+    elif not acted:
+        made = ", ".join(r.ref for r in decision.made) or "nothing"
+        yield (f"The {words.source(chosen.source)} acted, on {chosen.trigger}, rated {chosen.rating:.2f}, with the"
+               f" {decision.focus} level in focus: it made {made}.")
+
+
+def _never(run: RunDirectory, source: str) -> Iterator[str]:
+    from harvey.agent import build_agent
+    from logs.run_head import RunHead
+
+    agent = build_agent(RunHead.read(run.path))
+    named = _find(source, agent.sources)
+    if not agent.servoing.allows(named.closes):
+        yield f"The {named.closes} level of servoing was off, and the {words.source(source)} closes it."
+
+
+def _ask_again(run: RunDirectory, history: Timeline, source: str, cycle: int) -> Iterator[str]:
+    """The knowledge source is asked once more, on the board as it was."""
+    from harvey.agent import build_agent
+    from logs.run_head import RunHead
+
+
+    head = RunHead.read(run.path)
+    if source in head.without:
+        yield f"The {words.source(source)} was left out of this run."
+        return
+    agent = build_agent(head)
+    named = _find(source, agent.sources)
+    if not agent.servoing.allows(named.closes):
+        yield f"The {named.closes} level of servoing was off, and the {words.source(source)} closes it."
+    else:
+        yield from why_absent(history, named, cycle, agent.kinds, agent.store)
+
+
+def _find(source: str, sources: tuple[KnowledgeSource, ...]) -> KnowledgeSource:
+    names = [one.name for one in sources]
+    if source not in names:
+        near = difflib.get_close_matches(source, names, n=4, cutoff=0.5) or names
+        raise BadInput(
+            f"--not: expected a knowledge source as {', '.join(near)}, or an entry as Goal-1, got {source!r}")
+    return sources[names.index(source)]
+
+
+CHANGES: Mapping[str, type[Change]] = {"Posted": Posted, "Revised": Revised, "Retracted": Retracted}
+
+
+def why_absent(
+    history: Timeline, source: KnowledgeSource, cycle: int, kinds: Registry, store: FrameStore
+) -> Iterator[str]:
+    """Why a knowledge source was not among those that could act in a cycle, in sentences.
+
+    Raises:
+        BadInput: the run has no such cycle, or a value of the journal is not of its type.
+    """
+    seen = changes(history, cycle, kinds, store)
+    woken = [change for change in seen if any(watch.sees(change) for watch in source.watches)]
+    if not woken:
+        yield from _tell_why_not_triggered(source, seen, cycle)
+        return
+    board = board_at(history, cycle, kinds, store)
+    for change in woken:
+        yield from _ask_rating(source, board, change)
+
+
+def _tell_why_not_triggered(source: KnowledgeSource, seen: Sequence[Change], cycle: int) -> Iterator[str]:
+    """Nothing came of the kinds that it watches for, or the condition of its watch did not hold for what came."""
+    name = words.source(source.name)
+    held_back = [change for change in seen if any(
+        watch.is_for(type(change), type(change.entry.value)) for watch in source.watches)]
+    if held_back:
+        came = ", ".join(f"{change.entry.ref} {change.kind.lower()}" for change in held_back)
+        yield (f"In cycle {cycle} came what the {name} watches for, {came}, but its watch has a condition, which did"
+               " not hold for the values:")
+        yield from (f"  {change.entry.ref}: {sentence(change.entry.value)}" for change in held_back)
+        return
+    watched = ", ".join(dict.fromkeys(f"{w.value_type.__name__} {_kinds(w.kinds)}" for w in source.watches))
+    came = ", ".join(f"{change.entry.ref} {change.kind.lower()}" for change in seen) or "nothing"
+    yield f"Nothing that the {name} watches for came in cycle {cycle}. It watches for: {watched}; what came: {came}."
+
+
+def _ask_rating(source: KnowledgeSource, board: Blackboard, change: Change) -> Iterator[str]:
+    name, ref = words.source(source.name), change.entry.ref
+    if not isinstance(change, Retracted) and not board.view.is_current(change.entry):
+        now = board.view.get(change.entry.id)
+        yield f"{ref} would have woken the {name}, but was {f'{now.ref} already' if now else 'withdrawn already'}."
+        return
+    view = AskedView(board)
+    try:
+        rating = source.rate(view, change)
+    except MissingEntryError as missing:
+        yield (f"{ref} woke the {name}; asked again, it lacks something to tell whether it could act:"
+               f" it {sentence(missing.request)}.")
+        return
+    if rating is not None:
+        yield f"{ref} woke the {name}; asked again, it says that it could have acted, rated {rating:.2f}."
+        return
+    yield f"{ref} woke the {name}, but it could not act. What it asked of the board, and found:"
+    yield from (f"  {question}: {', '.join(dict.fromkeys(answers)) or 'nothing'}" for question, answers in view.asked)
+    if view.asked:
+        yield "The last of these decided."
+
+
+def _kinds(kinds: Iterable[type[Change]]) -> str:
+    return "/".join(kind.__name__.lower() for kind in kinds)
+
+
+class AskedView(View):
+    """A view that remembers what was asked of it, in words, and the answers."""
+
+    __slots__ = ("asked",)
+
+    def __init__(self, board: Blackboard) -> None:
+        super().__init__(board)
+        self.asked: list[tuple[str, list[str]]] = []
+
+    def _note(self, question: str, found: Iterable[Entry[Any] | None]) -> None:
+        if not self.asked or self.asked[-1][0] != question:
+            self.asked.append((question, []))
+        self.asked[-1][1].extend(str(e.ref) for e in found if e is not None)
+
+    def get(self, id: str) -> Entry[Any] | None:
+        found = super().get(id)
+        self._note(f"what {id} is now", (found,))
+        return found
+
+    def latest(self, kind: type[Any], where: Callable[[Any], bool] = always) -> Entry[Any] | None:
+        found = super().latest(kind, where)
+        condition = "" if where is always else " that meets a condition"
+        self._note(f"the newest {kind.__name__}{condition}", (found,))
+        return found
+
+    def where(self, kind: type[Any], predicate: Callable[[Any], bool]) -> tuple[Entry[Any], ...]:
+        found = super().where(kind, predicate)
+        self._note(f"every {kind.__name__} that meets a condition", found)
+        return found
+
+    def newest(self, index: Index[Any], key: Any) -> Entry[Any] | None:
+        found = super().newest(index, key)
+        self._note(f"the newest {_by(index, key)}", (found,))
+        return found
+
+    def having(self, index: Index[Any], key: Any) -> tuple[Entry[Any], ...]:
+        found = super().having(index, key)
+        self._note(f"every {_by(index, key)}", found)
+        return found
+
+
+def _by(index: Index[Any], key: Any) -> str:
+    """``open Discrepancy (plan level)``: what an index finds by a key."""
+    what = f"{index.word} {index.kind.__name__}".lstrip()
+    if key is True:
+        return what
+    return f"{what} ({key} level)" if isinstance(key, Level) else f"{what} ({key})"
+
+
+def changes(history: Timeline, cycle: int, kinds: Registry, store: FrameStore) -> tuple[Change, ...]:
+    """What a cycle took up: what the one before had made, and what came from outside. Raises BadInput."""
+    decision = history.decision(cycle)
+    outside = {r.ref for r in decision.observed}
+    before = [r for r in history.written_by(cycle - 1) if r.ref in decision.seen and r.ref not in outside]
+    return tuple(CHANGES.get(r.change, Posted)(entry_of(r, kinds, store)) for r in (*before, *decision.observed))
+
+
+def board_at(history: Timeline, cycle: int, kinds: Registry, store: FrameStore) -> Blackboard:
+    """The board as knowledge sources saw it when they were asked in a cycle. Raises BadInput."""
+    told: list[EntryRecord[Any]] = []
+    for one in history.cycles:
+        if one > cycle:
+            break
+        decision = history.decision(one)
+        told += (*decision.observed, *(decision.made if one < cycle else ()))
+    last = {record.id: record for record in told}
+    # older revisions cannot be seen any more, so each value is made once
+    values = {id: entry_of(record, kinds, store).value for id, record in last.items()}
+    board = Blackboard()
+    for record in told:
+        board.apply([_effect(board, record, values[record.id])], author=record.author, cycle=cycle_of_writing(record))
+    return board
+
+
+def _effect(board: Blackboard, record: EntryRecord[Any], value: Any) -> Effect:
+    if record.is_new:
+        return Post(value, refs_of(record.because))
+    entry = board.view.get(record.id)
+    if entry is None:
+        raise BadInput(f"{record.ref}: expected it on the board in cycle {record.cycle}, where it is not")
+    if record.is_gone:
+        return Retract(entry, refs_of(record.retracted_because))
+    return Revise(entry, value, refs_of(record.because))

@@ -1,0 +1,410 @@
+"""Where two runs part, and why: the first decision that differs, field by field or down to the observation or setting
+that it comes from; and how far apart they went."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any
+
+from logs.explain.phrases import STRANGE, sentence
+from logs.records import Candidate, DecisionRecord, EntryRecord, as_line
+from logs.run_directory import RunDirectory
+from logs.tables import table
+from logs.timeline import Timeline
+from world_models import words
+from world_models.entries.body import Frame, MotorCommand
+from world_models.entries.location import Hypothesis
+from world_models.entries.task import Goal, Milestone, PlanSketch
+from world_models.words import count, metres
+
+if TYPE_CHECKING:
+    from logs.run_head import RunHead
+
+MEANINGS: Mapping[str, str] = {
+    "cycle": "the number of the cycle",
+    "observed": "what came from outside",
+    "seen": "the changes taken up",
+    "obviated": "what was dropped from the agenda",
+    "focus": "the level in focus",
+    "activated": "who could act",
+    "chosen": "what was chosen",
+    "runner_up": "what came second",
+    "pending": "how many were left pending",
+    "made": "what the act brought about",
+    "refused": "why the act was refused",
+}
+"""The fields of a decision, in the order in which one follows from the other."""
+
+MOST_VALUES = 6
+"""How many differing values of one field are told."""
+
+LONGEST = 60
+
+
+class _Absent:
+    """A value that is not there."""
+
+    def __str__(self) -> str:
+        return "nothing"
+
+
+ABSENT = _Absent()
+
+
+def first_difference(
+    ours: Iterable[DecisionRecord], theirs: Iterable[DecisionRecord]
+) -> tuple[int, DecisionRecord | None, DecisionRecord | None]:
+    """How many decisions agree, and the pair that does not; (n, None, None) where all do."""
+    agreed = 0
+    for one, other in zip_longest(ours, theirs):
+        if one is None or other is None or one.line != other.line:
+            return agreed, one, other
+        agreed += 1
+    return agreed, None, None
+
+
+def describe(agreed: int, one: DecisionRecord | None, other: DecisionRecord | None) -> Iterator[str]:
+    """The answer in plain words; the runs are called first and second."""
+    if one is None and other is None:
+        yield f"The two runs agree in all of their {count(agreed, 'decision')}."
+        return
+    yield f"The two runs agree for {count(agreed, 'decision')}."
+    if one is None or other is None:
+        ended, name = ("first", "second") if one is None else ("second", "first")
+        yield f"Then the {ended} run ends, while the {name} goes on: {_what(one or other)}."
+        return
+    yield f"In cycle {one.cycle} they differ:"
+    if not (fields := [key for key in MEANINGS if as_line(one.data[key]) != as_line(other.data[key])]):
+        yield "  only in how the line is written"
+    for key in fields:
+        yield f"  {MEANINGS[key]} ({key}):"
+        yield from _field(key, one, other)
+
+
+def _field(key: str, one: DecisionRecord, other: DecisionRecord) -> Iterator[str]:
+    if key in ("observed", "made"):
+        yield from _entries(getattr(one, key), getattr(other, key))
+        return
+    for name, decision in (("first", one), ("second", other)):
+        yield f"    {name + ':':<8}{_to_text(key, decision)}"
+
+
+def _entries(ours: tuple[EntryRecord[Any], ...], theirs: tuple[EntryRecord[Any], ...]) -> Iterator[str]:
+    for a, b in zip_longest(ours, theirs):
+        if a is not None and b is not None and same(a, b):
+            continue
+        if a is not None and b is not None and a.ref == b.ref:
+            yield f"    {a.ref}:"
+            yield f"      first:  {sentence(a)}"
+            yield f"      second: {sentence(b)}"
+            yield from (f"      {line}" for line in _values(a, b))
+        else:
+            yield from (f"    only in the {name}: {e.ref}: {sentence(e)}"
+                        for name, e in (("first", a), ("second", b)) if e is not None)
+
+
+def _values(a: EntryRecord[Any], b: EntryRecord[Any]) -> list[str]:
+    """The differing leaves of two records of the same entry."""
+    pairs = (("author", a.author, b.author), ("change", a.change, b.change), ("rests on", a.because, b.because))
+    lines = [f"{name}: {short(x)} against {short(y)}" for name, x, y in pairs if x != y]
+    leaves = [f"{path}: {short(x)} against {short(y)}" for path, x, y in differing_leaves(a.fields, b.fields)]
+    more = [f"and {len(leaves) - MOST_VALUES} more values"] if len(leaves) > MOST_VALUES else []
+    return lines + leaves[:MOST_VALUES] + more
+
+
+def differing_leaves(a: Any, b: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """(path, left, right) of each value in which two JSON values differ; lists of other lengths differ as wholes.
+
+    What only one of two objects has is :data:`ABSENT` in the other.
+    """
+    ours, theirs = ({} if x is ABSENT else x for x in (a, b))
+    if isinstance(ours, Mapping) and isinstance(theirs, Mapping) and (ours or theirs):
+        for key in {**ours, **theirs}:
+            yield from differing_leaves(ours.get(key, ABSENT), theirs.get(key, ABSENT), f"{path}.{key}".lstrip("."))
+    elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
+        for index, (x, y) in enumerate(zip(a, b, strict=True)):
+            yield from differing_leaves(x, y, f"{path}[{index}]")
+    elif ABSENT in (a, b) or as_line(a) != as_line(b):
+        yield path or "value", a, b
+
+
+def short(value: Any) -> str:
+    """A value in a few words."""
+    text = f"{len(value)} values" if isinstance(value, list) and len(value) > 4 else str(value)
+    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+
+
+def _to_text(key: str, d: DecisionRecord) -> str:
+    value = getattr(d, key)
+    if isinstance(value, tuple):
+        return ", ".join(_candidate(v) if isinstance(v, Candidate) else str(v) for v in value) or "nothing"
+    if isinstance(value, Candidate):
+        return _candidate(value)
+    return "nothing" if value in (None, "") else str(value).rstrip().splitlines()[-1]
+
+
+def _candidate(c: Candidate) -> str:
+    return f"{c.source} on {c.trigger} rated {c.rating:.4g}" + (f" ({c.reason})" if c.reason else "")
+
+
+def _what(d: DecisionRecord | None) -> str:
+    if d is None or d.chosen is None:
+        return "nothing is chosen"
+    return f"in cycle {d.cycle} {d.chosen.source} acts on {d.chosen.trigger}"
+
+
+MOST_SETTINGS = 8
+IGNORED = frozenset({"harvey", "code", "arithmetic", "folder", "world_sha256"})
+
+
+@dataclass(frozen=True, slots=True)
+class Parting:
+    """Where two runs part.
+
+    Attributes:
+        observation: ref of the first entry from outside that is not the same in both; "" where all are.
+        decision: cycle of the first decision that does something else; 0 where none does.
+        motion: the first motor command that differs; "" where none does.
+        source: cycle of the first decision in which another knowledge source acts, or the same on something else; 0:
+            there is none.
+    """
+
+    observation: str
+    decision: int
+    motion: str
+    source: int
+
+
+def parting(ours: Timeline, theirs: Timeline, agreed: int) -> Parting:
+    """Where two runs part that agree in their first ``agreed`` decisions."""
+    observation, motion, decision, source = "", "", 0, 0
+    for cycle in ours.cycles[agreed:]:
+        one, other = ours.cycle_of(cycle), theirs.cycle_of(cycle)
+        if one is None or other is None:
+            break
+        observation = observation or _first(one.observed, other.observed)
+        acted = _to_action(one), _to_action(other)
+        if not source and acted[0] != acted[1]:
+            source = cycle
+        if not decision and (acted[0] != acted[1] or _first(one.made, other.made) or one.refused != other.refused):
+            decision = cycle
+        motion = motion or _first(_motions(one), _motions(other))
+        if observation and decision and motion and source:
+            break
+    return Parting(observation, decision, motion, source)
+
+
+def _first(ours: tuple[EntryRecord[Any], ...], theirs: tuple[EntryRecord[Any], ...]) -> str:
+    """The first entry that is not the same in both."""
+    for a, b in zip(ours, theirs, strict=False):
+        if not same(a, b):
+            return a.ref
+    longer = ours if len(ours) > len(theirs) else theirs
+    return longer[min(len(ours), len(theirs))].ref if len(ours) != len(theirs) else ""
+
+
+def same(a: EntryRecord[Any] | None, b: EntryRecord[Any] | None) -> bool:
+    """Whether two runs say the same of an entry, to the last bit."""
+    return a == b if a is None or b is None else a == b and as_line(a.fields) == as_line(b.fields)
+
+
+def _to_action(d: DecisionRecord) -> tuple[str, str]:
+    return ("", "") if d.chosen is None else (d.chosen.source, d.chosen.trigger)
+
+
+def _motions(d: DecisionRecord) -> tuple[EntryRecord[Any], ...]:
+    return tuple(r for r in d.made if r.kind is MotorCommand)
+
+
+def grounds(ours: Timeline, theirs: Timeline, ref: str) -> Iterator[tuple[EntryRecord[Any], EntryRecord[Any]]]:
+    """From an entry that differs to the oldest difference that it rests on, by the shortest way.
+
+    What is nearest is not what it came from: a belief that differs since the first picture rests on the last one too.
+    """
+    above: dict[str, str] = {ref: ""}
+    met, roots = [ref], list[str]()
+    for name in met:  # which grows meanwhile
+        below = _differing(ours, theirs, name)
+        if not below:
+            roots.append(name)
+        for under in below:
+            if under not in above:
+                above[under] = name
+                met.append(under)
+    oldest = min(roots, key=lambda name: (_cycle(ours, name), name), default=ref)
+    way = [oldest]
+    while above[way[-1]]:
+        way.append(above[way[-1]])
+    for name in reversed(way):
+        a, b = ours.entry(name), theirs.entry(name)
+        if a is not None and b is not None:
+            yield a, b
+
+
+def _differing(ours: Timeline, theirs: Timeline, ref: str) -> list[str]:
+    """The reasons of an entry that both runs have and that are not the same in both."""
+    a, b = ours.entry(ref), theirs.entry(ref)
+    shared = [name for name in a.because if name in b.because] if a is not None and b is not None else []
+    pairs = ((name, ours.entry(name), theirs.entry(name)) for name in dict.fromkeys(shared))
+    return [name for name, one, other in pairs if one is not None and other is not None and not same(one, other)]
+
+
+def _cycle(history: Timeline, ref: str) -> int:
+    record = history.entry(ref)
+    return 0 if record is None else record.cycle
+
+
+def settings(first: RunHead, second: RunHead) -> Iterator[str]:
+    """What was set differently, and by which code and on what it was decided where both say so and differ."""
+    if first.harvey != second.harvey:
+        yield f"decided by harvey {first.harvey} against {second.harvey}"
+    elif first.code and second.code and first.code != second.code:
+        yield f"decided by different code: {first.code} against {second.code}"
+    if first.arithmetic and second.arithmetic and first.arithmetic != second.arithmetic:
+        yield f"calculated on different processors: {first.arithmetic} against {second.arithmetic}"
+    ours, theirs = (json.loads(json.dumps(asdict(head))) for head in (first, second))
+    keys = [key for key in {**ours, **theirs} if key not in IGNORED]
+    told = [f"{path}: {short(a)} against {short(b)}" for key in keys
+            for path, a, b in differing_leaves({key: ours.get(key)}, {key: theirs.get(key)})]
+    yield from told[:MOST_SETTINGS]
+    if len(told) > MOST_SETTINGS:
+        yield f"and {len(told) - MOST_SETTINGS} more"
+
+
+def because(ours: Timeline, theirs: Timeline, agreed: int, settings: tuple[str, ...]) -> Iterator[str]:
+    """Why the runs part, in sentences. The runs are called first and second."""
+    where = parting(ours, theirs, agreed)
+    if where.observation:
+        yield from _tell_observation(ours, theirs, where)
+    if where.decision:
+        yield from _tell_decision(ours, theirs, where, settings)
+    if where.motion and where.motion not in (where.observation, ""):
+        yield from _tell_first_motion(ours, theirs, where.motion)
+    if where.source and where.source != where.decision:
+        yield from _others(ours, theirs, where.source)
+
+
+def _tell_observation(ours: Timeline, theirs: Timeline, where: Parting) -> Iterator[str]:
+    a, b = ours.entry(where.observation), theirs.entry(where.observation)
+    cycle = (a or b or EntryRecord("", "", "", "", (), None, 0, True)).cycle
+    later = "" if not where.decision or cycle <= where.decision else ", after they had decided differently"
+    yield f"The first observation that differs is {where.observation}, in cycle {cycle}{later}:"
+    yield from _both(a, b)
+    if a is not None and b is not None and a.kind is Frame and b.kind is Frame:
+        yield "  (the same picture was asked for, and another came: other noise, or the robot stood elsewhere)"
+
+
+def _both(a: EntryRecord[Any] | None, b: EntryRecord[Any] | None) -> Iterator[str]:
+    yield f"  first:  {sentence(a) if a else 'none'}"
+    yield f"  second: {sentence(b) if b else 'none'}"
+    if a is not None and b is not None:
+        leaves = list(differing_leaves(a.fields, b.fields))
+        if leaves and sentence(a) == sentence(b):
+            yield f"  (they differ in {', '.join(path for path, _, _ in leaves[:4])})"
+
+
+def _tell_decision(ours: Timeline, theirs: Timeline, where: Parting, settings: tuple[str, ...]) -> Iterator[str]:
+    one, other = ours.decision(where.decision), theirs.decision(where.decision)
+    if _to_action(one) != _to_action(other):
+        yield from _others(ours, theirs, where.decision, "The first decision that differs is in cycle")
+    else:
+        ref = _first(one.made, other.made)
+        who = words.source(_to_action(one)[0])
+        yield f"The first decision that differs is in cycle {where.decision}, of the {who}: {ref or 'nothing'}"
+        yield from _both(_find_entry(one, ref), _find_entry(other, ref))
+        if one.refused != other.refused:
+            yield f"  refused in the {'first' if one.refused else 'second'}: {(one.refused or other.refused).strip()}"
+        yield from _tell_grounds(ours, theirs, ref)
+    if not where.observation or _cycle(ours, where.observation) > where.decision:
+        yield from _minds(one, other, settings)
+
+
+def _minds(one: DecisionRecord, other: DecisionRecord, settings: tuple[str, ...]) -> Iterator[str]:
+    """Everything that came from outside was the same: then who decides is not."""
+    only = [(name, sorted({c.source for c in a.activated} - {c.source for c in b.activated}))
+            for name, a, b in (("first", one, other), ("second", other, one))]
+    for name, sources in only:
+        if sources:
+            yield f"  able to act only in the {name}: {', '.join(map(words.source, sources))}"
+    why = "see \"set differently\" above" if settings else "the runs name no setting that differs"
+    yield f"Until then both observed the same, so the knowledge sources, their settings or their code differ: {why}."
+
+
+def _find_entry(d: DecisionRecord, ref: str) -> EntryRecord[Any] | None:
+    return next((r for r in d.made if r.ref == ref), None)
+
+
+def _tell_grounds(ours: Timeline, theirs: Timeline, ref: str) -> Iterator[str]:
+    """What the difference comes from, down to what was observed."""
+    for a, b in list(grounds(ours, theirs, ref))[1:]:
+        yield f"  because of {a.ref}" + (", which came from outside" if a.observed else "") + ":"
+        yield from (f"  {line}" for line in _both(a, b))
+
+
+def _tell_first_motion(ours: Timeline, theirs: Timeline, ref: str) -> Iterator[str]:
+    a, b = ours.entry(ref), theirs.entry(ref)
+    cycle = (a or b or EntryRecord("", "", "", "", (), None, 0, True)).cycle
+    yield f"The first motion that differs is {ref}, in cycle {cycle}:"
+    yield from _both(a, b)
+    yield from _tell_grounds(ours, theirs, ref)
+
+
+def _others(
+    ours: Timeline, theirs: Timeline, cycle: int, head: str = "They take other steps for the first time in cycle"
+) -> Iterator[str]:
+    yield f"{head} {cycle}:"
+    for name, history in (("first: ", ours), ("second:", theirs)):
+        d = history.decision(cycle)
+        if d.chosen is None:
+            yield f"  {name} nobody acts"
+        else:
+            made = "; ".join(f"{r.ref}: {sentence(r)}" for r in d.made[:2])
+            who = words.source(d.chosen.source)
+            yield f"  {name} the {who} on {d.chosen.trigger}, rated {d.chosen.rating:.2f}: {made}"
+
+
+def apart(first: RunDirectory, second: RunDirectory, ours: Timeline, theirs: Timeline) -> str:
+    """How the two runs went, side by side."""
+    rows = [["decisions", str(len(ours.cycles)), str(len(theirs.cycles))]]
+    for kind in (MotorCommand, Frame, Milestone, PlanSketch, Goal):
+        rows.append([kind.__name__, *(str(len(h.ids_of(kind))) for h in (ours, theirs))])
+    a, b = first.read_result(), second.read_result()
+    for key in ("outcome", "final_error_m", "sim_time_s", "path_length_m", "relocalizations", "collisions"):
+        if key in a or key in b:
+            rows.append([key, *(_cell(result.get(key)) for result in (a, b))])
+    try:
+        far, at = _furthest(ours, theirs)
+    except STRANGE:
+        far, at = 0.0, ""
+    tail = f"\nthe two beliefs were furthest apart before {at}: {metres(far)}" if at else ""
+    return table(["", "first", "second"], rows) + tail
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _furthest(ours: Timeline, theirs: Timeline) -> tuple[float, str]:
+    """How far apart the robots believed to stand when they gave the same motor command by number [m]."""
+    far, at = 0.0, ""
+    for ref in (ref for ref in ours.refs if ref.startswith("MotorCommand-")):
+        a, b = ours.entry(ref), theirs.entry(ref)
+        if a is None or b is None:
+            break
+        here, there = ours.reason(a, Hypothesis), theirs.reason(b, Hypothesis)
+        if here is None or there is None or here.fields["locale"] != there.fields["locale"]:
+            continue
+        p, q = here.fields["locale_from_robot"], there.fields["locale_from_robot"]
+        away = math.hypot(p["x_m"] - q["x_m"], p["y_m"] - q["y_m"])
+        if away > far:
+            far, at = away, a.id
+    return far, at
+
+
+def agreement(agreed: int) -> str:
+    """How long the runs agree."""
+    return f"The two runs agree for {count(agreed, 'decision')}."

@@ -1,0 +1,332 @@
+"""The phrase book: what an entry, a decision, and an entry with its neighbours say in whole sentences.
+
+One entry is told by the sentence of its own kind. A run of another version, whose values do not fit their kinds, raises
+BadInput.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from logs.errors import BadInput
+from logs.records import WHAT_IF, Candidate, EntryRecord
+from logs.timeline import Timeline
+from world_models import words
+from world_models.building.locale_frame import FrameRequest
+from world_models.entries.body import Course, Frame, MotionReport, MotorCommand
+from world_models.entries.location import Hypothesis, Place
+from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
+from world_models.entries.task import Certificate, Goal, Leg, Milestone, PlanSketch
+from world_models.words import count, degrees, landmark, listed, metres, point, quantity, size, turn
+
+STRANGE = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError)
+"""What reading a value raises that has other fields than this version writes."""
+MAX_LISTED = 4
+SLIGHT_RAD = math.radians(0.05)
+CORRECTED_BY: Mapping[Level, str] = {
+    Level.ACTION: "on the move", Level.PLAN: "at a milestone", Level.GOAL: "by finding out anew where it is",
+}
+
+
+def sentence(record: EntryRecord[Any]) -> str:
+    """One sentence, without the entry's name and without a full stop."""
+    try:
+        text = words.sentence(record.value)
+    except (BadInput, ValueError, TypeError, OverflowError):  # a kind, or fields, that this version does not know
+        text = words.fields(record.fields)
+    return f"{text}; no longer believed" if record.is_gone else text
+
+
+def describe_decision(history: Timeline, record: EntryRecord[Any]) -> str:
+    """By whom, when and against what."""
+    time_s = history.time_at(record.cycle)
+    when = f"cycle {record.cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run,")
+    if record.author == WHAT_IF:
+        return f"It was revised in {when.rstrip(',')} by the question what if."
+    if record.observed:
+        return f"It came from outside, from {record.author}, and was taken up in {when.rstrip(',')}."
+    decision = history.decision(record.cycle)
+    text = f"Decided in {when} by the {words.source(record.author)}"
+    if decision.chosen is None:
+        return text + "."
+    asked = tell_questions(history, record)
+    next_best = decision.runner_up
+    second = f"; next best was {describe_candidate(next_best)}" if next_best else "; nobody else could act"
+    return f"{text}, woken by {decision.chosen.trigger}, rated {decision.chosen.rating:.2f}{second}.{asked}"
+
+
+def describe_candidate(c: Candidate) -> str:
+    return f"the {words.source(c.source)}, rated {c.rating:.2f}"
+
+
+def tell_questions(history: Timeline, record: EntryRecord[Any]) -> str:
+    """What the act that made an entry had asked for before it came again; "" where it lacked nothing."""
+    chosen = history.decision(record.cycle).chosen
+    if record.observed or chosen is None or chosen.since == record.cycle:
+        return ""
+    asked: list[EntryRecord[Any]] = []
+    for request in history.of_kind(FrameRequest):
+        if request.revision or not chosen.since <= request.cycle < record.cycle:
+            continue
+        before = history.decision(request.cycle).chosen
+        if before is not None and before.number == chosen.number:
+            asked.append(request)
+    if not asked:
+        return ""
+    wanted = listed([f"{sentence(request).removeprefix('asks ')} ({request.ref})" for request in asked], MAX_LISTED)
+    return f" It had waited for an answer first: it asked for {wanted}."
+
+
+def tell_answer(history: Timeline, request: EntryRecord[Any]) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """What became of the act that asked."""
+    asked = history.entry(f"{request.id}.0") or request
+    decision = history.decision(asked.cycle)
+    if decision.chosen is None:
+        return
+    for later in history.naming(decision.chosen.trigger):
+        if later.cycle <= asked.cycle or later.chosen is None or later.chosen.number != decision.chosen.number:
+            continue
+        made = listed([record.ref for record in later.made], MAX_LISTED) or "nothing"
+        text = f"The act waited for the answer, and came again in cycle {later.cycle}: it made {made}."
+        yield text, tuple(record.ref for record in later.made[:MAX_LISTED])
+        return
+
+
+def place(p: Place) -> str:
+    return f"{point(p.x_m, p.y_m)} of {p.locale}"
+
+
+def pose(h: Hypothesis) -> str:
+    """Where a hypothesis says that the robot stands, and how surely."""
+    p = h.locale_from_robot
+    sure = f"sure to {metres(h.sigma_m)} and {degrees(h.sigma_rad)}"
+    return f"{point(p.x_m, p.y_m)} of {h.locale}, heading {degrees(p.heading_rad)} ({sure})"
+
+
+def picture(frame: EntryRecord[Any] | None, ref: str = "") -> str:
+    """A picture by the name of its entry: ``Frame-49``."""
+    return frame.id if frame is not None else ref or "a picture"
+
+
+def line(leg: Leg, sketch: PlanSketch | None) -> str:
+    """The line that is driven, and how the robot stood to it."""
+    length_m = math.hypot(leg.x1_m - leg.x0_m, leg.y1_m - leg.y0_m)
+    end = f" to {place(sketch.subgoals[leg.index].destination)}" if sketch is not None else ""
+    text = f"It was driving a straight line of {metres(length_m)}{end}"
+    if leg.to_go_m is None or leg.left_m is None:
+        return text + f" ({leg.status} after {count(leg.increments, 'increment')})."
+    text += f": {metres(abs(leg.to_go_m))} {'were left' if leg.to_go_m >= 0 else 'too far'}"
+    side = "left" if leg.left_m >= 0 else "right"
+    beside = f"{metres(abs(leg.left_m))} to the {side} of" if abs(leg.left_m) >= 0.0005 else "on"
+    text += f", it stood {beside} the line"
+    if leg.status == "moving" and leg.aim_rad is not None:
+        text += f", and the point of the line that it steers at lay {turn(leg.aim_rad)} of where it faced"
+    else:
+        text += f", near enough within {metres(leg.tolerance_m)}"
+    return text + "."
+
+
+def tracking(tracks: Tracks, frame: EntryRecord[Any] | None) -> str:
+    """Which landmarks were found where, against where they were expected."""
+    found = tracks.found_again()
+    old = [t for t in tracks.items if t.template_frame != tracks.frame]
+    where = picture(frame, tracks.frame)
+    if not found:
+        return f"In {where} none of {count(len(old), 'landmark')} that it follows was found." if old else (
+            f"It chose {count(len(tracks.items), 'landmark')} of {where} to follow.")
+    middle = sorted(math.hypot(*track.shift_px) for track in found)[len(found) // 2]
+    return (f"In {where} it found {len(found)} of the {count(len(old), 'landmark')} that it follows; a corner of"
+            f" {off(found[0])}, the furthest of them; half of them were within {middle:.1f} px.")
+
+
+def off(track: Track) -> str:
+    """Where a landmark was, against its prediction."""
+    (du, dv), (u, v) = track.shift_px, track.predicted_px
+    parts = [f"{abs(du):.1f} px {'right' if du >= 0 else 'left'} of"] if abs(du) >= 0.05 else []
+    parts += [f"{abs(dv):.1f} px {'below' if dv >= 0 else 'above'}"] if abs(dv) >= 0.05 else []
+    return f"{landmark(track.landmark)} was {' and '.join(parts) or 'at'} its prediction at ({u:.0f}, {v:.0f}) px"
+
+
+def describe_belief_change(now: Hypothesis, before: Hypothesis) -> str:
+    """How far a new belief is from the one before; empty where they are in different frames."""
+    if now.locale != before.locale:
+        return ""
+    a, b = before.locale_from_robot, now.locale_from_robot
+    angle = math.remainder(b.heading_rad - a.heading_rad, math.tau)
+    turned = f" and turned it {turn(angle)}" if abs(angle) >= SLIGHT_RAD else ""
+    return f"That moved its belief by {metres(a.distance_to(b))}{turned}."
+
+
+def wheels(report: MotionReport) -> str:
+    """What the wheels claim."""
+    parts = [f"turned {turn(report.turn_rad)}"] * (abs(report.turn_rad) > 1e-6)
+    parts += [f"moved {metres(report.move_m)} ahead"] * (abs(report.move_m) > 1e-6)
+    return f"the wheels claimed to have {' and '.join(parts) or 'stood still'}"
+
+
+def describe_line_match(history: Timeline, record: EntryRecord[Any]) -> str:
+    """Which segments of which frame were taken for which model elements, and what pose follows."""
+    match, fix = history.reason(record, LineMatch), record.value
+    if match is None:
+        return f"The pose was solved from {fix.match}."
+    seen = history.reason(match, Segments)
+    by_name = by_landmark(history, fix, match)
+    where = f" in {picture(None if seen is None else history.reason(seen, Frame), 'a picture')}"
+    agreeing = int(fix.inliers.sum())
+    if not by_name:
+        return f"The pose was solved from {count(agreeing, 'pair')} of segment and model line{where}."
+    (best, numbers), *others = by_name
+    rest = [f"{landmark(name)} ({len(pairs)})" for name, pairs in others]
+    more = f"; the other {agreeing - len(numbers)} with {listed(rest)}" if rest else ""
+    of_all = f" of {count(len(seen.value.segments_px), 'line segment')}" if seen is not None else ""
+    lines = len(np.unique(match.value.pairs[fix.inliers][:, 0]))
+    return (f"{agreeing}{of_all}{where} were matched with {count(lines, 'model line')}: {_segments(numbers)} with"
+            f" {landmark(best)}{more}.")
+
+
+def best_pairs(history: Timeline, record: EntryRecord[Any], match: EntryRecord[Any]) -> str:
+    """The segments of the landmark with most of them: ``segments 12, 31 and 40 in Frame-88 against ...``."""
+    fix, seen = record.value, history.reason(match, Segments)
+    where = picture(None if seen is None else history.reason(seen, Frame))
+    by_name = by_landmark(history, fix, match)
+    if not by_name:
+        return f"{count(int(fix.inliers.sum()), 'pair')} in {where}"
+    best, numbers = by_name[0]
+    return f"{_segments(numbers)} in {where} against {landmark(best)}"
+
+
+def by_landmark(history: Timeline, fix: PoseFix, match: EntryRecord[Any]) -> list[tuple[str, list[int]]]:
+    """Landmarks with the segments that agree with the pose, those with most segments first."""
+    expected = history.reason(match, Milestone)
+    if expected is None:
+        return []
+    milestone, pairs = expected.value, match.value.pairs[fix.inliers].tolist()
+    names = [milestone.landmarks[milestone.landmark_of[model]] for model, _ in pairs]
+    return [(name, [segment for other, (_, segment) in zip(names, pairs, strict=True) if other == name])
+            for name, _ in Counter(names).most_common()]
+
+
+def _segments(numbers: list[int]) -> str:
+    return f"{'segment' if len(numbers) == 1 else 'segments'} {listed(numbers)}"
+
+
+def verdict(certificate: Certificate, milestone: Milestone | None) -> str:
+    """What was concluded, with the numbers that decided."""
+    what = milestone_name(milestone) if milestone is not None else certificate.milestone
+    chance = f"the probability that so much agrees at a wrong place is {certificate.p_false:.2g}"
+    away = (f"the pose is {metres(certificate.deviation_m)} and {degrees(abs(certificate.deviation_rad))} from what was"
+            " believed")
+    if certificate.verdict != "verified":
+        judged = f"(at the pose that was found; from the belief it expected {count(certificate.expected, 'line')})"
+        return f"{what} was judged {certificate.verdict}: {certificate.reason} {judged}; {chance}."
+    return (f"{what} was verified: {certificate.reason} (up to {certificate.tolerance_px:.0f} px may be corrected);"
+            f" {away}; {chance}.")
+
+
+def milestone_name(milestone: Milestone) -> str:
+    """``milestone M1 of the route``, or the check that it is."""
+    return f"milestone {milestone.name()}" if milestone.sketch else f"the {milestone.name()}"
+
+
+def expectation(milestone: Milestone) -> str:
+    """What a milestone says should be seen."""
+    name = milestone_name(milestone)
+    if not milestone.expected:
+        return f"It was to look for {name}, and first had to turn to where most is to be seen of it."
+    names = [landmark(mark) for mark in milestone.landmarks]
+    return f"At {name} it expected to see {count(len(milestone.expected), 'model line')} of {listed(names, 4)}."
+
+
+def plan(sketch: PlanSketch) -> str:
+    """Which sketch, how far along."""
+    subgoals, where = sketch.subgoals, sketch.where()
+    end = place(subgoals[-1].destination)
+    if sketch.status == "done":
+        return f"Its plan {where} was carried out to its end, {end}."
+    if sketch.status != "active":
+        return f"Its plan {where} was {sketch.status} in part {sketch.at + 1} of {len(subgoals)}."
+    if sketch.current is None:
+        return f"This is in its plan {where}: at its end, {end}."
+    by = f" by {sketch.current.passage}" if sketch.current.passage else ""
+    to = f"to {place(sketch.current.destination)}{by}"
+    return f"This is in its plan {where}: part {sketch.at + 1} of {len(subgoals)}, {to}."
+
+
+def goal(value: Goal) -> str:
+    way = f"from {place(value.origin)} to {place(value.destination)}"
+    if value.status == "reached":
+        return f"The goal was reached: {way}."
+    if value.status == "abandoned":
+        return f"The goal was given up for a new one: {way}."
+    return f"All of it serves the goal: {way}."
+
+
+def describe_segments(segments: Segments, frame: EntryRecord[Any] | None) -> str:
+    """``179 line segments in Frame-49 (contrast 41 of 255)``."""
+    found = count(len(segments.segments_px), "line segment")
+    return f"{found} in {picture(frame, segments.frame)} (contrast {segments.contrast:.0f} of 255)"
+
+
+def doubt(d: Discrepancy) -> str:
+    """A discrepancy in words."""
+    bound = f"; up to {quantity(d.bound, d.unit)} may be corrected there" if math.isfinite(d.bound) else ""
+    large = "" if d.magnitude is None else f" ({size(d.magnitude, d.unit)}{bound})"
+    came = {"escalated": ", so the next level had to deal with it", "corrected": ", and was corrected"}
+    return f"Something was not as expected, to be dealt with {CORRECTED_BY[d.level]}: {d.what}{large}" + (
+        came.get(d.status, "") + ".")
+
+
+def in_one_sentence(history: Timeline, command: EntryRecord[Any]) -> str:
+    """Why the robot moved as it did; "" for entries that are no motor command."""
+    if command.kind not in (MotorCommand, Course):
+        return ""
+    parts = list(_because(history, command))
+    return f"Harvey was told to {sentence(command)} {', '.join(parts)}." if parts else ""
+
+
+def _because(history: Timeline, command: EntryRecord[Any]) -> Iterator[str]:
+    leg, milestone = history.reason(command, Leg), history.reason(command, Milestone)
+    belief = history.reason(command, Hypothesis)
+    aim_rad = None if leg is None else leg.value.aim_rad
+    if aim_rad is not None:
+        yield f"because the line to follow lay {turn(aim_rad)} of where it believed that it faced"
+    elif milestone is not None:
+        yield f"because it had to face {milestone_name(milestone.value)} to look for it"
+    elif leg is None and (segments := history.reason(command, Segments)) is not None:
+        seen = describe_segments(segments.value, history.reason(segments, Frame))
+        yield f"because it did not know where it was, and did not find it out from {seen}"
+    if belief is not None:
+        yield from _describe_worst_landmark(history, belief)
+        yield from _describe_match(history, belief)
+
+
+def _describe_worst_landmark(history: Timeline, belief: EntryRecord[Any]) -> Iterator[str]:
+    """The landmark that was furthest from its prediction, and the pose that the prediction was made from."""
+    tracks, before = history.tracks_of(belief), history.reason(belief, Hypothesis)
+    if belief.value.basis != "tracks" or tracks is None or before is None:
+        return
+    value = tracks.value
+    if not value.found_again():
+        return
+    frame = picture(history.reason(belief, Frame), value.frame)
+    yield f"because in {frame} {off(value.found_again()[0])} ({tracks.ref})"
+    yield f"made from pose {before.ref}"
+
+
+def _describe_match(history: Timeline, belief: EntryRecord[Any]) -> Iterator[str]:
+    """The match that the belief goes back to."""
+    anchor = history.anchor_of(belief)
+    fix = None if anchor is None else history.reason(anchor, PoseFix)
+    match = None if fix is None else history.reason(fix, LineMatch)
+    whose = "" if belief.value.basis == "tracks" else "where its pose was "
+    if fix is not None and match is not None:
+        yield f"{whose}made from match {match.id} of {best_pairs(history, fix, match)}"
+    elif anchor is not None:
+        yield f"made from pose {anchor.ref} by {anchor.value.basis}"

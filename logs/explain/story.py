@@ -1,0 +1,605 @@
+"""What a story is made of: sentences, each with the cycle that it tells of, in sections."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from logs.errors import BadInput
+from logs.explain import phrases
+from logs.explain.phrases import STRANGE, sentence
+from logs.explain.turning_points import TurningPoint, read_collisions, read_turning_points, turn_lines
+from logs.records import EntryRecord
+from logs.run_directory import RunDirectory
+from logs.tables import table
+from logs.timeline import Timeline
+from world_models.building.locale_frame import LocaleFrame
+from world_models.camera_lessons import find_camera_lessons
+from world_models.entries.body import Look
+from world_models.entries.door_state import DoorState
+from world_models.entries.location import Hypothesis
+from world_models.entries.obstacle import Obstacle
+from world_models.entries.robot import CameraState
+from world_models.entries.task import Certificate, Command, Goal, Milestone, Outcome, PlanSketch
+from world_models.entries.told import Redirection, Told
+from world_models.entries.touch import Contact
+from world_models.words import count, listed, metres
+
+
+@dataclass(frozen=True, slots=True)
+class Sentence:
+    """Something that happened.
+
+    Attributes:
+        text: one sentence or two.
+        cycle: when; None for what is so during the whole run.
+        time_s: since the run began, by the body's clock; None where nothing told it.
+        refs: the entries that say so; none for what only the simulator knows.
+    """
+
+    text: str
+    cycle: int | None = None
+    time_s: float | None = None
+    refs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of a story under its title."""
+
+    title: str
+    sentences: tuple[Sentence, ...]
+
+
+def sentence_of(history: Timeline, text: str, record: EntryRecord[Any], *others: EntryRecord[Any] | None) -> Sentence:
+    """A sentence that a record tells, in its cycle; ``others`` say so too."""
+    refs = dict.fromkeys(one.ref for one in (record, *others) if one is not None)
+    return Sentence(text, record.cycle, history.time_at(record.cycle), tuple(refs))
+
+
+WITHOUT: Mapping[str, str] = {
+    "action": "no landmark was followed, and it drove by dead reckoning between milestones",
+    "plan": "no pose was taken over from a milestone",
+    "goal": "a robot that is lost does not look for where it is",
+}
+"""What it means that a level is off."""
+
+
+def run_name(run: RunDirectory) -> str:
+    """``hallway-kidnap, seed 0``; the directory's name where its head cannot be read."""
+    head = _head(run)
+    name, seed = head.get("name"), head.get("seed")
+    if not isinstance(name, str):
+        return run.path.resolve().name
+    return f"{name}, seed {seed}" if isinstance(seed, int) and head.get("kind") == "simulator" else name
+
+
+def levels_off(run: RunDirectory) -> Iterator[str]:
+    """Which servo levels were switched off, as run.json says; nothing where it does not."""
+    head = _head(run)
+    try:
+        servo = {
+            **head["servo"],
+            **{
+                key.removeprefix("servo."): value == "on"
+                for key, value in head["constants"]
+                if key.startswith("servo.")
+            },
+        }
+    except (AttributeError, ValueError, KeyError, TypeError):
+        return
+    for level, is_on in servo.items():
+        if is_on is False:
+            yield f"The {level} level of servoing was off in this run: {WITHOUT.get(level, 'nobody closed it')}."
+
+
+def _head(run: RunDirectory) -> dict[str, Any]:
+    try:
+        head = json.loads((run.path / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return head if isinstance(head, dict) else {}
+
+
+WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, Told, Redirection)
+"""What changes the knowledge of a locale."""
+
+
+def tell_errand(history: Timeline) -> Section:
+    """What was asked for, and what it was told on the way."""
+    return Section(
+        "What it was to do",
+        tuple(
+            sentence_of(history, f"{_capital(sentence(record))}.", record)
+            for record in history.of_kind(Command, Told, Redirection)
+            if record.observed
+        ),
+    )
+
+
+def tell_plans(history: Timeline) -> Section:
+    """Each goal, each sketch, and each that was withdrawn."""
+    told: list[Sentence] = []
+    for record in history.of_kind(Goal, PlanSketch):
+        text = _goal(record) if record.kind is Goal else _sketch(history, record)
+        told += [sentence_of(history, text, record)] if text else []
+    return Section("How it planned", tuple(told))
+
+
+def _goal(record: EntryRecord[Any]) -> str:
+    return f"{_capital(sentence(record))}." if record.is_new or record.fields["status"] != "active" else ""
+
+
+def _sketch(history: Timeline, record: EntryRecord[Any]) -> str:
+    sketch = record.value
+    if record.is_new:
+        look = "to look from elsewhere, " if sketch.is_look else ""
+        return f"Plan {look}{sketch.where()}, {count(len(sketch.subgoals), 'part')}: to {_steps(sketch)}."
+    if not record.is_gone and sketch.status == "superseded":
+        causes = listed([cause for ref in record.because if (cause := _cause(history, ref))]) or "it no longer held"
+        part = f"in part {sketch.at + 1} of {len(sketch.subgoals)}"
+        return f"The plan {sketch.where()} was withdrawn {part}, because of this: {causes}."
+    return ""
+
+
+def _steps(sketch: PlanSketch) -> str:
+    return ", then ".join(
+        phrases.place(step.destination) + (f" by {step.passage}" if step.passage else "") for step in sketch.subgoals
+    )
+
+
+def _cause(history: Timeline, ref: str) -> str:
+    """What an entry says that a plan was withdrawn for, in its first clause."""
+    record = history.entry(ref)
+    if record is None:
+        return ""
+    if record.kind is Goal:
+        asked = history.nearest(record, Redirection)
+        return "there was a new goal" if asked is None else f"it {sentence(asked).partition(';')[0]}"
+    if record.kind is LocaleFrame:  # the changes of a frame are many; what made the last of them is told
+        record = history.nearest(record, *WHAT_CHANGES) or record
+    return sentence(record).partition(";")[0]
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+MOST_PLACES = 4
+"""So many places that came into question are told, the newest."""
+
+
+def tell_lost(history: Timeline) -> Section:
+    """Each time that it was lost."""
+    told: list[Sentence] = []
+    lost = [record for record in history.of_kind(Discrepancy) if is_lost(record)]
+    found = [record for record in history.of_kind(Hypothesis) if is_found(record)]
+    for record in lost:
+        until = next((one for one in found if one.cycle >= record.cycle), None)
+        told += sorted(_tell_loss(history, record, until), key=lambda one: one.cycle or 0)
+    return Section("Lost and found", tuple(told) or (Sentence("It was never lost."),))
+
+
+def is_lost(record: EntryRecord[Discrepancy]) -> bool:
+    """Whether with it the robot no longer knew where it was: nobody below the goal level could correct it."""
+    if record.is_gone or record.fields.get("status") != "escalated":
+        return False
+    return record.value.level.above is Level.GOAL
+
+
+def is_found(record: EntryRecord[Hypothesis]) -> bool:
+    """Whether with it the robot knew where it was again."""
+    if record.is_gone or record.fields.get("basis") != "relocalization":
+        return False
+    return record.value.is_held
+
+
+def _tell_loss(history: Timeline, lost: EntryRecord[Any], found: EntryRecord[Any] | None) -> Iterator[Sentence]:
+    below = history.nearest(lost, Hypothesis)
+    where = "" if below is None else f" It believed that it stood at {phrases.pose(below.value)}."
+    yield sentence_of(history, f"It was lost: {lost.value.what}.{where}", lost, below)
+    yield from _tell_reasons(history, lost)
+    yield from _tell_search(history, lost, found)
+    if found is None:
+        yield Sentence("It did not find out where it was.", history.cycles[-1], history.time_at(history.cycles[-1]))
+        return
+    now = found.value
+    how = f": {now.evidence}" if now.evidence else ""
+    yield sentence_of(
+        history,
+        f"It found out where it was, {_after(history, lost, found)}: at {phrases.pose(now)}{_apart(below, now)}{how}.",
+        found,
+    )
+
+
+def _tell_reasons(history: Timeline, lost: EntryRecord[Any]) -> Iterator[Sentence]:
+    """The verdict that it was lost by, and with what the doubt had begun."""
+    certificate = history.nearest(lost, Certificate)
+    if certificate is not None:
+        yield sentence_of(history, f"{_verdict(certificate.value)}.", certificate)
+    what = lost.value.what
+    for record in history.within(lost):
+        if record.kind is Discrepancy and record.value.what != what:
+            first = _first(history, record)
+            yield sentence_of(history, f"It began to doubt: {record.value.what}.", first)
+            return
+
+
+def _verdict(certificate: Certificate) -> str:
+    return f"The last verdict on a milestone was {certificate.verdict}: {certificate.reason}"
+
+
+def _first(history: Timeline, record: EntryRecord[Any]) -> EntryRecord[Any]:
+    return history.entry(f"{record.id}.0") or record
+
+
+def _tell_search(history: Timeline, lost: EntryRecord[Any], found: EntryRecord[Any] | None) -> Iterator[Sentence]:
+    """How many pictures it took to find itself, and which places came into question."""
+    last = found.cycle if found is not None else history.cycles[-1]
+    looks = [
+        record
+        for record in history.of_kind(Look, until=last)
+        if record.cycle >= lost.cycle and record.value.purpose == "probe"
+    ]
+    candidates = {
+        record.id: record
+        for record in history.of_kind(Hypothesis, until=last)
+        if record.cycle >= lost.cycle and record.is_new and record.fields["status"] == "candidate"
+    }
+    if not looks and not candidates:
+        return
+    text = f"To find out where it was it took {count(len(looks), 'picture')}"
+    if candidates:
+        places = [
+            f"{record.value.place()} ({record.value.weight:.0%})"
+            for record in candidates.values()
+        ]
+        text += f"; it may have stood at {listed(places, MOST_PLACES)}"
+    first = min((*looks, *candidates.values()), key=lambda record: record.cycle)
+    yield sentence_of(history, f"{text}.", first, *candidates.values())
+
+
+def _after(history: Timeline, lost: EntryRecord[Any], found: EntryRecord[Any]) -> str:
+    text = f"{count(found.cycle - lost.cycle, 'cycle')} later"
+    then, now = history.time_at(lost.cycle), history.time_at(found.cycle)
+    return text if then is None or now is None else f"{text}, after {now - then:.1f} s"
+
+
+def _apart(believed: EntryRecord[Any] | None, now: Hypothesis) -> str:
+    """How far that is from where it had believed to be, where both are in one frame."""
+    if believed is None:
+        return ""
+    before = believed.value
+    if before.locale != now.locale:
+        return f", and not in {before.locale}"
+    return f", {metres(now.locale_from_robot.distance_to(before.locale_from_robot))} from where it had believed"
+
+
+def tell_contacts(history: Timeline, turns: tuple[TurningPoint, ...], result: Mapping[str, Any]) -> Section:
+    """What it felt; and, where the simulator says so, what it truly touched."""
+    felt = tuple(_sentences(turns, "contact"))
+    truly = tuple(
+        Sentence(f"It truly touched something at {point.text}.", point.cycle, point.time_s)
+        for point in read_collisions(history, result)
+    )
+    nothing = (Sentence("It felt no contact."),)
+    unknown = (
+        ""
+        if "collisions" in result and result["collisions"] is not None
+        else ("What it touched without feeling it nobody recorded: there is no result of the simulator.")
+    )
+    missing = (result.get("collisions") or 0) - len(truly)
+    more = f"The simulator counts {missing} more, and does not say where." if missing > 0 else unknown
+    return Section("What it touched", (*(felt or nothing), *truly, *((Sentence(more),) if more else ())))
+
+
+def tell_things(turns: tuple[TurningPoint, ...]) -> Section:
+    """Doors found shut, things in the way, and what became of them; faults of its body."""
+    found = tuple(point for point in turns if point.kind in ("door", "thing", "fault", "resumed"))
+    told = tuple(Sentence(f"{point.text[:1].upper()}{point.text[1:]}.", point.cycle, point.time_s) for point in found)
+    return Section(
+        "Doors, things in the way and faults",
+        told or (Sentence("No door was found otherwise than known, nothing stood in the way, and nothing failed."),),
+    )
+
+
+def tell_camera(history: Timeline) -> Section:
+    """What has turned out to be otherwise about the camera than told: each since when it was so to the end."""
+    records = list(history.of_kind(CameraState))
+    states = [record.value for record in records]
+    lessons = [find_camera_lessons(states[0], state) for state in states]
+    told: list[Sentence] = []
+    for lesson in lessons[-1] if lessons else ():
+        since = next(
+            i for i, _ in enumerate(lessons) if all(lesson.what in (one.what for one in later) for later in lessons[i:])
+        )
+        told.append(sentence_of(history, f"The {lesson.text()}; known since then.", records[since], records[-1]))
+    return Section("The camera", tuple(told) or (Sentence("The camera was found to be as told."),))
+
+
+def _sentences(turns: tuple[TurningPoint, ...], kind: str) -> Iterator[Sentence]:
+    for point in turns:
+        if point.kind == kind:
+            yield Sentence(f"{point.text[:1].upper()}{point.text[1:]}.", point.cycle, point.time_s)
+
+
+COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong")
+MOST_ROWS = 60
+"""Of more rows only those are printed that were not verified, and the last ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class MilestoneRow:
+    """What became of a milestone.
+
+    Attributes:
+        cycle: of the verdict; of a milestone that was not judged its last.
+        time_s: since the run began; None where nothing told it.
+        name: ``M1 of hallway``, or ``check of the belief``.
+        verdict: verified, refuted, not testable; or withdrawn, expected, turning.
+        expected, matched: numbers of model lines.
+        deviation_m, deviation_rad: from the belief that predicted it; None where it was not judged.
+        p_false: probability that so much agrees at a wrong place.
+        refs: certificate and milestone.
+    """
+
+    cycle: int
+    time_s: float | None
+    name: str
+    verdict: str
+    expected: int
+    matched: int
+    deviation_m: float | None
+    deviation_rad: float | None
+    p_false: float | None
+    refs: tuple[str, ...]
+
+
+def read_milestones(history: Timeline) -> tuple[MilestoneRow, ...]:
+    """Every verdict of a run, and every milestone that got none, in the order of time."""
+    rows = [*_judged(history)]
+    judged = {ref.rpartition(".")[0] for row in rows for ref in row.refs}
+    rows += _not_judged(history, judged)
+    return tuple(sorted(rows, key=lambda row: row.cycle))
+
+
+def _judged(history: Timeline) -> Iterator[MilestoneRow]:
+    for record in history.of_kind(Certificate):
+        if record.is_gone:
+            continue
+        certificate, below = record.value, history.reason(record, Milestone)
+        name = certificate.milestone if below is None else _name(below)
+        refs = (record.ref, below.ref if below is not None else f"{certificate.milestone}.0")
+        yield MilestoneRow(
+            record.cycle,
+            history.time_at(record.cycle),
+            name,
+            certificate.verdict,
+            certificate.expected,
+            certificate.matched,
+            certificate.deviation_m,
+            certificate.deviation_rad,
+            certificate.p_false,
+            refs,
+        )
+
+
+def _not_judged(history: Timeline, judged: set[str]) -> Iterator[MilestoneRow]:
+    for id, ref in history.newest.items():
+        record = history.entry(ref) if id.startswith("Milestone-") and id not in judged else None
+        if record is not None:
+            yield MilestoneRow(
+                record.cycle, history.time_at(record.cycle), _name(record), str(record.fields["status"]),
+                len(record.fields["expected"]), 0, None, None, None, (ref,))
+
+
+def _name(record: EntryRecord[Any]) -> str:
+    """As :meth:`~world_models.entries.task.Milestone.name`, without decoding its lines."""
+    return str(record.fields["what"]).partition(", because")[0]
+
+
+def milestone_lines(rows: Sequence[MilestoneRow]) -> Iterator[str]:
+    """The table; of a long run what was not verified, and the newest."""
+    if not rows:
+        yield "There was none."
+        return
+    shown = (
+        rows
+        if len(rows) <= MOST_ROWS
+        else sorted(
+            {*(row for row in rows if row.verdict != "verified"), *rows[-MOST_ROWS // 2 :]}, key=lambda row: row.cycle
+        )
+    )
+    if len(shown) < len(rows):
+        yield f"Of {len(rows)} these {len(shown)}; --json has them all."
+    yield from table(COLUMNS, [_cells(row) for row in shown]).splitlines()
+
+
+def _cells(row: MilestoneRow) -> tuple[str, ...]:
+    off_m, off_rad, p = row.deviation_m, row.deviation_rad, row.p_false
+    return (
+        str(row.cycle),
+        "-" if row.time_s is None else f"{row.time_s:.1f}",
+        row.name,
+        row.verdict,
+        f"{row.matched} of {row.expected}",
+        "-" if off_m is None else f"{1e3 * off_m:.1f}",
+        "-" if off_rad is None else f"{math.degrees(abs(off_rad)):.1f}",
+        "-" if p is None else f"{p:.1g}",
+    )
+
+
+def how_it_ended(history: Timeline) -> str:
+    """``reached in cycle 774, 104.6 s into the run``; of a run without an outcome where its journal ends."""
+    outcome = outcome_of(history)
+    cycle = history.cycles[-1] if outcome is None else outcome.cycle
+    time_s = history.time_at(cycle)
+    when = f"in cycle {cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run")
+    return f"cut off {when}" if outcome is None else f"{outcome.value.kind} {when}"
+
+
+def outcome_of(history: Timeline) -> EntryRecord[Any] | None:
+    """The outcome of a run; None where it has none."""
+    return next(iter([*history.of_kind(Outcome)][-1:]), None)
+
+
+def tell_end(history: Timeline, result: Mapping[str, Any]) -> Section:
+    """The outcome, the last belief, and the errors that only the simulator knows."""
+    outcome, told = outcome_of(history), list[Sentence]()
+    if outcome is not None:
+        said = sentence(outcome)
+        told.append(sentence_of(history, f"{said[:1].upper()}{said[1:]}.", outcome))
+    told += _tell_belief(history)
+    text = ", ".join(_truth(result))
+    told.append(
+        Sentence(
+            f"In truth, by the simulator's result.json: {text}."
+            if text
+            else "Where it truly was nobody recorded: there is no result of the simulator."
+        )
+    )
+    return Section("How it ended", tuple(told))
+
+
+def _tell_belief(history: Timeline) -> Iterator[Sentence]:
+    for ref in reversed([ref for ref in history.refs if ref.startswith("Hypothesis-")]):
+        record = history.entry(ref)
+        if record is not None and record.value.is_held:
+            now = history.newest[record.id] == ref and history.retraction(ref) is None
+            text = "It believed that it stood at" if now else "The last place where it had believed to stand was"
+            yield sentence_of(history, f"{text} {phrases.pose(record.value)}.", record)
+            return
+
+
+def _truth(result: Mapping[str, Any]) -> Iterator[str]:
+    off_m, touched, path_m = (result.get(key) for key in ("final_error_m", "collisions", "path_length_m"))
+    if off_m is None:
+        return
+    yield f"it stood {metres(off_m)} from the goal"
+    if path_m is not None:
+        yield f"had driven {path_m:.1f} m"
+    if touched is not None:
+        yield f"had touched something {count(touched, 'time')}" if touched else "had touched nothing"
+    wrong = (result.get("milestones") or {}).get("false_accepts")
+    if isinstance(wrong, int):
+        yield f"and accepted {count(wrong, 'milestone')} wrongly" if wrong else "and accepted no milestone wrongly"
+
+
+WIDTH = 120
+MILESTONES = "Milestones"
+LEGEND = """\
+Places are in metres in each room's own frame. Times are by the body's clock. All of it is from the journal, as the
+robot knew it, except where the simulator is named. Names in brackets are entries: ask on with harvey why RUN NAME, or
+with harvey why RUN --at CYCLE."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunStory:
+    """What happened in a run.
+
+    Attributes:
+        opening: its first lines.
+        turning_points: all of them, as the robot knew them.
+        sections: what happened, by subject.
+        milestones: what became of each.
+    """
+
+    opening: tuple[str, ...]
+    turning_points: tuple[TurningPoint, ...]
+    sections: tuple[Section, ...]
+    milestones: tuple[MilestoneRow, ...]
+
+    def record(self) -> dict[str, Any]:
+        """As JSON types."""
+        return asdict(self)
+
+
+def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
+    """Which run it is, how it ended, and what went wrong on the way: the first lines of a story.
+
+    Raises:
+        BadInput: the journal has no decision, or ``result.json`` is malformed.
+    """
+    if not history.cycles:
+        history.verify()
+        raise BadInput(f"{history.source}: expected at least one decision, got none")
+    try:
+        yield f"{run_name(run)}: {how_it_ended(history)}."
+        yield from levels_off(run)
+        yield from turn_lines(history, run.read_result())
+    except STRANGE as error:
+        raise _strange(history, error) from error
+
+
+def first_lines(path: Path | None) -> tuple[str, ...]:
+    """As :func:`opening`, of a run that has just ended; none where it is not on the disk."""
+    if path is None:
+        return ()
+    run = RunDirectory(path)
+    return tuple(opening(run, Timeline(run.journal)))
+
+
+def tell_run(run: RunDirectory, history: Timeline) -> RunStory:
+    """The story of a run. Raises BadInput where journal or ``result.json`` cannot be read as this version's."""
+    first = tuple(opening(run, history))
+    try:
+        return _sections(first, history, run.read_result())
+    except STRANGE as error:
+        raise _strange(history, error) from error
+
+
+def _sections(first: tuple[str, ...], history: Timeline, result: Mapping[str, Any]) -> RunStory:
+    turns = tuple(read_turning_points(history))
+    sections = (
+        tell_errand(history),
+        tell_plans(history),
+        tell_lost(history),
+        tell_contacts(history, turns, result),
+        tell_things(turns),
+        tell_camera(history),
+        tell_end(history, result),
+    )
+    return RunStory(first, turns, sections, read_milestones(history))
+
+
+def _strange(history: Timeline, error: Exception) -> BadInput:
+    return BadInput(f"{history.source}: expected entries as this version writes them, got others ({error!r})")
+
+
+def story_lines(story: RunStory) -> Iterator[str]:
+    """The page; the milestones stand before how it ended."""
+    yield from story.opening
+    *before, last = story.sections
+    for section in before:
+        yield from ("", section.title, *_section_lines(section))
+    yield from ("", MILESTONES, *(f"  {line}" for line in milestone_lines(story.milestones)))
+    yield from ("", last.title, *_section_lines(last))
+    yield from ("", LEGEND)
+
+
+def _section_lines(section: Section) -> Iterator[str]:
+    heads = [_when(one) for one in section.sentences]
+    width = max(map(len, heads), default=0)
+    for head, one in zip(heads, section.sentences, strict=True):
+        refs = f"  [{', '.join(one.refs)}]" if one.refs else ""
+        first = f"  {head:<{width}}" + "  " * (width > 0)
+        yield fill(
+            one.text + refs,
+            WIDTH,
+            initial_indent=first,
+            subsequent_indent=" " * len(first),
+            break_on_hyphens=False,
+        )
+
+
+def _when(one: Sentence) -> str:
+    if one.cycle is None:
+        return ""
+    return f"cycle {one.cycle}" + ("" if one.time_s is None else f"  {one.time_s:7.1f} s")

@@ -1,0 +1,374 @@
+"""The whole web of reasons: a run cycle by cycle, an entry with all that it rests on, and whether every decision rests
+on something: a goal, the model or what the camera saw."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from textwrap import fill
+from typing import Any, TextIO
+
+from blackboard.journal import Decision, Sink, decision_record
+from logs.explain.diff import differing_leaves
+from logs.explain.phrases import describe_decision, sentence
+from logs.records import Candidate, DecisionRecord, EntryRecord, decision_of
+from logs.timeline import Timeline
+from world_models.building.locale_frame import LocaleFrame
+from world_models.entries.body import Frame, Look, MotorCommand, Recovery
+from world_models.entries.location import Hypothesis
+from world_models.entries.percepts import Tracks
+from world_models.entries.robot import CameraState, Footprint, Wheels
+from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone, Outcome, PlanSketch
+from world_models.entries.told import Redirection, Told
+from world_models.words import count
+
+
+def printing(out: TextIO) -> Sink:
+    """A sink that prints every cycle."""
+    trace = Trace()
+
+    def sink(decision: Decision) -> None:
+        out.write("\n".join(trace.lines(decision_of(decision_record(decision)))) + "\n")
+
+    return sink
+
+
+class Trace:
+    """Tells decisions one after the other; it remembers what is pending, as the journal tells only what is new."""
+
+    def __init__(self) -> None:
+        self._pending: dict[int, Candidate] = {}
+
+    def lines(self, decision: DecisionRecord) -> Iterator[str]:
+        """What to print for the next decision."""
+        candidates = {**self._pending, **{c.number: c for c in decision.activated}}
+        for dropped in decision.obviated:
+            candidates.pop(dropped.number, None)
+        chosen = decision.chosen
+        yield from cycle_lines(decision, ranked(candidates.values(), chosen))
+        gone = chosen.number if chosen is not None and decision.asks is None else None
+        self._pending = {number: c for number, c in candidates.items() if number != gone}
+
+
+def cycle_lines(decision: DecisionRecord, candidates: Iterable[Candidate]) -> Iterator[str]:
+    """One cycle; the candidates are those among which was chosen."""
+    yield f"cycle {decision.cycle}, focus {decision.focus}"
+    yield from (_change_line("observed", change) for change in decision.observed)
+    outside = {change.ref for change in decision.observed}
+    if inside := [ref for ref in decision.seen if ref not in outside]:
+        yield f"  sees      {', '.join(inside)}"
+    yield from (f"  drops     {_activation(c)}: {c.reason}" for c in decision.obviated)
+    yield from (_candidate_line(c, decision) for c in candidates)
+    yield from (_change_line(change.change.lower(), change) for change in decision.made)
+    if decision.refused:
+        yield f"  refused   {decision.refused.rstrip().splitlines()[-1]}"
+
+
+def ranked(candidates: Iterable[Candidate], chosen: Candidate | None) -> list[Candidate]:
+    """The chosen one first, then the best rated, then the oldest."""
+    first = chosen.number if chosen else None
+    return sorted(candidates, key=lambda c: (c.number != first, -c.rating, c.number))
+
+
+def _candidate_line(c: Candidate, decision: DecisionRecord) -> str:
+    chosen = decision.chosen is not None and c.number == decision.chosen.number
+    second = decision.runner_up is not None and c.number == decision.runner_up.number
+    return f"  {'chooses' if chosen else 'next' if second else 'pending':<9} {_activation(c)}, rated {c.rating:.2f}"
+
+
+def _activation(c: Candidate) -> str:
+    return f"{c.source} ({c.level}) on {c.trigger}"
+
+
+def _change_line(word: str, change: EntryRecord[Any]) -> str:
+    return f"  {word:<9} {change.ref} by {change.author}: {sentence(change)}"
+
+
+WIDTH = 120
+DEEPEST_INDENT = 20
+FEW = 2
+DEPTH = 5
+"""How many steps down the walk goes unless told otherwise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """One line of the explanation.
+
+    Attributes:
+        depth: 0 for what is explained.
+        ref: of the entry.
+        record: what the journal says of it; None where it says nothing.
+        after: the entry that rests on it; None for what is explained.
+        known: ``above`` or ``below``, where it is told already or, nearer to what is explained, told yet.
+        hidden: how many reasons of its own are left out because they lie too deep.
+    """
+
+    depth: int
+    ref: str
+    record: EntryRecord[Any] | None
+    after: EntryRecord[Any] | None = None
+    known: str = ""
+    hidden: int = 0
+
+
+def walk(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Iterator[Reason]:
+    """Each entry, then what it rests on, depth first; what is shared is told once, nearest to what is explained."""
+    told: set[str] = set()
+    nearest = _distances(history, refs, depth)
+    stack: list[tuple[int, str, EntryRecord[Any] | None]] = [(0, ref, None) for ref in reversed(refs)]
+    while stack:
+        level, name, after = stack.pop()
+        record = history.entry(name)
+        known = "above" if name in told else "below" if nearest[name] < level else ""
+        if known or record is None:
+            yield Reason(level, name, record, after, known)
+            continue
+        told.add(name)
+        hidden = len(record.because) if level >= depth else 0
+        yield Reason(level, name, record, after, hidden=hidden)
+        if not hidden:
+            stack += [(level + 1, reason, record) for reason in reversed(record.because)]
+
+
+def _distances(history: Timeline, refs: Sequence[str], depth: int) -> dict[str, int]:
+    """The fewest steps from what is explained to each entry that is at most ``depth`` steps away."""
+    nearest = dict.fromkeys(refs, 0)
+    queue = deque(refs)
+    while queue:
+        name = queue.popleft()
+        record = history.entry(name)
+        if record is None or nearest[name] >= depth:
+            continue
+        for reason in record.because:
+            if reason not in nearest:
+                nearest[reason] = nearest[name] + 1
+                queue.append(reason)
+    return nearest
+
+
+def explain(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Iterator[str]:
+    """The walk in plain sentences, indented.
+
+    Raises:
+        BadInput: a reason is missing, and so is a line of the journal, or a part of one.
+    """
+    reasons = list(walk(history, refs, depth))
+    if any(reason.record is None for reason in reasons):
+        history.verify()
+    for index, reason in enumerate(reasons):
+        if reason.depth == 0 and reason.record is not None:
+            yield from ["", _who(reason.record, history)] if index else [_who(reason.record, history)]
+        leads_on = index + 1 < len(reasons) and reasons[index + 1].depth > reason.depth
+        yield _wrap(reason.depth, _describe(reason) + (", because" if leads_on else ""))
+    if any(reason.hidden for reason in reasons):
+        yield f"(--depth {depth + 1} goes on where it says \"and so on\")"
+
+
+def _wrap(depth: int, text: str) -> str:
+    indent = "  " * min(depth, DEEPEST_INDENT)
+    return fill(text, WIDTH, initial_indent=indent, subsequent_indent=indent + "    ", break_on_hyphens=False)
+
+
+def _describe(reason: Reason) -> str:
+    if reason.known:
+        return f"{reason.ref}, as {reason.known}"
+    if reason.record is None:
+        return f"{reason.ref}, of which the journal says nothing"
+    tail = f" (and so on: {count(reason.hidden, 'reason')} below)" if reason.hidden else ""
+    return f"{reason.ref}: {_describe_record(reason.record, reason.after)}{tail}"
+
+
+def _describe_record(record: EntryRecord[Any], after: EntryRecord[Any] | None) -> str:
+    """The sentence; of an earlier revision of what rests on it, only what little was different, if it was little."""
+    if after is not None and after.id == record.id:
+        changed = list(differing_leaves(record.fields, after.fields))
+        if 0 < len(changed) <= FEW:
+            return "before that, " + ", ".join(f"{path} = {then}" for path, then, _ in changed)
+    return sentence(record)
+
+
+def _who(record: EntryRecord[Any], history: Timeline) -> str:
+    return fill(f"{record.ref}: {describe_decision(history, record)}", WIDTH, break_on_hyphens=False)
+
+
+PRINCIPAL = (
+    Outcome, MotorCommand, Goal, PlanSketch, Recovery, Hypothesis, Certificate, Milestone, Leg,
+    Look,
+)
+"""Of what one act makes, the first of these is what it was done for."""
+
+
+def _rank(record: EntryRecord[Any]) -> int:
+    """A smaller number for what an act was rather done for; that it found out where it is comes before its new goal."""
+    value = record.fields if isinstance(record.fields, dict) else {}
+    if record.kind is Hypothesis and value.get("basis") == "relocalization" and value.get("status") == "held":
+        return 0
+    return 1 + (PRINCIPAL.index(record.kind) if record.kind in PRINCIPAL else len(PRINCIPAL))
+
+
+def find_refs(history: Timeline, what: str | int | None) -> list[str]:
+    """The entries that explain an entry (by name), a cycle (by number), or the outcome (None). Raises BadInput."""
+    if isinstance(what, int):
+        return principal(history.decision(what))
+    return [history.resolve(what) if what else history.outcome()]
+
+
+def principal(decision: DecisionRecord) -> list[str]:
+    """What to explain of a decision: the chief entry that it made, or what woke those who made nothing."""
+    made = sorted(decision.made, key=_rank)
+    if made:
+        return [made[0].ref]
+    if decision.chosen is not None:
+        return [decision.chosen.trigger]
+    return list(decision.seen[:1])
+
+
+GOAL, MODEL, SENSOR = "goal", "model", "sensor"
+KINDS = (GOAL, MODEL, SENSOR)
+"""What an explanation may end in: what was asked for, what is known of building and robot, what the camera saw."""
+KNOWN = frozenset({LocaleFrame, CameraState, Wheels, Footprint, Told, Redirection})
+"""The kinds of entries that are a part of the model, and what the robot is told of it."""
+Kind = Callable[[EntryRecord[Any]], str | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Grounds:
+    """What some entries rest on.
+
+    Attributes:
+        kinds: which of KINDS they reach, in that order.
+        lacking: reasons of which the journal says nothing.
+    """
+
+    kinds: tuple[str, ...]
+    lacking: tuple[str, ...] = ()
+
+    @property
+    def hold(self) -> bool:
+        """Whether there is something at the bottom, and no step of the way is missing."""
+        return bool(self.kinds) and not self.lacking
+
+
+@dataclass(frozen=True, slots=True)
+class Accounted:
+    """A decision, what it is to be explained by, and what each of these rests on."""
+
+    decision: DecisionRecord
+    grounds: Mapping[str, Grounds]
+
+    @property
+    def holds(self) -> bool:
+        """Whether everything that it did rests on something; so it does where nothing was decided."""
+        return all(grounds.hold for grounds in self.grounds.values())
+
+
+def kind_of(record: EntryRecord[Any]) -> str | None:
+    """The kind of ground that an entry is itself; None where it is none."""
+    value = record.fields if isinstance(record.fields, dict) else {}
+    if record.kind in (Command, Goal):
+        return GOAL
+    if record.kind is Frame:
+        return SENSOR
+    if record.kind in KNOWN:
+        return MODEL
+    return MODEL if _names_the_model(record.kind, value) else None
+
+
+def _names_the_model(kind: type[Any], value: Mapping[str, Any]) -> bool:
+    if kind is Milestone:
+        return bool(value.get("landmarks"))
+    if kind is Tracks:
+        return bool(value.get("items"))
+    return kind is PlanSketch and bool(value.get("subgoals"))
+
+
+def reaches(entry: Callable[[str], EntryRecord[Any] | None], refs: Iterable[str], kind_of: Kind = kind_of) -> Grounds:
+    """What some entries rest on, by walking ``because`` as far as it leads; each entry is looked at once."""
+    todo, known = list(refs), set[str]()
+    kinds: set[str] = set()
+    lacking: list[str] = []
+    while todo:
+        ref = todo.pop()
+        if ref in known:
+            continue
+        known.add(ref)
+        record = entry(ref)
+        if record is None:
+            lacking.append(ref)
+            continue
+        if (kind := kind_of(record)) is not None:
+            kinds.add(kind)
+        todo += record.because
+    return Grounds(tuple(k for k in KINDS if k in kinds), tuple(sorted(lacking)))
+
+
+def explained_by(decision: DecisionRecord) -> tuple[str, ...]:
+    """The entries that a decision is explained by.
+
+    What it made; where it made nothing (it was refused), what woke the knowledge source; where nobody acted, what
+    woke those that were dropped. Nothing where nothing was decided.
+    """
+    if decision.made:
+        return tuple(dict.fromkeys(ref for r in decision.made for ref in r.retracted_because or (r.ref,)))
+    if decision.chosen is not None:
+        return (decision.chosen.trigger,)
+    return tuple(dict.fromkeys(c.trigger for c in decision.obviated))
+
+
+def trace_grounds(decisions: Iterable[DecisionRecord], kind_of: Kind = kind_of) -> Iterator[Accounted]:
+    """Each decision of a run with what it rests on; reasons are older than what rests on them, so one pass does."""
+    known: dict[str, Grounds] = {}
+    for decision in decisions:
+        for record in (*decision.observed, *decision.made):
+            if not record.is_gone or record.ref not in known:
+                known[record.ref] = _together(record, known, kind_of(record))
+        refs = explained_by(decision)
+        yield Accounted(decision, {ref: known.get(ref, Grounds((), (ref,))) for ref in refs})
+
+
+def _together(record: EntryRecord[Any], known: Mapping[str, Grounds], own: str | None) -> Grounds:
+    below = [known.get(ref, Grounds((), (ref,))) for ref in record.because]
+    kinds = {kind for grounds in below for kind in grounds.kinds} | {own}
+    lacking = sorted({ref for grounds in below for ref in grounds.lacking})
+    return Grounds(tuple(k for k in KINDS if k in kinds), tuple(lacking))
+
+
+def ground_names() -> tuple[str, ...]:
+    """The kinds of grounds in words, as those who reach them."""
+    return "reach the goal", "the model", "a camera frame"
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """How many decisions of a run rest on something.
+
+    Attributes:
+        decisions: all cycles; acts: those in which somebody was chosen.
+        reached: how many rest on something.
+        by_kind: how many reach each of KINDS.
+        failing: those that do not.
+    """
+
+    decisions: int
+    acts: int
+    reached: int
+    by_kind: Mapping[str, int]
+    failing: tuple[Accounted, ...]
+
+
+def check(history: Timeline) -> Check:
+    """Every decision of a run. Raises BadInput where a line of its journal is malformed."""
+    decisions = acts = reached = 0
+    by_kind = dict.fromkeys(KINDS, 0)
+    failing: list[Accounted] = []
+    for one in trace_grounds(history.decisions()):
+        decisions += 1
+        acts += one.decision.chosen is not None
+        reached += one.holds
+        for kind in sorted({kind for grounds in one.grounds.values() for kind in grounds.kinds}):
+            by_kind[kind] += 1
+        if not one.holds:
+            failing.append(one)
+    return Check(decisions, acts, reached, by_kind, tuple(failing))

@@ -1,0 +1,78 @@
+"""The camera's pictures of a run, by number; and the one that a cycle had seen, as a PNG file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from io import BytesIO
+from pathlib import Path
+
+from logs.camera_file import Pictures
+from logs.errors import BadInput
+from logs.records import DecisionRecord, EntryRecord, is_a, read_records
+from logs.run_directory import RunDirectory
+from world_models.entries.body import Frame
+
+
+def open_pictures(run: RunDirectory) -> Mapping[int, bytes]:
+    """The pictures of a run: from its camera file or, where it has none, from its recording.
+
+    Raises:
+        BadInput: the journal cannot be read, or the camera file is shorter than what it tells of.
+        RecordingError: there is no camera file, and the recording cannot be read.
+    """
+    sizes = list(_sizes(read_records(run.journal)))
+    if sizes and not run.camera.is_file():
+        from logs.reader import read_frames
+
+        return read_frames(run.recording)
+    pictures, there = Pictures(run.camera, sizes), camera_bytes(run)
+    if there < pictures.end:
+        raise BadInput(
+            f"{run.camera}: expected {pictures.end} bytes of pictures that the journal tells of, got {there}")
+    return pictures
+
+
+def camera_bytes(run: RunDirectory) -> int:
+    """Length of the camera file; 0 where there is none."""
+    return run.camera.stat().st_size if run.camera.is_file() else 0
+
+
+def _sizes(decisions: Iterable[DecisionRecord]) -> Iterator[tuple[int, int]]:
+    """(number, bytes) of every picture that was seen, in the order in which they came."""
+    for record in (record for decision in decisions for record in decision.observed if is_a(record, Frame)):
+        try:
+            yield int(record.fields["number"]), int(record.fields["jpeg"]["bytes"])
+        except (KeyError, TypeError, ValueError):
+            raise BadInput(f"{record.ref}: expected a picture's number and length, got {record.fields!r}") from None
+
+
+def find_picture(run: RunDirectory, cycle: int) -> EntryRecord[Frame]:
+    """The newest picture that the board had seen in a cycle. Raises BadInput where there is none, or no such cycle."""
+    newest, first, last = None, 0, 0
+    for decision in read_records(run.journal):
+        last = decision.cycle
+        for record in decision.changes:
+            if is_a(record, Frame) and record.is_new:
+                first = first or last
+                newest = record if last <= cycle else newest
+    if first == 0:
+        raise BadInput(f"--picture: expected a run with pictures, got {run.path}, which has none")
+    if newest is None or cycle > last:
+        raise BadInput(f"--picture: expected a cycle from the first picture to the end, {first} to {last}, got {cycle}")
+    return newest
+
+
+def write_picture(run: RunDirectory, record: EntryRecord[Frame], out: Path) -> tuple[int, int]:
+    """Writes it as PNG with the pixels of the camera's JPEG; returns width and height [px]. Raises BadInput."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        picture = Image.open(BytesIO(open_pictures(run)[record.fields["number"]]))
+        picture.load()
+    except (UnidentifiedImageError, OSError) as error:
+        raise BadInput(f"{record.id}: expected a picture of the camera as JPEG, got: {error}") from None
+    try:
+        picture.save(out, "PNG")
+    except OSError as error:
+        raise BadInput(f"{out}: expected a file to write to, got: {error.strerror or error}") from None
+    return picture.size

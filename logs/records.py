@@ -1,0 +1,419 @@
+"""The journal read back: each line a decision, each change an entry with the value that it had on the board.
+
+A value is decoded when it is first asked for; what the journal keeps only by reference (the bytes of a picture, a
+locale frame) is left as that, unless the originals are at hand (:func:`effect_of`). A kind that is not known here, as
+of a package that is not installed, is :class:`Opaque`: its fields can be read all the same.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeGuard, TypeVar, cast
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Quiescence, Retracted, Revised
+from blackboard.effect import Effect, Post, Retract, Revise
+from blackboard.entry import Entry, Ref
+from blackboard.kinds import Registry
+from blackboard.servoing import Discrepancy
+from logs.camera_file import Pictures
+from logs.decoding import decode
+from logs.errors import BadInput
+from logs.journal_file import JournalError, read_journal
+from world_models import words
+from world_models.building.locale_frame import FrameReference, FrameRequest, LocaleFrame
+from world_models.entries.body import Frame
+from world_models.entries.kinds import KINDS
+
+if TYPE_CHECKING:  # an explanation starts fast only where no world is imported that it does not need
+    from world_models.frame_store import FrameStore
+
+WHAT_IF = "what if"
+"""The author of the revisions by which a question of what would have been is asked."""
+OWN = Registry((*KINDS, Discrepancy, Quiescence))
+"""The kinds that come with the project: no knowledge source needs to be loaded to read them."""
+CHANGES: Mapping[str, type[Change]] = {kind.__name__: kind for kind in (Posted, Revised, Retracted)}
+
+Kind = type[Any]
+K = TypeVar("K")
+T_co = TypeVar("T_co", covariant=True)
+_GIVEN: ContextVar[Registry] = ContextVar("given", default=OWN)
+
+
+@dataclass(frozen=True, slots=True)
+class Opaque:
+    """A value of a kind that is not known here.
+
+    Attributes:
+        fields: as JSON types.
+    """
+
+    fields: Any
+
+    def sentence(self) -> str:
+        return words.fields(self.fields)
+
+
+@contextmanager
+def knowing(kinds: Registry) -> Iterator[None]:
+    """For a while, also the kinds that the calling program brought."""
+    before = _GIVEN.set(kinds)
+    try:
+        yield
+    finally:
+        _GIVEN.reset(before)
+
+
+@cache
+def _foreign_kinds() -> Registry:
+    from blackboard.knowledge_source import KnowledgeSource
+    from blackboard.scheduler import registry_of
+    from world_models.plugins import SOURCES_GROUP, load_plugin_classes
+
+    return registry_of(load_plugin_classes(SOURCES_GROUP, KnowledgeSource).values(), KINDS)
+
+
+def kinds_for(type: str) -> Registry:
+    """The kinds that are known here; those of other packages are loaded only for an entry that needs them."""
+    if type in OWN:
+        return OWN
+    return given if type in (given := _GIVEN.get()) else _foreign_kinds()
+
+
+@dataclass(frozen=True)
+class EntryRecord(Generic[T_co]):
+    """One change of one entry, as the journal tells it.
+
+    Attributes:
+        change: Posted, Revised or Retracted.
+        ref: ``Goal-1.0``.
+        type: the name of its kind; :attr:`kind` is the kind itself.
+        author: knowledge source or port.
+        because: refs of the revisions that it rests on.
+        fields: of the value, as JSON types; :attr:`value` is the value itself.
+        cycle: of the decision that made it, or that took it up where it came from outside.
+        observed: whether it came from outside.
+        retracted_because: of a retraction: what it rests on itself.
+    """
+
+    change: str
+    ref: str
+    type: str
+    author: str
+    because: tuple[str, ...]
+    fields: Any
+    cycle: int
+    observed: bool
+    retracted_because: tuple[str, ...] = ()
+
+    @property
+    def id(self) -> str:
+        """The entry without its revision."""
+        return self.ref.rpartition(".")[0]
+
+    @property
+    def revision(self) -> int:
+        """Its number among those of the entry; 0 is the first."""
+        return ref_of(self.ref).revision
+
+    @property
+    def is_gone(self) -> bool:
+        """Whether the change is that the entry is no longer believed."""
+        return self.change == Retracted.__name__
+
+    @property
+    def is_new(self) -> bool:
+        """Whether it is the first of the entry."""
+        return self.change == Posted.__name__
+
+    @cached_property
+    def kind(self) -> Kind:
+        """The class of its value, which need not be decoded for that; Opaque where it is not known here."""
+        kinds = kinds_for(self.type)
+        return kinds.get(self.type, Opaque)
+
+    @cached_property
+    def value(self) -> T_co:
+        """As it was on the board, but a picture has no bytes, and a locale frame is the reference to it.
+
+        Raises:
+            BadInput: the fields are not those of its kind: the run is of another version.
+        """
+        if self.kind is Opaque:
+            return cast(T_co, Opaque(self.fields))
+        return cast(T_co, entry_of(self, kinds_for(self.type)).value)
+
+    @property
+    def change_of_board(self) -> Change:
+        """As a change of the board. Raises BadInput as :attr:`value` does."""
+        ref = ref_of(self.ref)
+        entry = Entry(ref.id, ref.revision, self.value, self.author, cycle_of_writing(self), refs_of(self.because))
+        return CHANGES.get(self.change, Posted)(entry, refs_of(self.retracted_because))
+
+
+def is_a(record: EntryRecord[Any] | None, kind: type[K]) -> TypeGuard[EntryRecord[K]]:
+    """Whether an entry is of a kind; its value is not decoded for that."""
+    return record is not None and record.kind is kind
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """An activation, as the journal tells it; ``reason`` says why it was dropped, if it was."""
+
+    number: int
+    source: str
+    level: str
+    trigger: str
+    kind: str
+    rating: float
+    since: int
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class DecisionRecord:
+    """One line of the journal; the attributes are those of :class:`blackboard.journal.Decision`."""
+
+    cycle: int
+    focus: str
+    observed: tuple[EntryRecord[Any], ...]
+    seen: tuple[str, ...]
+    activated: tuple[Candidate, ...]
+    obviated: tuple[Candidate, ...]
+    chosen: Candidate | None
+    runner_up: Candidate | None
+    pending: int
+    made: tuple[EntryRecord[Any], ...]
+    refused: str
+    data: Mapping[str, Any]
+    used: tuple[str, ...] = ()
+
+    @property
+    def asks(self) -> EntryRecord[FrameRequest] | None:
+        """What the act lacked and asked for, where that was all that it did: it comes again when it is answered."""
+        first = self.made[0] if len(self.made) == 1 and self.made[0].is_new else None
+        return first if is_a(first, FrameRequest) else None
+
+    @property
+    def changes(self) -> tuple[EntryRecord[Any], ...]:
+        """What was observed, then what it made."""
+        return (*self.observed, *self.made)
+
+    @property
+    def line(self) -> str:
+        """As it stands in the journal, without its newline."""
+        return as_line(self.data)
+
+
+def as_line(data: Any) -> str:
+    """JSON types as one line, as the journal writes them; equal lines mean equal values to the last bit."""
+    return json.dumps(data, separators=(",", ":"))
+
+
+def read_records(path: Path) -> Iterator[DecisionRecord]:
+    """The decisions of a journal, one by one. A last line that was cut off in the middle of writing is left out.
+
+    Raises:
+        BadInput: the file cannot be read, or a line is not a decision; names file and line.
+    """
+    lines = read_journal(path)
+    number = 0
+    while True:
+        number += 1
+        try:
+            data = next(lines, None)
+            if data is None or "truncated" in data:
+                return
+            decision = decision_of(data)
+        except JournalError as error:
+            raise BadInput(str(error)) from None
+        except RecursionError:
+            raise BadInput(f"{path}:{number}: expected a decision, got too many nested brackets") from None
+        except ValueError as error:
+            raise BadInput(f"{path}:{number}: {error}") from None
+        except OSError as error:
+            raise BadInput(f"{path}: expected a readable journal, got: {error.strerror}") from None
+        yield decision
+
+
+def decision_of(data: Any) -> DecisionRecord:
+    """A decision from JSON types. Raises ValueError naming the key, what was expected and what came."""
+    cycle = _get(data, "cycle", int)
+    return DecisionRecord(
+        cycle=cycle,
+        focus=_get(data, "focus", str),
+        observed=tuple(_entry(item, cycle, True) for item in _get(data, "observed", list)),
+        seen=_texts(data, "seen"),
+        activated=tuple(_candidate(item) for item in _get(data, "activated", list)),
+        obviated=tuple(_candidate(item, _get(item, "reason", str)) for item in _get(data, "obviated", list)),
+        chosen=_optional(data, "chosen"),
+        runner_up=_optional(data, "runner_up"),
+        pending=_get(data, "pending", int),
+        made=tuple(_entry(item, cycle, False) for item in _get(data, "made", list)),
+        refused=_get(data, "refused", str),
+        data=data,
+        used=_texts(data, "used") if "used" in data else (),
+    )
+
+
+def _entry(item: Any, cycle: int, observed: bool) -> EntryRecord[Any]:
+    return EntryRecord(
+        _get(item, "change", str), _get(item, "entry", str), _get(item, "type", str), _get(item, "author", str),
+        _texts(item, "because"), _get(item, "value", object), cycle, observed,
+        _texts(item, "retracted_because") if "retracted_because" in item else (),
+    )
+
+
+def _candidate(item: Any, reason: str = "") -> Candidate:
+    return Candidate(
+        _get(item, "number", int), _get(item, "source", str), _get(item, "level", str), _get(item, "trigger", str),
+        _get(item, "kind", str), float(_get(item, "rating", (int, float))), _get(item, "since", int), reason,
+    )
+
+
+def _optional(data: Any, key: str) -> Candidate | None:
+    item = _get(data, key, object)
+    return None if item is None else _candidate(item)
+
+
+def _texts(data: Any, key: str) -> tuple[str, ...]:
+    items = _get(data, key, list)
+    if not all(isinstance(item, str) for item in items):
+        raise ValueError(f"{key}: expected texts, got {items!r}")
+    return tuple(items)
+
+
+def _get(data: Any, key: str, kind: type | tuple[type, ...]) -> Any:
+    if not isinstance(data, dict):
+        raise ValueError(f"expected an object with the key {key!r}, got {type(data).__name__}")
+    if key not in data:
+        raise ValueError(f"expected the key {key!r}, got keys {', '.join(data) or 'none'}")
+    value = data[key]
+    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not object):
+        names = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
+        raise ValueError(f"{key}: expected {names}, got {type(value).__name__}")
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class Originals:
+    """What the journal names only by reference.
+
+    Attributes:
+        pictures: number -> JPEG bytes.
+        frames: of the world's locales.
+    """
+
+    pictures: Mapping[int, bytes]
+    frames: FrameStore
+
+
+def effect_of(record: EntryRecord[Any], originals: Originals, view: View, kinds: Registry) -> Effect:
+    """The effect behind an observed change.
+
+    Args:
+        view: the board as it is before the effect.
+        kinds: the kinds of entries of that board.
+
+    Raises:
+        BadInput: the value is of a kind that is not known, its fields are not the kind's, or its picture is missing.
+    """
+    because = refs_of(record.because)
+    if record.is_new:
+        return Post(original_of(record, originals, kinds), because)
+    entry = view.get(record.id)
+    if entry is None:
+        raise BadInput(f"{record.ref}: expected an entry on the board, got none")
+    if record.is_gone:
+        return Retract(entry, refs_of(record.retracted_because))
+    return Revise(entry, original_of(record, originals, kinds), because)
+
+
+def original_of(record: EntryRecord[Any], originals: Originals, kinds: Registry) -> Any:
+    """The value itself, with what the journal keeps by reference."""
+    if record.type == LocaleFrame.__name__:
+        return _restore_frame(record, originals.frames)
+    kind, fields = find_kind(record, kinds), record.fields
+    if kind is Frame and isinstance(fields, dict):
+        fields = {**fields, "jpeg": _picture(record, originals.pictures)}
+    try:
+        return decode(fields, kind)
+    except (ValueError, TypeError) as error:
+        raise BadInput(f"{record.ref}: {error}") from None
+
+
+def _picture(record: EntryRecord[Any], frames: Mapping[int, bytes]) -> bytes:
+    """The bytes of a frame, after checking that they are those that the journal saw."""
+    number, seen = record.fields.get("number"), record.fields.get("jpeg")
+    if not isinstance(number, int) or number not in frames:
+        raise BadInput(f"{record.ref}: expected picture {number} among those that were kept, which are {len(frames)}")
+    jpeg = frames[number]
+    if not isinstance(seen, dict) or hashlib.sha256(jpeg).hexdigest() != seen.get("sha256"):
+        where = f"{frames.where(number)}: " if isinstance(frames, Pictures) else ""
+        raise BadInput(f"{where}{record.ref}: expected the picture that the journal saw, got another one for number "
+                       f"{number}")
+    return jpeg
+
+
+def _restore_frame(record: EntryRecord[Any], store: FrameStore) -> LocaleFrame:
+    """The locale frame that a record refers to. Raises BadInput where the world has no such frame."""
+    try:
+        return store.restore(decode(record.fields, FrameReference))
+    except (ValueError, TypeError) as error:
+        raise BadInput(f"{record.ref}: {error}") from None
+
+
+def find_kind(record: EntryRecord[Any], kinds: Registry) -> type[Any]:
+    """The type of a record's value. Raises BadInput where it is not known here."""
+    if record.type not in kinds:
+        raise BadInput(f"{record.ref}: expected a kind of entry that is known here ({', '.join(sorted(kinds))}), got a "
+                       f"{record.type}: is the package that brings it installed?")
+    return kinds[record.type]
+
+
+def entry_of(record: EntryRecord[Any], kinds: Registry, store: FrameStore | None = None) -> Entry[Any]:
+    """An entry as it stood on the board, but for the bytes of a picture, which the journal does not keep.
+
+    A locale frame comes from the store; without a store, the reference to it that the journal keeps is the value.
+
+    Raises:
+        BadInput: the value is of a kind that is not known, or does not fit it.
+    """
+    fields, kind = record.fields, find_kind(record, kinds)
+    if kind is Frame and isinstance(fields, dict):
+        fields = {**fields, "jpeg": b""}
+    if kind is LocaleFrame and store is not None:
+        restored: Any = _restore_frame(record, store)
+    else:
+        try:
+            restored = decode(fields, FrameReference if kind is LocaleFrame else kind)
+        except (ValueError, TypeError) as error:
+            what = f"expected a {record.type} as this version has it, got another"
+            raise BadInput(f"{record.ref}: {what}: {error}") from None
+    ref = ref_of(record.ref)
+    return Entry(ref.id, ref.revision, restored, record.author, cycle_of_writing(record), refs_of(record.because))
+
+
+def cycle_of_writing(record: EntryRecord[Any]) -> int:
+    """In which cycle it was put on the board; what comes from outside is taken up in the next."""
+    return record.cycle - record.observed
+
+
+def refs_of(texts: Iterable[str]) -> tuple[Ref, ...]:
+    """Revisions by their names. Raises BadInput."""
+    return tuple(ref_of(text) for text in texts)
+
+
+def ref_of(text: str) -> Ref:
+    """A revision by its name, as ``Goal-1.0``. Raises BadInput."""
+    id, _, revision = text.rpartition(".")
+    if not revision.isdecimal():
+        raise BadInput(f"expected a revision as Goal-1.0, got {text!r}")
+    return Ref(id, int(revision))

@@ -1,0 +1,174 @@
+"""A run directory.
+
+``run.json`` tells how the run began, ``journal.jsonl`` what was decided, ``camera.mjpeg`` what the camera delivered:
+from these three a run is decided again, goes on after a crash, and is drawn anew. ``recording.rrd`` is the drawing, and
+``result.json`` tells how it ended.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from logs.errors import BadInput
+
+RUNS = Path("runs")
+"""Where runs are kept unless ``--out`` says otherwise."""
+
+FILES = ("run.json", "journal.jsonl", "camera.mjpeg", "recording.rrd", "result.json", "camera.toml")
+
+RESULT: Mapping[str, tuple[Any, str]] = {
+    "scenario": (str, "a text"),
+    "outcome": (str, "a text"),
+    "seed": (int, "a number"),
+    "milestones": (dict, "an object"),
+    **dict.fromkeys(("decisions", "collisions", "replans", "relocalizations"), (int | None, "a number")),
+    "contacts": (list, "a list"),
+    **dict.fromkeys(("final_error_m", "sim_time_s", "path_length_m"), (int | float | None, "a number")),
+}
+"""Keys of ``result.json`` that others read, with the JSON types that they have; null is what nobody knows."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunDirectory:
+    """Where one run is recorded."""
+
+    path: Path
+
+    @property
+    def recording(self) -> Path:
+        return self.path / "recording.rrd"
+
+    @property
+    def journal(self) -> Path:
+        return self.path / "journal.jsonl"
+
+    @property
+    def camera(self) -> Path:
+        return self.path / "camera.mjpeg"
+
+    @property
+    def result(self) -> Path:
+        return self.path / "result.json"
+
+    def read_result(self) -> dict[str, Any]:
+        """The result; empty where the run has none (it was cut off). Raises BadInput where it is malformed."""
+        if not self.result.exists():
+            return {}
+        try:
+            data = json.loads(self.result.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise BadInput(f"{self.result}: expected a readable file, got: {error.strerror}") from None
+        except (ValueError, RecursionError) as error:
+            raise BadInput(f"{self.result}: expected JSON, got: {error}") from None
+        if not isinstance(data, dict):
+            raise BadInput(f"{self.result}: expected a JSON object, got {type(data).__name__}")
+        for key, (kind, named) in RESULT.items():
+            if key in data and not isinstance(data[key], kind):
+                raise BadInput(f"{self.result}: {key}: expected {named}, got {json.dumps(data[key])}")
+        return data
+
+    def write_camera(self, text: str) -> None:
+        """Write ``camera.toml``: the camera at the end, where it is otherwise than told. Raises OSError."""
+        (self.path / "camera.toml").write_text(text, encoding="utf-8")
+
+    def write_result(self, record: Mapping[str, Any]) -> None:
+        """Write ``result.json``; an older one stays as it is until the new one is whole. Raises OSError."""
+        part = self.path / "result.json.part"
+        try:
+            part.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+            os.replace(part, self.result)
+        except OSError:
+            part.unlink(missing_ok=True)
+            raise
+
+
+def check_vacant(path: Path) -> Path:
+    """A place where a run may be written: nothing, or an older run. Raises BadInput where there is anything else."""
+    try:
+        here = next(p for p in (path, *path.parents) if p.exists())
+        names = {p.name for p in here.iterdir()}
+    except OSError as error:
+        raise BadInput(f"--out {path}: expected a directory, got: {error.strerror}") from None
+    others = sorted(names.difference(FILES))
+    if others and here == path:
+        raise BadInput(f"--out {path}: expected a new directory or an older run's, got one with {others[0]!r}")
+    if "journal.jsonl" in names and here != path:
+        raise BadInput(f"--out {path}: expected a directory outside of runs, got one in the run {here}")
+    return path
+
+
+def prepare_directory(path: Path, name: str, seed: int) -> tuple[Path, Path | None]:
+    """Make room for a run of a scenario and seed.
+
+    An older run of the same is deleted; one of another scenario or seed is moved aside.
+
+    Returns:
+        where the run may be written, and where the older one is now, if it is kept.
+
+    Raises:
+        BadInput: the directory cannot be used.
+    """
+    try:
+        check_vacant(path).mkdir(parents=True, exist_ok=True)
+        aside = None if _is_of(path, name, seed) else _free_beside(path)
+        if aside is not None:
+            path.rename(aside)
+            path.mkdir()
+        for file in FILES:
+            (path / file).unlink(missing_ok=True)
+    except OSError as error:
+        raise BadInput(f"--out {path}: expected a directory to write to, got: {error.strerror}") from None
+    return path, aside
+
+
+def _is_of(path: Path, name: str, seed: int) -> bool:
+    """Whether what is there may be deleted: an older run of this scenario and seed, or no run at all."""
+    try:
+        head = json.loads((path / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return not (path / "journal.jsonl").exists()
+    return isinstance(head, dict) and (head.get("name"), head.get("seed")) == (name, seed)
+
+
+def _free_beside(path: Path) -> Path:
+    """The first name beside a directory that nothing has: ``runs/try-older-1``."""
+    there = path if path.name not in ("", "..") else path.resolve()
+    return next(p for n in count(1) if not (p := there.with_name(f"{there.name}-older-{n}")).exists())
+
+
+def open_run(text: str, needed: str = "journal.jsonl") -> RunDirectory:
+    """The run that a user names: its directory, a file in it, or its name under ``runs/``.
+
+    Raises:
+        BadInput: there is none (near ones are listed), or it lacks the needed file.
+    """
+    run = RunDirectory(find_directory(text))
+    inner = sorted(str(p.parent) for p in run.path.glob("*/journal.jsonl"))
+    if inner and not run.journal.exists():
+        raise BadInput(f"expected one run, got {text!r}, which holds {len(inner)} of them, as {inner[0]}")
+    if not (run.path / needed).is_file():
+        raise BadInput(f"expected a run directory with a {needed}, got {text!r}, which has none")
+    return run
+
+
+def find_directory(text: str) -> Path:
+    """The directory that a user names, as it is or under ``runs/``, or by a run's file in it. Raises BadInput."""
+    path = next((p for p in (Path(text), RUNS / text) if p.exists()), None)
+    if path is None:
+        raise BadInput(f"expected a run directory{_near(text)}, got {text!r}, which does not exist")
+    if not path.is_dir() and path.name not in FILES:
+        raise BadInput(f"expected a run directory or a file of one ({', '.join(FILES)}), got {text!r}")
+    return path if path.is_dir() else path.parent
+
+
+def _near(text: str) -> str:
+    known = [str(p.parent) for p in (*RUNS.glob("*/journal.jsonl"), *RUNS.glob("*/*/journal.jsonl"))]
+    near = difflib.get_close_matches(text, sorted(known), n=4, cutoff=0.5) or sorted(known)[:4]
+    return f" as {', '.join(near)}" if near else " (harvey run makes them under runs/)"

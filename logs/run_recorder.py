@@ -1,0 +1,149 @@
+"""RunRecorder: the files that a run writes while it goes on: journal, camera file, recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from blackboard.change import Change
+from blackboard.effect import Effect, Retract
+from blackboard.journal import Decision, Sink, decision_line
+from blackboard.scheduler import Port
+from logs.camera_file import CameraFile
+from logs.disk import sync_folder
+from logs.journal_file import JournalFile
+from logs.recording.writer import RecordingWriter
+from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
+from world_models.building.geometry.faces import Face
+from world_models.building.world import World
+from world_models.entries.body import Frame
+from world_models.entries.location import Place
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """How much of a run's files is whole [bytes]."""
+
+    journal: int = 0
+    camera: int = 0
+
+
+class RunRecorder:
+    """Records a run. With neither a directory nor a viewer it records nothing.
+
+    Attributes:
+        replaying: while it is set, the run is drawn, but nothing is written to journal and camera file, and the ports
+            are not asked.
+    """
+
+    def __init__(
+        self, run: RunDirectory | None, head: RunHead, world: World, robot: RobotModel, *,
+        live: bool = False, whole: Extent | None = None, drawing: Path | None = None,
+    ) -> None:
+        """Begin the files of a run.
+
+        Args:
+            run: where; None keeps neither journal nor pictures.
+            live: let a viewer watch.
+            whole: go on with the files of a run, of which so much is whole.
+            drawing: of a run that is only replayed: where its recording is drawn.
+
+        Raises:
+            OSError: a file cannot be written, or another process is writing it.
+            RecordingError: the recording cannot be written.
+        """
+        self.replaying = whole is not None or drawing is not None
+        self._journal: JournalFile | None = None
+        self._camera: CameraFile | None = None
+        self._recording_writer: RecordingWriter | None = None
+        drawing = run.recording if run is not None else drawing
+        with ExitStack() as opened:
+            if run is not None:
+                self._open(run, head, whole, opened)
+            if drawing is not None or live:
+                self._recording_writer = _recording_writer(drawing, head, world, robot, live, self._journal)
+                opened.callback(self._recording_writer.close)
+            self._opened = opened.pop_all()
+
+    def _open(self, run: RunDirectory, head: RunHead, whole: Extent | None, opened: ExitStack) -> None:
+        if whole is None:
+            run.path.mkdir(parents=True, exist_ok=True)
+            head.write(run.path)
+        keep = whole or Extent()
+        self._journal = JournalFile(run.journal, keep=keep.journal)
+        opened.callback(self._journal.close)
+        self._camera = CameraFile(run.camera, keep=keep.camera)
+        opened.callback(self._camera.close)
+        sync_folder(run.path)
+
+    @property
+    def sinks(self) -> tuple[Sink, ...]:
+        """For the scheduler; the journal comes first."""
+        return (self._write, *([self._recording_writer] if self._recording_writer else []))
+
+    def record_port(self, port: Port) -> RecordedPort:
+        """The port, whose pictures are on the disk before the board sees them."""
+        return RecordedPort(self, port)
+
+    def record_picture(self, effect: Effect) -> None:
+        """Put a picture on the disk, if that is what was observed. Raises CannotWriteError."""
+        value = None if isinstance(effect, Retract) else effect.value
+        if self._camera is not None and isinstance(value, Frame):
+            self._camera.add(value.jpeg)
+
+    def draw_truth(self, pose: Pose2, sim_time_s: float, contacts: Sequence[Place] = ()) -> None:
+        """Where the robot truly is, and where it touched something since the last cycle, for the drawing."""
+        if self._recording_writer is not None:
+            self._recording_writer.truth(pose, sim_time_s, contacts)
+
+    def draw_true_building(self, added: tuple[Face, ...], gone: tuple[Face, ...]) -> None:
+        """How the building truly differs from its model from now on: faces that are there besides, and that are not."""
+        if self._recording_writer is not None:
+            self._recording_writer.true_building(added, gone)
+
+    def close(self) -> None:
+        """No more decisions. Raises RecordingError where the recording's last part could not be written."""
+        self._opened.close()
+
+    def _write(self, decision: Decision) -> None:
+        if self._journal is not None and not self.replaying:
+            self._journal(decision)
+
+
+class RecordedPort:
+    """A port whose pictures are recorded.
+
+    Attributes:
+        closed: whether it leaves everything unanswered.
+    """
+
+    def __init__(self, recorder: RunRecorder, port: Port) -> None:
+        self._recorder, self._port = recorder, port
+        self.closed = False
+
+    @property
+    def name(self) -> str:
+        return self._port.name
+
+    def answer(self, change: Change) -> Iterable[Effect]:
+        return () if self.closed or self._recorder.replaying else self._answers(change)
+
+    def _answers(self, change: Change) -> Iterator[Effect]:
+        for effect in self._port.answer(change):
+            self._recorder.record_picture(effect)
+            yield effect
+
+
+def _recording_writer(
+    path: Path | None, head: RunHead, world: World, robot: RobotModel, live: bool, journal: JournalFile | None
+) -> RecordingWriter:
+    return RecordingWriter(
+        path, world=world, camera=robot.lens, mount=robot.mount, live=live,
+        title=f"harvey {head.name}", recording_id=f"{head.name}-{head.seed}",
+        line_of=decision_line if journal is None else journal.line,
+    )

@@ -1,0 +1,353 @@
+"""Timeline: a recorded run asked by name: every revision of every entry, the decision that made it, what it rests on.
+
+Where each entry stands in the journal is found in one sweep over its bytes, and only the lines that are needed are
+read. No index is kept beside the journal: the sweep over an hour's journal takes a tenth of a second, and what a line
+says is believed only once the line has been read as a decision.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+import re
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+
+from logs.errors import BadInput
+from logs.journal_file import out_of_step
+from logs.records import Candidate, DecisionRecord, EntryRecord, decision_of, is_a
+from world_models.entries.location import Hypothesis
+from world_models.entries.percepts import Tracks
+from world_models.entries.task import Outcome
+
+K = TypeVar("K")
+
+PLAIN = re.compile(rb'\{"cycle":(\d{1,15}),"')
+"""How a line begins as the scheduler writes it; a line that begins otherwise is read in full."""
+CHANGE = re.compile(rb'\{"change":"(\w+)","entry":"([^"\\]+)"')
+"""How a change begins there. Inside a text every quotation mark has a backslash before it, so no text looks like it."""
+CLOSES = ord("}")
+FAR = 3000
+"""So many entries are looked at for the nearest of a kind."""
+REVISIONS = 2000
+"""So many revisions of a belief are looked back for where it began."""
+TIMED_WITHIN = 100
+"""A time is looked for in so many decisions, backwards."""
+YAW_CALIBRATOR = "yaw_calibrator"
+"""It turns a belief after a milestone, and tells nothing of where that is from."""
+
+
+class Timeline:
+    """A run by its ``journal.jsonl``. A last line that was cut off in the middle of writing is left out."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises BadInput where the file cannot be read."""
+        try:
+            self._data = path.read_bytes()
+        except OSError as error:
+            raise BadInput(f"{path}: expected a readable journal, got: {error.strerror}") from None
+        self._path = path
+        self._ends = [match.start() for match in re.finditer(rb"\n", self._data)]
+        self._read: dict[int, DecisionRecord] = {}
+        self._line_of: dict[int, int] = {}
+        self._entries: dict[bytes, int] = {}
+        self._retracted: dict[bytes, int] = {}
+        self._sweep()
+
+    @property
+    def source(self) -> str:
+        """Where it is read from."""
+        return str(self._path)
+
+    @cached_property
+    def newest(self) -> Mapping[str, str]:
+        """Id of each entry -> ref of its last revision; in the order in which the entries came about."""
+        return {ref.rpartition(".")[0]: ref for ref in self.refs}
+
+    @cached_property
+    def refs(self) -> Sequence[str]:
+        """Every revision, in the order in which they came about."""
+        return tuple(ref.decode(errors="replace") for ref in self._entries)
+
+    @cached_property
+    def cycles(self) -> Sequence[int]:
+        """Of the decisions, in their order."""
+        return tuple(self._line_of)
+
+    def entry(self, ref: str) -> EntryRecord[Any] | None:
+        """What the journal says of a revision; None where it says nothing."""
+        return self._find(ref, self._entries.get(ref.encode(errors="replace")), retracted=False)
+
+    def retraction(self, ref: str) -> EntryRecord[Any] | None:
+        """How a revision was retracted; None where it was not."""
+        return self._find(ref, self._retracted.get(ref.encode(errors="replace")), retracted=True)
+
+    def cycle_of(self, cycle: int) -> DecisionRecord | None:
+        """The decision of a cycle; None where the run has no such cycle."""
+        line = self._line_of.get(cycle)
+        return None if line is None else self._decision(line)
+
+    def naming(self, ref: str) -> Iterator[DecisionRecord]:
+        """The decisions that name a revision anywhere, in their order; some that do not may be among them."""
+        name, at, after = json.dumps(ref).encode(), 0, -1
+        while (at := self._data.find(name, at)) >= 0:
+            line = self._line_at(at)
+            at += len(name)
+            if after < line < len(self._ends):
+                after = line
+                yield self._decision(line)
+
+    def verify(self) -> None:
+        """Read every line. Raises BadInput for the first that is no decision."""
+        for line in range(len(self._ends)):
+            self._decision(line)
+
+    def lines_alike(self, other: Timeline) -> int:
+        """How many of the first lines are the same to the byte."""
+        start = 0
+        for line, (end, there) in enumerate(zip(self._ends, other._ends, strict=False)):
+            if end != there or self._data[start:end] != other._data[start:end]:
+                return line
+            start = end + 1
+        return min(len(self._ends), len(other._ends))
+
+    def of_kind(self, *kinds: type[K], until: int | None = None) -> Iterator[EntryRecord[K]]:
+        """All revisions of some kinds, up to a cycle, in the order in which they came about."""
+        heads = tuple(f"{kind.__name__}-" for kind in kinds)
+        for ref in self.refs:
+            record = self.entry(ref) if ref.startswith(heads) else None
+            if record is not None and (until is None or record.cycle <= until):
+                yield record
+
+    def ids_of(self, kind: type[Any]) -> list[str]:
+        """Of the entries of a kind, in the order in which they came about."""
+        return [id for id in self.newest if id.startswith(f"{kind.__name__}-")]
+
+    def decision(self, cycle: int) -> DecisionRecord:
+        """Raises BadInput where the run has no such cycle."""
+        found = self.cycle_of(cycle)
+        if found is None:
+            have = f"cycles {min(self.cycles)} to {max(self.cycles)}" if self.cycles else "none"
+            raise BadInput(f"--at: expected a cycle of the run, which has {have}, got {cycle}")
+        return found
+
+    def decisions(self) -> Iterator[DecisionRecord]:
+        """All of them, in their order."""
+        return (self.decision(cycle) for cycle in self.cycles)
+
+    def candidates(self, cycle: int) -> tuple[Candidate, ...]:
+        """Among whom a cycle chose: what was pending or new, and not dropped; the chosen first, then the best rated.
+
+        Raises:
+            BadInput: the run has no such cycle.
+        """
+        decision = self.decision(cycle)
+        wanted = decision.pending + (decision.chosen is not None and decision.asks is None)
+        gone: set[int] = set()
+        found: dict[int, Candidate] = {}
+        for one in reversed(self.cycles[: bisect_right(self.cycles, cycle)]):
+            past = self.decision(one)
+            gone.update(c.number for c in past.obviated)
+            if past.chosen is not None and past.asks is None and one != cycle:
+                gone.add(past.chosen.number)
+            found.update((c.number, c) for c in past.activated if c.number not in gone)
+            if len(found) >= wanted:
+                break
+        return ranked(found.values(), decision.chosen)
+
+    def written_by(self, cycle: int) -> tuple[EntryRecord[Any], ...]:
+        """The entries that a cycle wrote."""
+        found = self.cycle_of(cycle)
+        return () if found is None else found.made
+
+    def time_at(self, cycle: int) -> float | None:
+        """The newest time that anything from outside had told by a cycle [s]; None where nothing had lately."""
+        for one in reversed(self.cycles[: bisect_right(self.cycles, cycle)][-TIMED_WITHIN:]):
+            told = [found for found in map(_time_of, self.decision(one).observed) if found is not None]
+            if told:
+                return max(told)
+        return None
+
+    def outcome(self) -> str:
+        """Ref of how the mission ended, or, where it did not come to that, of the last entry.
+
+        Raises:
+            BadInput: the journal is empty.
+        """
+        if not self.newest:
+            self.verify()
+            raise BadInput(f"{self.source}: expected at least one entry, got none")
+        outcomes = self.ids_of(Outcome)
+        return self.newest[outcomes[-1]] if outcomes else self.refs[-1]
+
+    @property
+    def cut_off(self) -> int | None:
+        """The last cycle of a run of which nothing says how it ended; None where it ended, or never began."""
+        return None if self.ids_of(Outcome) or not self.cycles else self.cycles[-1]
+
+    def reason(self, record: EntryRecord[Any], kind: type[K]) -> EntryRecord[K] | None:
+        """The first entry of a kind that an entry rests on directly."""
+        refs = (ref for ref in record.because if ref.startswith(f"{kind.__name__}-"))
+        return next((found for ref in refs if (found := self.entry(ref)) is not None), None)
+
+    def within(self, record: EntryRecord[Any]) -> Iterator[EntryRecord[Any]]:
+        """An entry and what it rests on, nearest first, each once; not more than FAR."""
+        known, queue = {record.ref}, deque([record])
+        for _ in range(FAR):
+            if not queue:
+                return
+            one = queue.popleft()
+            yield one
+            for ref in one.because:
+                if ref not in known and (below := self.entry(ref)) is not None:
+                    known.add(ref)
+                    queue.append(below)
+
+    def nearest(self, record: EntryRecord[Any], *kinds: type[K]) -> EntryRecord[K] | None:
+        """The entry of one of these kinds that is fewest steps down ``because``; the entry itself counts."""
+        return next((one for one in self.within(record) if one.kind in kinds), None)
+
+    def tracks_of(self, belief: EntryRecord[Any]) -> EntryRecord[Tracks] | None:
+        """The landmarks that corrected a belief: they were written in the same act."""
+        here = [r for r in self.written_by(belief.cycle) if is_a(r, Tracks) and r.author == belief.author]
+        return here[0] if here else self.reason(belief, Tracks)
+
+    def anchor_of(self, belief: EntryRecord[Any]) -> EntryRecord[Hypothesis] | None:
+        """The revision with which a belief began that was carried on by wheels and landmarks since."""
+        for back in range(belief.revision, max(-1, belief.revision - REVISIONS), -1):
+            found = self.entry(f"{belief.id}.{back}")
+            if found is None:
+                return None
+            if found.fields["basis"] not in ("tracks", "odometry") and found.author != YAW_CALIBRATOR:
+                return found
+        return None
+
+    def resolve(self, text: str) -> str:
+        """The ref that a user means: ``MotorCommand-12.3``, or ``MotorCommand-12`` for its last revision.
+
+        Raises:
+            BadInput: the run has no such entry; near ones are named.
+        """
+        found = self.find(text)
+        if found is not None:
+            return found
+        self.verify()
+        raise BadInput(f"expected an entry of the run, as {', '.join(self.near(text)) or 'none'}, got {text!r}")
+
+    def find(self, text: str) -> str | None:
+        """As :meth:`resolve`; None where the run has no such entry."""
+        low = text.lower()
+        for names in (self.newest, self.refs):
+            for name in names:
+                if name.lower() == low:
+                    return self.newest.get(name, name)
+        return None
+
+    def near(self, text: str) -> list[str]:
+        """Names like one that is not there: of the same kind with near numbers, else of a kind that is spelt alike."""
+        kinds = {id.rpartition("-")[0].lower(): id.rpartition("-")[0] for id in self.newest}
+        kind, _, rest = text.rpartition("-")
+        alike = difflib.get_close_matches((kind or text).lower(), sorted(kinds), n=2, cutoff=0.6)
+        if not alike:
+            ids = list(self.newest)
+            return [ids[0], ids[-1]] if ids else []
+        wanted = int(rest.partition(".")[0]) if rest.partition(".")[0].isdecimal() else 1
+        near: list[str] = []
+        for name in alike:
+            numbers = sorted(_numbers(self.newest, kinds[name]), key=lambda n: (abs(n - wanted), n))
+            near += [f"{kinds[name]}-{n}" for n in numbers[:2]]
+        return near
+
+    def _sweep(self) -> None:
+        """Note where each cycle and each entry stands. What stands in an unusual line is read from it.
+
+        Raises BadInput where a line is not the cycle that follows on the line before.
+        """
+        start, unusual = 0, list[int]()
+        for line, end in enumerate(self._ends):
+            plain = PLAIN.match(self._data, start)
+            if plain is None or self._data[end - 1] != CLOSES:
+                unusual.append(line)
+            cycle = int(plain[1]) if plain else self._decision(line).cycle
+            if cycle != line + 1:
+                raise BadInput(out_of_step(f"{self._path}:{line + 1}", line + 1, cycle))
+            self._line_of[cycle] = line
+            start = end + 1
+        if unusual:
+            self._sweep_slowly()
+            return
+        whole = self._ends[-1] if self._ends else 0
+        for change in CHANGE.finditer(self._data, 0, whole):
+            kind, ref = change.groups()
+            (self._retracted if kind == b"Retracted" else self._entries)[ref] = change.start()
+
+    def _sweep_slowly(self) -> None:
+        for line in range(len(self._ends)):
+            for record in self._decision(line).changes:
+                where = self._retracted if record.is_gone else self._entries
+                where[record.ref.encode(errors="replace")] = self._ends[line] - 1
+
+    def _find(self, ref: str, offset: int | None, *, retracted: bool) -> EntryRecord[Any] | None:
+        """The newest change of that name; where the index is wrong, every line is searched."""
+        if offset is None:
+            return None
+        for line in range(self._line_at(offset), -1, -1):
+            found = [one for one in self._decision(line).changes if one.ref == ref and one.is_gone is retracted]
+            if found:
+                return found[-1]
+        return None
+
+    def _line_at(self, offset: int) -> int:
+        return bisect_right(self._ends, offset - 1)
+
+    def _decision(self, line: int) -> DecisionRecord:
+        """Raises BadInput where the line is no decision; names file and line."""
+        if line not in self._read:
+            start = self._ends[line - 1] + 1 if line else 0
+            self._read[line] = _decision_at(self._data[start : self._ends[line]], f"{self._path}:{line + 1}")
+        return self._read[line]
+
+
+def ranked(candidates: Iterable[Candidate], chosen: Candidate | None) -> tuple[Candidate, ...]:
+    """The chosen one first, then the best rated, then the oldest."""
+    first = chosen.number if chosen else None
+    return tuple(sorted(candidates, key=lambda c: (c.number != first, -c.rating, c.number)))
+
+
+def _time_of(record: EntryRecord[Any]) -> float | None:
+    """When an observation was made, read without decoding it."""
+    if not isinstance(record.fields, Mapping):
+        return None
+    value = record.fields.get("sim_time_s", record.fields.get("when_s"))
+    since, waited = record.fields.get("since_s"), record.fields.get("waited_s")
+    if isinstance(since, int | float) and isinstance(waited, int | float):
+        value = since + waited
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
+
+
+def _numbers(ids: Iterable[str], kind: str) -> Iterator[int]:
+    for id in ids:
+        head, _, number = id.rpartition("-")
+        if head == kind and number.isdecimal():
+            yield int(number)
+
+
+def _decision_at(text: bytes, where: str) -> DecisionRecord:
+    """A line as a decision. Raises BadInput naming ``where``, what was expected and what came."""
+    try:
+        data = json.loads(text)
+    except RecursionError:
+        raise BadInput(f"{where}: expected a decision, got too many nested brackets") from None
+    except ValueError as error:
+        raise BadInput(f"{where}: expected a decision as a JSON object, got {text[:60]!r} ({error})") from None
+    if not isinstance(data, dict):
+        raise BadInput(f"{where}: expected a decision as a JSON object, got {text[:60]!r}")
+    try:
+        return decision_of(data)
+    except ValueError as error:
+        raise BadInput(f"{where}: {error}") from None
