@@ -13,9 +13,9 @@ from typing import Any
 from harvey.errors import BadInput
 from knowledge_sources.settings.table import Row
 from world_models.actuator import BOUNDS, ActuatorModel
-from world_models.bounds import Bounds
 from world_models.entries.robot import CameraState, Footprint, Wheels
 from world_models.files.toml.settings import parse_value, spellings
+from world_models.units import Bounds
 
 BY_MISSION = "by the mission"
 """Instead of a value that has no default."""

@@ -18,7 +18,7 @@ from blackboard.scheduler import Scheduler
 from harvey.errors import BadInput
 from harvey.robot_settings import build_believed
 from logs.records import WHAT_IF
-from world_models.building.changes.removals import element_names
+from world_models.building.changes import element_names
 from world_models.building.locale_frame import FrameChange, FrameRequest, LocaleFrame
 from world_models.building.world import World
 from world_models.entries.robot import CameraState, Footprint, Wheels

@@ -25,7 +25,7 @@ from knowledge_sources.methods.motion.footprints import build_free_floor, build_
 from knowledge_sources.questions import active_goal, deepest_sketch, find_robot
 from knowledge_sources.settings import Settings
 from knowledge_sources.settings.action import ActionSettings
-from world_models.building.things import EXTRA_KIND, Thing
+from world_models.building.locales import EXTRA_KIND, Thing
 from world_models.entries.body import Frame, MotionReport, RideReport
 from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.bounds import Bounds, check_bounds
-from world_models.building.geometry.faces import Face
-from world_models.building.geometry.regions import Region
+from world_models.building.geometry.faces import Face, Region
+from world_models.units import Bounds, check_bounds
 
 Floats = NDArray[np.float64]
 

@@ -2,6 +2,6 @@
 
 ``entries`` (what lies on the board), ``building`` (locales, faces, landmarks), ``visibility`` (what is in view),
 ``files`` (how a building is read), ``worlds`` (buildings that come with the project). Beside them: ``frames``,
-``camera``, ``actuator`` and ``robot`` (the robot's model of itself), ``ptrans`` and ``commands`` (goals), ``plugins``
-(what other packages add).
+``camera``, ``actuator`` and ``robot`` (the robot's model of itself), ``commands`` (goals), ``units`` (and bounds),
+``plugins`` (what other packages add).
 """

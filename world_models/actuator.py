@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.bounds import Bounds, check_bounds
 from world_models.frames import Pose2
+from world_models.units import Bounds, check_bounds
 
 BOUNDS: Mapping[str, Bounds] = {
     "reach": Bounds(0.1, 2.0),

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from difflib import get_close_matches
 
-from world_models.building.changes.removals import element_names
+from world_models.building.changes import element_names
 from world_models.building.locale_frame import FrameAnswer, FrameReference, FrameRequest, LocaleFrame
 from world_models.building.world import World
 from world_models.commands import find_room

@@ -49,8 +49,7 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings.action import ActionSettings
 from world_models.building.building import Building
 from world_models.building.locale_frame import FrameChange, LocaleFrame
-from world_models.building.locales import Doorway
-from world_models.building.things import EXTRA_KIND
+from world_models.building.locales import EXTRA_KIND, Doorway
 from world_models.entries.body import MotorCommand
 from world_models.entries.floor import FloorThing, FreeFloor
 from world_models.entries.location import Hypothesis, Place

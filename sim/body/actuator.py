@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from world_models.bounds import Bounds, check_bounds
 from world_models.frames import Pose2
+from world_models.units import Bounds, check_bounds
 
 STEP_M = 0.02
 """Largest step of the integration of a motion [m]."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from world_models.bounds import Bounds, check_bounds
 from world_models.entries.touch import Contact
+from world_models.units import Bounds, check_bounds
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from sim.truth import Truth
-from world_models.bounds import Bounds, check_bounds
 from world_models.building.locales import Link
 from world_models.entries.body import Ride
 from world_models.entries.location import Frames
 from world_models.frames import Pose2, flattened
+from world_models.units import Bounds, check_bounds
 
 
 @dataclass(frozen=True, slots=True)

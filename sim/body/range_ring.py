@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.body.collision import ROBOT_RADIUS_M
-from world_models.bounds import Bounds, check_bounds
 from world_models.entries.touch import Ranges
 from world_models.frames import Pose2
+from world_models.units import Bounds, check_bounds
 
 Floats = NDArray[np.float64]
 

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometry.faces import Face
-from world_models.building.geometry.regions import Finish
+from world_models.building.geometry.faces import Face, Finish
 from world_models.building.geometry.solids import Box, Range, Solid
 from world_models.frames import Pose
 

@@ -8,10 +8,10 @@ from typing import TypeVar
 
 from sim.differences.inexact import EXACT, TrueInexact
 from sim.differences.shapes import SHAPES
-from world_models.bounds import Bounds, check_bounds
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.settings import MAX_NUMBER, read_settings, suggest_keys
 from world_models.files.toml.source import Node
+from world_models.units import Bounds, check_bounds
 
 T = TypeVar("T")
 DOOR_STATES = ("shut", "ajar", "open")

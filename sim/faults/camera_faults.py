@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from sim.faults.fault import DeviceFault, Fault, FaultTarget
-from world_models.bounds import Bounds
+from world_models.units import Bounds
 
 KNOCK = Bounds(-0.5, 0.5)
 

@@ -10,9 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from sim.faults.fault import Fault, FaultTarget
-from world_models.bounds import Bounds
 from world_models.entries.location import Place
 from world_models.frames import Pose2
+from world_models.units import Bounds
 
 MAX_DISPLACEMENT_M = 5.0
 """Largest displacement along each axis; further only to a place that is named."""

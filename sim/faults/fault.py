@@ -11,9 +11,9 @@ import numpy as np
 
 from sim.render.occluder import Occluder
 from sim.truth import Truth
-from world_models.bounds import Bounds, check_bounds
 from world_models.entries.location import Place
 from world_models.frames import Pose2
+from world_models.units import Bounds, check_bounds
 
 TRIGGER_BOUNDS: Mapping[str, Bounds] = {"after_m": Bounds(0.0, 1e6), "after_s": Bounds(0.0, 1e6)}
 DURATION = Bounds(0.0, 1e6, above=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from sim.faults.fault import DURATION, Fault, FaultTarget
-from world_models.bounds import Bounds
+from world_models.units import Bounds
 
 
 @dataclass(frozen=True, slots=True)

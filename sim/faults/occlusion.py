@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from sim.faults.fault import DURATION, Fault, FaultTarget
 from sim.render.occluder import Occluder
-from world_models.bounds import Bounds
+from world_models.units import Bounds
 
 
 @dataclass(frozen=True, slots=True)

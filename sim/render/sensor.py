@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from world_models.bounds import Bounds, check_bounds
+from world_models.units import Bounds, check_bounds
 
 MEAN, INVERSE_SIGMA = np.float32(510.0), np.float32(1.0 / np.sqrt((256.0**2 - 1.0) / 3.0))
 """Mean and reciprocal standard deviation of the sum of four random bytes."""

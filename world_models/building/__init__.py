@@ -3,8 +3,7 @@
 In reading order:
 
 * :mod:`.geometry`: faces with regions, landmarks, solids and outlines: shapes and colors.
-* :mod:`.locales`: locales, doorways, links (elevators and stairs), and where locales lie.
-* :mod:`.things`: furniture and the like, and findings about a world.
+* :mod:`.locales`: locales, what stands in them, doorways, links (elevators and stairs), and where locales lie.
 * :mod:`.changes`: what is believed otherwise than the world file says: a door found shut, a thing gone.
 * :mod:`.passages`: passage graphs at every level of the hierarchy, and routes.
 * :mod:`.locale_frame`: all that is known of one locale: the unit in which a building is asked, told and changed.

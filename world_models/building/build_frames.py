@@ -14,12 +14,12 @@ from world_models.building.locales import (
     Link,
     Locale,
     LocaleExtent,
+    Thing,
     bounding_box,
     bounding_rectangle,
     compute_reaches,
 )
 from world_models.building.passages import build_passage_graphs, drivable_passages
-from world_models.building.things import Thing
 from world_models.frames import Pose
 
 K = TypeVar("K")

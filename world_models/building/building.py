@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from world_models.building.geometry.scene import LocaleGeometry, Scene, build_scene, concatenate_scenes
 from world_models.building.locale_frame import LocaleFrame
-from world_models.building.locales import Doorway, Link, Locale, LocaleExtent
+from world_models.building.locales import Doorway, Link, Locale, LocaleExtent, Thing
 from world_models.building.passages import Route, find_route
-from world_models.building.things import Thing
 from world_models.frames import Pose, frozen
 
 T = TypeVar("T")

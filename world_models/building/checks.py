@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.geometry.outlines import distance_to_border, inside_polygon
-from world_models.building.locales import Locale
-from world_models.building.things import STEP_M, Finding, Thing
+from world_models.building.locales import STEP_M, Finding, Locale, Thing
 from world_models.building.world import World
 
 TOLERANCE_M = 0.01

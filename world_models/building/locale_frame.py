@@ -19,13 +19,10 @@ from blackboard.kinds import observation, request
 from blackboard.level import Level
 from blackboard.servoing import OPEN
 from world_models import words
-from world_models.building.changes.extra_things import add_extra
-from world_models.building.changes.removals import remove_element, remove_thing
-from world_models.building.changes.shut_doors import shut_door
+from world_models.building.changes import add_extra, remove_element, remove_thing, shut_door
 from world_models.building.geometry.scene import LocaleGeometry
-from world_models.building.locales import Doorway, Link, Locale, LocaleExtent
+from world_models.building.locales import EXTRA_KIND, ROBOT_TOP_M, Doorway, Link, Locale, LocaleExtent, Thing
 from world_models.building.passages import PassageEdge
-from world_models.building.things import EXTRA_KIND, ROBOT_TOP_M, Thing
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, PlanSketch
 from world_models.frames import frozen

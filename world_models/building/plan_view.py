@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.geometry.faces import Face
-from world_models.building.things import STEP_M
+from world_models.building.locales import STEP_M
 from world_models.building.world import World
 
 SCALE = 40.0

@@ -17,8 +17,7 @@ from world_models.building.geometry.faces import Face
 from world_models.building.geometry.landmarks import Landmark
 from world_models.building.geometry.scene import LocaleGeometry, Scene, build_scene, concatenate_scenes
 from world_models.building.locale_frame import LocaleFrame
-from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.things import Finding, Thing
+from world_models.building.locales import Doorway, Finding, Link, Locale, Thing
 
 T = TypeVar("T")
 

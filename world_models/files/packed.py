@@ -23,8 +23,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from world_models.building.locale_frame import LocaleFrame
-from world_models.building.locales import Doorway, Link
-from world_models.building.things import Finding
+from world_models.building.locales import Doorway, Finding, Link
 from world_models.building.world import World, words_about, words_of
 from world_models.files.toml.source import WorldError
 from world_models.frames import frozen

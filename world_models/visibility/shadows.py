@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometry.intervals import subtract_intervals
+from world_models.building.geometry.outlines import subtract_intervals
 from world_models.camera import NEAR_PLANE_M
 from world_models.visibility.portals import Window
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from sim.faults.fault import Fault, FaultTarget
-from world_models.bounds import Bounds
 from world_models.frames import Pose2
+from world_models.units import Bounds
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from world_models.building.build_frames import iterate_frames
-from world_models.building.geometry.faces import Face, build_barrier
+from world_models.building.geometry.faces import Face, Finish, build_barrier, expected_brightness
 from world_models.building.geometry.landmarks import Edges, Landmark
-from world_models.building.geometry.regions import Finish, expected_brightness
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.building.locale_frame import LocaleFrame
 from world_models.building.locales import Doorway, Link, Locale

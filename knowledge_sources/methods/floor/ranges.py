@@ -18,7 +18,7 @@ from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from world_models.building.building import Building
-from world_models.building.things import ROBOT_TOP_M, STEP_M
+from world_models.building.locales import ROBOT_TOP_M, STEP_M
 from world_models.entries.floor import FloorEnd, FloorThing, FreeFloor, Point
 from world_models.entries.touch import Ranges
 from world_models.frames import Pose2

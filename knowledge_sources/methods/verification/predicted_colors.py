@@ -13,8 +13,7 @@ from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.verification import VerificationSettings
 from world_models.building.building import Building
-from world_models.building.geometry.faces import area_vector
-from world_models.building.geometry.regions import Finish, expected_brightness
+from world_models.building.geometry.faces import Finish, area_vector, expected_brightness
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from world_models.bounds import Bounds, check_bounds
+from world_models.units import Bounds, check_bounds
 
 GAMMA = 2.2
 """Colours are as seen: light is their power of this, relative to a white surface at full light."""

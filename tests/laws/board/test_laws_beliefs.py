@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from world_models.actuator import ActuatorModel
+from world_models.commands import parse_ptrans
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.frames import Pose, Pose2, wrap_angle
-from world_models.ptrans import parse_ptrans
 from world_models.units import FOOT_M
 
 angles = st.floats(-math.pi, math.pi)

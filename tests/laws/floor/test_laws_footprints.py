@@ -24,7 +24,7 @@ from knowledge_sources.methods.motion.footprints import (
     measure_width_m,
     take_free,
 )
-from world_models.building.changes.extra_things import build_extra_faces
+from world_models.building.changes import build_extra_faces
 from world_models.building.geometry.faces import area_vector
 
 SQUARE = ((2.0, -0.2), (2.4, -0.2), (2.4, 0.2), (2.0, 0.2))

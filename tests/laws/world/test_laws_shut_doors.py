@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from experiments.generated.scenes import generate_house
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from world_models.actuator import ActuatorModel
-from world_models.building.changes.shut_doors import build_shut_faces, shut_door
+from world_models.building.changes import build_shut_faces, shut_door
 from world_models.building.geometry.outlines import inside_polygon
 from world_models.building.locales import Doorway
 from world_models.building.world import World

@@ -8,8 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from world_models.building.geometry.faces import Region
 from world_models.building.geometry.outlines import inside_polygon
-from world_models.building.geometry.regions import Region
 from world_models.building.geometry.scene import stack_regions
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world

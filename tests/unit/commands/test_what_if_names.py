@@ -8,7 +8,7 @@ from harvey.errors import BadInput
 from harvey.what_if import check_removals
 from logs.run_head import load_known_world
 from world_models.building.geometry.scene import LocaleGeometry
-from world_models.files.toml.includes import WORLDS
+from world_models.files.toml.source import WORLDS
 from world_models.frame_store import FrameStore
 
 

@@ -5,10 +5,8 @@ import pytest
 
 from logs.recording.loggers.surroundings.building import _meshes
 from world_models.building.build_frames import build_frames
-from world_models.building.changes.removals import element_names, remove_element, remove_thing
-from world_models.building.changes.shut_doors import build_shut_faces, shut_door
-from world_models.building.geometry.faces import area_vector
-from world_models.building.geometry.regions import UNKNOWN, expected_brightness
+from world_models.building.changes import build_shut_faces, element_names, remove_element, remove_thing, shut_door
+from world_models.building.geometry.faces import UNKNOWN, area_vector, expected_brightness
 from world_models.building.world import World
 from world_models.files.world_files import WORLDS, load_world
 

@@ -2,8 +2,8 @@
 
 In reading order:
 
-* :mod:`.intervals`, :mod:`.outlines`: geometry on a line and on the floor.
-* :mod:`.regions`, :mod:`.faces`: planar patches with finishes, and their expected brightness.
+* :mod:`.outlines`: geometry on a line and on the floor.
+* :mod:`.faces`: planar patches with finishes, and their expected brightness.
 * :mod:`.landmarks`: model lines with the surfaces on both sides, and corner points.
 * :mod:`.solids`: boxes, from which faces and model lines follow.
 * :mod:`.scene`: model lines and surfaces in arrays.

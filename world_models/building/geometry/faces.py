@@ -1,7 +1,9 @@
-"""Faces (§3.4, Figure 6): planar patches that bound locales, of type barrier or doorway."""
+"""Faces (§3.4, Figure 6): planar patches that bound locales, of type barrier or doorway, and the regions on them."""
 
 from __future__ import annotations
 
+import math
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -9,8 +11,75 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometry.regions import Finish, Region, build_region
 from world_models.frames import frozen
+
+TEXTURES = ("plain", "speckle", "wood", "brick", "tiles", "carpet", "stripes", "poster")
+
+LUMA = np.array([0.299, 0.587, 0.114])
+"""Weights of red, green and blue in a grey image."""
+
+AMBIENT = 0.6
+"""Brightness of a white surface parallel to the light."""
+LAMP = np.array([0.12, 0.04, 0.18])
+"""Direction of the building's light: from above and a little from the east. It decides which creases show."""
+LAMP_DIRECTION = LAMP / np.linalg.norm(LAMP)
+
+
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """Appearance of a surface.
+
+    Its colour (red, green, blue) in 0..1 (NaN: unknown), one of :data:`TEXTURES`, size of its cells [m].
+    """
+
+    colour: tuple[float, float, float]
+    texture: str = "plain"
+    texture_scale_m: float = 0.1
+
+    @property
+    def luma(self) -> float:
+        return float(np.dot(LUMA, self.colour))
+
+
+UNKNOWN = Finish((math.nan, math.nan, math.nan))
+"""Of a surface whose colour the model does not know: it hides what is behind it, and no colour of it is expected."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Region:
+    """An area of a face with uniform appearance.
+
+    Attributes:
+        name: unique in the world.
+        polygon_world: (k, 3) convex and flat, counter-clockwise as seen from its visible side [m].
+        colour: (red, green, blue) in 0..1; NaN: unknown.
+        texture: one of :data:`TEXTURES`.
+        texture_scale_m: size of the texture's cells [m].
+        seed: of the texture.
+    """
+
+    name: str
+    polygon_world: NDArray[np.float64]
+    colour: tuple[float, float, float]
+    texture: str
+    texture_scale_m: float
+    seed: int
+
+
+def build_region(name: str, polygon_world: Any, finish: Finish) -> Region:
+    """A region with this finish; its seed is a hash of its name."""
+    polygon = frozen(polygon_world, (None, 3))
+    seed = zlib.crc32(name.encode()) & 0xFFFF
+    return Region(name, polygon, finish.colour, finish.texture, finish.texture_scale_m, seed)
+
+
+def expected_brightness(finish: Finish, normal_world: Any) -> float:
+    """Brightness, 0..1, of a surface with this finish and unit normal (3,): ambient plus Lambertian light.
+
+    NaN where its colour is unknown.
+    """
+    return float(finish.luma * (AMBIENT + 0.25 * np.dot(LAMP_DIRECTION, normal_world)))
+
 
 FaceKind = Literal["barrier", "doorway"]
 

@@ -1,4 +1,4 @@
-"""Outlines: simple counter-clockwise polygons on the floor; containment, distance and convex parts.
+"""Outlines: simple counter-clockwise polygons on the floor; containment, distance and convex parts; intervals.
 
 Point tests are plain Python: outlines have few corners and are asked often, which shapely's overhead would slow down.
 """
@@ -6,9 +6,25 @@ Point tests are plain Python: outlines have few corners and are asked often, whi
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+
+Interval = tuple[float, float]
+"""(low, high)."""
+
+
+def subtract_intervals(whole: Interval, taken: Sequence[Interval], min_length: float) -> list[Interval]:
+    """The pieces of ``whole`` outside all ``taken`` intervals, at least ``min_length`` long, in order."""
+    pieces, at = [], whole[0]
+    for low, high in sorted(taken):
+        if low > at:
+            pieces.append((at, min(low, whole[1])))
+        at = max(at, high)
+    pieces.append((at, whole[1]))
+    return [(low, high) for low, high in pieces if high - low >= min_length]
+
 
 MIN_AREA_M2, MIN_SIDE_M, MIN_GAP_M = 1e-4, 0.01, 1e-3
 """What a room's outline must have: area, length of its sides, distance between sides that share no corner."""

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometry.faces import Face, area_vector
+from world_models.building.geometry.faces import Face, Region, area_vector
 from world_models.building.geometry.landmarks import Edges, Landmark
-from world_models.building.geometry.regions import Region
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometry.faces import Face, build_barrier
-from world_models.building.geometry.intervals import Interval, subtract_intervals
+from world_models.building.geometry.faces import Face, Finish, build_barrier, expected_brightness
 from world_models.building.geometry.landmarks import Edges
-from world_models.building.geometry.regions import Finish, expected_brightness
+from world_models.building.geometry.outlines import Interval, subtract_intervals
 from world_models.frames import Pose
 
 CONTACT_M = 1.5e-3

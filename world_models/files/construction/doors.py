@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometry.faces import Face, build_barrier
+from world_models.building.geometry.faces import Face, Finish, build_barrier, expected_brightness
 from world_models.building.geometry.landmarks import Edges, Landmark
-from world_models.building.geometry.regions import Finish, expected_brightness
 from world_models.building.geometry.solids import Box, Range, Solid, Surface, surface_from_polygon
 from world_models.files.construction.rooms import CASING_DEPTH_M, CASING_WIDTH_M, Opening, Wall
 from world_models.files.construction.specs import DoorSpec

@@ -9,11 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometry.faces import Face
-from world_models.building.geometry.intervals import subtract_intervals
+from world_models.building.geometry.faces import Face, Finish, build_region, expected_brightness
 from world_models.building.geometry.landmarks import Edges, Landmark
-from world_models.building.geometry.outlines import convex_pieces
-from world_models.building.geometry.regions import Finish, build_region, expected_brightness
+from world_models.building.geometry.outlines import convex_pieces, subtract_intervals
 from world_models.building.geometry.solids import MIN_LINE_M, Box, Range, Solid, Surface, surface_from_polygon
 from world_models.files.construction.specs import LocaleSpec, RoomFinishes
 from world_models.frames import Pose

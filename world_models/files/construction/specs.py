@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometry.regions import Finish
+from world_models.building.geometry.faces import Finish
 from world_models.building.geometry.solids import Box
 from world_models.frames import Pose
 

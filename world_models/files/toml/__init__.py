@@ -2,12 +2,11 @@
 
 In reading order:
 
-* :mod:`.line_numbers`, :mod:`.source`: TOML values that know their file and line.
+* :mod:`.line_numbers`, :mod:`.source`: TOML values that know their file and line, and the files that they name.
 * :mod:`.settings`: tables as typed dataclasses, with units in the keys.
 * :mod:`.mission`: what missions of the simulator and of hardware have in common.
 * :mod:`.camera_file`: intrinsics, lens and mounting of a camera.
-* :mod:`.includes`: files that a world file names.
-* :mod:`.shared_parts`, :mod:`.placements`: finishes, parts, and where things are put.
+* :mod:`.placements`: finishes, parts, and where things are put.
 * :mod:`.locale_reader`, :mod:`.subtrees`: one locale, and a part of one world in another.
 * :mod:`.world_reader`: a whole world.
 """

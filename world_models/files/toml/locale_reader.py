@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from world_models.building.geometry.faces import Finish
 from world_models.building.geometry.outlines import is_simple
-from world_models.building.geometry.regions import Finish
 from world_models.building.model_errors import SIGMA
 from world_models.files.construction.specs import LocaleSpec, RoomFinishes
-from world_models.files.toml.shared_parts import SharedParts
+from world_models.files.toml.placements import SharedParts
 from world_models.files.toml.source import Node
 from world_models.frames import Pose
 

@@ -12,14 +12,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
-from world_models.bounds import Bounds, check_bounds
 from world_models.building.world import World
 from world_models.commands import check_command, check_destination, parse_destination
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command
 from world_models.entries.told import DOOR_STATES, Redirection, Told, ToldState
 from world_models.files.packed import SUFFIXES
-from world_models.files.toml.includes import WORLDS
 from world_models.files.toml.settings import (
     MAX_NUMBER,
     known_keys,
@@ -28,7 +26,8 @@ from world_models.files.toml.settings import (
     replace_value,
     suggest_keys,
 )
-from world_models.files.toml.source import Node, Source, WorldError
+from world_models.files.toml.source import WORLDS, Node, Source, WorldError
+from world_models.units import Bounds, check_bounds
 
 ROOT = WORLDS.parents[1]
 """The folder of the packages: files that come with the project are named relative to it."""

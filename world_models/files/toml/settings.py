@@ -13,9 +13,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any, TypeVar, get_type_hints
 
-from world_models.bounds import OutOfBoundsError
 from world_models.files.toml.source import Node, WorldError
-from world_models.units import FOOT_M, INCH_M
+from world_models.units import FOOT_M, INCH_M, OutOfBoundsError
 
 T = TypeVar("T")
 MAX_NUMBER = 10**9

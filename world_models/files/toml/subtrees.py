@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from world_models.building.geometry.regions import Finish
+from world_models.building.geometry.faces import Finish
 from world_models.files.construction.specs import LocaleSpec, RoomFinishes, ThingSpec, WorldSpec
 from world_models.files.toml.source import Node
 from world_models.frames import Pose

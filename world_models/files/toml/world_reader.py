@@ -7,13 +7,12 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations, count
 from pathlib import Path
 
-from world_models.building.geometry.regions import Finish
+from world_models.building.geometry.faces import Finish
 from world_models.building.model_errors import SIGMA, SIGMAS
 from world_models.files.construction.specs import DoorSpec, LinkSpec, LocaleSpec, ThingSpec, WorldSpec
-from world_models.files.toml.includes import find_named_file, read_included
 from world_models.files.toml.locale_reader import LOCALE_KEYS, LocaleReader, pose_at, read_properties, read_sigma
 from world_models.files.toml.placements import Placement, read_coordinates, read_placements
-from world_models.files.toml.source import Node, Source
+from world_models.files.toml.source import Node, Source, find_named_file, read_included
 from world_models.files.toml.subtrees import COPY_KEYS, extract_subtree, rename_locales
 
 SHARED_KEYS = ("include", "finishes", "parts", "defaults")

@@ -17,7 +17,7 @@ from logs.recording.panel import Panel
 from logs.recording.paths import BELIEVED_TRAIL, BUILDING, DOORWAYS, NAMES, TRUE_TRAIL, WORLD
 from logs.recording.signs import viewable
 from logs.recording.stream import RecordingStream
-from world_models.building.geometry.regions import LAMP
+from world_models.building.geometry.faces import LAMP
 from world_models.building.geometry.scene import stack_regions
 from world_models.building.world import World
 

@@ -22,8 +22,7 @@ from logs.recording.signs import viewable
 from logs.recording.stream import RecordingStream
 from world_models import words
 from world_models.building.locale_frame import FrameChange, FrameRequest, LocaleFrame
-from world_models.building.locales import Doorway
-from world_models.building.things import Thing
+from world_models.building.locales import Doorway, Thing
 from world_models.entries.robot import CameraState, Footprint, Wheels
 
 ROBOT_KINDS = (CameraState, Wheels, Footprint)

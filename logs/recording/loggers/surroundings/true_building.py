@@ -13,8 +13,7 @@ from logs.recording.loggers.surroundings.building import light_colours, triangle
 from logs.recording.palette import REJECTED, TRUE
 from logs.recording.paths import TRUE_ADDED, TRUE_GONE
 from logs.recording.stream import RecordingStream
-from world_models.building.geometry.faces import Face, area_vector
-from world_models.building.geometry.regions import Region
+from world_models.building.geometry.faces import Face, Region, area_vector
 
 LINE_M = 0.015
 """Half the width of an outline."""

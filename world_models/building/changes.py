@@ -1,0 +1,177 @@
+"""What is believed otherwise than the world file says: pure functions on the geometry and the things of a locale.
+
+A doorway found shut; a thing, a landmark or a face that is gone; something that stands there and the file lacks. A
+landmark that is gone keeps its number and its name, but has no lines any more: what was seen of it has a name still.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world_models.building.geometry.faces import UNKNOWN, Face, build_barrier
+from world_models.building.geometry.landmarks import Edges
+from world_models.building.geometry.scene import LocaleGeometry
+from world_models.building.locales import Doorway, Thing
+
+SAME_PLACE_M = 1e-3
+"""Corners no further apart than this on the plan are the same."""
+
+
+def shut_door(parts: tuple[LocaleGeometry, ...], doorway: Doorway, floor_m: float) -> tuple[LocaleGeometry, ...]:
+    """The geometry of one of a doorway's two locales, with the door shut.
+
+    The faces of type doorway go; the shut faces come into the parts that the two locales share. Both locales' geometry
+    gets the same shared parts. The numbers of the shut faces follow from their names: negative, and so apart from those
+    of the world's own faces.
+
+    Args:
+        parts: own and shared parts of the locale.
+        floor_m: height of the floor at the doorway [m, world].
+    """
+    shut = build_shut_faces(doorway, floor_m)
+    changed = {(part.locale, part.neighbour): _without_opening(part, doorway) for part in parts}
+    for face in shut:
+        key = face.locale, face.neighbour
+        part = changed.get(key) or LocaleGeometry(*key, (), ())
+        faces = dict(part.faces) | {_number_of(face): face}
+        changed[key] = replace(part, faces=tuple(sorted(faces.items())))
+    return tuple(changed.values())
+
+
+def build_shut_faces(doorway: Doorway, floor_m: float) -> tuple[Face, Face]:
+    """Two one-sided barriers that fill an opening, one at the threshold of each locale, facing that locale.
+
+    The model does not know how deep the leaf hangs in the opening, nor what colour it has. So nothing within the
+    opening is expected to be seen, and no colour is claimed.
+
+    Args:
+        floor_m: height of the floor at the doorway [m, world].
+    """
+    first, second = (_build_shut_face(doorway, locale, floor_m) for locale in doorway.between)
+    return first, second
+
+
+def _build_shut_face(doorway: Doorway, locale: str, floor_m: float) -> Face:
+    left, right = doorway.threshold_of(locale)
+    top_m = floor_m + doorway.height_m
+    corners = [(*left, floor_m), (*right, floor_m), (*right, top_m), (*left, top_m)]
+    return build_barrier(f"{locale}/{doorway.name}/shut", locale, corners, UNKNOWN, neighbour=doorway.other(locale))
+
+
+def _number_of(face: Face) -> int:
+    return -1 - zlib.crc32(face.name.encode())
+
+
+def _without_opening(part: LocaleGeometry, doorway: Doorway) -> LocaleGeometry:
+    """A part without the faces of type doorway that fill this opening."""
+    kept = tuple((number, face) for number, face in part.faces if not _fills(face, doorway))
+    return part if len(kept) == len(part.faces) else replace(part, faces=kept)
+
+
+def _fills(face: Face, doorway: Doorway) -> bool:
+    """Whether this is a face of type doorway whose corners are all at the jambs' feet on the plan."""
+    if face.kind != "doorway" or {face.locale, face.neighbour} != set(doorway.between):
+        return False
+    feet: NDArray[np.float64] = doorway.thresholds_world.reshape(4, 2)
+    away_m = np.linalg.norm(face.polygon_world[:, None, :2] - feet, axis=2).min(axis=1)
+    return bool(away_m.max() < SAME_PLACE_M)
+
+
+Parts = tuple[LocaleGeometry, ...]
+
+
+def remove_thing(parts: Parts, things: tuple[Thing, ...], name: str) -> tuple[Parts, tuple[Thing, ...]]:
+    """The geometry and the things of a locale without one thing, its faces and its landmark's lines.
+
+    What stands near it, or on top of it, stays: the model does not say what carries what.
+
+    Raises:
+        ValueError: none of the things has this name.
+    """
+    kept = tuple(thing for thing in things if thing.name != name)
+    if len(kept) == len(things):
+        raise ValueError(f"expected one of the things {', '.join(t.name for t in things) or '(none)'}, got {name!r}")
+    return _remove(parts, lambda known: known == name or known.startswith(f"{name}/")), kept
+
+
+def remove_element(parts: Parts, name: str) -> Parts:
+    """The geometry of a locale without the face of this name, and without the lines of the landmark of this name.
+
+    A wall and its trim have one name, and go together.
+
+    Raises:
+        ValueError: none of its faces and landmarks has this name.
+    """
+    if name not in element_names(parts):
+        locales = sorted({part.locale for part in parts})
+        raise ValueError(f"expected the name of a face or landmark of {', '.join(locales)}, got {name!r}")
+    return _remove(parts, lambda known: known == name)
+
+
+def element_names(parts: Parts) -> frozenset[str]:
+    """The names of all faces and landmarks."""
+    faces = (face.name for part in parts for _, face in part.faces)
+    return frozenset(faces).union(mark.name for part in parts for _, mark in part.landmarks)
+
+
+def _remove(parts: Parts, is_gone: Callable[[str], bool]) -> Parts:
+    """The same parts where nothing is gone."""
+    return tuple(_remove_from(part, is_gone) if any(map(is_gone, element_names((part,)))) else part for part in parts)
+
+
+def _remove_from(part: LocaleGeometry, is_gone: Callable[[str], bool]) -> LocaleGeometry:
+    no_edges = Edges.from_rows(())
+    faces = tuple((number, face) for number, face in part.faces if not is_gone(face.name))
+    landmarks = tuple((n, replace(mark, edges=no_edges) if is_gone(mark.name) else mark) for n, mark in part.landmarks)
+    return replace(part, faces=faces, landmarks=landmarks)
+
+
+MIN_AREA_M2 = 1e-6
+"""A smaller footprint hides nothing."""
+
+
+def add_extra(
+    parts: tuple[LocaleGeometry, ...], name: str, locale: str, footprint: Any, floor_m: float, height_m: float
+) -> tuple[LocaleGeometry, ...]:
+    """The geometry of a locale, with one more thing before what is behind it; the same where it hides nothing.
+
+    The numbers of its faces follow from their names: negative, and so apart from those of the world's own faces.
+
+    Args:
+        footprint: (k, 2) corners of what it takes of the floor [m, world].
+        floor_m: height of the floor [m, world].
+        height_m: of its top above the floor; 0: nothing tells it, and it hides nothing.
+    """
+    faces = build_extra_faces(name, locale, footprint, floor_m, height_m)
+    if not faces:
+        return parts
+    numbered = {-1 - zlib.crc32(face.name.encode()): face for face in faces}
+    own = next((part for part in parts if part.neighbour is None), LocaleGeometry(locale, None, (), ()))
+    changed = LocaleGeometry(own.locale, None, tuple(sorted((dict(own.faces) | numbered).items())), own.landmarks)
+    return (*(part for part in parts if part is not own), changed)
+
+
+def build_extra_faces(name: str, locale: str, footprint: Any, floor_m: float, height_m: float) -> tuple[Face, ...]:
+    """The sides and the top of the hull of a footprint, up to a height.
+
+    What it is nobody knows, so nothing of it is expected to be seen, and no colour is claimed; it hides what is behind.
+    """
+    import shapely  # slow to import, and what reads a journal needs none of it
+    from shapely.geometry.polygon import orient
+
+    hull = shapely.convex_hull(shapely.multipoints(np.asarray(footprint, float).reshape(-1, 2)))
+    if not isinstance(hull, shapely.Polygon) or hull.area < MIN_AREA_M2 or height_m <= 0.0:
+        return ()
+    ring = np.asarray(orient(hull).exterior.coords)[:-1, :2]
+    top_m = floor_m + height_m
+    sides = [[(*a, floor_m), (*b, floor_m), (*b, top_m), (*a, top_m)]
+             for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
+    top = [(float(x), float(y), top_m) for x, y in ring]
+    return tuple(build_barrier(f"{name}/{index}", locale, corners, UNKNOWN)
+                 for index, corners in enumerate([*sides, top]))
