@@ -21,6 +21,7 @@ from knowledge_sources.methods.features.lines import LineSegments, find_lines, r
 from knowledge_sources.methods.matching import match_in_space
 from knowledge_sources.methods.matching.pose_pairs import CameraParameters, build_camera_parameters
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml, trunc_r_and_t
+from knowledge_sources.methods.pose.med_r_and_t import MIN_NOISE_PART
 from knowledge_sources.methods.verification.line_check import Agreement, compute_agreement, compute_p_false
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
@@ -273,7 +274,7 @@ class _Search:
             return estimate
         i, k = pairs[kept].T
         seen = math.sqrt(float(np.sum(squares)) / (squares.size - 6))
-        seen_px = sigma_px * max(seen, DEFAULT.pose.min_noise_part)
+        seen_px = sigma_px * max(seen, MIN_NOISE_PART)
         again = r_and_t_ml(
             self.model[i], near[k], self.camera, estimate.camera_from_world, sigma_px=seen_px)
         return replace(estimate, covariance=again.covariance) if again.ok else estimate

@@ -268,7 +268,7 @@ def refine_near(
     lines_world: Floats, segments_px: Floats, camera: Camera, parameters: PoseParameters, pose: Pose
 ) -> Pose:
     """The pose near ``pose`` at which lines (m, 2, 3) fit segments (k, 2, 2): reweighted least squares."""
-    return refine_pose(lines_world, segments_px, camera, parameters, pose, RIVAL_WIDTHS_PX, DEFAULT.matching)
+    return refine_pose(lines_world, segments_px, camera, parameters, pose, RIVAL_WIDTHS_PX)
 
 
 def measure_apart(pose: Pose, other: Pose) -> tuple[float, float]:

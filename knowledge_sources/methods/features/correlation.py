@@ -17,8 +17,13 @@ from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Floats32
 from knowledge_sources.methods.features.picture import estimate_noise_sigma, require_grey
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.features import FeaturesSettings
+
+ALIGNMENT_STEPS = 2  # gauss-Newton steps of the sub-pixel alignment
+# share of an edge's gradient energy that seems to lie along it (measured on rendered edges (tests/laws/features))
+GRADIENT_LEAK = 3e-4
+# px; error of an aligned position that remains without noise (measured on rendered edges (tests/laws/features))
+POSITION_FLOOR_PX = 0.02
+PEAK_LOBE_PX = 2  # px; distance from the best place up to which a local maximum is the same peak
 
 _MARGIN_PX = 4
 """Kept round a patch beyond twice its half-width, for the cubic interpolation of a patch shrunk to half."""
@@ -80,7 +85,7 @@ class Correlation:
 
 
 def extract_template(
-    image: Any, centre_px: Any, half_px: int, settings: FeaturesSettings = DEFAULT.features
+    image: Any, centre_px: Any, half_px: int
 ) -> Template:
     """Cut a template from an image (h, w) round a centre (u, v) [px], which need not be whole.
 
@@ -98,7 +103,7 @@ def extract_template(
     u, v = (math.floor(c) for c in centre)
     left, top = max(u - reach, 0), max(v - reach, 0)
     window = np.array(pixels[top : v + reach + 2, left : u + reach + 2], np.float32, order="C")
-    return Template(window, centre - (left, top), int(half_px), estimate_noise_sigma(window, settings))
+    return Template(window, centre - (left, top), int(half_px), estimate_noise_sigma(window))
 
 
 def lies_inside(shape: tuple[int, ...], centre_px: Any, half_px: float) -> bool:
@@ -109,7 +114,6 @@ def lies_inside(shape: tuple[int, ...], centre_px: Any, half_px: float) -> bool:
 
 def correlate(
     template: Template, image: Any, predicted_px: Any, search_px: float, *, scale: float = 1.0,
-    settings: FeaturesSettings = DEFAULT.features,
 ) -> Correlation | None:
     """Find a template in an image (h, w) near a prediction (u, v) [px].
 
@@ -141,7 +145,7 @@ def correlate(
     score = _compute_scores(np.ascontiguousarray(patch[1:-1, 1:-1]), view)
     u, v, uu, uv, vv, peak, second, at_border = find_peak(
         patch, view, score, template.noise, float(search_px),
-        settings.alignment_steps, settings.gradient_leak, settings.position_floor_px, settings.peak_lobe_px,
+        ALIGNMENT_STEPS, GRADIENT_LEAK, POSITION_FLOOR_PX, PEAK_LOBE_PX,
     )
     position = np.array([u + u0, v + v0])
     covariance = np.array([[uu, uv], [uv, vv]])
@@ -166,7 +170,7 @@ def measure_corner_strengths(image: Any, centres_px: Any, half_px: int) -> Float
 
 
 def compute_second_peak(
-    image: Any, centre_px: Any, half_px: int, search_px: float, settings: FeaturesSettings = DEFAULT.features
+    image: Any, centre_px: Any, half_px: int, search_px: float
 ) -> float:
     """Correlation, -1 to 1, of the patch round a centre (u, v), to the next pixel, with the best other place near it.
 
@@ -184,19 +188,19 @@ def compute_second_peak(
     row, column = int(centre[1]) - v0, int(centre[0]) - u0
     size = 2 * half_px + 1
     score = _compute_scores(np.ascontiguousarray(view[row : row + size, column : column + size]), view)
-    return float(find_second_peak(score, row, column, settings.peak_lobe_px, half_px // 2))
+    return float(find_second_peak(score, row, column, PEAK_LOBE_PX, half_px // 2))
 
 
 def self_correlate(
-    image: Any, centre_px: Any, half_px: int, search_px: float, settings: FeaturesSettings = DEFAULT.features
+    image: Any, centre_px: Any, half_px: int, search_px: float
 ) -> Correlation:
     """Correlate a patch with its own image: `distinctiveness` and `covariance_px` rate it as a landmark.
 
     Raises:
         ValueError: the patch does not lie in the image.
     """
-    template = extract_template(image, centre_px, half_px, settings)
-    found = correlate(template, image, np.rint(np.asarray(centre_px, float)), search_px, settings=settings)
+    template = extract_template(image, centre_px, half_px)
+    found = correlate(template, image, np.rint(np.asarray(centre_px, float)), search_px)
     if found is None:
         raise ValueError(f"expected a patch of half-width {half_px} inside the image, got centre {centre_px!r}")
     return found

@@ -22,8 +22,24 @@ import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Floats32, Indices, Mask
-from knowledge_sources.settings.features import FeaturesSettings
 from world_models.camera import clip_segments
+
+MIN_GRADIENT_SIGMAS = 4.0  # least gradient of an edge pixel, in standard deviations of the gradient of pure noise
+MIN_EDGE_DENSITY = 0.6  # least share of a segment's length that has an edge pixel
+# rad; largest angle between a pixel's gradient and the mean of its line-support region (Burns et al. 1986; Grompone
+# von Gioi et al. 2012)
+MAX_REGION_TURN_RAD = math.radians(22.5)
+REGION_GAP_PX = 2  # px; distance of edge pixels that may still belong to one line-support region
+MAX_REGION_BEND_PX = 0.6  # px; largest RMS distance of a region's pixels from its line before it is cut in two
+REGION_END_PX = 1.5  # px; distance by which an edge reaches beyond its last edge pixel (measured on rendered corners)
+MAX_BAND_TURN_RAD = 0.3  # rad; largest angle between a segment and the predicted line
+BAND_SMOOTHING_ALONG_PX = 2.0  # px; standard deviation of the smoothing of a band along the predicted line
+BAND_SMOOTHING_ACROSS_PX = 1.0  # px; standard deviation of the smoothing of a band across the predicted line
+MIN_BAND_GRADIENT_PER_PX = 0.5  # grey levels/px; least gradient of an edge in a band, however little noise there is
+CHAIN_GAP_PX = 2  # px; half the gap over which gradient peaks of a band are joined to one chain
+CHAIN_SCALE_PX = 0.5  # px; scale of the Geman-McClure weights of the line fit to a chain
+CHAIN_ITERATIONS = 3  # reweighting steps of the line fit to a chain
+MAX_CHAIN_RESIDUAL_PX = 1.0  # px; largest distance of a peak from the line of its chain
 
 compiled = njit(cache=True, error_model="numpy")
 
@@ -32,7 +48,7 @@ _STEPS_PER_LEVEL = 32.0
 
 
 def find_line_regions(
-    smooth: Floats32, min_gradient: float, min_length_px: float, settings: FeaturesSettings
+    smooth: Floats32, min_gradient: float, min_length_px: float
 ) -> Floats:
     """Find rough segments (n, 2, 2) [px] of a smoothed image (h, w), the brighter side on the right.
 
@@ -43,11 +59,11 @@ def find_line_regions(
     places, units, strengths, index = _find_edge_pixels(smooth, float(min_gradient))
     levels = np.rint(np.minimum(_STEPS_PER_LEVEL * strengths, 32767.0)).astype(np.int16)
     order = np.argsort(-levels, kind="stable")
-    min_cosine = math.cos(settings.max_region_turn_rad)
-    members, first = _grow_regions(places, units, index, order, min_cosine, settings.region_gap_px)
+    min_cosine = math.cos(MAX_REGION_TURN_RAD)
+    members, first = _grow_regions(places, units, index, order, min_cosine, REGION_GAP_PX)
     segments: Floats = _fit_regions(
         places, units, members, first, float(min_length_px),
-        settings.min_edge_density, settings.max_region_bend_px, settings.region_end_px,
+        MIN_EDGE_DENSITY, MAX_REGION_BEND_PX, REGION_END_PX,
     )
     return segments
 
@@ -268,7 +284,6 @@ class _Chains:
 
 def find_in_bands(
     image: Floats32, predicted_px: Floats, noise: float, band_px: float, min_length_px: float,
-    settings: FeaturesSettings,
 ) -> BandSegments:
     """Find rough segments near predicted lines; their ends run the way of the prediction.
 
@@ -280,17 +295,17 @@ def find_in_bands(
         min_length_px: least length of a segment [px].
     """
     smooth, derivative = (
-        _build_gaussian(settings.band_smoothing_along_px), _build_derivative(settings.band_smoothing_across_px))
+        _build_gaussian(BAND_SMOOTHING_ALONG_PX), _build_derivative(BAND_SMOOTHING_ACROSS_PX))
     strips = _build_strips(image.shape, predicted_px, band_px, guard=len(smooth) // 2)
     if strips is None:
         return BandSegments(np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0, np.intp))
     gradient = np.asarray(cv2.sepFilter2D(_sample(image, strips.x, strips.y), cv2.CV_32F, smooth, derivative))
     noise_gain = float(np.linalg.norm(smooth) * np.linalg.norm(derivative))
-    threshold = max(settings.min_gradient_sigmas * noise * noise_gain, settings.min_band_gradient_per_px)
+    threshold = max(MIN_GRADIENT_SIGMAS * noise * noise_gain, MIN_BAND_GRADIENT_PER_PX)
     parts = []
     for sign in (1.0, -1.0):
-        chains = _find_chains(sign * gradient, strips.usable, threshold, min_length_px, settings)
-        ends, owner = _fit_chains(strips, chains, min_length_px, settings)
+        chains = _find_chains(sign * gradient, strips.usable, threshold, min_length_px)
+        ends, owner = _fit_chains(strips, chains, min_length_px)
         parts.append((ends, np.full(len(ends), sign), owner))
     ends, signs, owners = zip(*parts, strict=True)
     return BandSegments(np.concatenate(ends), np.concatenate(signs), np.concatenate(owners))
@@ -353,18 +368,18 @@ def _build_derivative(sigma: float) -> Floats:
 
 
 def _find_chains(
-    gradient: Floats32, usable: Mask, threshold: float, min_length: float, settings: FeaturesSettings
+    gradient: Floats32, usable: Mask, threshold: float, min_length: float
 ) -> _Chains:
     """Join the gradient peaks of neighbouring columns to chains, without those sure to be too short."""
     peak = np.zeros(gradient.shape, bool)
     mid = gradient[1:-1]
     peak[1:-1] = (mid > threshold) & (mid >= gradient[:-2]) & (mid > gradient[2:])
     peak &= usable
-    joined = cv2.dilate(peak.view(np.uint8), np.ones((1, 2 * settings.chain_gap_px + 1), np.uint8))
+    joined = cv2.dilate(peak.view(np.uint8), np.ones((1, 2 * CHAIN_GAP_PX + 1), np.uint8))
     _, labels = cv2.connectedComponents(joined, connectivity=8)
     row, column = np.nonzero(peak)
     label = labels[row, column]
-    enough = np.bincount(label) >= max(settings.min_edge_density * min_length, 3.0)
+    enough = np.bincount(label) >= max(MIN_EDGE_DENSITY * min_length, 3.0)
     renumbered = np.cumsum(enough) - 1
     keep = enough[label]
     order = np.argsort(label[keep], kind="stable")
@@ -376,7 +391,7 @@ def _find_chains(
 
 
 def _fit_chains(
-    strips: _Strips, chains: _Chains, min_length: float, settings: FeaturesSettings
+    strips: _Strips, chains: _Chains, min_length: float
 ) -> tuple[Floats, Indices]:
     """Fit a line to each chain by reweighted least squares (Geman-McClure); drop those too short, bent or turned.
 
@@ -388,7 +403,7 @@ def _fit_chains(
         return np.zeros((0, 2, 2)), np.zeros(0, np.intp)
     n = int(label.max()) + 1
     offset, slope, weight = np.zeros(n), np.zeros(n), np.ones(len(row))
-    for _ in range(settings.chain_iterations):
+    for _ in range(CHAIN_ITERATIONS):
         mass = np.bincount(label, weight, n)
         safe = np.maximum(mass, 1e-9)
         mean_c, mean_r = np.bincount(label, weight * column, n) / safe, np.bincount(label, weight * row, n) / safe
@@ -396,15 +411,15 @@ def _fit_chains(
         slope = np.bincount(label, weight * dc * dr, n) / np.maximum(np.bincount(label, weight * dc * dc, n), 1e-9)
         offset = mean_r - slope * mean_c
         residual = row - offset[label] - slope[label] * column
-        weight = 1.0 / (1.0 + (residual / settings.chain_scale_px) ** 2) ** 2
-    on_line = np.abs(residual) < settings.max_chain_residual_px
+        weight = 1.0 / (1.0 + (residual / CHAIN_SCALE_PX) ** 2) ** 2
+    on_line = np.abs(residual) < MAX_CHAIN_RESIDUAL_PX
     start = np.flatnonzero(np.diff(label, prepend=-1))
     low = np.minimum.reduceat(np.where(on_line, column, np.inf), start)
     high = np.maximum.reduceat(np.where(on_line, column, -np.inf), start)
     count = np.bincount(label[on_line], minlength=n)
     length = high - low + 1.0
-    good = (count >= 3) & (length >= min_length) & (count >= settings.min_edge_density * length)
-    good &= np.abs(slope) <= np.tan(settings.max_band_turn_rad)
+    good = (count >= 3) & (length >= min_length) & (count >= MIN_EDGE_DENSITY * length)
+    good &= np.abs(slope) <= np.tan(MAX_BAND_TURN_RAD)
     which = np.flatnonzero(good)
     ends = np.stack([_to_image(strips, c[which], (offset + slope * c)[which]) for c in (low, high)], axis=1)
     owner = np.zeros(n, np.intp)

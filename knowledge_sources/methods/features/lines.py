@@ -10,17 +10,41 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Floats32, Indices
-from knowledge_sources.methods.features.line_candidates import find_in_bands, find_line_regions
+from knowledge_sources.methods.features.line_candidates import MIN_GRADIENT_SIGMAS, find_in_bands, find_line_regions
 from knowledge_sources.methods.features.picture import estimate_noise_sigma, to_grey_float
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.features import FeaturesSettings
+
+# px; standard deviation of the Gaussian smoothing before an edge is located (engineering judgement; the phase-bias
+# table below was computed for it)
+EDGE_SMOOTHING_PX = 0.8
+# px; standard deviation of a sharp edge's gradient profile after smoothing and differencing (measured on rendered
+# edges (tests/laws/features))
+EDGE_PROFILE_PX = 1.1
+MIN_LINE_LENGTH_PX = 8.0  # px; least length of a segment (§6.1.4)
+MIN_LINE_CONTRAST = 2.0  # grey levels; least brightness step across a segment
+MIN_LINE_SUPPORT = 0.5  # least share of a segment's samples that lie on its refined line
+MAX_DUPLICATE_OVERHANG_PX = 3.0  # px; largest distance beyond the ends at which a segment repeats a longer one
+MIN_GRADIENT_PER_PX = 4.0  # grey levels/px; least gradient of an edge pixel when the whole image is searched
+SAMPLE_SPACING_PX = 2.0  # px; distance of the places along a segment at which the edge is located
+MIN_SAMPLES = 5  # least number of such places on a segment
+REFINEMENT_REACH_PX = 2  # px; distance across a rough segment up to which its edge is looked for
+# least gradient within the ends of an edge, as a share of the strongest within two samples (measured on rendered
+# corners)
+MIN_END_GRADIENT_SHARE = 0.35
+# px; error of a single gradient peak that remains without noise (measured on rendered edges (tests/laws/features))
+PEAK_FLOOR_PX = 0.03
+# variance of a mean of neighbouring peaks over that of independent ones (measured on rendered edges
+# (tests/laws/features))
+PEAK_CORRELATION = 2.0
+PRIOR_PEAKS = 4.0  # number of peaks for which the predicted scatter counts beside the measured one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +101,7 @@ def remove_duplicates(found: LineSegments, settings: FeaturesSettings = DEFAULT.
     """
     ordered = found.take(np.argsort(-found.lengths_px, kind="stable"))
     start, delta = ordered.segments_px[:, 0], ordered.segments_px[:, 1] - ordered.segments_px[:, 0]
-    length, overhang = ordered.lengths_px, settings.max_duplicate_overhang_px
+    length, overhang = ordered.lengths_px, MAX_DUPLICATE_OVERHANG_PX
     along = delta / length[:, None]
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     on = np.ones((len(found), len(found)), bool)  # [i, j]: segment j lies on segment i
@@ -104,7 +128,7 @@ def find_lines(
         image: (h, w) grey levels, uint8 or float on the same scale of 0 to 255.
         predicted_px: None, or (m, 2, 2) lines expected [px]; NaN rows (not visible) find nothing.
         band_px: half-width of the band round a prediction, also beyond its ends [px]; by default ``settings.band_px``.
-        min_length_px: least length of a segment [px]; by default ``settings.min_line_length_px``.
+        min_length_px: least length of a segment [px]; by default ``MIN_LINE_LENGTH_PX``.
 
     Raises:
         ValueError: the image is not (h, w), the predictions are not (m, 2, 2), or a limit is not positive.
@@ -113,18 +137,18 @@ def find_lines(
     """
     pixels = to_grey_float(image)
     band_px = settings.band_px if band_px is None else band_px
-    min_length_px = settings.min_line_length_px if min_length_px is None else min_length_px
+    min_length_px = MIN_LINE_LENGTH_PX if min_length_px is None else min_length_px
     if not (band_px > 0 and min_length_px > 0):
         raise ValueError(f"expected positive band_px and min_length_px, got {band_px} and {min_length_px}")
-    noise, smooth = estimate_noise_sigma(pixels, settings), smooth_image(pixels, settings)
+    noise, smooth = estimate_noise_sigma(pixels), smooth_image(pixels)
     if predicted_px is None:
         min_gradient = max(
-            settings.min_gradient_per_px, settings.min_gradient_sigmas * compute_noise_gain(settings) * noise)
-        rough = find_line_regions(smooth, min_gradient, min_length_px, settings)
-        fit = refine_segments(smooth, rough, np.ones(len(rough)), noise, 2, settings)
+            MIN_GRADIENT_PER_PX, MIN_GRADIENT_SIGMAS * compute_noise_gain() * noise)
+        rough = find_line_regions(smooth, min_gradient, min_length_px)
+        fit = refine_segments(smooth, rough, np.ones(len(rough)), noise, 2)
         return _select(fit, np.full(len(rough), -1, np.intp), min_length_px, settings)
-    near = find_in_bands(pixels, _require_segments(predicted_px), noise, band_px, min_length_px, settings)
-    fit = refine_segments(smooth, near.segments_px, near.sign, noise, 1, settings)
+    near = find_in_bands(pixels, _require_segments(predicted_px), noise, band_px, min_length_px)
+    fit = refine_segments(smooth, near.segments_px, near.sign, noise, 1)
     return _select(fit, near.predicted, min_length_px, settings)
 
 
@@ -143,8 +167,8 @@ def _select(
 ) -> LineSegments:
     """The segments long, strong and straight enough, with the systematic error in their deviations."""
     length = np.linalg.norm(fit.segments_px[:, 1] - fit.segments_px[:, 0], axis=1)
-    keep = (length >= min_length) & (np.abs(fit.contrast) >= settings.min_line_contrast)
-    keep &= fit.support >= settings.min_line_support
+    keep = (length >= min_length) & (np.abs(fit.contrast) >= MIN_LINE_CONTRAST)
+    keep &= fit.support >= MIN_LINE_SUPPORT
     systematic = settings.line_systematic_px
     offset = np.hypot(fit.sigma_offset_px, systematic)
     # A displacement spread evenly along a segment of length L has, as a slope, deviation sqrt(12) / L.
@@ -162,17 +186,6 @@ Computed, as the next table, for a smoothing of 0.8 px.
 
 _SHIFT_PER_SKEW = (0.205, 0.26, 0.335, 0.51, 0.63)
 """Displacement of that peak over the third moment of bilinear interpolation, for each."""
-
-
-class _PeakSettings(NamedTuple):
-    """The settings that the compiled kernels read (:class:`FeaturesSettings` says what they are)."""
-
-    sample_spacing_px: float
-    min_samples: float
-    min_end_gradient_share: float
-    peak_floor_px: float
-    peak_correlation: float
-    prior_peaks: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,18 +207,18 @@ class RefinedSegments:
     support: Floats
 
 
-def smooth_image(image: Floats32, settings: FeaturesSettings) -> Floats32:
+def smooth_image(image: Floats32) -> Floats32:
     """Smooth an image (h, w) with the Gaussian before it is differentiated."""
-    return np.asarray(cv2.GaussianBlur(image, (0, 0), settings.edge_smoothing_px), np.float32)
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), EDGE_SMOOTHING_PX), np.float32)
 
 
-def compute_noise_gain(settings: FeaturesSettings) -> float:
+def compute_noise_gain() -> float:
     """Standard deviation of the smoothed gradient of white noise of deviation one [1/px]."""
-    return 1.0 / (math.sqrt(8.0 * math.pi) * settings.edge_smoothing_px**2)
+    return 1.0 / (math.sqrt(8.0 * math.pi) * EDGE_SMOOTHING_PX**2)
 
 
 def refine_segments(
-    smooth: Floats32, segments_px: Floats, sign: Floats, noise: float, passes: int, settings: FeaturesSettings
+    smooth: Floats32, segments_px: Floats, sign: Floats, noise: float, passes: int
 ) -> RefinedSegments:
     """Refine rough segments of an image to sub-pixel accuracy.
 
@@ -216,18 +229,17 @@ def refine_segments(
         noise: standard deviation of the pixel noise [grey levels].
         passes: how often each segment is refined.
     """
-    profile_px = settings.edge_profile_px
-    peak = noise * math.sqrt(3.0 / (16.0 * math.pi)) / settings.edge_smoothing_px**3 * profile_px**2
+    profile_px = EDGE_PROFILE_PX
+    peak = noise * math.sqrt(3.0 / (16.0 * math.pi)) / EDGE_SMOOTHING_PX**3 * profile_px**2
     segments, sign = np.array(segments_px, float, order="C"), np.array(sign, float)
-    numbers = _PeakSettings(*(float(getattr(settings, name)) for name in _PeakSettings._fields))
-    ends, facts = _refine_all(smooth, segments, sign, peak, passes, settings.refinement_reach_px, numbers)
+    ends, facts = _refine_all(smooth, segments, sign, peak, passes, REFINEMENT_REACH_PX)
     contrast = sign * facts[:, 2] * math.sqrt(2.0 * math.pi) * profile_px
     return RefinedSegments(ends, np.sqrt(facts[:, 0]), np.sqrt(facts[:, 1]), contrast, facts[:, 3])
 
 
 @compiled
 def _refine_all(
-    smooth: Any, segments: Any, sign: Any, noise_peak: float, passes: int, reach: int, settings: _PeakSettings
+    smooth: Any, segments: Any, sign: Any, noise_peak: float, passes: int, reach: int
 ) -> tuple[Any, Any]:
     """Ends (n, 2, 2), and (n, 4) variance of offset and of slope, gradient, support."""
     ends, facts = segments.copy(), np.zeros((len(segments), 4))
@@ -238,8 +250,8 @@ def _refine_all(
             along_u, along_v = end[1, 0] - end[0, 0], end[1, 1] - end[0, 1]
             length = math.hypot(along_u, along_v)
             along_u, along_v = along_u / length, along_v / length
-            t, peaks, heights = _find_peaks(smooth, u, v, along_u, along_v, length, sign[i], reach, settings)
-            offset, slope, inlier = _fit_peaks(t, peaks, heights, noise_peak, settings, facts[i])
+            t, peaks, heights = _find_peaks(smooth, u, v, along_u, along_v, length, sign[i], reach)
+            offset, slope, inlier = _fit_peaks(t, peaks, heights, noise_peak, facts[i])
             low, high = -0.5 * length, 0.5 * length
             on = np.flatnonzero(inlier)
             if turn == passes - 1 and len(on):  # cut to the outermost samples that lie on the line
@@ -254,13 +266,12 @@ def _refine_all(
 @compiled
 def _find_peaks(
     smooth: Any, u: float, v: float, along_u: float, along_v: float, length: float, sign: float, reach: int,
-    settings: _PeakSettings,
 ) -> tuple[Any, Any, Any]:
     """Places along a segment (n,) [px], the gradient's peak across it at each [px] and its height.
 
     The height is 0 where there is no peak within the reach.
     """
-    count = max(round(length / settings.sample_spacing_px), int(settings.min_samples))
+    count = max(round(length / SAMPLE_SPACING_PX), MIN_SAMPLES)
     t, peaks, heights = np.empty(count), np.zeros(count), np.zeros(count)
     profile, gradient = np.empty(2 * reach + 3), np.empty(2 * reach + 1)
     for k in range(count):
@@ -318,7 +329,7 @@ def _compute_phase_bias(u: float, v: float, normal_u: float, normal_v: float, be
 
 @compiled
 def _fit_peaks(
-    t: Any, peaks: Any, heights: Any, noise_peak: float, settings: _PeakSettings, facts: Any
+    t: Any, peaks: Any, heights: Any, noise_peak: float, facts: Any
 ) -> tuple[float, float, Any]:
     """Fit the line offset + slope t to the peaks by reweighted least squares (Tukey); which of them lie on it (n,).
 
@@ -343,10 +354,10 @@ def _fit_peaks(
         gradient, squares = gradient + weights[k] * heights[k] / safe, squares + weights[k] ** 2
         seen += weights[k] * (peaks[k] - offset - slope * t[k]) ** 2 / safe
         strongest = heights[max(k - 2, 0) : k + 3].max()
-        inlier[k] = tukey[k] > 0.1 and heights[k] > settings.min_end_gradient_share * strongest
+        inlier[k] = tukey[k] > 0.1 and heights[k] > MIN_END_GRADIENT_SHARE * strongest
     found = float(np.sum(inlier))
-    variance = _compute_peak_variance(seen, found, gradient, noise_peak, settings)
-    per_mean = settings.peak_correlation * variance / max(mass**2 / max(squares, 1e-12), 1.0)
+    variance = _compute_peak_variance(seen, found, gradient, noise_peak)
+    per_mean = PEAK_CORRELATION * variance / max(mass**2 / max(squares, 1e-12), 1.0)
     facts[1] = per_mean / max(spread, 1e-6)
     facts[0] = per_mean + middle**2 * facts[1]
     facts[2], facts[3] = gradient, found / count
@@ -355,17 +366,17 @@ def _fit_peaks(
 
 @compiled
 def _compute_peak_variance(
-    seen: float, found: float, gradient: float, noise_peak: float, settings: _PeakSettings
+    seen: float, found: float, gradient: float, noise_peak: float
 ) -> float:
     """Variance of one peak [px^2]: what the noise predicts, combined with the measured scatter.
 
     White noise of deviation s, smoothed by sigma, has a second derivative of variance 3 s^2 / (16 pi sigma^6); a peak
     of height g and width b has curvature g / b^2; the quotient, ``noise_peak`` / g, is the peak's displacement.
     """
-    prior = (noise_peak / max(gradient, 1e-6)) ** 2 + settings.peak_floor_px**2
+    prior = (noise_peak / max(gradient, 1e-6)) ** 2 + PEAK_FLOOR_PX**2
     freedom = max(found - 2.0, 0.0)
     scatter = freedom * seen * found / max(freedom, 1.0)
-    return (settings.prior_peaks * prior + scatter) / (settings.prior_peaks + freedom)
+    return (PRIOR_PEAKS * prior + scatter) / (PRIOR_PEAKS + freedom)
 
 
 @compiled

@@ -19,9 +19,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats32, Image
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.features import FeaturesSettings
 from world_models.camera import Camera
+
+NOISE_ROWS = 64  # rows of an image, about, on which its pixel noise is estimated
 
 ROUNDING_SIGMA = 12.0**-0.5
 """Standard deviation of rounding to whole grey levels."""
@@ -150,7 +150,7 @@ def compute_mean_and_deviation(image: Image) -> tuple[float, float]:
     return float(mean[0, 0]), float(deviation[0, 0])
 
 
-def estimate_noise_sigma(image: Floats32, settings: FeaturesSettings = DEFAULT.features) -> float:
+def estimate_noise_sigma(image: Floats32) -> float:
     """Standard deviation of the pixel noise of an image (h, w) [grey levels], at least that of rounding.
 
     It is the median response to a mask that is blind to plain, linear and straight-edge structure.
@@ -158,7 +158,7 @@ def estimate_noise_sigma(image: Floats32, settings: FeaturesSettings = DEFAULT.f
     """
     if min(image.shape) < 3:
         return ROUNDING_SIGMA
-    step = max(image.shape[0] // settings.noise_rows, 1)
+    step = max(image.shape[0] // NOISE_ROWS, 1)
     response = _compute_noise_response(np.ascontiguousarray(image, np.float32), step)
     return max(response / (0.6745 * 6.0), ROUNDING_SIGMA)
 

@@ -21,6 +21,9 @@ from knowledge_sources.methods.features.picture import to_grey_float
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.features import FeaturesSettings
 
+HISTOGRAM_BINS = 64  # bins of a sector's histogram of grey levels
+MAX_BORDER_STEP = 12.0  # grey levels; largest step across a sector's border between parts that are joined
+
 Labels = NDArray[np.int32]
 
 
@@ -62,7 +65,7 @@ def segment_regions(
     levels = np.clip(np.rint(pixels), 0, 255).astype(np.uint8)
     smooth = np.asarray(cv2.medianBlur(levels, 3), np.uint8)
     labels = _label_sectors(smooth, sector_px, settings)
-    labels = _merge_sectors(labels, smooth.astype(np.float32), sector_px, settings.max_border_step)
+    labels = _merge_sectors(labels, smooth.astype(np.float32), sector_px, MAX_BORDER_STEP)
     labels = _merge_small(labels, pixels, min_area_px)
     return Regions(labels, *_compute_statistics(labels, pixels))
 
@@ -73,7 +76,7 @@ def find_histogram_valleys(levels: Image, settings: FeaturesSettings = DEFAULT.f
     A valley counts where it is low enough against the lower of its two peaks (``max_valley_share``) and each side holds
     enough pixels (``min_mode_share``).
     """
-    bins = settings.histogram_bins
+    bins = HISTOGRAM_BINS
     counts = np.histogram(levels, bins, (0.0, 256.0))[0].astype(float)
     smooth = np.convolve(np.pad(counts, 3, mode="edge"), np.array([1, 3, 6, 7, 6, 3, 1]) / 27.0, mode="valid")
     minima = np.flatnonzero((smooth[1:-1] <= smooth[:-2]) & (smooth[1:-1] < smooth[2:])) + 1

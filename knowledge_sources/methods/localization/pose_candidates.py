@@ -187,7 +187,7 @@ class _Search:
         """None where no view shows level lines. The view with the longest segments that does is taken."""
         mount = robot.mount.camera_from_robot
         for view in sorted(views, key=lambda v: -_total_length(v.segments_px)):
-            direction = find_level_direction(view.segments_px, robot.camera, mount, settings.features)
+            direction = find_level_direction(view.segments_px, robot.camera, mount)
             if direction is not None:
                 maps = tuple(compute_chamfer_maps(v.segments_px, robot.camera, settings.localization) for v in views)
                 heading = direction + view.now_from_then.heading_rad

@@ -109,7 +109,7 @@ def _find_axes(
     views: Sequence[CameraView], camera: Camera, camera_from_robot: Pose, settings: Settings
 ) -> dict[int, float]:
     """By index of the views that show level lines: their direction in the frame of now, modulo a right angle [rad]."""
-    found = [find_level_direction(v.segments_px, camera, camera_from_robot, settings.features) for v in views]
+    found = [find_level_direction(v.segments_px, camera, camera_from_robot) for v in views]
     return {k: direction + view.now_from_then.heading_rad
             for k, (view, direction) in enumerate(zip(views, found, strict=True)) if direction is not None}
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.matching.image_pairs import (
+    HOUGH_WINDOW_RAD,
     LineTable,
     PairTable,
     Peak,
@@ -40,6 +41,13 @@ from knowledge_sources.methods.matching.search import (
 )
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.matching import MatchingSettings
+
+COVERAGE_CELLS = 48  # cells along a model line by which its coverage is counted
+MAX_PAIR_RAD = 0.3  # rad; largest angle between a data line and its model line (§6.1.4)
+MIN_SIGMA_PX = 1.0  # px; smallest standard deviation of a data end, likelihood
+MIN_START_ERROR_PX = 3.0  # px; smallest error of a start that the likelihood assumes
+HOUGH_PEAKS_PER_START = 4  # peaks that are refined for each placement that is searched
+START_WIDTHS_PX = (8.0, 6.0, 4.0, 3.0, 2.0, 1.5)  # px; widths of the loss by which a peak is refined
 
 Pair = tuple[int, int]
 """Model index, data index."""
@@ -107,8 +115,8 @@ def match_lines(
     still, scene = build_line_table(model, centre), build_line_table(data, centre)
     gates = _check_gates(settings.max_pair_px if pair_px is None else pair_px, len(model))
     terms = _build_terms(still, scene, gates, settings)
-    window_px = settings.hough_window_px + np.maximum(gates, settings.start_widths_px[0])
-    table = build_pair_table(still, scene, window_px, settings.hough_window_rad + settings.max_pair_rad)
+    window_px = settings.hough_window_px + np.maximum(gates, START_WIDTHS_PX[0])
+    table = build_pair_table(still, scene, window_px, HOUGH_WINDOW_RAD + MAX_PAIR_RAD)
     placements = [compute_placement(start)] if start else _find_starts(still, scene, table, settings)
     tries = []
     for placement in placements:
@@ -140,12 +148,12 @@ def format_trace(match: Match) -> str:
 def _build_terms(model: LineTable, data: LineTable, gates: Floats, settings: MatchingSettings) -> Terms:
     """The objective, its noise taken from the median distance (m,) within which pairs are looked for [px]."""
     if settings.objective == "paper":
-        return build_paper_terms(model.lengths, data.lengths, settings)
+        return build_paper_terms(model.lengths, data.lengths)
     if settings.objective != "likelihood":
         raise ValueError(f'expected objective "paper" or "likelihood", got {settings.objective!r}')
     width = float(np.median(gates)) if len(gates) else settings.max_pair_px
-    sigma_px = max(settings.min_sigma_px, width / settings.pair_sigmas)
-    start_px = max(width, settings.min_start_error_px)
+    sigma_px = max(MIN_SIGMA_PX, width / settings.pair_sigmas)
+    start_px = max(width, MIN_START_ERROR_PX)
     return build_likelihood_terms(model.lengths, len(data.ends), sigma_px, start_px, settings)
 
 
@@ -154,9 +162,9 @@ def _find_starts(still: LineTable, scene: LineTable, table: PairTable, settings:
 
     They differ by 1 px of shift, or 0.01 of turn or scale.
     """
-    peaks = find_hough_peaks(still, scene, settings.hough_peaks_per_start * settings.max_starts, settings)
+    peaks = find_hough_peaks(still, scene, HOUGH_PEAKS_PER_START * settings.max_starts, settings)
     coarse = np.stack([compute_placement(peak) for peak in peaks])
-    placements, support = refine_placements(table, coarse, settings.start_widths_px)
+    placements, support = refine_placements(table, coarse, START_WIDTHS_PX)
     kept: list[int] = []
     for i in np.argsort(-support, kind="stable"):
         apart = [np.abs((placements[i] - placements[j]) * (100.0, 100.0, 1.0, 1.0, 100.0)).max() for j in kept]
@@ -169,7 +177,7 @@ def _build_space(
     table: PairTable, placement: Floats, gates: Floats, terms: Terms, settings: MatchingSettings
 ) -> tuple[PairSpace, Mask]:
     """The restricted space at a placement, and the state to start from: each near data line to its nearest line."""
-    members = np.flatnonzero(find_gated(table, placement, gates, settings.max_pair_rad))
+    members = np.flatnonzero(find_gated(table, placement, gates, MAX_PAIR_RAD))
     model, data = table.model[members], table.data[members]
     rows = table.across[members]
     weights = terms.end_weights[data]
@@ -179,7 +187,7 @@ def _build_space(
         model=model,
         data=data,
         forms=np.swapaxes(rows * weights[:, None, None], 1, 2) @ rows,
-        masks=build_masks(table.along[members] @ placement, table.lengths[members], settings.coverage_cells),
+        masks=build_masks(table.along[members] @ placement, table.lengths[members], COVERAGE_CELLS),
         lines=table.lines,
         anchor=build_anchors(placement[None], shift, turn, scale)[0],
         fitting=Fitting.in_image(settings.with_scale, placement),

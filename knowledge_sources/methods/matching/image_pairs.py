@@ -16,6 +16,8 @@ from knowledge_sources.methods.arrays import Floats, Indices, Ints, Mask
 from knowledge_sources.methods.matching.search import Similarity2, compute_best_fits
 from knowledge_sources.settings.matching import MatchingSettings
 
+HOUGH_WINDOW_RAD = 0.3  # rad; largest turn of the model (§6.1.4)
+
 MIN_LENGTH_PX = 1e-12
 """Keeps the direction of a segment without length finite."""
 
@@ -83,7 +85,7 @@ def find_hough_peaks(model: LineTable, data: LineTable, count: int, settings: Ma
     """
     if not (len(model.ends) and len(data.ends)):
         return [NO_MOTION]
-    window_px, window_rad = settings.hough_window_px, settings.hough_window_rad
+    window_px, window_rad = settings.hough_window_px, HOUGH_WINDOW_RAD
     half = int(np.ceil(window_rad / settings.hough_step_rad))
     turns = np.linspace(-half * settings.hough_step_rad, half * settings.hough_step_rad, 2 * half + 1)
     axis = np.linspace(-window_px, window_px, settings.hough_cells)
@@ -118,7 +120,7 @@ def _count_offset_votes(
     model: LineTable, data: LineTable, turns: Floats, step: float, settings: MatchingSettings
 ) -> Floats:
     """(t, m, bins): length of each model line found at each offset across it, at each turn."""
-    window_px, window_rad = settings.hough_window_px, settings.hough_window_rad
+    window_px, window_rad = settings.hough_window_px, HOUGH_WINDOW_RAD
     bins = 2 * int(np.ceil(1.5 * window_px / step)) + 1
     rows, columns = find_pairs_within(model, data, np.full(len(model.ends), window_px), window_rad)
     votes: Floats = _vote(

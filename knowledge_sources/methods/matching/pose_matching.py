@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
+from knowledge_sources.methods.matching.image_matching import COVERAGE_CELLS
 from knowledge_sources.methods.matching.pose_pairs import (
     LineScene,
     PosePairs,
@@ -49,6 +50,18 @@ from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.matching import MatchingSettings
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
+
+MAX_POSE_PAIR_PX = 5.0  # px; largest distance of a data end from its model line at a pose
+MAX_POSE_PAIR_RAD = 0.15  # rad; largest angle between a data line and its model line at a pose
+POSE_SIGMA_PX = 1.5  # px; standard deviation of a data end across its model line
+LAST_WIDTHS_PX = (6.0, 4.0, 3.0, 2.0)  # px; widths by which the best of them are refined at their own poses
+MAX_WIDTH_RATIO = 5.0  # pairs further than this many widths (root mean square) do not pull
+MAX_REFINED_PAIR_PX = 40.0  # px; pairs further than this from a pose are left out when it is refined
+UNIT_LENGTH_PX = 20.0  # px; a pair of this length weighs like one measurement
+MAX_BESIDE_PX = 20.0  # px; a data line further than this beyond a model line's end supports nothing
+POSE_FINALISTS = 8  # starts that are refined at their own poses
+MAX_POSE_STARTS = 4  # poses that are searched from
+MIN_POSE_DIFFERENCE_SIGMAS = 0.05  # poses nearer to each other than this, in the prior's deviations, are one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +116,7 @@ def match_on_floor(
     """
     parameters = build_floor_parameters(camera_from_robot, prior, prior_covariance)
     match = _match(
-        model_lines_world, data_px, camera, parameters, settings.max_pose_pair_px, settings.pose_sigma_px, settings
+        model_lines_world, data_px, camera, parameters, MAX_POSE_PAIR_PX, POSE_SIGMA_PX, settings
     )
     return FloorMatch(
         match.pairs, match.camera_from_world, match.e_fit, match.e_omission, match.coverage, match.residuals_px,
@@ -128,14 +141,14 @@ def match_in_space(
         model_lines_world: (m, 2, 3) the pieces visible from about the prior [m].
         data_px: (k, 2, 2) as the lens shows them.
         prior, prior_covariance: ``camera_from_world`` and (6, 6) of its left perturbation (rotation, translation).
-        pair_px, sigma_px: in place of ``settings.max_pose_pair_px`` and ``settings.pose_sigma_px``.
+        pair_px, sigma_px: in place of ``MAX_POSE_PAIR_PX`` and ``POSE_SIGMA_PX``.
 
     Raises:
         ValueError: no model line, or a wrong shape.
     """
     parameters = build_camera_parameters(prior, prior_covariance)
-    pair_px = settings.max_pose_pair_px if pair_px is None else pair_px
-    sigma_px = settings.pose_sigma_px if sigma_px is None else sigma_px
+    pair_px = MAX_POSE_PAIR_PX if pair_px is None else pair_px
+    sigma_px = POSE_SIGMA_PX if sigma_px is None else sigma_px
     return _match(model_lines_world, data_px, camera, parameters, pair_px, sigma_px, settings)
 
 
@@ -151,13 +164,13 @@ def _match(
     scene = build_scene(model_lines_world, data_px, camera, parameters)
     lengths = project_model(scene, parameters.prior)[1]
     terms = build_likelihood_terms(lengths, len(scene.data), sigma_px, pair_px, settings)
-    wide = keep_longest(find_allowed_pairs(scene, settings), settings.max_allowed_pairs)
+    wide = keep_longest(find_allowed_pairs(scene), settings.max_allowed_pairs)
     tries = []
-    for pose in find_start_poses(scene, keep_longest(wide, settings.max_start_pairs), settings):
+    for pose in find_start_poses(scene, keep_longest(wide, settings.max_start_pairs)):
         pairs = linearise_pairs(scene, pose, wide.model, wide.data)
-        pairs = pairs.take(find_near_pairs(pairs, pair_px, settings.max_pose_pair_rad))
+        pairs = pairs.take(find_near_pairs(pairs, pair_px, MAX_POSE_PAIR_RAD))
         pairs = keep_longest(pairs, settings.max_near_pairs)
-        space, first = _build_space(scene, pose, pairs, pair_px, sigma_px, settings)
+        space, first = _build_space(scene, pose, pairs, pair_px, sigma_px)
         result = search_pairs(space, terms, first, settings, strategy="steepest", exchange=True, keep_trace=False)
         tries.append((space, pairs, pose, result))
     space, pairs, pose, result = min(tries, key=lambda tried: tried[3].error)
@@ -165,7 +178,7 @@ def _match(
 
 
 def _build_space(
-    scene: LineScene, pose: Pose, pairs: PosePairs, pair_px: float, sigma_px: float, settings: MatchingSettings
+    scene: LineScene, pose: Pose, pairs: PosePairs, pair_px: float, sigma_px: float
 ) -> tuple[PairSpace, Mask]:
     """The restricted space at a pose, forms in (step, 1), the prior as anchor; and the state to start from."""
     parameters = scene.parameters
@@ -176,7 +189,7 @@ def _build_space(
         model=pairs.model,
         data=pairs.data,
         forms=np.swapaxes(rows, 1, 2) @ rows,
-        masks=build_masks(pairs.along, pairs.lengths, settings.coverage_cells),
+        masks=build_masks(pairs.along, pairs.lengths, COVERAGE_CELLS),
         lines=len(scene.model),
         anchor=0.5 * prior.T @ parameters.information @ prior,
         fitting=POSE_STEP,
@@ -204,7 +217,7 @@ def _build_match(
 compiled = njit(cache=True, error_model="numpy")
 
 
-def find_start_poses(scene: LineScene, wide: PosePairs, settings: MatchingSettings) -> list[Pose]:
+def find_start_poses(scene: LineScene, wide: PosePairs) -> list[Pose]:
     """Poses to search from, best supported first.
 
     Starts all over the prior are refined to first order, by iteratively reweighted least squares on Geman and
@@ -217,26 +230,25 @@ def find_start_poses(scene: LineScene, wide: PosePairs, settings: MatchingSettin
     if not len(wide.model):
         return [parameters.prior]
     reach_px = np.median(np.sqrt(np.mean((wide.slopes @ parameters.root) ** 2, axis=1)), axis=0)
-    starts = parameters.list_starts(reach_px, settings) @ parameters.root.T
+    starts = parameters.list_starts(reach_px) @ parameters.root.T
     steps, support = _refine_steps(
-        wide, starts, parameters.information, np.zeros(starts.shape[1]), parameters.get_widths(settings), settings
+        wide, starts, parameters.information, np.zeros(starts.shape[1]), parameters.get_widths()
     )
     poses = [
         parameters.move(parameters.prior, steps[i])
-        for i in _select_distinct(steps, support, settings.pose_finalists, scene, settings)
+        for i in _select_distinct(steps, support, POSE_FINALISTS, scene)
     ]
-    widths, size = settings.last_widths_px, parameters.widths_per_linearisation
+    widths, size = LAST_WIDTHS_PX, parameters.widths_per_linearisation
     groups = [widths[i : i + size] for i in range(0, len(widths), size)]
-    exact = [_refine_pose(scene, wide, pose, groups, settings) for pose in poses]
+    exact = [_refine_pose(scene, wide, pose, groups) for pose in poses]
     reached = np.stack([parameters.compute_step(pose) for pose, _ in exact])
     scores = np.array([score for _, score in exact])
-    best = _select_distinct(reached, scores, settings.max_pose_starts, scene, settings)
-    return [_refine_pose(scene, wide, exact[i][0], [groups[-1][-2:]], settings)[0] for i in best]
+    best = _select_distinct(reached, scores, MAX_POSE_STARTS, scene)
+    return [_refine_pose(scene, wide, exact[i][0], [groups[-1][-2:]])[0] for i in best]
 
 
 def refine_pose(
     model_lines_world: Any, segments_px: Any, camera: Camera, parameters: PoseParameters, pose: Pose, widths: Widths,
-    settings: MatchingSettings,
 ) -> Pose:
     """The pose near ``pose`` at which model lines (m, 2, 3) [m] fit data lines (k, 2, 2) [px], the prior as one term.
 
@@ -246,34 +258,34 @@ def refine_pose(
     """
     scene = build_scene(model_lines_world, segments_px, camera, parameters)
     for width in widths:
-        pairs = find_pairs_near(scene, pose, width, settings.max_pose_pair_rad)
+        pairs = find_pairs_near(scene, pose, width, MAX_POSE_PAIR_RAD)
         if not len(pairs.model):
             break
         still, offset = np.zeros((1, len(parameters.root))), parameters.compute_step(pose)
-        steps, _ = _refine_steps(pairs, still, parameters.information, offset, (width, width), settings)
+        steps, _ = _refine_steps(pairs, still, parameters.information, offset, (width, width))
         pose = parameters.move(pose, steps[0])
     return pose
 
 
 def _refine_pose(
-    scene: LineScene, wide: PosePairs, pose: Pose, groups: list[Widths], settings: MatchingSettings
+    scene: LineScene, wide: PosePairs, pose: Pose, groups: list[Widths]
 ) -> tuple[Pose, float]:
     """A pose refined with the pairs linearised there, anew for each group of widths; and its support."""
     parameters, support = scene.parameters, 0.0
     for group in groups:
         pairs = linearise_pairs(scene, pose, wide.model, wide.data)
-        pairs = pairs.take(np.abs(pairs.distances).max(axis=1) < settings.max_refined_pair_px)
+        pairs = pairs.take(np.abs(pairs.distances).max(axis=1) < MAX_REFINED_PAIR_PX)
         if not len(pairs.model):
             break
         still = np.zeros((1, len(parameters.root)))
         offset = parameters.compute_step(pose)
-        steps, supports = _refine_steps(pairs, still, parameters.information, offset, group, settings)
+        steps, supports = _refine_steps(pairs, still, parameters.information, offset, group)
         pose, support = parameters.move(pose, steps[0]), float(supports[0])
     return pose, support
 
 
 def _select_distinct(
-    steps: Floats, scores: Floats, count: int, scene: LineScene, settings: MatchingSettings
+    steps: Floats, scores: Floats, count: int, scene: LineScene
 ) -> list[int]:
     """The best ``count`` of the steps (s, d) that differ, in the prior's deviations (non-maximum suppression)."""
     whitened = steps @ np.linalg.inv(scene.parameters.root).T
@@ -282,27 +294,27 @@ def _select_distinct(
     for i in np.argsort(-scores, kind="stable"):
         if free[i]:
             kept.append(int(i))
-            free &= np.abs(whitened - whitened[i]).max(axis=1) > settings.min_pose_difference_sigmas
+            free &= np.abs(whitened - whitened[i]).max(axis=1) > MIN_POSE_DIFFERENCE_SIGMAS
         if len(kept) == count:
             break
     return kept
 
 
 def _refine_steps(
-    pairs: PosePairs, steps: Floats, information: Floats, offset: Floats, widths: Widths, settings: MatchingSettings
+    pairs: PosePairs, steps: Floats, information: Floats, offset: Floats, widths: Widths
 ) -> tuple[Floats, Floats]:
     """Steps (s, d) moved to where close pairs agree, to first order, and their support (s,) [px of model line].
 
     ``information`` (d, d) is the prior's, ``offset`` (d,) the step from the prior to where the pairs are linearised.
     """
-    max_square = settings.max_width_ratio**2
+    max_square = MAX_WIDTH_RATIO**2
     moved: Floats = _reweight(
         pairs.distances, pairs.slopes, pairs.shares, np.array(steps), information, offset, np.array(widths),
-        settings.unit_length_px, max_square,
+        UNIT_LENGTH_PX, max_square,
     )
     support: Floats = _compute_support(
         pairs.model, pairs.distances, pairs.slopes, pairs.along, pairs.lengths, pairs.shares, moved, widths[-1],
-        settings.max_beside_px, max_square,
+        MAX_BESIDE_PX, max_square,
     )
     return moved, support
 

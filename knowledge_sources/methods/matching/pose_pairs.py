@@ -17,9 +17,20 @@ from scipy.special import ndtri
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.pose.line_set import LineSet, build_line_set
-from knowledge_sources.settings.matching import MatchingSettings
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2, frozen, wrap_angle
+
+GATE_SIGMAS = 3.0  # deviations of the prior within which a pair must lie
+GATE_PX = 3.0  # px; and the segment's own error across its line
+GATE_RAD = 0.12  # rad; and the segment's own error in direction
+GATE_ALONG_PX = 30.0  # px; how far beyond a model line's end a segment may lie besides
+MAX_GATE_RAD = 0.6  # rad; pairs that differ more in direction are never looked at
+GRID_SIGMAS = 2.0  # deviations to either side of a prior on the floor that starts reach
+GRID_PX = 20.0  # px; distance of two such starts in the image, so that the loss draws what lies between to one
+MAX_GRID_STEPS = 3  # most starts to either side of an axis
+SPACE_STARTS = 128  # starts spread over a prior with six unknowns, besides the prior itself
+FLOOR_WIDTHS_PX = (16.0, 12.0, 8.0)  # px; widths of the loss by which starts on the floor are refined, to first order
+SPACE_WIDTHS_PX = (16.0, 12.0, 8.0, 6.0)  # px; the same with six unknowns
 
 Widths = tuple[float, ...]
 
@@ -41,11 +52,11 @@ class PoseParameters(ABC):
     widths_per_linearisation: ClassVar[int]
 
     @abstractmethod
-    def list_starts(self, reach_px: Floats, settings: MatchingSettings) -> Floats:
+    def list_starts(self, reach_px: Floats) -> Floats:
         """(s, d) starts, in deviations, given how far one along each axis moves the picture (d,) [px]."""
 
     @abstractmethod
-    def get_widths(self, settings: MatchingSettings) -> Widths:
+    def get_widths(self) -> Widths:
         """Widths of the loss [px] by which starts are refined, to first order about the prior."""
 
     @abstractmethod
@@ -67,11 +78,11 @@ class CameraParameters(PoseParameters):
 
     widths_per_linearisation = 1
 
-    def list_starts(self, reach_px: Floats, settings: MatchingSettings) -> Floats:
-        return _spread_normal(settings.space_starts)
+    def list_starts(self, reach_px: Floats) -> Floats:
+        return _spread_normal(SPACE_STARTS)
 
-    def get_widths(self, settings: MatchingSettings) -> Widths:
-        return settings.space_widths_px
+    def get_widths(self) -> Widths:
+        return SPACE_WIDTHS_PX
 
     def compute_basis(self, pose: Pose) -> Floats:
         return np.eye(6)
@@ -97,12 +108,12 @@ class FloorParameters(PoseParameters):
     turning: Floats
     widths_per_linearisation = 4
 
-    def list_starts(self, reach_px: Floats, settings: MatchingSettings) -> Floats:
-        steps = (round(settings.grid_sigmas * reach / settings.grid_px + 0.25) for reach in reach_px.tolist())
-        return _build_grid(tuple(min(count, settings.max_grid_steps) for count in steps), settings.grid_sigmas)
+    def list_starts(self, reach_px: Floats) -> Floats:
+        steps = (round(GRID_SIGMAS * reach / GRID_PX + 0.25) for reach in reach_px.tolist())
+        return _build_grid(tuple(min(count, MAX_GRID_STEPS) for count in steps), GRID_SIGMAS)
 
-    def get_widths(self, settings: MatchingSettings) -> Widths:
-        return settings.floor_widths_px
+    def get_widths(self) -> Widths:
+        return FLOOR_WIDTHS_PX
 
     def compute_robot_pose(self, pose: Pose) -> Pose2:
         """``world_from_robot`` of a camera pose."""
@@ -262,14 +273,14 @@ def project_model(scene: LineScene, pose: Pose) -> tuple[Floats, Floats, Mask]:
     return projected
 
 
-def find_allowed_pairs(scene: LineScene, settings: MatchingSettings) -> PosePairs:
+def find_allowed_pairs(scene: LineScene) -> PosePairs:
     """Pairs that the prior allows: near the prediction in offset at both ends, in angle, and along the line."""
     parameters = scene.parameters
     px, _, visible = project_model(scene, parameters.prior)
-    i, k = _find_nearly_parallel(px, visible, scene.data, settings.max_gate_rad)
+    i, k = _find_nearly_parallel(px, visible, scene.data, MAX_GATE_RAD)
     pairs = linearise_pairs(scene, parameters.prior, i, k)
     data_lengths = np.linalg.norm(scene.data[:, 1] - scene.data[:, 0], axis=1)
-    gates = settings.gate_sigmas, settings.gate_px, settings.gate_rad, settings.gate_along_px
+    gates = GATE_SIGMAS, GATE_PX, GATE_RAD, GATE_ALONG_PX
     return pairs.take(
         _find_within_prior(pairs.distances, pairs.slopes, pairs.along, pairs.lengths, pairs.angles, data_lengths[k],
                            parameters.root, gates)

@@ -26,6 +26,10 @@ from knowledge_sources.methods.matching.kernels import (
 )
 from knowledge_sources.settings.matching import MatchingSettings
 
+MAX_MOVES_PER_PAIR = 4  # the search stops after this many moves for each possible pair
+OMISSION_ALPHA = 0.5  # weight of the omission error, paper (§6.1.3, alpha)
+OMISSION_BETA = 4.0  # exponent of the omission error, paper (§6.1.3, beta)
+
 
 @dataclass(frozen=True, slots=True)
 class Similarity2:
@@ -133,7 +137,7 @@ class Terms:
         return np.asarray(self.omission_scale[lines] * np.exp(self.omission_rate * uncovered))
 
 
-def build_paper_terms(model_lengths: Floats, data_lengths: Floats, settings: MatchingSettings) -> Terms:
+def build_paper_terms(model_lengths: Floats, data_lengths: Floats) -> Terms:
     """E_match = E_fit + alpha sum_L e^(beta P_L). Source: §6.1.3.
 
     Lengths (m,), (k,) [px] count relative to the model's: E_fit is a mean squared distance [px^2], and a model line's
@@ -143,9 +147,9 @@ def build_paper_terms(model_lengths: Floats, data_lengths: Floats, settings: Mat
     total = max(float(np.sum(model_lengths)), 1.0)
     return Terms(
         end_weights=0.5 * data_lengths / total,
-        omission_scale=settings.omission_alpha * model_lengths / total,
+        omission_scale=OMISSION_ALPHA * model_lengths / total,
         lengths=model_lengths,
-        omission_rate=settings.omission_beta,
+        omission_rate=OMISSION_BETA,
         anchor_weights=(1e-6, 1e-2, 1e-2),
     )
 
@@ -251,7 +255,7 @@ def search_pairs(
     """
     if strategy not in STRATEGIES:
         raise ValueError(f'expected strategy "first" or "steepest", got {strategy!r}')
-    most = settings.max_moves_per_pair * len(start)
+    most = MAX_MOVES_PER_PAIR * len(start)
     chosen, moves, errors = search_locally(
         space.arrays, terms.arrays, *space.fitting, start, strategy == "first", exchange, most, settings.min_gain
     )

@@ -33,6 +33,15 @@ from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2, wrap_angle
 
+MAX_FEW_LINES = 3  # so few lines move a prior of unknown worth only as far as their noise demands
+MAX_MARGINAL_ROUNDS = 12  # rounds in which lines that do not agree are left out
+MAX_MARGINAL_STEPS = 8  # steps of Gauss-Newton in each of them
+MIN_MARGINAL_STEP = 1e-7  # step [m, rad] at which these end (convergence)
+DISPLACED_WIDTH_SIGMAS = 2.0  # widest of these, in standard deviations of the lines in the picture
+DISPLACED_GATE_SIGMAS = 2.5  # deviations of belief and model within which a segment may belong to a line
+DISPLACED_GATE_PX = 3.0  # px; and the segment's own error across its line
+DISPLACED_GATE_RAD = 0.15  # rad; and the segment's own error in direction
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DisplacedFit:
@@ -137,8 +146,8 @@ def _choose_widths(
     lines: Floats, errors: LineErrors, camera: Camera, mount: Pose, pose: Pose2, settings: PoseSettings
 ) -> tuple[float, ...]:
     """The widths that are not much wider than the model is inexact: a wider loss draws to other lines."""
-    most_px = settings.displaced_width_sigmas * float(np.median(compute_sigmas_px(lines, errors, camera, mount, pose)))
-    return tuple(w for w in settings.displaced_widths_px if w <= max(most_px, settings.displaced_gate_px))
+    most_px = DISPLACED_WIDTH_SIGMAS * float(np.median(compute_sigmas_px(lines, errors, camera, mount, pose)))
+    return tuple(w for w in settings.displaced_widths_px if w <= max(most_px, DISPLACED_GATE_PX))
 
 
 def _solve(slopes: Floats, distances: Floats, weights: Floats, information: Floats, away: Floats) -> Floats:
@@ -166,7 +175,7 @@ def _find_candidates(
     along, lengths = _measure(projected)
     data_along, _ = _measure(segments)
     turned = np.abs(along[:, None, 0] * data_along[None, :, 1] - along[:, None, 1] * data_along[None, :, 0])
-    which, data = np.nonzero(turned <= np.sin(settings.displaced_gate_rad))
+    which, data = np.nonzero(turned <= np.sin(DISPLACED_GATE_RAD))
     if not len(which):
         return which, data
     observed = build_line_set(lines[which], segments[data], camera, 1.0)
@@ -174,7 +183,7 @@ def _find_candidates(
     variances = np.sum(by_mode**2, axis=2)
     if covariance is not None:
         variances = variances + np.einsum("nei,ij,nej->ne", by_pose, covariance, by_pose)
-    reach = settings.displaced_gate_sigmas * np.sqrt(variances) + settings.displaced_gate_px
+    reach = DISPLACED_GATE_SIGMAS * np.sqrt(variances) + DISPLACED_GATE_PX
     at = np.einsum("ni,nei->ne", along[which], segments[data] - projected[which, :1])
     beside = reach.max(axis=1) + settings.max_beside_px
     overlaps = (at.max(axis=1) >= -beside) & (at.min(axis=1) <= lengths[which] + beside)
@@ -231,17 +240,17 @@ def maximise_marginal(
     """
     bound, near = 2.0 * settings.outlier_sigmas**2, near.copy()
     prior = _loosen(prior, lines.take(near), shifts[:, near], sigma_px, mount, state, settings)
-    for _ in range(settings.max_marginal_rounds):
-        state = _minimise(lines.take(near), shifts[:, near], sigma_px, mount, prior, state, settings)
+    for _ in range(MAX_MARGINAL_ROUNDS):
+        state = _minimise(lines.take(near), shifts[:, near], sigma_px, mount, prior, state)
         squares = np.where(near, np.sum(_explain(lines, shifts, sigma_px, mount, state, near) ** 2, axis=1), 0.0)
         worst = float(squares.max(initial=0.0))
-        if worst <= bound * sigma_px**2 or np.count_nonzero(near) <= settings.max_few_lines:
+        if worst <= bound * sigma_px**2 or np.count_nonzero(near) <= MAX_FEW_LINES:
             break
         near = near & (squares < 0.5 * worst)
     r, slopes, weights = _linearise(lines.take(near), shifts[:, near], sigma_px, mount, state)
     away = _subtract(state, prior.mean)
     chi2 = float(r @ weights @ r)
-    scatter = settings.marginal_spread**2 * compute_scatter(chi2, len(r), settings, bound)
+    scatter = settings.marginal_spread**2 * compute_scatter(chi2, len(r), bound)
     return MarginalFit(
         state, np.asarray(np.linalg.inv(slopes.T @ weights @ slopes + prior.information) * scatter, float), near,
         _explain(lines, shifts, sigma_px, mount, state, near), chi2 + float(away @ prior.information @ away))
@@ -266,15 +275,14 @@ def _loosen(
 
 def _minimise(
     lines: LineSet, shifts: Floats, sigma_px: float, mount: Pose, prior: PlanarPrior, state: Floats,
-    settings: PoseSettings,
 ) -> Floats:
     """Gauss-Newton on generalised least squares."""
-    for _ in range(settings.max_marginal_steps):
+    for _ in range(MAX_MARGINAL_STEPS):
         r, slopes, weights = _linearise(lines, shifts, sigma_px, mount, state)
         hessian = slopes.T @ weights @ slopes + prior.information
         step = np.linalg.solve(hessian, slopes.T @ weights @ r + prior.information @ _subtract(state, prior.mean))
         state = state - step
-        if np.abs(step).max() < settings.min_marginal_step:
+        if np.abs(step).max() < MIN_MARGINAL_STEP:
             break
     return state
 

@@ -21,6 +21,15 @@ from knowledge_sources.methods.pose.line_set import LineSet, compute_image_jacob
 from knowledge_sources.settings.pose import PoseSettings
 from world_models.frames import Pose, Pose2, frozen
 
+WEAK_ROTATION_RAD = 0.3  # rad; standard deviation of a camera's rotation where none is given
+WEAK_TRANSLATION_M = 3.0  # m; standard deviation of a camera's translation where none is given
+MAX_PRIOR_WEIGHT_LOG10 = 10.0  # largest weight of a weak prior that is tried, as a power of ten
+PRIOR_WEIGHT_STEP_LOG10 = 0.1  # how closely the weight of a weak prior is found, as a power of ten
+MIN_SCATTER_FREEDOM = 6  # degrees of freedom from which a larger scatter of the inliers widens the covariance
+# largest ratio of the noise's variance to the stated one that is told from the inliers' scatter (engineering
+# judgement: four times the noise; then the cut on inliers hides the rest)
+MAX_SCATTER = 16.0
+
 DISTANCE = "too far from the model line"
 BEHIND = "behind the camera"
 NO_OVERLAP = "beside the model line's ends"
@@ -127,7 +136,6 @@ def solve_near_prior(
     solve: Callable[[float], State],
     compute_chi2: Callable[[State], float],
     max_chi2: float,
-    settings: PoseSettings,
 ) -> State:
     """The state nearest to the prior that explains the lines to their noise, by Morozov's discrepancy principle.
 
@@ -143,8 +151,8 @@ def solve_near_prior(
     if compute_chi2(prior) <= max_chi2:
         return prior
     best, low = solve(1.0), 0.0
-    high = settings.max_prior_weight_log10 if compute_chi2(best) <= max_chi2 else low
-    while high - low > settings.prior_weight_step_log10:
+    high = MAX_PRIOR_WEIGHT_LOG10 if compute_chi2(best) <= max_chi2 else low
+    while high - low > PRIOR_WEIGHT_STEP_LOG10:
         middle = 0.5 * (low + high)
         trial = solve(10.0**middle)
         if compute_chi2(trial) <= max_chi2:
@@ -169,9 +177,9 @@ MIN_LENGTH_PX = 1e-9
 """A shorter segment has no direction."""
 
 
-def compute_weak_information(settings: PoseSettings) -> Floats:
+def compute_weak_information() -> Floats:
     """(6, 6) information of a prior without a covariance: too little to move a pose that lines decide. Read-only."""
-    return _compute_weak_information(settings.weak_rotation_rad, settings.weak_translation_m)
+    return _compute_weak_information(WEAK_ROTATION_RAD, WEAK_TRANSLATION_M)
 
 
 @lru_cache(maxsize=8)
@@ -179,9 +187,9 @@ def _compute_weak_information(rotation_rad: float, translation_m: float) -> Floa
     return frozen(np.diag([rotation_rad**-2] * 3 + [translation_m**-2] * 3))
 
 
-def has_open_direction(hessian: Floats, settings: PoseSettings) -> bool:
+def has_open_direction(hessian: Floats) -> bool:
     """Whether, in some direction, the lines know less than a weak prior."""
-    scale = 1.0 / np.sqrt(np.diag(compute_weak_information(settings)))
+    scale = 1.0 / np.sqrt(np.diag(compute_weak_information()))
     return bool(np.linalg.eigvalsh(hessian * scale[:, None] * scale)[0] < 1.0)
 
 
@@ -270,7 +278,7 @@ def compute_covariance(
     noise = measure_scatter(lines.take(kept), rotation, translation, settings)
     if bound is not None:
         mean = noise if noise > 1.0 else compute_mean_square(1.0, bound)
-        noise = compute_spread(mean, bound, settings.max_scatter)
+        noise = compute_spread(mean, bound, MAX_SCATTER)
     arrays = lines.arrays
     if bound is not None and doubtful is not None:
         arrays = (*arrays[:6], lines.sigma_px * np.where(doubtful, math.sqrt(max(0.5 * bound, 1.0)), 1.0), arrays[7])
@@ -287,7 +295,7 @@ def measure_scatter(lines: LineSet, rotation: Floats, translation: Floats, setti
     freedom = 2.0 * len(lines) - 6.0
     distances = measure_lines(lines, rotation, translation)[0]
     chi2 = float(np.sum((distances / lines.sigma_px[:, None]) ** 2))
-    if freedom < settings.min_scatter_freedom or chi2 <= compute_max_chi2(freedom, settings):
+    if freedom < MIN_SCATTER_FREEDOM or chi2 <= compute_max_chi2(freedom, settings):
         return 1.0
     residuals, slopes = compute_image_jacobian(lines, rotation, translation)
     normals_px = kernels.compute_gain(
@@ -301,7 +309,7 @@ def measure_scatter(lines: LineSet, rotation: Floats, translation: Floats, setti
     basis = basis[:, sizes > 1e-9 * sizes[0]]
     freedom = len(whitened) - basis.shape[1]
     left = float(np.sum((whitened - basis @ (basis.T @ whitened)) ** 2))
-    is_more = freedom >= settings.min_scatter_freedom and left > compute_max_chi2(freedom, settings)
+    is_more = freedom >= MIN_SCATTER_FREEDOM and left > compute_max_chi2(freedom, settings)
     return left / freedom if is_more else 1.0
 
 
@@ -311,7 +319,7 @@ def build_prior_estimate(
     """The prior unchanged, with the reason why and its ``covariance`` (6, 6); lines behind it are no inliers."""
     rejected = reject_behind(lines, prior.rotation, prior.translation)
     if covariance is None:
-        covariance = np.asarray(np.linalg.inv(compute_weak_information(settings)), float)
+        covariance = np.asarray(np.linalg.inv(compute_weak_information()), float)
     return build_estimate(
         lines, prior.rotation, prior.translation, covariance, rejected, float("inf"), 0, reason, settings
     )

@@ -30,7 +30,7 @@ from knowledge_sources.methods.pose.line_set import (
     compute_squared_distances,
     group_by_landmark,
 )
-from knowledge_sources.methods.pose.r_and_t import NO_INFORMATION, PoseState
+from knowledge_sources.methods.pose.r_and_t import MAX_ITERATIONS, NO_INFORMATION, PoseState
 from knowledge_sources.methods.pose.r_and_t_ml import (
     compute_likeliest_covariance,
     find_likeliest,
@@ -41,6 +41,21 @@ from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.pose import PoseSettings
 from world_models.camera import Camera
 from world_models.frames import Pose
+
+SUBSET_ITERATIONS = 4  # gauss-Newton steps on a subset (§6.2.4)
+# how often the best candidates are solved again on the lines that fit them best (Rousseeuw's concentration steps)
+CONCENTRATION_ROUNDS = 3
+CONCENTRATION_ITERATIONS = 2  # gauss-Newton steps in each of these rounds
+MAX_REFINEMENTS = 6  # rounds in which inliers and pose may still change each other (§6.2.4, steps 3 and 4)
+MAX_OUTLIER_PART = 0.45  # share of wrong lines up to which the median is to hold (§6.2.4, Table 3)
+MED_DRAWN_OUTLIER_PART = 0.5  # share of wrong lines for which enough subsets are drawn (§6.2.4)
+MED_CANDIDATES = 16  # candidates of least median that are solved again
+MIN_NOISE_PART = 0.3  # smallest estimate of the noise, in parts of the stated one
+TRUNC_DRAWN_OUTLIER_PART = 0.7  # share of wrong lines for which enough subsets are drawn (experiment table3)
+TRUNC_CANDIDATES = 24  # candidates of least loss that are solved again
+TRUNC_INLIER_PART = 0.35  # share of the lines that they are solved again on
+TRUNC_FINALISTS = 5  # candidates that are refined before one is chosen
+TRUNC_ROUNDS = 6  # rounds of inliers and pose in that refinement
 
 MEDIAN_CHI2_2 = 1.386
 """Median of the chi-squared law with two degrees of freedom: a line has two residuals."""
@@ -84,20 +99,20 @@ def med_r_and_t(
             covariance of another shape.
     """
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
-    outlier_part = settings.med_drawn_outlier_part
-    candidates = compute_candidates(lines, prior, landmark_ids, probability, outlier_part, rng, settings)
+    outlier_part = MED_DRAWN_OUTLIER_PART
+    candidates = compute_candidates(lines, prior, landmark_ids, probability, outlier_part, rng)
     if candidates is None:
         return r_and_t_ml(
             model_lines_world, segments_px, camera, prior, sigma_px=sigma_px, prior_covariance=prior_covariance,
             settings=settings,
         )
-    rotations, translations = _add_concentrated(lines, *candidates, settings)
+    rotations, translations = _add_concentrated(lines, *candidates)
     rotations, translations = keep_possible(lines, prior, prior_covariance, rotations, translations)
     errors = compute_squared_distances(lines, rotations, translations)
     medians = np.median(errors, axis=1)
     least = float(medians.min())
-    bound = 2.0 * (settings.outlier_sigmas * _compute_robust_scale(least, len(lines), settings)) ** 2
-    tied = np.flatnonzero(medians <= max(least, _compute_tied_median(settings)))
+    bound = 2.0 * (settings.outlier_sigmas * _compute_robust_scale(least, len(lines))) ** 2
+    tied = np.flatnonzero(medians <= max(least, _compute_tied_median()))
     best = int(tied[np.argmin(np.minimum(errors[tied], bound).sum(axis=1))])
     start = rotations[best], translations[best]
     near = errors[best] <= bound
@@ -111,7 +126,6 @@ def compute_candidates(
     probability: float | None,
     outlier_part: float,
     rng: np.random.Generator | None,
-    settings: PoseSettings,
 ) -> tuple[Floats, Floats] | None:
     """Poses (k, 3, 3), (k, 3) of the subsets, or ``None`` if there are fewer than 4 lines."""
     groups = group_by_landmark(landmark_ids, len(lines))
@@ -121,7 +135,7 @@ def compute_candidates(
         return None
     needed = None if probability is None else count_subsets(SUBSET_SIZE, outlier_part, probability)
     rows, real = pad_rows(groups, list_subsets(len(groups), SUBSET_SIZE, needed, rng))
-    return solve_subsets(lines, rows, real, prior, settings)
+    return solve_subsets(lines, rows, real, prior)
 
 
 def keep_possible(
@@ -171,7 +185,7 @@ def refine_on_inliers(
     near = near & (lines.lengths_px > MIN_LENGTH_PX)
     if int(np.count_nonzero(near)) < SUBSET_SIZE:
         return build_prior_estimate(lines, prior, NO_SUBSET, settings, known)
-    for _ in range(max(settings.max_refinements, 1)):
+    for _ in range(max(MAX_REFINEMENTS, 1)):
         end, reason = find_likeliest(lines.take(near), prior, information, settings, start)
         start = rotation, translation = end.state
         fine = compute_squared_distances(lines, rotation, translation) <= bound
@@ -190,29 +204,29 @@ def refine_on_inliers(
 
 
 def _add_concentrated(
-    lines: LineSet, rotations: Floats, translations: Floats, settings: PoseSettings
+    lines: LineSet, rotations: Floats, translations: Floats
 ) -> tuple[Floats, Floats]:
     """The candidates, and those of least median solved again on the better half of all lines."""
     medians = np.median(compute_squared_distances(lines, rotations, translations), axis=1)
-    few = np.argsort(medians, kind="stable")[: settings.med_candidates]
+    few = np.argsort(medians, kind="stable")[: MED_CANDIDATES]
     half = (len(lines) + SUBSET_SIZE) // 2
-    more = concentrate(lines, rotations[few], translations[few], half, settings)
+    more = concentrate(lines, rotations[few], translations[few], half)
     return np.concatenate([rotations, more[0]]), np.concatenate([translations, more[1]])
 
 
-def _compute_tied_median(settings: PoseSettings) -> float:
+def _compute_tied_median() -> float:
     """Medians of squared errors up to this are ties: with the most wrong lines, noise alone gives as much.
 
     The median of all lines is then the quantile 0.5 / (1 - outliers) of the right ones' chi-squared law with two
     degrees of freedom, 1 - exp(-x / 2).
     """
-    return -2.0 * math.log(1.0 - 0.5 / (1.0 - settings.max_outlier_part))
+    return -2.0 * math.log(1.0 - 0.5 / (1.0 - MAX_OUTLIER_PART))
 
 
-def _compute_robust_scale(median_squared: float, n: int, settings: PoseSettings) -> float:
+def _compute_robust_scale(median_squared: float, n: int) -> float:
     """Standard deviation of one residual from the median over n lines, with Rousseeuw's small-sample factor."""
     scale = (1.0 + 5.0 / max(n - SUBSET_SIZE, 1)) * float(np.sqrt(median_squared / MEDIAN_CHI2_2))
-    return max(scale, settings.min_noise_part)
+    return max(scale, MIN_NOISE_PART)
 
 
 def trunc_r_and_t(
@@ -239,18 +253,18 @@ def trunc_r_and_t(
         ValueError: as :func:`med_r_and_t`.
     """
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
-    outlier_part = settings.trunc_drawn_outlier_part
-    candidates = compute_candidates(lines, prior, landmark_ids, probability, outlier_part, rng, settings)
+    outlier_part = TRUNC_DRAWN_OUTLIER_PART
+    candidates = compute_candidates(lines, prior, landmark_ids, probability, outlier_part, rng)
     if candidates is None:
         return r_and_t_ml(
             model_lines_world, segments_px, camera, prior, sigma_px=sigma_px, prior_covariance=prior_covariance,
             settings=settings,
         )
     bound = 2.0 * settings.outlier_sigmas**2
-    rotations, translations = _add_concentrated_by_loss(lines, *candidates, bound, settings)
+    rotations, translations = _add_concentrated_by_loss(lines, *candidates, bound)
     rotations, translations = keep_possible(lines, prior, prior_covariance, rotations, translations)
     costs = _compute_costs(lines, rotations, translations, bound)
-    order = np.argsort(costs, kind="stable")[: settings.trunc_finalists].tolist()
+    order = np.argsort(costs, kind="stable")[: TRUNC_FINALISTS].tolist()
     information = NO_INFORMATION
     if prior_covariance is not None:
         information, order = np.linalg.inv(prior_covariance), [*order, len(rotations) - 1]
@@ -261,13 +275,13 @@ def trunc_r_and_t(
 
 
 def _add_concentrated_by_loss(
-    lines: LineSet, rotations: Floats, translations: Floats, bound: float, settings: PoseSettings
+    lines: LineSet, rotations: Floats, translations: Floats, bound: float
 ) -> tuple[Floats, Floats]:
     """The candidates, and the best of them solved again on the few lines that fit them best."""
     costs = _compute_costs(lines, rotations, translations, bound)
-    few = np.argsort(costs, kind="stable")[: settings.trunc_candidates]
-    keep = max(SUBSET_SIZE + 1, int(len(lines) * settings.trunc_inlier_part))
-    more = concentrate(lines, rotations[few], translations[few], keep, settings)
+    few = np.argsort(costs, kind="stable")[: TRUNC_CANDIDATES]
+    keep = max(SUBSET_SIZE + 1, int(len(lines) * TRUNC_INLIER_PART))
+    more = concentrate(lines, rotations[few], translations[few], keep)
     return np.concatenate([rotations, more[0]]), np.concatenate([translations, more[1]])
 
 
@@ -281,8 +295,8 @@ def _refine(
     """Alternate inliers and likelihood until they agree; the state and its truncated cost, with the prior's share."""
     rotation, translation, cost = kernels.refine_truncated(
         lines.arrays, (np.array(state[0]), np.array(state[1])), (np.array(prior.rotation), np.array(prior.translation)),
-        np.array(information), np.array(compute_weak_information(settings)), bound, settings.max_beside_px, SUBSET_SIZE,
-        settings.trunc_rounds, settings.max_iterations,
+        np.array(information), np.array(compute_weak_information()), bound, settings.max_beside_px, SUBSET_SIZE,
+        TRUNC_ROUNDS, MAX_ITERATIONS,
     )
     return (rotation, translation), cost
 
@@ -335,29 +349,25 @@ def pad_rows(groups: list[Indices], subsets: Indices) -> tuple[Indices, Floats]:
     return table[subsets].reshape(len(subsets), -1), real[subsets].reshape(len(subsets), -1)
 
 
-def solve_subsets(
-    lines: LineSet, rows: Indices, real: Floats, start: Pose, settings: PoseSettings
-) -> tuple[Floats, Floats]:
+def solve_subsets(lines: LineSet, rows: Indices, real: Floats, start: Pose) -> tuple[Floats, Floats]:
     """Poses (k, 3, 3), (k, 3) of least E1 on k padded subsets ``rows`` (k, w), weights ``real``, all from ``start``."""
     rotations = np.tile(start.rotation, (len(rows), 1, 1))
     translations = np.tile(start.translation, (len(rows), 1))
     poses: tuple[Floats, Floats] = kernels.solve_subsets(
-        lines.arrays, rows, real, rotations, translations, settings.subset_iterations
+        lines.arrays, rows, real, rotations, translations, SUBSET_ITERATIONS
     )
     return poses
 
 
-def concentrate(
-    lines: LineSet, rotations: Floats, translations: Floats, keep: int, settings: PoseSettings
-) -> tuple[Floats, Floats]:
+def concentrate(lines: LineSet, rotations: Floats, translations: Floats, keep: int) -> tuple[Floats, Floats]:
     """Poses (k, 3, 3), (k, 3), each solved again, round by round, on the ``keep`` lines that fit it best.
 
     Rousseeuw's concentration steps: a minimal subset amplifies the noise; half of all lines do not.
     """
-    for _ in range(settings.concentration_rounds):
+    for _ in range(CONCENTRATION_ROUNDS):
         errors = compute_squared_distances(lines, rotations, translations)
         rows = np.ascontiguousarray(np.argsort(errors, axis=1, kind="stable")[:, :keep])
         rotations, translations = kernels.solve_subsets(
-            lines.arrays, rows, np.ones(rows.shape), rotations, translations, settings.concentration_iterations
+            lines.arrays, rows, np.ones(rows.shape), rotations, translations, CONCENTRATION_ITERATIONS
         )
     return rotations, translations

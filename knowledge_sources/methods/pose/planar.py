@@ -9,7 +9,13 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose import kernels
-from knowledge_sources.methods.pose.estimate import BEHIND, PlanarEstimate, compute_spread
+from knowledge_sources.methods.pose.estimate import (
+    BEHIND,
+    MAX_SCATTER,
+    MIN_SCATTER_FREEDOM,
+    PlanarEstimate,
+    compute_spread,
+)
 from knowledge_sources.methods.pose.kernels import PointArrays, RigidMotion
 from knowledge_sources.methods.pose.levenberg_marquardt import cross, invert_information
 from knowledge_sources.methods.pose.line_set import LineSet, check_sigma, compute_distance_slopes
@@ -17,6 +23,12 @@ from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.pose import PoseSettings
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2, wrap_angle
+
+WEAK_POSITION_M = 1.0  # m; standard deviation of a robot's position where none is given
+WEAK_HEADING_RAD = 0.3  # rad; standard deviation of a robot's heading where none is given
+MAX_FLOOR_ITERATIONS = 20  # levenberg-Marquardt steps for the three unknowns of a robot
+HUBER_SIGMAS = 1.5  # deviation beyond which a point pulls with a constant force (Huber)
+MAX_POINT_ROUNDS = 6  # rounds in which inliers and pose may still change each other
 
 FEW = "too few measurements: the prior decides the rest"
 NOT_BETTER = "no pose fits better than the prior"
@@ -37,7 +49,7 @@ class PlanarPrior:
     given: bool
 
 
-def build_planar_prior(prior: Pose2, covariance: Any, settings: PoseSettings = DEFAULT.pose) -> PlanarPrior:
+def build_planar_prior(prior: Pose2, covariance: Any) -> PlanarPrior:
     """The prior as a Gaussian; without a covariance (3, 3) a weak one.
 
     Raises:
@@ -45,7 +57,7 @@ def build_planar_prior(prior: Pose2, covariance: Any, settings: PoseSettings = D
     """
     mean = np.array([prior.x_m, prior.y_m, prior.heading_rad])
     if covariance is None:
-        weak = np.diag([settings.weak_position_m**-2] * 2 + [settings.weak_heading_rad**-2])
+        weak = np.diag([WEAK_POSITION_M**-2] * 2 + [WEAK_HEADING_RAD**-2])
         return PlanarPrior(mean, weak, False)
     matrix = np.asarray(covariance, float)
     if matrix.shape != (3, 3):
@@ -63,7 +75,7 @@ def to_pose2(state: Floats) -> Pose2:
     return Pose2(float(state[0]), float(state[1]), wrap_angle(float(state[2])))
 
 
-def compute_scatter(squares: float, count: int, settings: PoseSettings, bound: float) -> float:
+def compute_scatter(squares: float, count: int, bound: float) -> float:
     """The factor on the covariance of ``count`` inlier residuals that scatter more than sigma says, never below 1.
 
     Args:
@@ -71,9 +83,9 @@ def compute_scatter(squares: float, count: int, settings: PoseSettings, bound: f
         bound: of a pair's squares; what is beyond was left out, so that the inliers scatter less than the noise does.
     """
     freedom = count - 3
-    if freedom < settings.min_scatter_freedom:
+    if freedom < MIN_SCATTER_FREEDOM:
         return 1.0
-    return max(1.0, compute_spread(squares / freedom, bound, settings.max_scatter))
+    return max(1.0, compute_spread(squares / freedom, bound, MAX_SCATTER))
 
 
 def compute_camera_poses(states: Floats, camera_from_robot: Pose) -> tuple[Floats, Floats]:
@@ -175,15 +187,15 @@ def planar_from_points(
     """
     world, pixels = _check_points(points_world, points_px)
     sigma = check_sigma(sigma_px, len(world))
-    belief = build_planar_prior(prior, prior_covariance, settings)
+    belief = build_planar_prior(prior, prior_covariance)
     focal = np.array([camera.fx, camera.fy])
     observed = camera.undistort(pixels) - (camera.cx, camera.cy)
     mount = to_rigid_motion(camera_from_robot)
     problem = _Problem((world, observed, sigma, focal, belief.mean, belief.information, mount), belief, settings)
-    state, _ = problem.minimise(belief.mean, np.ones(len(world), bool), settings.max_floor_iterations)
+    state, _ = problem.minimise(belief.mean, np.ones(len(world), bool), MAX_FLOOR_ITERATIONS)
     near = problem.find_near(state)
-    for _ in range(settings.max_point_rounds):
-        state, _ = problem.minimise(state, near, settings.max_floor_iterations)
+    for _ in range(MAX_POINT_ROUNDS):
+        state, _ = problem.minimise(state, near, MAX_FLOOR_ITERATIONS)
         again = problem.find_near(state)
         if np.array_equal(again, near):
             break
@@ -202,7 +214,7 @@ class _Problem:
     def minimise(self, state: Floats, chosen: Mask, iterations: int) -> tuple[Floats, float]:
         """The state (3,) of least loss over the chosen points (n,), with the prior's share; and that loss."""
         end, _, loss, _ = kernels.minimise_points(
-            self.points, np.array(state), chosen, self.settings.huber_sigmas, NEAR_PLANE_M, iterations
+            self.points, np.array(state), chosen, HUBER_SIGMAS, NEAR_PLANE_M, iterations
         )
         return end, float(loss)
 
@@ -226,7 +238,7 @@ def _build_estimate(problem: _Problem, state: Floats, near: Mask) -> PlanarEstim
     j = jacobian[near].reshape(-1, 3)
     few = not problem.prior.given and int(np.count_nonzero(near)) < MIN_POINTS
     bound = problem.settings.point_outlier_sigmas**2
-    scatter = compute_scatter(float(np.sum(residuals[near] ** 2)), residuals[near].size, problem.settings, bound)
+    scatter = compute_scatter(float(np.sum(residuals[near] ** 2)), residuals[near].size, bound)
     sigma = problem.points[2]
     return PlanarEstimate(
         world_from_robot=to_pose2(state),

@@ -10,7 +10,7 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.pose import kernels
-from knowledge_sources.methods.pose.displacements import compute_sigmas_px, maximise_marginal
+from knowledge_sources.methods.pose.displacements import MAX_FEW_LINES, compute_sigmas_px, maximise_marginal
 from knowledge_sources.methods.pose.estimate import (
     BEHIND,
     DISTANCE,
@@ -30,6 +30,7 @@ from knowledge_sources.methods.pose.line_set import (
 )
 from knowledge_sources.methods.pose.planar import (
     FEW,
+    MAX_FLOOR_ITERATIONS,
     NOT_BETTER,
     PlanarPrior,
     build_planar_prior,
@@ -43,6 +44,14 @@ from knowledge_sources.settings.pose import PoseSettings
 from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
+
+FLOOR_START_ITERATIONS = 8  # levenberg-Marquardt steps on all lines, for a first candidate
+FLOOR_SUBSET_LINES = 28  # pairs are formed of this many of the longest segments
+FLOOR_PAIR_ITERATIONS = 4  # gauss-Newton steps on each pair
+MAX_FLOOR_STEP_M = 2.0  # m; largest move in one Gauss-Newton step: beyond it a pair is nearly degenerate
+MAX_FLOOR_STEP_RAD = 0.5  # rad; largest turn in one such step
+FLOOR_FINALISTS = 8  # candidates that are refined before one is chosen
+MAX_FLOOR_ROUNDS = 8  # rounds in which inliers and pose may still change each other
 
 NO_BOUND = 1e12
 """Bound on squared distances where every line is taken as right; finite, as compiled costs are sums."""
@@ -88,16 +97,16 @@ def planar_from_lines(
                               landmark_ids, float(sigma_px), robust, errors, settings)
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     groups = group_by_landmark(landmark_ids, len(lines))
-    floor = _Floor(lines, build_planar_prior(prior, prior_covariance, settings), camera_from_robot, settings)
+    floor = _Floor(lines, build_planar_prior(prior, prior_covariance), camera_from_robot, settings)
     mean = floor.prior.mean
     bound = 2.0 * settings.outlier_sigmas**2
     if not len(lines):
         return _build_estimate(floor, mean, (), bound, FEW)
     if not robust:
-        state, _ = floor.minimise(mean, settings.max_floor_iterations)
+        state, _ = floor.minimise(mean, MAX_FLOOR_ITERATIONS)
         return _finish(floor, np.ones(len(lines), bool), state, NO_BOUND)
     candidates = _compute_candidates(floor, groups)
-    order = np.argsort(floor.compute_costs(candidates, bound), kind="stable")[: settings.floor_finalists]
+    order = np.argsort(floor.compute_costs(candidates, bound), kind="stable")[: FLOOR_FINALISTS]
     finalists = _refine(floor, candidates[order], bound)
     best = int(np.argmin(floor.compute_costs(finalists, bound)))
     state, near = _alternate(floor, finalists[best], bound)
@@ -118,7 +127,7 @@ def _solve_inexact(
     if first.reason is not None:
         return first
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
-    belief = build_planar_prior(prior, prior_covariance, settings)
+    belief = build_planar_prior(prior, prior_covariance)
     if not belief.given:
         belief = replace(belief, information=np.zeros((3, 3)))
     pose = first.world_from_robot
@@ -174,17 +183,17 @@ class _Floor:
 
 def _compute_candidates(floor: _Floor, groups: list[Indices]) -> Floats:
     """States (k, 3): the prior, all lines at once, and each pair of long lines of different landmarks."""
-    lines, settings = floor.lines, floor.settings
+    lines = floor.lines
     group_of = np.empty(len(lines), dtype=np.intp)
     for g, rows in enumerate(groups):
         group_of[rows] = g
-    longest = np.sort(np.argsort(-lines.lengths_px, kind="stable")[: settings.floor_subset_lines])
+    longest = np.sort(np.argsort(-lines.lengths_px, kind="stable")[: FLOOR_SUBSET_LINES])
     pairs = np.array([p for p in combinations(longest, 2) if group_of[p[0]] != group_of[p[1]]], dtype=np.intp)
-    whole, _ = floor.minimise(floor.prior.mean, settings.floor_start_iterations)
+    whole, _ = floor.minimise(floor.prior.mean, FLOOR_START_ITERATIONS)
     base = np.stack([floor.prior.mean, whole])
     if not len(pairs):
         return base
-    states = kernels.solve_floor_pairs(floor.arrays, pairs, _max_step(settings), settings.floor_pair_iterations)
+    states = kernels.solve_floor_pairs(floor.arrays, pairs, _max_step(), FLOOR_PAIR_ITERATIONS)
     return np.concatenate([base, states])
 
 
@@ -192,20 +201,20 @@ def _refine(floor: _Floor, states: Floats, bound: float) -> Floats:
     """States (k, 3) moved by Gauss-Newton on each one's own inliers, all at once; the first rounds let more in."""
     settings = floor.settings
     moved: Floats = kernels.refine_floor_states(
-        floor.arrays, states, _max_step(settings), bound, np.array(settings.floor_widenings)
+        floor.arrays, states, _max_step(), bound, np.array(settings.floor_widenings)
     )
     return moved
 
 
-def _max_step(settings: PoseSettings) -> Floats:
-    return np.array([settings.max_floor_step_m, settings.max_floor_step_m, settings.max_floor_step_rad])
+def _max_step() -> Floats:
+    return np.array([MAX_FLOOR_STEP_M, MAX_FLOOR_STEP_M, MAX_FLOOR_STEP_RAD])
 
 
 def _alternate(floor: _Floor, state: Floats, bound: float) -> tuple[Floats, Mask]:
     """Alternate inliers and likelihood until they agree."""
     near = floor.find_near(state, bound)
-    for _ in range(floor.settings.max_floor_rounds):
-        state, _ = floor.take(near).minimise(state, floor.settings.max_floor_iterations)
+    for _ in range(MAX_FLOOR_ROUNDS):
+        state, _ = floor.take(near).minimise(state, MAX_FLOOR_ITERATIONS)
         again = floor.find_near(state, bound)
         if np.array_equal(again, near):
             break
@@ -222,8 +231,8 @@ def _finish(floor: _Floor, near: Mask, state: Floats, bound: float) -> PlanarEst
         alone = replace(kept, prior=PlanarPrior(mean, np.zeros((3, 3)), True))
         _, hessian = alone.minimise(state, 0)
         reason = None if _is_decided(hessian, floor.prior) else FEW
-        if reason is None and len(kept.lines) > settings.max_few_lines:
-            state, _ = alone.minimise(state, settings.max_floor_iterations)
+        if reason is None and len(kept.lines) > MAX_FEW_LINES:
+            state, _ = alone.minimise(state, MAX_FLOOR_ITERATIONS)
         else:
             state = _solve_near_prior(kept)
     rejected = find_rejections(floor.lines, *compute_camera_poses(state, floor.mount), near, settings)
@@ -241,13 +250,13 @@ def _solve_near_prior(floor: _Floor) -> Floats:
 
     def solve(weight: float) -> Floats:
         pulled = replace(floor, prior=replace(prior, information=weight * prior.information))
-        return pulled.minimise(prior.mean, settings.max_floor_iterations)[0]
+        return pulled.minimise(prior.mean, MAX_FLOOR_ITERATIONS)[0]
 
     def compute_chi2(state: Floats) -> float:
         return float(np.sum(kernels.compute_floor_squares(floor.arrays, np.array(state))))
 
     max_chi2 = compute_max_chi2(2.0 * len(floor.lines), settings)
-    return solve_near_prior(prior.mean, solve, compute_chi2, max_chi2, settings)
+    return solve_near_prior(prior.mean, solve, compute_chi2, max_chi2)
 
 
 def _is_decided(hessian: Floats, prior: PlanarPrior) -> bool:
@@ -266,7 +275,7 @@ def _build_estimate(
         hessian = hessian - floor.prior.information
     distances = floor.measure_lines(state)[0]
     squares = float(np.sum((distances[inliers] / kept.lines.sigma_px[:, None]) ** 2))
-    scatter = compute_scatter(squares, 2 * len(kept.lines), floor.settings, bound)
+    scatter = compute_scatter(squares, 2 * len(kept.lines), bound)
     return PlanarEstimate(
         world_from_robot=to_pose2(state),
         covariance=invert_information(hessian) * scatter,

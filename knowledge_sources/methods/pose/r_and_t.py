@@ -37,6 +37,8 @@ from knowledge_sources.settings.pose import PoseSettings
 from world_models.camera import Camera
 from world_models.frames import Pose
 
+MAX_ITERATIONS = 30  # levenberg-Marquardt steps for the six unknowns of a camera
+
 PoseState = tuple[Floats, Floats]
 """Rotation (3, 3) and translation (3,) [m] of ``camera_from_world``."""
 
@@ -84,10 +86,10 @@ def r_and_t(
     if len(lines) < MIN_LINES:
         return build_prior_estimate(lines, prior, FEW_LINES, settings)
     weights = compute_line_weights(lines, weighting)
-    end = minimise_e1(lines, prior, weights, settings)
+    end = minimise_e1(lines, prior, weights)
     steps = end.iterations
     if objective == "E2":
-        end = minimise(end.state, _build_e2(lines, weights), _perturb, settings.max_iterations)
+        end = minimise(end.state, _build_e2(lines, weights), _perturb, MAX_ITERATIONS)
         steps += end.iterations
     rotation, translation = end.state
     scale = np.ones((len(lines), 2))
@@ -100,9 +102,9 @@ def r_and_t(
     return check_in_front(lines, prior, estimate, settings)
 
 
-def minimise_e1(lines: LineSet, start: Pose, weights: Floats, settings: PoseSettings) -> Minimum[PoseState]:
+def minimise_e1(lines: LineSet, start: Pose, weights: Floats) -> Minimum[PoseState]:
     """Minimise E1 over R, with T eliminated exactly at every step."""
-    return minimise_compiled(PLANES, lines, weights, (start.rotation, start.translation), settings.max_iterations)
+    return minimise_compiled(PLANES, lines, weights, (start.rotation, start.translation), MAX_ITERATIONS)
 
 
 def minimise_compiled(
@@ -162,7 +164,7 @@ def r_then_t(
     if len(lines) < MIN_LINES:
         return build_prior_estimate(lines, prior, FEW_LINES, settings)
     weights = compute_line_weights(lines, weighting)
-    end = _minimise_rotation(lines, prior, weights, settings)
+    end = _minimise_rotation(lines, prior, weights)
     rotation = end.state
     translation = compute_translation(lines, rotation, prior.translation, weights)
     misses = compute_plane_distances(lines, compute_camera_ends(lines, rotation, translation))
@@ -174,7 +176,7 @@ def r_then_t(
     return check_in_front(lines, prior, estimate, settings)
 
 
-def _minimise_rotation(lines: LineSet, prior: Pose, weights: Floats, settings: PoseSettings) -> Minimum[Floats]:
+def _minimise_rotation(lines: LineSet, prior: Pose, weights: Floats) -> Minimum[Floats]:
     root = np.sqrt(weights)[:, None]
 
     def linearise(rotation: Floats) -> NormalEquations:
@@ -185,7 +187,7 @@ def _minimise_rotation(lines: LineSet, prior: Pose, weights: Floats, settings: P
     def retract(rotation: Floats, step: Floats) -> Floats:
         return np.asarray(compute_rotations(step) @ rotation)
 
-    return minimise(prior.rotation, linearise, retract, settings.max_iterations)
+    return minimise(prior.rotation, linearise, retract, MAX_ITERATIONS)
 
 
 def _compute_gain(lines: LineSet, rotation: Floats, translation: Floats, weights: Floats) -> tuple[Floats, Floats]:

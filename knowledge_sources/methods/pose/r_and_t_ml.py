@@ -37,7 +37,7 @@ from knowledge_sources.methods.pose.line_set import (
     check_sigma,
     compute_squared_distances,
 )
-from knowledge_sources.methods.pose.r_and_t import MIN_LINES, PoseState, minimise_compiled, minimise_e1
+from knowledge_sources.methods.pose.r_and_t import MAX_ITERATIONS, MIN_LINES, PoseState, minimise_compiled, minimise_e1
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.pose import PoseSettings
 from world_models.camera import Camera
@@ -121,11 +121,11 @@ def find_likeliest(
     ``information`` (6, 6) is the prior's, ``None`` if it does not count.
     """
     if information is not None:
-        return _minimise_image(lines, start or _find_start(lines, prior, settings), settings, prior, information), None
+        return _minimise_image(lines, start or _find_start(lines, prior), prior, information), None
     if len(lines) < MIN_LINES:
         return _solve_near_prior(lines, prior, settings), FEW_LINES
-    end = _minimise_image(lines, start or _find_start(lines, prior, settings), settings)
-    undecided = has_open_direction(end.normal.hessian, settings)
+    end = _minimise_image(lines, start or _find_start(lines, prior))
+    undecided = has_open_direction(end.normal.hessian)
     if len(lines) > MIN_LINES and not undecided:
         return end, None
     return _solve_near_prior(lines, prior, settings), UNDECIDED if undecided else None
@@ -134,13 +134,12 @@ def find_likeliest(
 def _solve_near_prior(lines: LineSet, prior: Pose, settings: PoseSettings) -> Minimum[PoseState]:
     """See :func:`solve_near_prior`. The covariance is that of a weak prior, as nobody stated how good the prior is."""
     here = (prior.rotation, prior.translation)
-    weak = compute_weak_information(settings)
+    weak = compute_weak_information()
     state = solve_near_prior(
         here,
-        lambda weight: _minimise_image(lines, here, settings, prior, weight * weak).state,
+        lambda weight: _minimise_image(lines, here, prior, weight * weak).state,
         lambda state: _compute_chi2(lines, *state),
         compute_max_chi2(2.0 * len(lines), settings),
-        settings,
     )
     return minimise_compiled(IMAGE, lines, np.ones(len(lines)), state, 0, prior, weak)
 
@@ -158,8 +157,8 @@ def _solve_in_prior_basin(
         return None
     fine, rotation, translation, covariance, cost, steps, distances, front = kernels.solve_from_prior(
         model, camera.undistort(ends_px), (camera.fx, camera.fy, camera.cx, camera.cy), check_sigma(sigma_px, n),
-        (np.array(prior.rotation), np.array(prior.translation)), np.array(compute_weak_information(settings)),
-        compute_max_chi2(freedom, settings), settings.max_beside_px, settings.max_iterations, settings.shared_px,
+        (np.array(prior.rotation), np.array(prior.translation)), np.array(compute_weak_information()),
+        compute_max_chi2(freedom, settings), settings.max_beside_px, MAX_ITERATIONS, settings.shared_px,
     )
     if not fine:
         return None
@@ -172,12 +171,12 @@ def _solve_in_prior_basin(
 
 
 def _minimise_image(
-    lines: LineSet, start: PoseState, settings: PoseSettings, prior: Pose | None = None,
+    lines: LineSet, start: PoseState, prior: Pose | None = None,
     information: Floats | None = None,
 ) -> Minimum[PoseState]:
     """Minimise the squared image distances over their variance, plus the prior's if its information is given."""
     weights = np.ones(len(lines))
-    return minimise_compiled(IMAGE, lines, weights, start, settings.max_iterations, prior, information)
+    return minimise_compiled(IMAGE, lines, weights, start, MAX_ITERATIONS, prior, information)
 
 
 def invert_covariance(covariance: Any) -> tuple[Floats | None, Floats | None]:
@@ -190,12 +189,12 @@ def invert_covariance(covariance: Any) -> tuple[Floats | None, Floats | None]:
     return np.asarray(np.linalg.inv(matrix)), matrix
 
 
-def _find_start(lines: LineSet, prior: Pose, settings: PoseSettings) -> PoseState:
+def _find_start(lines: LineSet, prior: Pose) -> PoseState:
     """E1's minimum, unless it is behind the camera or the prior fits the image better."""
     here = (prior.rotation, prior.translation)
     if len(lines) < MIN_LINES:
         return here
-    e1 = minimise_e1(lines, prior, np.ones(len(lines)), settings).state
+    e1 = minimise_e1(lines, prior, np.ones(len(lines))).state
     if not is_mostly_in_front(lines, *e1):
         return here
     return e1 if _compute_chi2(lines, *e1) <= _compute_chi2(lines, *here) else here

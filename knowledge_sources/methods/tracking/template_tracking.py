@@ -75,7 +75,7 @@ def follow_landmarks(
         found = None
         if expected:
             search = min(max(s.search_sigmas * sigma + s.search_margin_px, s.min_search_px), s.max_search_px)
-            found = correlate(template_of(track), image, at, search, scale=scale, settings=settings.features)
+            found = correlate(template_of(track), image, at, search, scale=scale)
         out.append(TrackUpdate(_update_track(track, at, found, expected, s), expected))
     return out
 
@@ -85,7 +85,7 @@ def cut_template(
     lens: Camera, pinhole: Camera, jpeg: bytes, at_px: tuple[float, float], half_px: int, settings: FeaturesSettings
 ) -> Template:
     """The template round a pixel of a rectified picture; cached, as it serves for many frames."""
-    return extract_template(read_picture(jpeg).rectified(lens, pinhole), at_px, half_px, settings)
+    return extract_template(read_picture(jpeg).rectified(lens, pinhole), at_px, half_px)
 
 
 def correct_pose(
@@ -138,7 +138,7 @@ def select_landmarks(
             break
         if not free[i]:
             continue
-        if compute_second_peak(image, px, half_px, s.second_peak_window_px, settings.features) < s.max_second_peak:
+        if compute_second_peak(image, px, half_px, s.second_peak_window_px) < s.max_second_peak:
             free &= _are_apart(points.points_px, px, s.min_spacing_px)
             name = points.marks[int(points.landmark[i])].name
             new.append(_begin_track(point, px, float(camera_from_world.apply(point)[2]), name, frame, s.min_sigma_px))

@@ -57,7 +57,7 @@ def draw_space(seed: int, fitting: Fitting) -> tuple[PairSpace, Terms, np.random
         anchor[0, 4] = anchor[4, 0] = -0.1
     lengths = rng.uniform(20.0, 120.0, LINES)
     tuning = MatchingSettings()
-    terms = (build_paper_terms(lengths, rng.uniform(10.0, 80.0, DATA), tuning) if seed % 2
+    terms = (build_paper_terms(lengths, rng.uniform(10.0, 80.0, DATA)) if seed % 2
              else build_likelihood_terms(lengths, DATA, 1.0, 5.0, tuning))
     return PairSpace(np.arange(len(model)), model, data, forms, masks, LINES, anchor, fitting), terms, rng
 

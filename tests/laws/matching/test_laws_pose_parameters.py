@@ -11,6 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching.pose_pairs import (
+    GRID_PX,
+    GRID_SIGMAS,
+    MAX_GRID_STEPS,
     PoseParameters,
     build_camera_parameters,
     build_floor_parameters,
@@ -20,14 +23,12 @@ from knowledge_sources.methods.matching.pose_pairs import (
 from knowledge_sources.methods.matching.search import compute_step_fits
 from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian
 from knowledge_sources.methods.pose.planar import compute_line_jacobian
-from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
 
 Array = NDArray[np.float64]
 CAMERA = Camera.from_field_of_view(np.radians(65.0))
 MOUNT = CameraMount(1.0, 0.1).camera_from_robot
-GRID = DEFAULT.matching
 seeds = st.integers(0, 2**32 - 1)
 some = settings(max_examples=25, deadline=None)
 
@@ -83,15 +84,15 @@ def test_a_robot_on_the_floor_stays_on_it(seed: int) -> None:
 @some
 @given(seeds, st.tuples(*[st.floats(0.0, 200.0)] * 3))
 def test_starts_on_a_floor_leave_no_gap_in_the_picture(seed: int, reach_px: tuple[float, float, float]) -> None:
-    starts = parametrise(np.random.default_rng(seed))[0].list_starts(np.array(reach_px), GRID)
-    assert len(np.unique(starts, axis=0)) == len(starts) <= (2 * GRID.max_grid_steps + 1) ** 3
+    starts = parametrise(np.random.default_rng(seed))[0].list_starts(np.array(reach_px))
+    assert len(np.unique(starts, axis=0)) == len(starts) <= (2 * MAX_GRID_STEPS + 1) ** 3
     assert 0.0 in np.abs(starts).sum(axis=1)
     for axis, reach in zip(starts.T, reach_px, strict=True):
         places_px = np.unique(axis) * reach
         np.testing.assert_allclose(places_px, -places_px[::-1])
-        assert GRID.grid_sigmas * reach - places_px[-1] <= 0.25 * GRID.grid_px
-        if len(places_px) <= 2 * GRID.max_grid_steps:
-            assert np.all(np.diff(places_px) <= 1.25 * GRID.grid_px + 1e-9)
+        assert GRID_SIGMAS * reach - places_px[-1] <= 0.25 * GRID_PX
+        if len(places_px) <= 2 * MAX_GRID_STEPS:
+            assert np.all(np.diff(places_px) <= 1.25 * GRID_PX + 1e-9)
 
 
 @some

@@ -19,7 +19,6 @@ from knowledge_sources.methods.pose.r_and_t import (
     compute_plane_distances,
     compute_plane_jacobian,
 )
-from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -199,7 +198,7 @@ def test_r_then_t_and_r_and_t_return_the_prior_below_three_lines(
 def weigh_error(found: Pose, truth: Pose) -> float:
     apart = found @ truth.inverse()
     move = np.concatenate([apart.rotation_vector, apart.translation])
-    return float(np.sqrt(move @ compute_weak_information(DEFAULT.pose) @ move))
+    return float(np.sqrt(move @ compute_weak_information() @ move))
 
 
 @given(scene=scenes, seed=seeds)
