@@ -47,9 +47,9 @@ def test_300_lines_against_4500_segments_are_within_the_bounds(
     looked: dict[str, list[int]] = {"start": [], "near": []}
     starts, build = pose_matching.find_start_poses, pose_matching._build_space
 
-    def find_start_poses(scene: Any, wide: PosePairs, tuning: Any) -> Any:
+    def find_start_poses(scene: Any, wide: PosePairs) -> Any:
         looked["start"].append(len(wide.model))
-        return starts(scene, wide, tuning)
+        return starts(scene, wide)
 
     def build_space(scene: Any, pose: Pose, pairs: PosePairs, *more: Any) -> Any:
         looked["near"].append(len(pairs.model))
