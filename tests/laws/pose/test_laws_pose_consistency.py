@@ -2,6 +2,11 @@
 
 The normalised error squared over many noise draws is within its chi-square band (`tests/consistency.py`). A robust
 solver leaves out what is too far off, so that what it keeps scatters less than the noise does.
+
+How many draws: 50, which are 150 unknowns on the floor and 300 of a camera. An honest solver then fails once in a
+thousand. On the floor one whose variances are too small by the factor 1.65, or too large by 1.7 (deviations by 30 %),
+is found nine times in ten; a camera's noise is estimated from its own lines, which takes some of the band, and more
+draws.
 """
 
 from __future__ import annotations
@@ -43,6 +48,8 @@ NOISES = (1.0, 1.5, 2.0)
 """The true noise over the stated one."""
 ESTIMATED = {1.0: 1.0, 1.5: 1.15, 2.0: 1.15}
 """By how much errors may exceed the stated ones where the noise is estimated from few residuals (Student's law)."""
+ON_FLOOR, IN_SPACE = 50, 50
+"""Draws of three and of six unknowns."""
 Array = NDArray[np.float64]
 
 
@@ -98,7 +105,7 @@ def on_floor_from_points(d: Draw) -> Any:
 @pytest.mark.parametrize(
     "solve", [on_floor_from_lines, on_floor_from_lines_alone, on_floor_from_every_line, on_floor_from_points])
 def test_a_pose_on_the_floor_is_as_far_off_as_it_says(solve: Callable[[Draw], Any], noise: float) -> None:
-    draws = [Draw(seed, noise) for seed in range(80)]
+    draws = [Draw(seed, noise) for seed in range(ON_FLOOR)]
     found = [solve(d) for d in draws]
     assert_consistent((compute_nees(compute_error(f.world_from_robot, d.truth), f.covariance)
                        for f, d in zip(found, draws, strict=True)), 3, most=ESTIMATED[noise])
@@ -107,7 +114,7 @@ def test_a_pose_on_the_floor_is_as_far_off_as_it_says(solve: Callable[[Draw], An
 @pytest.mark.parametrize("solve", [on_floor_from_lines, on_floor_from_points])
 def test_with_three_times_the_noise_it_is_hardly_too_sure(solve: Callable[[Draw], Any]) -> None:
     """A third of the right lines is then left out as wrong, and the cut hides most of the noise."""
-    draws = [Draw(seed, 3.0) for seed in range(80)]
+    draws = [Draw(seed, 3.0) for seed in range(ON_FLOOR)]
     found = [solve(d) for d in draws]
     assert_consistent((compute_nees(compute_error(f.world_from_robot, d.truth), f.covariance)
                        for f, d in zip(found, draws, strict=True)), 3, most=2.0)
@@ -117,7 +124,7 @@ def test_with_three_times_the_noise_it_is_hardly_too_sure(solve: Callable[[Draw]
 @pytest.mark.parametrize("solve", [r_then_t, r_and_t, r_and_t_ml, med_r_and_t, trunc_r_and_t])
 def test_a_camera_pose_is_as_far_off_as_it_says(solve: Callable[..., PoseEstimate], noise: float) -> None:
     errors = []
-    for seed in range(50):
+    for seed in range(IN_SPACE):
         d = Draw(seed, noise)
         prior = d.camera_from_world.perturbed(d.rng.normal(0.0, 0.01, 3), d.rng.normal(0.0, 0.1, 3))
         found = solve(d.lines, d.segments, CAMERA, prior, sigma_px=SIGMA_PX, settings=ALONE)
@@ -129,7 +136,7 @@ def test_a_camera_pose_is_as_far_off_as_it_says(solve: Callable[..., PoseEstimat
 @pytest.mark.parametrize("solve", [r_and_t_ml, med_r_and_t])
 def test_with_four_times_the_noise_no_pose_is_called_decided(solve: Callable[..., PoseEstimate]) -> None:
     ok = []
-    for seed in range(30):
+    for seed in range(20):
         d = Draw(seed, 4.0)
         ok.append(solve(d.lines, d.segments, CAMERA, d.camera_from_world, sigma_px=SIGMA_PX, settings=ALONE).ok)
     assert np.mean(ok) <= 0.1
@@ -142,7 +149,7 @@ def test_a_pose_in_an_inexact_model_is_as_far_off_as_it_says(noise: float) -> No
     The factor for segments of a wrong line, which none is here, covers noise that is larger than stated.
     """
     errors, tuning = [], ALONE if noise == 1.0 else DEFAULT.pose
-    for seed in range(60):
+    for seed in range(ON_FLOOR):
         d = Draw(seed, noise)
         shifts = np.zeros((6, len(d.lines), 3))
         for k in range(6):
@@ -160,7 +167,7 @@ def test_a_pose_in_an_inexact_model_is_as_far_off_as_it_says(noise: float) -> No
 def test_a_pose_with_the_camera_is_as_far_off_as_it_says(noise: float) -> None:
     errors = []
     camera_sigma = np.array([0.01, 0.01, 1e-6, 0.01, 0.01, 0.1, 0.1])
-    for seed in range(60):
+    for seed in range(ON_FLOOR):
         d = Draw(seed, noise)
         found = estimate_camera_and_pose(d.lines, d.segments, CAMERA, MOUNT, d.prior, PRIOR, np.diag(camera_sigma**2),
                                          sigma_px=SIGMA_PX)
@@ -174,7 +181,7 @@ def test_as_many_right_ones_are_left_out_as_the_bound_says(solve: Callable[[Draw
     s = DEFAULT.pose
     bound = 2.0 * s.outlier_sigmas**2 if solve is on_floor_from_lines else s.point_outlier_sigmas**2
     for noise in (1.0, 1.5, 2.0):
-        kept = np.concatenate([solve(Draw(seed, noise)).inliers for seed in range(60)])
+        kept = np.concatenate([solve(Draw(seed, noise)).inliers for seed in range(ON_FLOOR)])
         out = int(np.count_nonzero(~kept))
         part = np.exp(-0.5 * bound / noise**2)
         low, high = binom.ppf((1e-3, 1.0 - 1e-3), len(kept), part)
