@@ -88,7 +88,13 @@ def run(name: str, *, quick: bool = False, seed: int = 0, missions: int | None =
         from world_models.files.toml.settings import suggest_keys
 
         raise BadInput(f"expected an experiment: {suggest_keys(name, list_names())}, got {name!r}")
-    run_one = importlib.import_module(_module(name)).run
+    try:
+        run_one = importlib.import_module(_module(name)).run
+    except ModuleNotFoundError as error:
+        if error.name is None or not error.name.startswith("harvey_"):
+            raise
+        extra = error.name.replace("_", "-")
+        raise BadInput(f"experiment {name} needs {extra}: pip install ./extras/{extra}") from None
     if missions is not None and "missions" not in inspect.signature(run_one).parameters:
         raise BadInput(f"--missions: {name} has no number of missions to choose")
     report: Report = run_one(quick, seed) if missions is None else run_one(quick, seed, missions=missions)

@@ -7,6 +7,8 @@
 ``harvey.faults``             a class under ``sim.faults.fault.Fault``
 ``harvey.loggers``            a class under ``logs.recording.logger.Logger``
 ``harvey.commands``           a ``harvey.commands.command.Command``; of a verb: ``world.import``
+``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
+``harvey.exporters``          a ``harvey_buildings.exporters.export_file.Exporter``
 ============================  ==========================================================================
 
 The name of an entry point is the name under which Harvey knows what it points to. What the folder ``extras`` has is
@@ -24,7 +26,7 @@ SOURCES_GROUP = "harvey.knowledge_sources"
 
 COMMANDS_GROUP = "harvey.commands"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
-    COMMANDS_GROUP: {},
+    COMMANDS_GROUP: {"world.export": "harvey-buildings", "world.import": "harvey-buildings"},
     "harvey.bases": {"p2os": "harvey-bases", "create2": "harvey-bases"},
     "harvey.emulators": {"p2os": "harvey-bases", "create2": "harvey-bases"},
 }

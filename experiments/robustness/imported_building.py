@@ -19,11 +19,11 @@ from experiments.report import Cell, Report, count_kinds
 from experiments.shared_data import DUPLEX, data_path, describe_absence
 from experiments.trials import campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
+from harvey_buildings import import_building
 from world_models.building.checks import check_world
 from world_models.building.geometry.outlines import distance_to_border
 from world_models.building.world import World
 from world_models.commands import find_open_point
-from world_models.files.importers import import_building
 from world_models.files.world_files import load_world
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def run(quick: bool, seed: int) -> Report:
     path, title = data_path(DUPLEX), "Missions between the rooms of an imported house"
     if find_spec("ifcopenshell") is None or not path.is_file():
         lacking = describe_absence(DUPLEX) if find_spec("ifcopenshell") else \
-            "ifcopenshell is not installed: .venv/bin/pip install '.[ifc]'"
+            "ifcopenshell is not installed: .venv/bin/pip install ifcopenshell"
         return Report(title, COLUMNS, (), (f"Nothing was tried: {lacking}.",), (("the house is there", False),))
     text = import_building(path).text
     folder = campaign_folder("imported-building", seed, quick=quick) / _digest(text)

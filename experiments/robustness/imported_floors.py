@@ -16,10 +16,10 @@ import numpy as np
 
 from experiments.report import Cell, Report
 from experiments.shared_data import UNIVERSITY, data_path, describe_absence
+from harvey_buildings import NavigationGraph, import_building
 from world_models.building.checks import check_world
 from world_models.building.passages import drivable_passages
 from world_models.building.world import World
-from world_models.files.importers import NavigationGraph, import_building
 from world_models.files.world_files import load_world
 
 MAX_REFINEMENTS = 20

@@ -30,7 +30,6 @@ from experiments.robustness.malformed_buildings_text import GML, IFC
 from experiments.robustness.malformed_worlds_text import SMALL
 from harvey.campaign.engine import map_values
 from world_models.building.checks import check_world
-from world_models.files.importers import BuildingError, import_building
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import compile_file, load_world, read_world
 
@@ -66,7 +65,7 @@ def run(quick: bool, seed: int) -> Report:
                f" {LIMIT_S:.0f} s).",
                "words, lines, values, characters: of a world's text; bytes: of a compiled world (SQLite); IndoorGML,"
                " IFC: building files, corrupted in words and lines, then imported."
-               + ("" if _with_ifc() else " No IFC file was tried: ifcopenshell is not installed."),
+               + ("" if _with_ifc() else " No IFC file was tried: harvey-buildings is not installed."),
                "with faults: a world that was read, whose check names its faults with file and line.",
                "unclear: an error or fault that does not name the file, what was expected and what it got.",
                *wrong[:10]),
@@ -110,7 +109,12 @@ def judge_files(numbers: Sequence[int], seed: int) -> list[FileResult]:
 
 
 def _with_ifc() -> bool:
-    return find_spec("ifcopenshell") is not None
+    return _with_buildings() and find_spec("ifcopenshell") is not None
+
+
+def _with_buildings() -> bool:
+    """Whether the extra that reads building files is installed."""
+    return find_spec("harvey_buildings") is not None
 
 
 Corruption = Callable[[np.random.Generator, bytes], str | bytes]
@@ -120,7 +124,7 @@ def choose_corruption(number: int) -> tuple[str, str, Corruption]:
     """Choose how the file of this number is corrupted: name, file ending, and function."""
     if number % IFC_EVERY == IFC_EVERY - 1 and _with_ifc():
         return CORRUPTIONS[-1]
-    return CORRUPTIONS[number % (len(CORRUPTIONS) - 1)]
+    return CORRUPTIONS[number % (len(CORRUPTIONS) - (1 if _with_buildings() else 2))]
 
 
 class _TooLongError(BaseException):
@@ -151,9 +155,9 @@ def judge_file(content: str | bytes, folder: Path, suffix: str = ".toml") -> str
     try:
         with _time_limit(LIMIT_S):
             return _read(content, folder / f"world{suffix}")
-    except (WorldError, BuildingError) as error:
+    except WorldError as error:
         text = str(error)
-        clear = "world." in text and "expected" in text and ("got" in text or isinstance(error, BuildingError))
+        clear = "world." in text and "expected" in text and ("got" in text or suffix in BUILDINGS)
         return "error" if clear else f"unclear: {text}"
     except _TooLongError:
         return "hang"
@@ -171,6 +175,8 @@ def _read(content: str | bytes, path: Path) -> str:
     elif path.suffix == ".toml":
         faults = check_world(read_world(Source.parse(content, path.name)))
     else:
+        from harvey_buildings import import_building
+
         path.write_text(content, encoding="utf-8")
         faults = check_world(read_world(Source.parse(import_building(path).text, "world.toml")))
     unclear = [str(f) for f in faults if "expected" not in f.what or "got" not in f.what or not f.source]
@@ -276,4 +282,5 @@ CORRUPTIONS: tuple[tuple[str, str, Corruption], ...] = (
     ("words", ".toml", _words(SMALL)), ("lines", ".toml", _lines(SMALL)), ("values", ".toml", _values),
     ("characters", ".toml", _characters), ("bytes", ".world", _bytes), ("IndoorGML", ".gml", _building(GML)),
     ("IFC", ".ifc", _building(IFC)))
-"""IFC is the last."""
+"""Building files are the last two, IFC the last."""
+BUILDINGS = (".gml", ".ifc")

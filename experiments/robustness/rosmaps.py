@@ -23,9 +23,9 @@ from experiments.robustness.rosmaps_scores import MapTruth, correlate_rooms, cou
 from experiments.shared_data import MAP_PLANS, data_path, describe_absence
 from experiments.trials import campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
+from harvey_buildings import import_building
 from world_models.building.checks import check_world
 from world_models.building.world import World
-from world_models.files.importers import import_building
 from world_models.files.world_files import load_world
 
 if TYPE_CHECKING:

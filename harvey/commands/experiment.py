@@ -44,7 +44,8 @@ COMMAND = Command(
     "Exit code 0 if all claims hold, 1 if one does not. With --json one object is printed: title, rows (the cells by\n"
     "their columns; beside them paper, peer and ours: a figure, several by name, or null), notes and claims.\n\n"
     "Long ones keep their results and pictures in runs/experiments/NAME/; one that was interrupted continues there.\n"
-    "Peers (PoseLib, CLIPS, py_trees) and IFC are extras: pip install '.[peers,ifc]'. Photographs and buildings by\n"
+    "Peers (PoseLib, CLIPS, py_trees) are installed by pip install '.[peers]'; buildings of other programs need\n"
+    "pip install ./extras/harvey-buildings. Photographs and buildings by\n"
     "others are not shipped: HARVEY_DATA=FOLDER names a folder with corridor/ and buildings/.\n\n"
     "Names, by what is asked (harvey list says more):\n"
     + "\n".join(fill(", ".join(group), 100, initial_indent=f"  {folder:<12}", subsequent_indent=" " * 14,

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harvey.commands.command import Command, add_parser, whole
+from harvey.commands import find_added_commands
+from harvey.commands.command import Command, add_parser
 from harvey.errors import BadInput
 from world_models.words import count
 
@@ -17,49 +18,32 @@ if TYPE_CHECKING:
 
 SILENT_S = 3.0
 """What takes longer than this shows a bar."""
-MIN_WALL_M, MAX_WALL_M = 1.0, 20.0
 LARGE_BYTES = 500_000
 """A world file of this size takes some seconds to read."""
 
 
 def _arguments(parser: ArgumentParser) -> None:
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for verb in VERBS:
+    for verb in (*VERBS, *find_added_commands("world")):
         add_parser(verbs, verb).set_defaults(verb=verb)
 
 
-def _file(parser: ArgumentParser) -> None:
+def add_file_arguments(parser: ArgumentParser) -> None:
+    """Of a verb that reads a world."""
     parser.add_argument("file", metavar="FILE",
                         help="a world file (.toml, compiled: .world), or the name of one that comes with the project")
     parser.add_argument("--details", metavar="FILE", action="append", default=[], help="add what only the building has")
 
 
 def _show_arguments(parser: ArgumentParser) -> None:
-    _file(parser)
+    add_file_arguments(parser)
     parser.add_argument("--out", metavar="FILE",
                         help="draw the plan there, as .svg or .png, or the building for the viewer, as .rrd")
 
 
 def _compile_arguments(parser: ArgumentParser) -> None:
-    _file(parser)
+    add_file_arguments(parser)
     parser.add_argument("--out", metavar="FILE", help="the .world file (named as the world, here)")
-
-
-def _import_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="a building (.ifc, .gml, .geojson) or a ROS map (map.yaml)")
-    parser.add_argument("--out", metavar="FILE", help="the .toml file (named as the building, here)")
-    parser.add_argument("--wall-height", metavar="METRES", type=float,
-                        help="of a ROS map: the height of its walls (2.5)")
-
-
-def _export_arguments(parser: ArgumentParser) -> None:
-    _file(parser)
-    parser.add_argument("--to", metavar="OUT", required=True,
-                        help="the file to write: .yaml (a ROS map, with its .pgm), .svg, .geojson, .glb or .gltf")
-    parser.add_argument("--format", choices=("rosmap", "svg", "geojson", "gltf"), help="where the ending does not say")
-    parser.add_argument("--storey", metavar="N", type=whole, help="of a ROS map: which storey, from 1 for the lowest")
-    parser.add_argument("--resolution", metavar="METRES", type=float, help="of a ROS map: side of a cell (0.05)")
-    parser.add_argument("--empty", action="store_true", help="of a ROS map: without what stands in the rooms")
 
 
 def _edit_arguments(parser: ArgumentParser) -> None:
@@ -81,7 +65,8 @@ def _run(args: Namespace) -> int:
     return verb.run(args)
 
 
-def _load(file: str, details: list[str]) -> World:
+def load_file(file: str, details: list[str]) -> World:
+    """A world file, or one that comes with the project. Raises BadInput, WorldError."""
     from world_models.files.world_files import load_world
 
     path = _path(file)
@@ -117,25 +102,6 @@ def _compile(file: str, details: list[str], out: str | None) -> int:
     return 0
 
 
-def _import(file: str, out: str | None, wall_height_m: float | None) -> int:
-    from world_models.files.importers import BuildingError, import_building
-    from world_models.files.world_files import load_world
-
-    path = Path(file)
-    target = Path(out or path.with_suffix(".toml").name)
-    if target.suffix != ".toml":
-        raise BadInput(f"--out: expected a name that ends in .toml, got {str(target)!r}")
-    if wall_height_m is not None and not MIN_WALL_M <= wall_height_m <= MAX_WALL_M:
-        raise BadInput(f"--wall-height: expected {MIN_WALL_M:g} to {MAX_WALL_M:g} metres, got {wall_height_m:g}")
-    try:
-        made = import_building(path, wall_height_m)
-    except BuildingError as error:
-        raise BadInput(str(error)) from None
-    target.write_text(made.text, encoding="utf-8")
-    print(f"{made.report}\n")
-    return _check(load_world(target), str(target))
-
-
 def _edit(args: Namespace) -> int:
     from harvey.commands.view import find_viewer, has_screen
     from harvey.world_editor import BuildingViewer, WorldEditor
@@ -160,21 +126,6 @@ def _edit(args: Namespace) -> int:
             viewer.close()
 
 
-def _export(args: Namespace) -> int:
-    from world_models.files.exporters.export_file import ExportError, export_world
-
-    out = Path(args.to)
-    try:
-        told = export_world(_load(args.file, args.details), out, args.format, storey=args.storey,
-                            resolution_m=args.resolution, with_things=not args.empty)
-    except ExportError as error:
-        raise BadInput(f"--to {out}: {error}") from None
-    except OSError as error:
-        raise BadInput(f"--to {out}: expected a file to write to, got: {error.strerror}") from None
-    print(f"{out}: {told}")
-    return 0
-
-
 def _new(name: str, rooms: str) -> int:
     from world_models.files.first_world import first_world_text
 
@@ -193,7 +144,8 @@ def _new(name: str, rooms: str) -> int:
     return 0
 
 
-def _check(world: World, file: str) -> int:
+def print_check(world: World, file: str) -> int:
+    """Print the faults of a world; the exit code."""
     from world_models.building.checks import check_world
 
     faults = check_world(world, _with_bar)
@@ -293,7 +245,7 @@ VERBS = (
         (("harvey world check my_floor.toml", "faults with file and line; exit code 2 where there are any"),
          ("harvey world check research_center", "one that comes with the project"),
          ("harvey world check floor.toml --details clutter.toml", "with what only the building has")),
-        _file, lambda args: _check(_load(args.file, args.details), args.file),
+        add_file_arguments, lambda args: print_check(load_file(args.file, args.details), args.file),
         "Exit code 0 where there are none, 2 where there are any.",
     ),
     Command(
@@ -301,33 +253,13 @@ VERBS = (
         (("harvey world show research_center", "rooms, doorways and what is in them"),
          ("harvey world show campus --out plan.png", "and the plan, storey beside storey (or .svg)"),
          ("harvey world show campus --out campus.rrd", "and the building for the viewer: rerun campus.rrd")),
-        _show_arguments, lambda args: _show(_load(args.file, args.details), args.out),
+        _show_arguments, lambda args: _show(load_file(args.file, args.details), args.out),
     ),
     Command(
         "compile", "compile a world into one file that is read room by room",
         (("harvey world compile campus.toml --out campus.world", "for worlds that are too large to read at once"),
          ("harvey run mission.toml", "a mission names it as any world: world = \"campus.world\"")),
         _compile_arguments, lambda args: _compile(args.file, args.details, args.out),
-    ),
-    Command(
-        "import", "import a building from IFC, IndoorGML, GeoJSON or a ROS map",
-        (("harvey world import house.ifc --out house.toml", "what was used of a building, guessed and left out"),
-         ("harvey world import campus.gml --out campus.toml", "IndoorGML 1.0, 1.1 and the core of 2.0"),
-         ("harvey world import campus.geojson --out campus.toml", "what export writes, or unit.geojson of IMDF"),
-         ("harvey world import map.yaml --out floor.toml --wall-height 2.7", "rooms and doors traced from a ROS map")),
-        _import_arguments, lambda args: _import(args.file, args.out, args.wall_height),
-        "Then checks it, as harvey world check does.",
-    ),
-    Command(
-        "export", "write a world for other programs: a ROS map, SVG, GeoJSON or glTF",
-        (("harvey world export research_center --to map.yaml --resolution 0.05", "a ROS map: map.yaml and map.pgm"),
-         ("harvey world export campus --to upstairs.yaml --storey 2 --empty", "the second storey, without furniture"),
-         ("harvey world export campus --to campus.svg", "the plan, storey beside storey"),
-         ("harvey world export campus --to campus.geojson", "rooms, doorways, things and links, in metres"),
-         ("harvey world export campus --to campus.glb", "for Blender, or a viewer in a browser (extra gltf)")),
-        _export_arguments, _export,
-        "Coordinates are metres in the building's frame, x to the east and y to the north; in glTF y is up.\n"
-        "An OUT that exists is written anew.",
     ),
 )
 COMMAND = Command(

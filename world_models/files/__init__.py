@@ -1,4 +1,4 @@
-"""How does a building get into the robot? World files are read, compiled and imported here, and nothing else parses.
+"""How does a building get into the robot? World files are read and compiled here, and nothing else parses.
 
 In reading order:
 
@@ -6,7 +6,5 @@ In reading order:
 * :mod:`.toml`: TOML with file and line for every error: worlds, missions, cameras, settings.
 * :mod:`.construction`: from a description to faces and model lines.
 * :mod:`.packed`: compiled worlds: a table of packed locale frames in one SQLite file.
-* :mod:`.importers`: IFC, IndoorGML, GeoJSON and ROS maps made into world files.
-* :mod:`.exporters`: a world for other programs: ROS map, SVG, GeoJSON, glTF.
 * :mod:`.first_world`: the text of a first world file to change.
 """

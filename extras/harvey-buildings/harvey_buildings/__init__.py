@@ -1,1 +1,88 @@
-"""Buildings of other programs, in and out."""
+"""How does a building of another program become a world file, and a world a file of theirs?
+
+In reading order:
+
+* :mod:`.commands`: ``harvey world import`` and ``harvey world export``.
+* :mod:`.building_plan`: what a building file contains: spaces, openings, furnishings, and a report of what was used.
+* :mod:`.indoor_gml`, :mod:`.ifc`, :mod:`.geojson`, :mod:`.ros_map`: the readers, each into a building plan.
+* :mod:`.polygons`, :mod:`.curved_walls`: outlines cleaned, kept apart by walls, and straightened at doors.
+* :mod:`.openings`: positions of doors, wide openings and windows in walls.
+* :mod:`.furnishings`: furniture and stairs fitted into rooms.
+* :mod:`.layout`: rooms with walls, openings and furniture in place.
+* :mod:`.world_text`: the world file.
+* :mod:`.exporters`: a world for other programs: ROS map, SVG, GeoJSON, glTF.
+
+Other packages add formats by entry points: ``harvey.importers``, an :class:`Importer` under the ending of its files,
+and ``harvey.exporters``, an ``Exporter`` (:mod:`.exporters.export_file`) under the ending or the name of its format.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from inspect import signature
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+from harvey_buildings.building_plan import BuildingError, BuildingPlan, ImportReport
+from harvey_buildings.indoor_gml.navigation_graph import NavigationGraph
+from harvey_buildings.layout import Layout, lay_out
+from harvey_buildings.ros_map.occupancy import PICTURES, explain_bare_picture
+from harvey_buildings.world_text import world_text
+from world_models.plugins import list_plugins, load_plugins
+
+__all__ = ["BuildingError", "ImportReport", "ImportedBuilding", "Importer", "NavigationGraph", "import_building",
+           "read_plan"]
+
+GROUP = "harvey.importers"
+
+
+@runtime_checkable
+class Importer(Protocol):
+    """Reads a building file; one that has a parameter ``wall_height_m`` may be given that. Raises BuildingError."""
+
+    def __call__(self, path: Path, /) -> BuildingPlan:
+        """The plan of the file."""
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedBuilding:
+    """A building as a world file: its text, its layout, and the navigation graph of the file, where it has one."""
+
+    text: str
+    layout: Layout
+    network: NavigationGraph | None
+
+    @property
+    def report(self) -> ImportReport:
+        """What was used of the file, what was guessed and what was left out."""
+        return self.layout.plan.report
+
+
+def import_building(path: Path, wall_height_m: float | None = None) -> ImportedBuilding:
+    """Read a building file and lay it out as a world. Raises BuildingError where it cannot be read.
+
+    ``wall_height_m``: of a ROS map, which has no heights.
+    """
+    plan, network = read_plan(path, wall_height_m)
+    layout = lay_out(plan)
+    return ImportedBuilding(world_text(layout), layout, network)
+
+
+def read_plan(path: Path, wall_height_m: float | None = None) -> tuple[BuildingPlan, NavigationGraph | None]:
+    """The building plan of a file, and its navigation graph where it has one. Raises BuildingError."""
+    ending = path.suffix.lower()
+    if ending in PICTURES:
+        raise BuildingError(explain_bare_picture(path))
+    formats = [f".{name}" for name in list_plugins(GROUP)]
+    if ending not in formats:
+        raise BuildingError(f"{path.name}: expected a building file that ends in {', '.join(formats)}")
+    if not path.is_file():
+        raise BuildingError(f"{path}: expected a building file, got none there")
+    importer = load_plugins(GROUP, Importer, ending[1:])[ending[1:]]
+    if wall_height_m is None:
+        plan: BuildingPlan = importer(path)
+    elif "wall_height_m" in signature(importer).parameters:
+        plan = importer(path, wall_height_m=wall_height_m)
+    else:
+        raise BuildingError(f"{path.name}: expected no wall height, as only a ROS map (.yaml, .yml) has none")
+    return plan, plan.network

@@ -133,15 +133,6 @@ def test_a_journal_that_is_none_is_refused(
     assert code == 2 and err.count("\n") == 1
 
 
-@pytest.mark.parametrize("argv", [
-    ["world", "import", "a.dxf", "--out", "b.toml"],
-])
-def test_a_building_in_an_unknown_format_is_refused(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    code, err = said(capsys, argv)
-    assert code == 2
-    assert err.count("\n") == 1
-    assert "expected a building file that ends in .ifc, .gml, .xml" in err
-
 
 @pytest.mark.parametrize("command", MODULES)
 def test_every_command_teaches_by_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:

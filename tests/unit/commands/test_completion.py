@@ -37,7 +37,7 @@ def script(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
     (["experiment", ""], {*list_names(), "mine.toml"}),
     (["why", ""], {"mine.toml"}),
     (["world", ""], {"new", "edit", "check", "show", "compile", "import", "export"}),
-    (["world", "import", "--w"], {"--wall-height"}),
+    (["world", "show", "--o"], {"--out"}),
     (["run", "bump", "--see"], {"--seed"}),
     (["completion", ""], {"bash", "zsh"}),
 ])

@@ -39,7 +39,7 @@ def test_every_command_is_understood_with_all_its_options(document: str) -> None
     assert [name for name in shown if " " not in name and name not in parser().format_help()] == []
     shown = [line for line in shown if " " in line and "--help" not in line]
     parsed = [(line, *parser().parse_known_args(shlex.split(line))) for line in shown]
-    assert [(line, unknown) for line, args, unknown in parsed if unknown and not args.command.open_ended] == []
+    assert [(line, unknown) for line, args, unknown in parsed if unknown and not args.open_ended] == []
 
 
 def test_every_toml_example_is_a_scenario_or_a_world_without_faults() -> None:
@@ -109,8 +109,9 @@ def test_what_is_told_in_the_document_of_locale_frames_is_told() -> None:
 
 def test_entry_points_are_those_of_the_plugins_table() -> None:
     groups = set(re.findall(r"``(harvey\.\w+)``", plugins.__doc__ or ""))
-    package = tomllib.loads((ROOT / "examples/plugin/pyproject.toml").read_text(encoding="utf-8"))
-    assert groups >= set(package["project"]["entry-points"])
+    packages = [ROOT / "examples/plugin/pyproject.toml", *(ROOT / "extras").glob("*/pyproject.toml")]
+    projects = [tomllib.loads(path.read_text(encoding="utf-8"))["project"] for path in packages]
+    assert groups == {group for project in projects for group in project.get("entry-points", ())}
     recipes = (HOW_TO / "README.md").read_text(encoding="utf-8")
     assert [group for group in sorted(groups) if f"`{group}`" not in recipes] == []
 

@@ -1,0 +1,166 @@
+"""Reading IFC (ISO 16739) building files with ifcopenshell (an extra), in a process of its own."""
+
+from __future__ import annotations
+
+import multiprocessing
+import re
+from collections.abc import Callable
+from importlib.util import find_spec
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harvey_buildings.building_plan import BuildingError, BuildingPlan
+from harvey_buildings.ifc.opened_file import READ_ERRORS, IfcFile, Progress, first_line
+from harvey_buildings.ifc.plan_reader import read_plan
+from harvey_buildings.ifc.shapes import Body
+
+TAIL_BYTES = 65536
+"""How much of a file's start and end is searched for its first and last line."""
+START_S, OPEN_S, OPEN_S_PER_MB = 60.0, 10.0, 5.0
+"""Time limits to start the process and to open a file; beyond these the file is given up."""
+
+
+def read_ifc(path: Path) -> BuildingPlan:
+    """The building plan of an IFC file, read in a process of its own: a broken file may crash or hang native code.
+
+    Raises:
+        BuildingError: the file cannot be read, or ifcopenshell is not installed.
+    """
+    if find_spec("ifcopenshell") is None:
+        raise BuildingError(f"{path.name}: reading IFC takes ifcopenshell, which is not installed: "
+                            ".venv/bin/pip install ifcopenshell")
+    context = multiprocessing.get_context("spawn")
+    answers, sender = context.Pipe(duplex=False)
+    child = context.Process(target=_serve, args=(path, sender), daemon=True)
+    child.start()
+    sender.close()
+    try:
+        answer = await_answer(path, answers)
+    except EOFError:
+        answer = f"{path.name}: expected an IFC file, got one that ends ifcopenshell"
+    finally:
+        child.kill()
+        child.join()
+        answers.close()
+    if isinstance(answer, BuildingPlan):
+        return answer
+    raise BuildingError(answer)
+
+
+def await_answer(path: Path, answers: Connection) -> BuildingPlan | str:
+    """The plan or the error text that the reading process sends, each step within the time limit that it announced."""
+    limit_s, doing = START_S, "starting to read"
+    while answers.poll(limit_s):
+        message: Progress | BuildingPlan | str = answers.recv()
+        if not isinstance(message, Progress):
+            return message
+        limit_s, doing = message.limit_s, message.doing
+    return (f"{path.name}: expected an IFC file, got one that ifcopenshell does not get done with: {doing} was given up"
+            f" after {limit_s:.0f} s")
+
+
+def _serve(path: Path, sender: Connection) -> None:
+    """The reading process: sends its progress, and in the end a plan or an error text."""
+    try:
+        sender.send(_read(path, sender.send))
+    except BuildingError as error:
+        sender.send(str(error))
+
+
+def _read(path: Path, send: Callable[[Progress], None]) -> BuildingPlan:
+    import ifcopenshell
+    import ifcopenshell.geom
+
+    try:
+        send(Progress("opening it", OPEN_S + OPEN_S_PER_MB * path.stat().st_size / 1e6))
+        if _is_truncated(path):
+            raise ValueError("one that is cut off: END-ISO-10303-21; is missing")
+        plain = path.read_bytes().isascii()
+        model = ifcopenshell.open(str(path)) if plain else ifcopenshell.file.from_string(_to_ascii(path))
+    except (*READ_ERRORS, OSError, ifcopenshell.Error) as error:
+        raise BuildingError(f"{path.name}: expected an IFC file, got: {first_line(error)}") from None
+    file = IfcFile(path.stem, path.name, model, _build_shape_reader(), _read_height, send)
+    try:
+        if not _has_unit(model):
+            _assume_metres(model)
+            file.plan.report.guessed.append("the file says nothing of its unit of length: taken for metres")
+        file.unit_m = _read_unit_m(model)
+        return read_plan(file)
+    except READ_ERRORS as error:
+        if isinstance(error, BuildingError):
+            raise
+        raise BuildingError(f"{path.name}: expected an IFC file with spaces, got: {first_line(error)}") from None
+
+
+def _is_truncated(path: Path) -> bool:
+    data = path.read_bytes()
+    return b"ISO-10303-21;" in data[:TAIL_BYTES] and b"END-ISO-10303-21" not in data[-TAIL_BYTES:]
+
+
+def _to_ascii(path: Path) -> str:
+    """The text of a file with every non-ASCII letter escaped as STEP wants it; some programs do not escape them."""
+    data = path.read_bytes()
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        text = data.decode("cp1252", errors="replace")
+    return re.sub(r"[^\x00-\x7f]+", lambda found: f"\\X4\\{found[0].encode('utf-32-be').hex().upper()}\\X0\\", text)
+
+
+def _build_shape_reader() -> Callable[[Any, bool], Body]:
+    """A function for the shape of an element; with ``roughly`` also from its bounding box or its lines on the plan."""
+    import ifcopenshell.geom
+
+    geometry: Any = ifcopenshell.geom
+    settings, rough = geometry.settings(), geometry.settings()
+    rough.set("keep-bounding-boxes", True)
+    rough.set("dimensionality", ifcopenshell.ifcopenshell_wrapper.CURVES_SURFACES_AND_SOLIDS)
+
+    def shape(element: Any, roughly: bool) -> Body:
+        try:
+            made = geometry.create_shape(rough if roughly else settings, element)
+        except RuntimeError:
+            given = "a shape that cannot be read" if getattr(element, "Representation", None) else "no shape"
+            raise ValueError(f"the file gives it {given}") from None
+        points = np.array(made.geometry.verts, float).reshape(-1, 3)
+        frame = np.array(made.transformation.matrix, float).reshape(4, 4).T[:3]
+        if not len(points) or not np.isfinite(points).all() or not np.isfinite(frame).all():
+            raise ValueError("it has no shape")
+        return Body(points, np.array(made.geometry.faces, int).reshape(-1, 3), frame,
+                    np.array(made.geometry.edges, int).reshape(-1, 2))
+
+    return shape
+
+
+def _read_height(element: Any) -> float | None:
+    """Height of an element's placement above the file's zero, in the file's unit; None where it has none."""
+    import ifcopenshell.util.placement
+
+    if getattr(element, "ObjectPlacement", None) is None:
+        return None
+    return float(ifcopenshell.util.placement.get_local_placement(element.ObjectPlacement)[2][3])
+
+
+def _has_unit(model: Any) -> bool:
+    return any(getattr(unit, "UnitType", None) == "LENGTHUNIT" for project in model.by_type("IfcProject")
+               for unit in getattr(project.UnitsInContext, "Units", None) or ())
+
+
+def _assume_metres(model: Any) -> None:
+    for project in model.by_type("IfcProject"):
+        units = tuple(getattr(project.UnitsInContext, "Units", None) or ())
+        metre = model.create_entity("IfcSIUnit", UnitType="LENGTHUNIT", Name="METRE")
+        project.UnitsInContext = model.create_entity("IfcUnitAssignment", Units=[*units, metre])
+
+
+def _read_unit_m(model: Any) -> float:
+    """The file's unit of length [m]."""
+    import ifcopenshell.util.unit
+
+    try:
+        return float(ifcopenshell.util.unit.calculate_unit_scale(model))
+    except READ_ERRORS:
+        return 1.0

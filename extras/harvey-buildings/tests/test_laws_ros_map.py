@@ -1,0 +1,163 @@
+"""The laws of ROS maps: pictures are read as the map server reads them; what is drawn is what is traced."""
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import shapely
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from experiments.generated.floors import ScanNoise, write_floor_map
+from harvey_buildings import BuildingError, import_building
+from harvey_buildings.ros_map.grid import find_wall_turn, make_grid
+from harvey_buildings.ros_map.map_yaml import MapFile, read_map_yaml
+from harvey_buildings.ros_map.occupancy import FREE, OCCUPIED, UNKNOWN, read_cells
+from world_models.building.checks import check_world
+from world_models.building.world import World
+from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
+
+PICTURES = arrays(np.uint8, st.tuples(st.integers(1, 12), st.integers(1, 12)))
+MANY = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FEW = settings(MANY, max_examples=15)
+
+
+def write_map(folder: Path, picture: np.ndarray, kind: str = "P5", **keys: object) -> Path:
+    """A map.yaml with its picture, as P2, P5 or png."""
+    rows, columns = picture.shape
+    name = "m.png" if kind == "png" else "m.pgm"
+    if kind == "png":
+        cv2.imwrite(str(folder / name), picture)
+    elif kind == "P5":
+        (folder / name).write_bytes(f"P5 {columns} {rows} 255\n".encode() + picture.tobytes())
+    else:
+        (folder / name).write_text(f"P2\n# by hand\n{columns} {rows}\n255\n"
+                                   + "\n".join(" ".join(map(str, row)) for row in picture.tolist()) + "\n")
+    lines = {"image": name, "resolution": 0.05, "origin": "[0, 0, 0]", **keys}
+    (folder / "m.yaml").write_text("".join(f"{key}: {value}\n" for key, value in lines.items()))
+    return folder / "m.yaml"
+
+
+def cells_of(path: Path) -> np.ndarray:
+    return read_cells(read_map_yaml(path))
+
+
+@MANY
+@given(picture=PICTURES, free=st.floats(0.0, 0.45), occupied=st.floats(0.5, 1.0), negate=st.booleans())
+def test_cells_are_those_of_the_map_server_in_each_format(
+    tmp_path: Path, picture: np.ndarray, free: float, occupied: float, negate: bool,
+) -> None:
+    keys = {"free_thresh": free, "occupied_thresh": occupied, "negate": int(negate)}
+    p = picture / 255.0 if negate else (255.0 - picture) / 255.0
+    near = (np.abs(p - free) < 1e-6) | (np.abs(p - occupied) < 1e-6)
+    expected = np.where(p < free, FREE, np.where(p > occupied, OCCUPIED, UNKNOWN))
+    for kind in ("P2", "P5", "png"):
+        cells = cells_of(write_map(tmp_path, picture, kind, **keys))
+        assert (cells == expected)[~near].all()
+
+
+@MANY
+@given(picture=PICTURES)
+def test_raw_cells_are_percents(tmp_path: Path, picture: np.ndarray) -> None:
+    expected = np.where(picture > 100, UNKNOWN, np.where(picture < 20, FREE, np.where(picture > 65, OCCUPIED, UNKNOWN)))
+    for kind in ("P5", "png"):
+        assert (cells_of(write_map(tmp_path, picture, kind, mode="raw")) == expected).all()
+
+
+@MANY
+@given(turn_deg=st.floats(-44.0, 44.0), x=st.floats(-50, 50), y=st.floats(-50, 50), yaw=st.floats(-3.0, 3.0))
+def test_a_cell_of_the_grid_is_where_the_map_server_puts_it(turn_deg: float, x: float, y: float, yaw: float) -> None:
+    """A mark in a turned picture: its place in the grid, mapped back, is its place in the map's frame."""
+    cells = np.full((120, 150), UNKNOWN)
+    rows, columns = np.mgrid[:120, :150]
+    c, s = math.cos(math.radians(turn_deg)), math.sin(math.radians(turn_deg))
+    along, across = c * (columns - 75) - s * (rows - 60), s * (columns - 75) + c * (rows - 60)
+    inside = (np.abs(along) < 40) & (np.abs(across) < 25)
+    cells[inside] = OCCUPIED
+    cells[(np.abs(along) < 38) & (np.abs(across) < 23)] = FREE
+    grid = make_grid(cells, MapFile(Path("m.pgm"), 0.1, (x, y, yaw), False, 0.65, 0.196, "trinary"))
+    middle = np.argwhere(grid.cells == FREE).mean(axis=0)
+    true = np.argwhere(cells == FREE).mean(axis=0)
+    flat = np.array([(true[1] + 0.5) * 0.1, (120 - 0.5 - true[0]) * 0.1])
+    turned = np.array([math.cos(yaw) * flat[0] - math.sin(yaw) * flat[1],
+                       math.sin(yaw) * flat[0] + math.cos(yaw) * flat[1]])
+    assert grid.to_map(middle[None])[0] == pytest.approx(turned + np.array([x, y]), abs=0.1)
+    assert math.degrees(find_wall_turn(cells)) == pytest.approx(turn_deg, abs=2.0)
+
+
+def two_rooms(width: float, depth: float, other: float, door: float, wall: float, at: float) -> World:
+    """Two rooms beside one another with an open door, as a world file."""
+    along = door / 2 + 0.5 + at * (depth - door - 1.0)
+    return read_world(Source.parse(f"""
+name = "two"
+units = "metres"
+[finishes]
+plain = {{ colour = [0.6, 0.6, 0.6] }}
+[defaults]
+height = 2.6
+walls = "plain"
+baseboard = "plain"
+frame = "plain"
+[locales.a]
+kind = "room"
+size = [{width}, {depth}]
+[locales.b]
+kind = "room"
+at = [{width + wall}, 0]
+size = [{other}, {depth}]
+[doors]
+d = {{ between = ["a", "b"], wall = "east", along = {along}, width = {door}, open = true }}
+""", "two"))
+
+
+def traced(path: Path, wall_height_m: float | None = None) -> World:
+    return read_world(Source.parse(import_building(path, wall_height_m).text, "traced"))
+
+
+@FEW
+@given(width=st.floats(2.5, 6.0), depth=st.floats(2.5, 5.0), other=st.floats(2.5, 6.0), door=st.floats(0.8, 1.2),
+       wall=st.floats(0.15, 0.4), at=st.floats(0.0, 1.0), turn=st.floats(-0.7, 0.7), seed=st.integers(0, 999))
+def test_rooms_and_their_door_are_traced_where_they_are(
+    tmp_path: Path, width: float, depth: float, other: float, door: float, wall: float, at: float, turn: float,
+    seed: int,
+) -> None:
+    world = two_rooms(width, depth, other, door, wall, at)
+    noise = ScanNoise(rough=0.05, turn_rad=turn)
+    made = traced(write_floor_map(tmp_path, world, noise, np.random.default_rng(seed)), 3.1)
+    assert check_world(made) == []
+    assert len(made.rooms) == 2
+    for room in world.rooms:
+        true = shapely.Polygon(world.outline(room))
+        overlap = max(shapely.Polygon(made.outline(r)).intersection(true).area / shapely.Polygon(made.outline(r)).union(
+            true).area for r in made.rooms)
+        assert overlap > 0.88
+    (doorway,) = made.doorways
+    (expected,) = world.doorways
+    assert doorway.centre_world == pytest.approx(expected.centre_world, abs=0.15)
+    assert doorway.width_m == pytest.approx(expected.width_m, abs=0.3)
+
+
+@settings(deadline=None, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(seed=st.integers(0, 10_000), size=st.integers(20, 90), boxes=st.integers(0, 12))
+def test_any_picture_becomes_a_world_without_faults_or_one_sentence(
+    tmp_path: Path, seed: int, size: int, boxes: int,
+) -> None:
+    """Free boxes laid over one another at random, with walls drawn across them."""
+    rng = np.random.default_rng(seed)
+    picture = np.full((size, size), 205, np.uint8)
+    for _ in range(boxes):
+        (r, c), (h, w) = rng.integers(0, size, 2), rng.integers(3, 50, 2)
+        picture[r : r + h, c : c + w] = 0
+        picture[r + 1 : r + h - 1, c + 1 : c + w - 1] = 254
+    path = write_map(tmp_path, picture, resolution=0.1)
+    try:
+        made = traced(path)
+    except BuildingError as error:
+        assert "expected" in str(error) and "m.p" in str(error)
+        return
+    assert check_world(made) == []
+    assert len(made.rooms) > 0
