@@ -198,9 +198,9 @@ def predict_p_false(
     projected = robot.camera.project_segments(lines_world, robot.camera_from_world(pose))[0]
     projected = projected[np.isfinite(projected).all(axis=(1, 2))]
     lines = check_lines(robot, lines_world, projected, pose, settings)
-    colors = predict_color_check(predict_face_colors(robot, pose, settings), settings)
+    colors = predict_color_check(predict_face_colors(robot, pose))
     return POSE_CONFIDENCE.p_false(compute_evidence(
-        robot, lines_world, projected, pose, covariance, pose, covariance, lines, colors, settings))
+        robot, lines_world, projected, pose, covariance, pose, covariance, lines, colors))
 
 
 def find_alias(
@@ -221,7 +221,7 @@ def find_alias(
 
 def _get_colors(robot: RobotModel, pose: Pose2, settings: VerificationSettings) -> Floats:
     """(n, 3) of the faces in view."""
-    return np.array([color for color, _ in predict_face_colors(robot, pose, settings)]).reshape(-1, 3)
+    return np.array([color for color, _ in predict_face_colors(robot, pose)]).reshape(-1, 3)
 
 
 def _repeat(robot: RobotModel, locale: str, pose: Pose2) -> Iterator[Pose2]:

@@ -18,7 +18,12 @@ from numba import njit
 from knowledge_sources.methods.arrays import Floats, Indices
 from knowledge_sources.methods.matching.pose_matching import refine_pose
 from knowledge_sources.methods.matching.pose_pairs import PoseParameters
-from knowledge_sources.methods.verification.line_check import compute_coverage
+from knowledge_sources.methods.verification.line_check import (
+    LINE_TOLERANCE_RAD,
+    MAX_LINE_WEIGHT_PX,
+    MIN_COVERED_FRACTION,
+    compute_coverage,
+)
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose
@@ -72,7 +77,7 @@ def compute_pose_score(lines_px: Floats, segments_px: Floats, chance: float) -> 
     ``chance`` is the probability that a line is found at a wrong pose.
     """
     s = DEFAULT.verification
-    coverage = compute_coverage(lines_px, segments_px, s.line_tolerance_px, s.line_tolerance_rad)
+    coverage = compute_coverage(lines_px, segments_px, s.line_tolerance_px, LINE_TOLERANCE_RAD)
     groups = group_lines(lines_px)
     seen = groups >= 0
     lengths = np.linalg.norm(lines_px[seen, 1] - lines_px[seen, 0], axis=1)
@@ -163,7 +168,7 @@ def find_self_motions(
         if not np.any(seen):
             continue
         covered = compute_coverage(there[seen], here, RIVAL_SAME_PX, RIVAL_SAME_RAD)
-        weights = np.minimum(lengths[seen], DEFAULT.verification.max_line_weight_px)
+        weights = np.minimum(lengths[seen], MAX_LINE_WEIGHT_PX)
         found.append((nearest, float(np.sum(covered * weights) / np.sum(weights))))
     alike = [pair for pair in found if pair[1] >= RIVAL_MIN_SELF_SIMILARITY]
     return sorted(alike, key=lambda pair: -pair[1])
@@ -178,7 +183,7 @@ def is_within_prior(parameters: PoseParameters, pose: Pose, sigmas: float) -> bo
 def _vote(at_camera: Floats, lengths: Floats, cell_m: float, parameters: PoseParameters) -> list[Floats]:
     """Translations (3,) [m, camera] with the most votes, of near-parallel lines (m, 2, 3), weighted by length [px]."""
     longest = np.argsort(-lengths, kind="stable")[: RIVAL_MAX_VOTING_LINES]
-    ends, weights = at_camera[longest], np.minimum(lengths[longest], DEFAULT.verification.max_line_weight_px)
+    ends, weights = at_camera[longest], np.minimum(lengths[longest], MAX_LINE_WEIGHT_PX)
     spans = ends[:, 1] - ends[:, 0]
     directions = spans / np.maximum(np.linalg.norm(spans, axis=1), 1e-9)[:, None]
     i, j = np.nonzero(np.abs(directions @ directions.T) >= np.cos(RIVAL_PARALLEL_RAD))
@@ -286,7 +291,7 @@ def _score(lines: Floats, segments_px: Floats, camera: Camera, pose: Pose, chanc
 
 def _compare(own: PoseScore, other: PoseScore, lines: Floats, there: Floats) -> tuple[int, int]:
     """Numbers of lines that agree at both poses, and at the first only."""
-    least = DEFAULT.verification.min_covered_fraction
+    least = MIN_COVERED_FRACTION
     at_own, at_other = _count_groups(own, least), _count_groups(other, least)
     if lines.shape == there.shape and np.array_equal(lines, there):
         agree = (np.nan_to_num(own.coverage) >= least, np.nan_to_num(other.coverage) >= least)

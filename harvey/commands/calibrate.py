@@ -16,8 +16,7 @@ from harvey.errors import BadInput
 if TYPE_CHECKING:
     from harvey.hardware.calibration import Grey, Mounted
     from harvey.hardware.drivers.camera import VideoCamera
-    from knowledge_sources.methods.calibration.chessboard import Pattern
-    from knowledge_sources.methods.calibration.intrinsics import Calibration
+    from knowledge_sources.methods.calibration.intrinsics import Calibration, Pattern
 
 PATTERN = re.compile(r"(\d{1,3})x(\d{1,3})", re.ASCII)
 
@@ -71,7 +70,7 @@ def _run(args: Namespace) -> int:
         grey_of,
         report,
     )
-    from knowledge_sources.methods.calibration.chessboard import Pattern
+    from knowledge_sources.methods.calibration.intrinsics import Pattern
     from knowledge_sources.methods.calibration.picture import draw_calibration
     from world_models.files.toml.camera_file import camera_text
 

@@ -13,8 +13,14 @@ from numpy.typing import NDArray
 from harvey.errors import BadInput
 from harvey.hardware.drivers.camera import VideoCamera
 from harvey.hardware.drivers.capture import CameraFault
-from knowledge_sources.methods.calibration.chessboard import Pattern, find_corners
-from knowledge_sources.methods.calibration.intrinsics import PARAMETERS, BoardView, Calibration, calibrate
+from knowledge_sources.methods.calibration.intrinsics import (
+    PARAMETERS,
+    BoardView,
+    Calibration,
+    Pattern,
+    calibrate,
+    find_corners,
+)
 from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
 from knowledge_sources.methods.features.picture import read_picture
 from world_models.camera import CameraDeviation, CameraMount

@@ -107,7 +107,7 @@ class Relocalizer(RobotKnowledgeSource):
         glimpses = _collect_glimpses(view, segments, before, robot.actuator)
         looks, hidden = [_to_view(view, g) for g in glimpses], view.latest(Obstruction)
         known, tuning = None if hidden is None else hidden.value, self._settings.localization
-        obstruction = update_obstruction(looks, robot.camera, known, settings=tuning)
+        obstruction = update_obstruction(looks, robot.camera, known)
         if obstruction is not None:
             looks = [replace(g, segments_px=obstruction.without_its_own(g.segments_px)) for g in looks]
         because: tuple[object, ...] = (segments, lost)
@@ -188,7 +188,7 @@ class Relocalizer(RobotKnowledgeSource):
         if looks < s.localization.min_views or not (is_stuck or looks >= s.localization.max_searched_views):
             return None
         hypotheses, looked = [c.hypothesis for c in result.candidates], [g.now_from_then for g in glimpses]
-        return choose_far_action(robot, hypotheses, looked, rooms, make_view_predictor(robot, s), s)
+        return choose_far_action(robot, hypotheses, looked, rooms, make_view_predictor(robot, s))
 
     def _list_rooms(self, view: View, belief: Hypothesis) -> list[str]:
         """The rooms of the floor, the nearest to the last belief first; other floors are not searched."""

@@ -152,8 +152,7 @@ class MilestoneJudge(RobotKnowledgeSource):
             robot, lines, segments.segments_px, pose, s.verification).projected_px
         faces = check_colors(robot, pose, read_picture(frame.jpeg).quarter, milestone.looks, s)
         weight = compute_evidence(
-            robot, lines, segments.segments_px, pose, fix.covariance, before, covariance, agreed, faces,
-            s.verification)
+            robot, lines, segments.segments_px, pose, fix.covariance, before, covariance, agreed, faces)
         p_false = POSE_CONFIDENCE.p_false(weight)
         in_doubt = open_discrepancy(view, Level.PLAN) is not None
         covariance = covariance + fix.covariance

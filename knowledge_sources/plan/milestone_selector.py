@@ -135,9 +135,7 @@ class MilestoneSelector(RobotKnowledgeSource):
         turned = replace(check, look_heading_rad=heading)
         yield Post(replace(turned, told=self._sum_told(view, turned)), (doubt, belief))
 
-    def _expect_again(
-        self, view: View, hidden: Entry[Obstruction], belief: Entry[Hypothesis]
-    ) -> Iterable[Effect]:
+    def _expect_again(self, view: View, hidden: Entry[Obstruction], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         """Predict a milestone again whose picture is taken, without what the obstruction hides."""
         waiting = _awaited_milestone(view)
         if waiting is None:
@@ -308,7 +306,7 @@ def predict_milestone(
         expected=_to_tuples(lines.lines_world),
         expected_px=_to_tuples(lines.segments_px),
         landmark_of=tuple(marks.index(int(i)) for i in lines.landmark),
-        looks=predict_face_colors(robot, pose, settings.verification),
+        looks=predict_face_colors(robot, pose),
         modes=errors.modes,
         shifts=pack_errors(errors),
         status="expected",

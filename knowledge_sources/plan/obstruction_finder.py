@@ -65,7 +65,7 @@ def _find_in_last_looks(
     """The obstruction that all looks show; else that fewer of the last ones show, as it may be new."""
     for number in range(len(views), MIN_OBSTRUCTION_LOOKS - 1, -1):
         found = update_obstruction(
-            views[:number], camera, known, MIN_OBSTRUCTION_PART, settings.localization)
+            views[:number], camera, known, MIN_OBSTRUCTION_PART)
         if found is not None:
             return found
     return None

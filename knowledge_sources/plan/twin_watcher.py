@@ -16,6 +16,7 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.localization.aliasing import find_repetitions
 from knowledge_sources.methods.localization.global_localization import make_alias_test
+from knowledge_sources.methods.localization.next_view import MIN_NEW_VIEW_RAD, MOVE_M
 from knowledge_sources.methods.localization.place_odds import compute_prior, compute_twin_odds
 from knowledge_sources.methods.localization.pose_candidates import are_distinct
 from knowledge_sources.methods.localization.refinement import compute_pose_likelihood
@@ -46,7 +47,7 @@ class TwinWatcher(RobotKnowledgeSource):
         if is_over(view) or open_discrepancy(view, Level.GOAL) is not None or find_belief(view) is None:
             return None
         fix = view.get(trigger.entry.value.fix)
-        if fix is None or not self._settings.localization.watches_twins:
+        if fix is None:
             return None
         known = _find_odds(view)
         return 1.0 if known is None or (known.value.twins and self._is_new(known.value, fix.value)) else None
@@ -78,9 +79,9 @@ class TwinWatcher(RobotKnowledgeSource):
 
     def _is_new(self, known: TwinOdds, fix: PoseFix) -> bool:
         """Whether a picture shows something else than the last that was counted."""
-        s, pose = self._settings.localization, fix.world_from_robot
+        pose = fix.world_from_robot
         turn = abs(wrap_angle(pose.heading_rad - known.last.heading_rad))
-        return pose.distance_to(known.last) >= 0.5 * s.move_m or turn >= s.min_new_view_rad
+        return pose.distance_to(known.last) >= 0.5 * MOVE_M or turn >= MIN_NEW_VIEW_RAD
 
     def _find_twins(self, view: View, robot: RobotModel, belief: Hypothesis, here: Pose2) -> tuple[Twin, ...]:
         """The places of the floor that look like the believed one by walls and doors."""
@@ -92,9 +93,9 @@ class TwinWatcher(RobotKnowledgeSource):
             return ()
         nearest = [belief.locale, *(room for room in rooms if room != belief.locale)][:self._settings.goal.max_rooms]
         back = here.inverse()
-        found, s = dict[Pose2, str](), self._settings.localization
-        for room, there in find_repetitions(robot.world, belief.locale, here, nearest, s):
-            if all(are_distinct(there, other, s) for other in (here, *found)):
+        found = dict[Pose2, str]()
+        for room, there in find_repetitions(robot.world, belief.locale, here, nearest):
+            if all(are_distinct(there, other) for other in (here, *found)):
                 found[there] = room
         return tuple(Twin(room, there @ back, 0.0) for there, room in found.items())
 

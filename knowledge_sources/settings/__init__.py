@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from knowledge_sources.settings.action import ActionSettings
-from knowledge_sources.settings.calibration import CalibrationSettings
 from knowledge_sources.settings.camera_state import CameraStateSettings
 from knowledge_sources.settings.features import FeaturesSettings
 from knowledge_sources.settings.floor import FloorSettings
@@ -31,7 +30,6 @@ class Settings:
     verification: VerificationSettings = field(default_factory=VerificationSettings)
     localization: LocalizationSettings = field(default_factory=LocalizationSettings)
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
-    calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
     camera_state: CameraStateSettings = field(default_factory=CameraStateSettings)
     action: ActionSettings = field(default_factory=ActionSettings)
     plan: PlanSettings = field(default_factory=PlanSettings)

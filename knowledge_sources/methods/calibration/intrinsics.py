@@ -1,23 +1,96 @@
-"""Camera calibration from views of a chessboard: intrinsics, distortion, and their covariance.
+"""Camera calibration from views of a chessboard: corners, intrinsics, distortion, and their covariance.
 
-Source: Z. Zhang, A flexible new technique for camera calibration, PAMI 22(11), 2000, as OpenCV implements it. The
-covariance is computed here, as OpenCV gives standard deviations only.
+Corners are found to a few hundredths of a pixel; where a picture cannot be used it is said why. Source: Z. Zhang, A
+flexible new technique for camera calibration, PAMI 22(11), 2000, as OpenCV implements it. The covariance is computed
+here, as OpenCV gives standard deviations only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 
-from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.calibration.chessboard import Pattern
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.calibration import CalibrationSettings
+from knowledge_sources.methods.arrays import Floats, Floats32
 from world_models.camera import Camera
 from world_models.frames import frozen
+
+MIN_SQUARE_PX = 5.0  # least side of a chessboard's square in a picture that is used
+MAX_EDGE_RISE_PX = 5.0  # largest width of the rise from black to white before a picture counts as blurred
+CORNER_WINDOW_SHARE = 0.4
+"""Half-width of the window of corner refinement as a share of the distance to the next corner (rendered boards: 0.048
+px RMS with 3 px, 0.035 px with 8 px)."""
+MAX_CORNER_WINDOW_PX = 11  # largest half-width of that window
+CORNER_ITERATIONS = 60  # iteration limit of corner refinement
+CORNER_TOLERANCE_PX = 1e-4  # step at which corner refinement ends
+
+_UNKNOWN_PX = 1000.0
+"""OpenCV's sharpness from here on means that it could not measure it, as for squares seen at a flat angle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """A chessboard: how many inner corners in a row and in a column, and the side of a square [m]."""
+
+    columns: int
+    rows: int
+    square_m: float
+
+    def __post_init__(self) -> None:
+        if min(self.columns, self.rows) < 3 or not 0.0 < self.square_m < 10.0:
+            raise ValueError("expected at least 3 x 3 inner corners and squares of more than 0 and less than 10 m, got "
+                             f"{self.columns} x {self.rows} and {self.square_m} m")
+
+    @property
+    def points(self) -> Floats:
+        """(columns rows, 3) inner corners, row by row, in the board's plane z = 0 [m]."""
+        y, x = np.divmod(np.arange(self.columns * self.rows), self.columns)
+        return np.stack([x, y, np.zeros_like(x)], axis=1) * self.square_m
+
+
+def find_corners(image: Any, pattern: Pattern) -> Floats | str:
+    """Find the inner corners of a board in a grey picture (h, w) uint8.
+
+    Returns:
+        (columns rows, 2) corners, row by row [px]; or the reason why the picture cannot be used.
+    """
+    grey = np.ascontiguousarray(image, np.uint8)
+    size = (pattern.columns, pattern.rows)
+    if min(grey.shape) < min(size) * MIN_SQUARE_PX:
+        return f"the picture is only {grey.shape[1]} x {grey.shape[0]} px"
+    found, corners = cv2.findChessboardCorners(grey, size)
+    if not found:
+        found, corners = cv2.findChessboardCornersSB(grey, size, flags=cv2.CALIB_CB_NORMALIZE_IMAGE)
+    if not found:
+        return f"no board of {pattern.columns} x {pattern.rows} inner corners in it"
+    rough = np.asarray(corners, np.float32).reshape(-1, 2)
+    spacing = _measure_spacing_px(rough, pattern)
+    if spacing < MIN_SQUARE_PX:
+        return f"the board's squares are only {spacing:.1f} px wide"
+    rise = float(np.ravel(cv2.estimateChessboardSharpness(grey, size, rough)[0])[0])
+    if MAX_EDGE_RISE_PX < rise < _UNKNOWN_PX:
+        return f"blurred: edges take {rise:.1f} px from black to white"
+    half = min(max(2, int(CORNER_WINDOW_SHARE * spacing)), MAX_CORNER_WINDOW_PX)
+    criteria = cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, CORNER_ITERATIONS, CORNER_TOLERANCE_PX
+    fine = cv2.cornerSubPix(grey, rough.reshape(-1, 1, 2).copy(), (half, half), (-1, -1), criteria).reshape(-1, 2)
+    moved = float(np.max(np.linalg.norm(fine - rough, axis=1)))
+    return f"a corner is not clear to {moved:.1f} px" if moved > half else np.asarray(fine, np.float64)
+
+
+def _measure_spacing_px(corners: Floats32, pattern: Pattern) -> float:
+    """The least distance between neighbouring corners [px]."""
+    grid = corners.reshape(pattern.rows, pattern.columns, 2)
+    steps = [np.linalg.norm(np.diff(grid, axis=axis), axis=-1).min() for axis in (0, 1)]
+    return float(min(steps))
+
+
+MIN_VIEWS = 4  # least number of views of the board (Zhang 2000)
+MAX_VIEW_RMS_RATIO = 3.0  # largest RMS error of a view over that of the median view before it is left out
+CALIBRATION_ITERATIONS = 100  # iteration limit of the calibration
+CALIBRATION_TOLERANCE = 1e-10  # relative step at which the calibration ends
 
 PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 """Names of the parameters, in OpenCV's order."""
@@ -75,7 +148,6 @@ class Calibration:
 
 def calibrate(
     views: Sequence[BoardView], pattern: Pattern, size: tuple[int, int], *, with_k3: bool = False,
-    settings: CalibrationSettings = DEFAULT.calibration,
 ) -> Calibration:
     """Estimate the camera from views of a board, and reject views whose error is an outlier.
 
@@ -88,13 +160,13 @@ def calibrate(
     """
     used, rejected = list(views), dict[str, str]()
     while True:
-        if len(used) < settings.min_views:
+        if len(used) < MIN_VIEWS:
             raise ValueError(
-                f"expected at least {settings.min_views} views of the board that can be used, got {len(used)}")
-        fit = _fit_camera(used, pattern, size, with_k3, settings)
+                f"expected at least {MIN_VIEWS} views of the board that can be used, got {len(used)}")
+        fit = _fit_camera(used, pattern, size, with_k3)
         rms = np.array([_compute_rms(r) for r in fit.residuals])
         worst, usual = int(np.argmax(rms)), float(np.median(rms))
-        if rms[worst] <= settings.max_view_rms_ratio * usual:
+        if rms[worst] <= MAX_VIEW_RMS_RATIO * usual:
             return _to_calibration(fit, used, rejected, size)
         why = f"its corners are off by {rms[worst]:.2f} px, {usual:.2f} px are usual here"
         rejected[used.pop(worst).name] = why
@@ -112,14 +184,12 @@ class _Fit:
     jacobians: tuple[Floats, ...]
 
 
-def _fit_camera(
-    views: Sequence[BoardView], pattern: Pattern, size: tuple[int, int], with_k3: bool, settings: CalibrationSettings
-) -> _Fit:
+def _fit_camera(views: Sequence[BoardView], pattern: Pattern, size: tuple[int, int], with_k3: bool) -> _Fit:
     points = pattern.points.astype(np.float32)
     flags = 0 if with_k3 else cv2.CALIB_FIX_K3
     corners = [view.corners_px.astype(np.float32) for view in views]
-    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, settings.calibration_iterations,
-                settings.calibration_tolerance)
+    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, CALIBRATION_ITERATIONS,
+                CALIBRATION_TOLERANCE)
     try:
         _, matrix, distortion, turns, places = cv2.calibrateCamera(
             [points] * len(views), corners, size, np.eye(3), np.zeros(5), flags=flags, criteria=criteria

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.calibration.chessboard import Pattern
-from knowledge_sources.methods.calibration.intrinsics import Calibration, project_board
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.calibration import CalibrationSettings
+from knowledge_sources.methods.calibration.intrinsics import Calibration, Pattern, project_board
 from world_models.camera import Camera
+
+MAX_TILT_RAD = 1.55  # largest tilt of a camera before the view of its mounting board is refused
+MAX_ROLL_RAD = 0.8  # largest roll of a camera before the view of its mounting board is refused
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,6 @@ class Mounting:
 
 def estimate_mounting(
     calibration: Calibration, corners_px: Floats, pattern: Pattern, *, standing_at_m: float | None = None,
-    settings: CalibrationSettings = DEFAULT.calibration,
 ) -> Mounting:
     """Estimate the mounting from one view of a board, with its covariance propagated to first order.
 
@@ -72,7 +71,7 @@ def estimate_mounting(
     px, jacobian = project_board(pattern, pose[:3], pose[3:], camera.matrix, np.asarray(camera.distortion))
     slope = _differentiate(compute, pose)
     covariance = slope @ _compute_pose_covariance(jacobian, corners_px - px, calibration) @ slope.T
-    if not (values[0] > 0.0 and abs(values[1]) < settings.max_tilt_rad and abs(values[2]) < settings.max_roll_rad):
+    if not (values[0] > 0.0 and abs(values[1]) < MAX_TILT_RAD and abs(values[2]) < MAX_ROLL_RAD):
         where = "on the floor" if standing_at_m is None else "upright"
         raise ValueError(f"expected a board {where} before the camera, got one that puts it {values[0]:.2f} m high, "
                          f"tilted by {math.degrees(values[1]):.0f} and rolled by {math.degrees(values[2]):.0f} degrees")

@@ -17,23 +17,34 @@ from typing import NamedTuple
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.localization.next_view import SAME_LINE_PX, SAME_LINE_RAD
 from knowledge_sources.methods.localization.pose_candidates import are_distinct, find_pose_candidates
 from knowledge_sources.methods.localization.refinement import refine_pose
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.pose.displacements import fit_displacements
-from knowledge_sources.methods.verification.line_check import compute_coverage, find_errors, predict_lines
+from knowledge_sources.methods.verification.line_check import (
+    LINE_TOLERANCE_RAD,
+    MAX_LINE_WEIGHT_PX,
+    MIN_COVERED_FRACTION,
+    compute_coverage,
+    find_errors,
+    predict_lines,
+)
 from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.localization import LocalizationSettings
 from world_models.building.building import Building
 from world_models.building.model_errors import LineErrors
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 
+MAX_SIZE_DIFFERENCE_M = 0.1  # difference in the sides of rooms that may be alike
+ALIAS_LINE_LENGTH_PX = 30.0  # length that counts as one line of a margin
+MAX_FITTING_POSES = 14  # most poses of a room that are tried because the picture fits
+VIEW_GRID_M = 0.1  # grid of positions on which visible lines are computed and kept
+VIEW_GRID_RAD = math.radians(2.0)  # grid of headings on which visible lines are computed and kept
+CACHED_VIEWS = 64  # predicted views on the grid that are kept
 
-def find_repetitions(
-    building: Building, room: str, pose: Pose2, rooms: Sequence[str],
-    settings: LocalizationSettings = DEFAULT.localization,
-) -> Iterator[tuple[str, Pose2]]:
+
+def find_repetitions(building: Building, room: str, pose: Pose2, rooms: Sequence[str]) -> Iterator[tuple[str, Pose2]]:
     """Yield room and pose of every place in ``rooms`` that looks like ``pose`` in ``room`` by walls and doors alone.
 
     Rooms of the same size are laid on each other, turned by right angles, also a room on itself; and the door nearest
@@ -45,7 +56,7 @@ def find_repetitions(
         there, sides = _find_box(building, other)
         for quarter in range(4):
             turned = size if quarter % 2 == 0 else size[::-1]
-            if np.all(np.abs(turned - sides) < settings.max_size_difference_m) and (quarter or other != room):
+            if np.all(np.abs(turned - sides) < MAX_SIZE_DIFFERENCE_M) and (quarter or other != room):
                 yield other, Pose2(float(there[0]), float(there[1]), quarter * 0.5 * math.pi) @ own
     doors = [(name, doorway.pose_from(name)) for name in (room, *(r for r in rooms if r != room))
              for doorway in building.doorways_of(name)]
@@ -77,22 +88,22 @@ def find_strongest_alias(
     Tried are the poses at which the room repeats itself and, with ``search``, wherever else in it the segments fit:
     notices and painted doors that no plan shows may repeat themselves. A search takes half a second.
     """
-    others = [*find_repeated_poses(robot, room, pose, settings),
+    others = [*find_repeated_poses(robot, room, pose),
               *(find_fitting_poses(robot, segments_px, room, pose, settings) if search else ())]
     if not others:
         return None
     views = predict_views_on_grid(robot, (pose, *others), settings, segments_px)
     own, *there = (score_view(lines_px, segments_px, settings) for lines_px in views)
-    margins = [compute_margin(own, other, settings) for other in there]
+    margins = [compute_margin(own, other) for other in there]
     smallest = int(np.argmin(margins))
     return Alias(others[smallest], margins[smallest])
 
 
-def find_repeated_poses(robot: RobotModel, room: str, pose: Pose2, settings: Settings = DEFAULT) -> list[Pose2]:
+def find_repeated_poses(robot: RobotModel, room: str, pose: Pose2) -> list[Pose2]:
     """Find the other poses within a room at which its plan repeats itself."""
     outline = robot.world.outline(room)
     low, high = outline.min(axis=0), outline.max(axis=0)
-    return [other for _, other in find_repetitions(robot.world, room, pose, (room,), settings.localization)
+    return [other for _, other in find_repetitions(robot.world, room, pose, (room,))
             if np.all((low <= other.position) & (other.position <= high))]
 
 
@@ -100,15 +111,15 @@ def find_fitting_poses(
     robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, settings: Settings = DEFAULT
 ) -> list[Pose2]:
     """Find the poses of a room, distinct from a pose, at which segments (k, 2, 2) fit best."""
-    views, tuning = (CameraView(segments_px, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))),), settings.localization
-    candidates = find_pose_candidates(robot, views, (room,), tuning.max_fitting_poses, settings)
+    views = (CameraView(segments_px, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))),)
+    candidates = find_pose_candidates(robot, views, (room,), MAX_FITTING_POSES, settings)
     refined = (refine_pose(robot, views, candidate.world_from_robot, settings)[0] for candidate in candidates)
-    return [other for other in refined if are_distinct(other, pose, tuning)]
+    return [other for other in refined if are_distinct(other, pose)]
 
 
 def precompute_views(robot: RobotModel, room: str, pose: Pose2, settings: Settings = DEFAULT) -> None:
     """Compute what should be visible from a pose and from where the room repeats itself, so that it is at hand."""
-    predict_views_on_grid(robot, (pose, *find_repeated_poses(robot, room, pose, settings)), settings)
+    predict_views_on_grid(robot, (pose, *find_repeated_poses(robot, room, pose)), settings)
 
 
 def predict_views_on_grid(
@@ -135,19 +146,17 @@ class ScoredView(NamedTuple):
 def score_view(lines_px: Floats, segments_px: Floats, settings: Settings = DEFAULT) -> ScoredView:
     """Score the lines of a view (n, 2, 2) by how much of each segments (k, 2, 2) cover, more or less than half."""
     tuning, length = settings.verification, np.linalg.norm(lines_px[:, 1] - lines_px[:, 0], axis=1)
-    lines = np.minimum(length, tuning.max_line_weight_px) / settings.localization.alias_line_length_px
-    covered = _cover(lines_px, segments_px, tuning.line_tolerance_px, tuning.line_tolerance_rad, settings)
-    return ScoredView(lines_px, lines * (covered - tuning.min_covered_fraction))
+    lines = np.minimum(length, MAX_LINE_WEIGHT_PX) / ALIAS_LINE_LENGTH_PX
+    covered = _cover(lines_px, segments_px, tuning.line_tolerance_px, LINE_TOLERANCE_RAD)
+    return ScoredView(lines_px, lines * (covered - MIN_COVERED_FRACTION))
 
 
-def compute_margin(one: ScoredView, other: ScoredView, settings: Settings = DEFAULT) -> float:
+def compute_margin(one: ScoredView, other: ScoredView) -> float:
     """Compute by how many lines the segments support one view more than another, by the lines not in both."""
-    return _sum_own(one, other, settings) - _sum_own(other, one, settings)
+    return _sum_own(one, other) - _sum_own(other, one)
 
 
-def _find_displaced_on_grid(
-    robot: RobotModel, pose: Pose2, segments_px: Floats | None, settings: Settings
-) -> Floats:
+def _find_displaced_on_grid(robot: RobotModel, pose: Pose2, segments_px: Floats | None, settings: Settings) -> Floats:
     """(n, 2, 3) the lines [m, world] of the grid's nearest pose, displaced as far as the model is inexact."""
     lines, errors = _find_visible_on_grid(robot, pose, settings)
     if segments_px is None or errors.is_exact:
@@ -161,28 +170,27 @@ def _find_visible_on_grid(robot: RobotModel, pose: Pose2, settings: Settings) ->
 
     Kept.
     """
-    grid_m, grid_rad = settings.localization.view_grid_m, settings.localization.view_grid_rad
+    grid_m, grid_rad = VIEW_GRID_M, VIEW_GRID_RAD
     turned = round(pose.heading_rad / grid_rad) % round(math.tau / grid_rad)
     nearest = (round(pose.x_m / grid_m), round(pose.y_m / grid_m), turned)
     of_grid = Pose2(nearest[0] * grid_m, nearest[1] * grid_m, nearest[2] * grid_rad)
-    key = robot.camera, robot.mount.height_m, nearest, grid_m, grid_rad, settings.verification
+    key = robot.camera, robot.mount.height_m, nearest, settings.verification
 
     def predict() -> tuple[Floats, LineErrors]:
         lines = predict_lines(robot, of_grid, settings.verification)
         return lines.lines_world, find_errors(robot, lines)
 
-    return robot.world.cached("views on a grid", settings.localization.cached_views, key, predict)
+    return robot.world.cached("views on a grid", CACHED_VIEWS, key, predict)
 
 
-def _sum_own(view: ScoredView, other: ScoredView, settings: Settings) -> float:
+def _sum_own(view: ScoredView, other: ScoredView) -> float:
     """The sum of the scores of the lines that another view lacks."""
-    tuning = settings.localization
-    common = _cover(view.lines_px, other.lines_px, tuning.same_line_px, tuning.same_line_rad, settings)
+    common = _cover(view.lines_px, other.lines_px, SAME_LINE_PX, SAME_LINE_RAD)
     return float(np.sum(view.scores * (1.0 - common)))
 
 
-def _cover(lines_px: Floats, by_px: Floats, tolerance_px: float, tolerance_rad: float, settings: Settings) -> Floats:
+def _cover(lines_px: Floats, by_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
     """(n,) covered part of each line, 0 where it is not in view."""
     if not len(lines_px) or not len(by_px):
         return np.zeros(len(lines_px))
-    return np.nan_to_num(compute_coverage(lines_px, by_px, tolerance_px, tolerance_rad, settings.verification))
+    return np.nan_to_num(compute_coverage(lines_px, by_px, tolerance_px, tolerance_rad))

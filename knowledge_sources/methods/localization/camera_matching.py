@@ -11,7 +11,7 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.matching.image_matching import Match
 from knowledge_sources.methods.matching.pose_matching import PoseMatch, match_in_space
 from knowledge_sources.methods.pose.with_camera import CameraEstimate, estimate_camera_and_pose
-from knowledge_sources.methods.verification.line_check import compute_coverage
+from knowledge_sources.methods.verification.line_check import LINE_TOLERANCE_RAD, MAX_LINE_WEIGHT_PX, compute_coverage
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, move_camera
 from world_models.frames import Pose, Pose2
@@ -92,9 +92,8 @@ def compute_sharp_part(
     lens, mounted = move_camera(camera, mount, estimate.step)
     camera_from_world = mounted.camera_from_robot @ estimate.world_from_robot.lifted().inverse()
     seen, _ = lens.project_segments(lines_world, camera_from_world)
-    s = settings.verification
-    covered = compute_coverage(seen, data_px, settings.camera_state.sharp_px, s.line_tolerance_rad, s)
-    lengths = np.minimum(np.nan_to_num(np.linalg.norm(seen[:, 1] - seen[:, 0], axis=1)), s.max_line_weight_px)
+    covered = compute_coverage(seen, data_px, settings.camera_state.sharp_px, LINE_TOLERANCE_RAD)
+    lengths = np.minimum(np.nan_to_num(np.linalg.norm(seen[:, 1] - seen[:, 0], axis=1)), MAX_LINE_WEIGHT_PX)
     total = float(lengths.sum())
     return float(np.sum(np.nan_to_num(covered) * lengths)) / total if total > 0.0 else 0.0
 

@@ -24,7 +24,12 @@ from knowledge_sources.methods.localization.next_view import (
     make_view_predictor,
     normalize_log_likelihoods,
 )
-from knowledge_sources.methods.localization.pose_candidates import are_distinct, find_pose_candidates
+from knowledge_sources.methods.localization.pose_candidates import (
+    FINE_CLIMB_M,
+    FINE_CLIMB_RAD,
+    are_distinct,
+    find_pose_candidates,
+)
 from knowledge_sources.methods.localization.refinement import (
     PoseLikelihood,
     compute_pose_likelihood,
@@ -34,9 +39,11 @@ from knowledge_sources.methods.localization.refinement import (
 from knowledge_sources.methods.localization.views import CameraView, align_headings
 from knowledge_sources.methods.verification.line_check import predict_lines
 from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.localization import LocalizationSettings
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
+
+MAX_VIEWS_OF_SEARCH = 8  # most views, the last, by which the floor is searched; what is found is refined by all
+MAX_CANDIDATES = 14  # most candidates of a floor that are refined
 
 LookAlike = Callable[[Pose2, Pose2], bool]
 """Whether two poses would look the same in all views."""
@@ -132,18 +139,18 @@ def find_candidates(
         return rank_candidates([*found, *known], look_alike, len(views), settings, found[0] if found else None)
     searched = [*found]
     for pose in _find_refined(robot, views, rooms, settings):
-        _keep_likelier(searched, _build_candidate(robot, views, pose, settings), tuning)
+        _keep_likelier(searched, _build_candidate(robot, views, pose, settings))
     first = None
     if found:  # the place of the guess, though the search may have found more exactly where it is
         first = min(searched, key=lambda c: c.world_from_robot.distance_to(found[0].world_from_robot))
     for candidate in known or _build_distinct(robot, views, followed, settings):
-        _keep_likelier(searched, candidate, tuning)
+        _keep_likelier(searched, candidate)
     kept = rank_candidates(searched, look_alike, len(views), settings, first)
     if len(kept) != 1 or not kept[0].is_accepted:
         return kept
     aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, settings)
     beside = [_build_candidate(robot, views, pose, settings) for pose in aliases]
-    repeated = _list_repetitions(robot, kept[0], rooms, settings)
+    repeated = _list_repetitions(robot, kept[0], rooms)
     beside += _build_distinct(robot, views, repeated, settings, [*kept, *beside])
     return rank_candidates([*kept, *beside], look_alike, len(views), settings, kept[0])
 
@@ -156,25 +163,23 @@ def _build_distinct(
     found: list[Candidate] = []
     for room, pose in rough:
         refined = RefinedPose(room, *refine_pose(robot, views, pose, settings))
-        if all(are_distinct(refined.world_from_robot, c.world_from_robot, settings.localization)
+        if all(are_distinct(refined.world_from_robot, c.world_from_robot)
                for c in (*known, *found)):
             found.append(_build_candidate(robot, views, refined, settings))
     return found
 
 
-def _keep_likelier(found: list[Candidate], new: Candidate, settings: LocalizationSettings) -> None:
+def _keep_likelier(found: list[Candidate], new: Candidate) -> None:
     """Add a candidate; of those that are one place the likeliest is kept, as refining may end beside the right pose."""
-    near = [c for c in found if not are_distinct(new.world_from_robot, c.world_from_robot, settings)]
+    near = [c for c in found if not are_distinct(new.world_from_robot, c.world_from_robot)]
     if all(new.likelihood.log_likelihood > c.likelihood.log_likelihood for c in near):
         found[:] = [*(c for c in found if c not in near), new]
 
 
-def _list_repetitions(
-    robot: RobotModel, candidate: Candidate, rooms: Sequence[str], settings: Settings
-) -> Iterator[tuple[str, Pose2]]:
+def _list_repetitions(robot: RobotModel, candidate: Candidate, rooms: Sequence[str]) -> Iterator[tuple[str, Pose2]]:
     """Where the plan repeats the candidate's place; what is in the rooms may differ, which the pictures tell."""
     room = _find_room(robot, rooms[0], candidate.world_from_robot)
-    return find_repetitions(robot.world, room, candidate.world_from_robot, rooms, settings.localization)
+    return find_repetitions(robot.world, room, candidate.world_from_robot, rooms)
 
 
 def find_aliases(
@@ -189,17 +194,16 @@ def find_aliases(
     lines = [predict_lines(robot, view.pose_then(pose), settings.verification) for view in views]
     predicted = [replace(view, segments_px=seen.segments_px) for view, seen in zip(views, lines, strict=True)]
     look_alike = make_alias_test(robot, [view.now_from_then for view in views], settings)
-    tuning = settings.localization
     found: list[RefinedPose] = []
     for refined in _find_refined(robot, predicted, rooms, settings):
         known = (pose, *(alias.world_from_robot for alias in found))
-        is_new = all(are_distinct(refined.world_from_robot, one, tuning) for one in known)
+        is_new = all(are_distinct(refined.world_from_robot, one) for one in known)
         if is_new and look_alike(pose, refined.world_from_robot):
             found.append(refined)
     room_of_pose = _find_room(robot, rooms[0], pose)
-    for room, other in find_repetitions(robot.world, room_of_pose, pose, rooms, tuning):
+    for room, other in find_repetitions(robot.world, room_of_pose, pose, rooms):
         known = (pose, *(alias.world_from_robot for alias in found))
-        if all(are_distinct(other, one, tuning) for one in known) and look_alike(pose, other):
+        if all(are_distinct(other, one) for one in known) and look_alike(pose, other):
             found.append(RefinedPose(room, *refine_pose(robot, predicted, other, settings)))
     return tuple(found)
 
@@ -210,7 +214,7 @@ def make_alias_test(robot: RobotModel, looked: Sequence[Pose2], settings: Settin
 
     def look_alike(one: Pose2, other: Pose2) -> bool:
         views, others = ([predict(pose @ look) for look in looked] for pose in (one, other))
-        return not are_distinguishable(views, others, settings)
+        return not are_distinguishable(views, others)
 
     return look_alike
 
@@ -249,12 +253,12 @@ def decide(
         return LocalizationResult(LocalizationStatus.FOUND, kept)
     if not kept:
         return LocalizationResult(LocalizationStatus.PROBE, (), SensingAction(find_widest_gap(looked), 0.0, 0.0))
-    predict, is_safe = make_view_predictor(robot, settings), make_safety_check(robot, settings.localization)
+    predict, is_safe = make_view_predictor(robot, settings), make_safety_check(robot)
     hypotheses = [c.hypothesis for c in kept]
     tied = len(kept) > 1 and all(c.is_accepted for c in kept[:2]) and enough
-    if tied and not can_distinguish(hypotheses[0], hypotheses[1], looked, predict, is_safe, settings):
+    if tied and not can_distinguish(hypotheses[0], hypotheses[1], looked, predict, is_safe):
         return LocalizationResult(LocalizationStatus.AMBIGUOUS, kept)
-    action = choose_sensing_action(hypotheses, looked, predict, is_safe, settings)
+    action = choose_sensing_action(hypotheses, looked, predict, is_safe)
     return LocalizationResult(LocalizationStatus.PROBE, kept, action)
 
 
@@ -262,12 +266,12 @@ def _find_refined(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings
 ) -> list[RefinedPose]:
     """The best candidates by the last views, refined by all; not the same pose twice."""
-    tuning, found = settings.localization, list[RefinedPose]()
-    last = views[-tuning.max_views_of_search:]
-    for candidate in find_pose_candidates(robot, last, rooms, tuning.max_candidates, settings):
+    found = list[RefinedPose]()
+    last = views[-MAX_VIEWS_OF_SEARCH:]
+    for candidate in find_pose_candidates(robot, last, rooms, MAX_CANDIDATES, settings):
         pose, covariance = refine_pose(robot, views, candidate.world_from_robot, settings)
-        if all(pose.distance_to(other.world_from_robot) > tuning.fine_climb_m
-               or abs(wrap_angle(pose.heading_rad - other.world_from_robot.heading_rad)) > tuning.fine_climb_rad
+        if all(pose.distance_to(other.world_from_robot) > FINE_CLIMB_M
+               or abs(wrap_angle(pose.heading_rad - other.world_from_robot.heading_rad)) > FINE_CLIMB_RAD
                for other in found):
             found.append(RefinedPose(candidate.room, pose, covariance))
     return found

@@ -22,10 +22,30 @@ from knowledge_sources.methods.floor.lookout import find_floor
 from knowledge_sources.methods.motion.routes import SLACK_M, find_bends, find_free_space, is_clear
 from knowledge_sources.methods.verification.line_check import compute_coverage, predict_lines
 from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.localization import LocalizationSettings
 from world_models.building.building import Building
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
+
+SAME_LINE_PX = 8.0  # distance up to which lines of two predicted views are the same, as precise as poses are
+SAME_LINE_RAD = 0.12  # angle up to which lines of two predicted views are the same
+MIN_COMPARED_LENGTH_PX = 20.0  # shortest line by which predicted views are compared
+MIN_DIFFERENT_LINES = 3.0  # lines in which two predicted views must differ to be told apart
+MIN_DIFFERENT_FRACTION = 0.15  # part of their lines in which two predicted views must differ to be told apart
+MAX_DIFFERENT_LINES = 20  # lines from which a larger difference separates hypotheses no better
+UNKNOWN_WEIGHT = 0.1  # weight of poses that no hypothesis covers
+TURNS_RAD = tuple(math.radians(a) for a in (180.0, 90.0, -90.0, 135.0, -135.0, 45.0, -45.0))
+"""Turns on the spot that are tried; of equals the first is taken."""
+TURNS_BEFORE_MOVE_RAD = tuple(math.radians(a) for a in (0.0, 90.0, -90.0, 180.0))  # turns that are tried before a move
+MOVE_M = 0.6  # length of a move to another view
+MOVE_CLEARANCE_M = 0.1  # clearance of a move beyond the robot's radius, from every hypothesis
+MIN_NEW_VIEW_RAD = math.radians(30.0)  # angle from earlier views from which a view at the same position is new
+CLEAR_DIFFERENCE = 2.0  # times as many lines as are needed, by which one or two views alone tell places apart
+FAR_REACH_M = 12.0  # how far away a view that tells places apart is looked for
+FAR_STEP_M = 1.0  # grid of the positions of such views
+FAR_LEG_M = 1.2  # longest move on the way there; then another look is taken
+FAR_ARRIVED_M = 0.15  # distance from such a position from which the robot only turns
+FAR_COARSE_M = 0.03  # to this the free floor's outline is simplified
+FAR_HYPOTHESES = 3  # most places, the likeliest, that a far view is to tell apart
 
 PredictView = Callable[[Pose2], Floats]
 """Returns the lines (n, 2, 2) that should be visible from a pose [px]."""
@@ -55,19 +75,17 @@ def make_view_predictor(robot: RobotModel, settings: Settings = DEFAULT) -> Pred
     def predict(pose: Pose2) -> Floats:
         lines = predict_lines(robot, pose, settings.verification).segments_px
         length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
-        return np.asarray(lines[length >= settings.localization.min_compared_length_px])
+        return np.asarray(lines[length >= MIN_COMPARED_LENGTH_PX])
 
     return predict
 
 
-def compute_view_difference(one: Floats, other: Floats, settings: Settings = DEFAULT) -> float:
+def compute_view_difference(one: Floats, other: Floats) -> float:
     """Compute by how many lines two views (n, 2, 2) and (m, 2, 2) differ: those of either that the other lacks."""
-    return math.fsum(_count_missing(a, b, settings) for a, b in ((one, other), (other, one)))
+    return math.fsum(_count_missing(a, b) for a, b in ((one, other), (other, one)))
 
 
-def are_distinguishable(
-    ones: Sequence[Floats], others: Sequence[Floats], settings: Settings = DEFAULT, *, clearly: float = 1.0
-) -> bool:
+def are_distinguishable(ones: Sequence[Floats], others: Sequence[Floats], *, clearly: float = 1.0) -> bool:
     """Whether the views from one pose differ from those from another: all of them together, or one or two clearly.
 
     A few lines always differ: those just long, near or clear enough to be predicted from one pose only. Of many views
@@ -76,28 +94,26 @@ def are_distinguishable(
     Args:
         clearly: by how many times as much as is needed they are to differ.
     """
-    differ = [compute_view_difference(one, other, settings) for one, other in zip(ones, others, strict=True)]
+    differ = [compute_view_difference(one, other) for one, other in zip(ones, others, strict=True)]
     lines = [len(one) + len(other) for one, other in zip(ones, others, strict=True)]
     most = sorted(range(len(differ)), key=lambda k: -differ[k])
-    clear = settings.localization.clear_difference
-    return _is_difference(differ, lines, clearly, settings) or any(
-        _is_difference([differ[k] for k in most[:n]], [lines[k] for k in most[:n]], clear, settings) for n in (1, 2))
+    clear = CLEAR_DIFFERENCE
+    return _is_difference(differ, lines, clearly) or any(
+        _is_difference([differ[k] for k in most[:n]], [lines[k] for k in most[:n]], clear) for n in (1, 2))
 
 
-def _is_difference(differ: Sequence[float], lines: Sequence[int], clearly: float, settings: Settings) -> bool:
-    tuning = settings.localization
-    least = max(tuning.min_different_lines, tuning.min_different_fraction * math.fsum(lines))
+def _is_difference(differ: Sequence[float], lines: Sequence[int], clearly: float) -> bool:
+    least = max(MIN_DIFFERENT_LINES, MIN_DIFFERENT_FRACTION * math.fsum(lines))
     return math.fsum(differ) >= clearly * least
 
 
-def _count_missing(one: Floats, other: Floats, settings: Settings) -> float:
+def _count_missing(one: Floats, other: Floats) -> float:
     """Number of lines of a view that are not in another; a line that is half there counts half."""
     if not len(one):
         return 0.0
     if not len(other):
         return float(len(one))
-    tuning = settings.localization
-    covered = compute_coverage(one, other, tuning.same_line_px, tuning.same_line_rad, settings.verification)
+    covered = compute_coverage(one, other, SAME_LINE_PX, SAME_LINE_RAD)
     return float(np.sum(1.0 - np.nan_to_num(covered)))
 
 
@@ -128,7 +144,6 @@ IsSafe = Callable[[PoseHypothesis, SensingAction], bool]
 
 def choose_sensing_action(
     hypotheses: Sequence[PoseHypothesis], looked: Sequence[Pose2], predict: PredictView, is_safe: IsSafe,
-    settings: Settings = DEFAULT,
 ) -> SensingAction | None:
     """Choose the action with the largest expected separation; None where no action shows anything new.
 
@@ -136,44 +151,43 @@ def choose_sensing_action(
         looked: poses of the views so far, in the robot's frame now.
         is_safe: a move must be safe from every hypothesis.
     """
-    options = [o for o in _list_actions(looked, settings.localization)
+    options = [o for o in _list_actions(looked)
                if o.move_m == 0.0 or all(is_safe(hypothesis, o) for hypothesis in hypotheses)]
     weights = [hypothesis.weight for hypothesis in hypotheses]
     rated = []
     for option in options:
         views = [predict(option.apply_to(hypothesis.world_from_robot)) for hypothesis in hypotheses]
-        rated.append(SensingAction(option.turn_rad, option.move_m, compute_separation(views, weights, settings)))
+        rated.append(SensingAction(option.turn_rad, option.move_m, compute_separation(views, weights)))
     return max(rated, key=lambda action: action.expected_separation, default=None)  # of equals the first
 
 
-def compute_separation(views: Sequence[Floats], weights: Sequence[float], settings: Settings = DEFAULT) -> float:
+def compute_separation(views: Sequence[Floats], weights: Sequence[float]) -> float:
     """Compute the expected number of lines by which a look separates hypotheses with these views.
 
     Sum over pairs by their weights, and of each hypothesis against the poses that none covers.
     """
-    tuning, terms = settings.localization, []
+    terms = []
     for i, one in enumerate(views):
-        terms.append(weights[i] * tuning.unknown_weight * min(len(one), tuning.max_different_lines))
+        terms.append(weights[i] * UNKNOWN_WEIGHT * min(len(one), MAX_DIFFERENT_LINES))
         terms += [weights[i] * weights[j]
-                  * min(compute_view_difference(one, views[j], settings), tuning.max_different_lines)
+                  * min(compute_view_difference(one, views[j]), MAX_DIFFERENT_LINES)
                   for j in range(i)]
     return math.fsum(terms)
 
 
 def can_distinguish(
     one: PoseHypothesis, other: PoseHypothesis, looked: Sequence[Pose2], predict: PredictView, is_safe: IsSafe,
-    settings: Settings = DEFAULT,
 ) -> bool:
     """Whether any look within reach, or one that was taken, would tell two hypotheses apart."""
     a, b = one.world_from_robot, other.world_from_robot
-    reach = [option.apply_to(HERE) for option in _list_actions((), settings.localization)
+    reach = [option.apply_to(HERE) for option in _list_actions(())
              if option.move_m == 0.0 or (is_safe(one, option) and is_safe(other, option))]
-    return any(are_distinguishable([predict(a @ step)], [predict(b @ step)], settings) for step in (*looked, *reach))
+    return any(are_distinguishable([predict(a @ step)], [predict(b @ step)]) for step in (*looked, *reach))
 
 
-def make_safety_check(robot: RobotModel, settings: LocalizationSettings = DEFAULT.localization) -> IsSafe:
+def make_safety_check(robot: RobotModel) -> IsSafe:
     """Return a check whether an action's move keeps free of the walls and things of the hypothesis's room."""
-    clearance_m = robot.radius_m + settings.move_clearance_m
+    clearance_m = robot.radius_m + MOVE_CLEARANCE_M
 
     def is_safe(hypothesis: PoseHypothesis, action: SensingAction) -> bool:
         free, pose = find_free_space(robot.world, hypothesis.room, clearance_m), hypothesis.world_from_robot
@@ -192,13 +206,13 @@ def find_widest_gap(looked: Sequence[Pose2]) -> float:
     return wrap_angle(start + 0.5 * width)
 
 
-def _list_actions(looked: Sequence[Pose2], settings: LocalizationSettings) -> list[SensingAction]:
+def _list_actions(looked: Sequence[Pose2]) -> list[SensingAction]:
     """The turns that show something new from here, and the moves."""
-    move = settings.move_m
+    move = MOVE_M
     here = [look.heading_rad for look in looked if math.hypot(look.x_m, look.y_m) < 0.5 * move]
-    turns = [turn for turn in settings.turns_rad
-             if all(abs(wrap_angle(turn - h)) >= settings.min_new_view_rad for h in here)]
-    moves = [SensingAction(turn, move, 0.0) for turn in settings.turns_before_move_rad]
+    turns = [turn for turn in TURNS_RAD
+             if all(abs(wrap_angle(turn - h)) >= MIN_NEW_VIEW_RAD for h in here)]
+    moves = [SensingAction(turn, move, 0.0) for turn in TURNS_BEFORE_MOVE_RAD]
     return [*(SensingAction(turn, 0.0, 0.0) for turn in turns), *moves]
 
 
@@ -215,7 +229,7 @@ class _Way(NamedTuple):
 
 def choose_far_action(
     robot: RobotModel, hypotheses: Sequence[PoseHypothesis], looked: Sequence[Pose2], rooms: Sequence[str],
-    predict: PredictView, settings: Settings = DEFAULT,
+    predict: PredictView,
 ) -> SensingAction | None:
     """Choose the first leg of the shortest way to a view that tells two hypotheses apart; None where there is none.
 
@@ -225,39 +239,38 @@ def choose_far_action(
         rooms: of the floor.
         predict: the lines that should be visible from a pose, world.
     """
-    tuning = settings.localization
-    free = find_common_floor(robot, hypotheses, rooms, settings)
-    compared = hypotheses[:tuning.far_hypotheses]
+    free = find_common_floor(robot, hypotheses, rooms)
+    compared = hypotheses[:FAR_HYPOTHESES]
     weights = [h.weight for h in compared]
-    for way in _list_ways(free, tuning.far_step_m):
+    for way in _list_ways(free, FAR_STEP_M):
         x_m, y_m = way.points[-1].tolist()
         arriving = _find_last_heading(way)
         for turn in (0.0, 0.5 * math.pi, -0.5 * math.pi, math.pi):
             look = Pose2(x_m, y_m, wrap_angle(arriving + turn))
-            if _was_looked(look, looked, settings):
+            if _was_looked(look, looked):
                 continue
             views = [predict(h.world_from_robot @ look) for h in compared]
-            if any(are_distinguishable([one], [other], settings, clearly=tuning.clear_difference)
+            if any(are_distinguishable([one], [other], clearly=CLEAR_DIFFERENCE)
                    for one, other in combinations(views, 2)):
-                return _begin(way, look, compute_separation(views, weights, settings), settings)
+                return _begin(way, look, compute_separation(views, weights))
     return None
 
 
 def find_common_floor(
-    robot: RobotModel, hypotheses: Sequence[PoseHypothesis], rooms: Sequence[str], settings: Settings = DEFAULT
+    robot: RobotModel, hypotheses: Sequence[PoseHypothesis], rooms: Sequence[str]
 ) -> shapely.Geometry:
     """Find where the robot's centre may be, in its frame now, whichever hypothesis is true: the part that is here.
 
     Empty where the robot stands too near something in one of them.
     """
-    tuning, building = settings.localization, robot.world
-    clearance_m = robot.radius_m + tuning.move_clearance_m
+    building = robot.world
+    clearance_m = robot.radius_m + MOVE_CLEARANCE_M
     whole = building.cached("floors for the robot's centre", MAX_FLOORS, (tuple(rooms), clearance_m),
-                            lambda: _shrink(building, rooms, clearance_m, tuning.far_coarse_m))
-    common: shapely.Geometry = shapely.Point(0.0, 0.0).buffer(tuning.far_reach_m)
+                            lambda: _shrink(building, rooms, clearance_m, FAR_COARSE_M))
+    common: shapely.Geometry = shapely.Point(0.0, 0.0).buffer(FAR_REACH_M)
     for hypothesis in hypotheses:
         pose = hypothesis.world_from_robot
-        near = shapely.intersection(whole, shapely.Point(pose.position).buffer(tuning.far_reach_m))
+        near = shapely.intersection(whole, shapely.Point(pose.position).buffer(FAR_REACH_M))
         here = pose.inverse()
         c, s = math.cos(here.heading_rad), math.sin(here.heading_rad)
         common = shapely.intersection(common, affinity.affine_transform(near, [c, -s, s, c, here.x_m, here.y_m]))
@@ -303,18 +316,16 @@ def _find_last_heading(way: _Way) -> float:
     return math.atan2(float(leg[1]), float(leg[0]))
 
 
-def _was_looked(look: Pose2, looked: Sequence[Pose2], settings: Settings) -> bool:
+def _was_looked(look: Pose2, looked: Sequence[Pose2]) -> bool:
     """Whether a view like this was taken."""
-    tuning = settings.localization
-    return any(look.distance_to(old) < 0.5 * tuning.move_m
-               and abs(wrap_angle(look.heading_rad - old.heading_rad)) < tuning.min_new_view_rad for old in looked)
+    return any(look.distance_to(old) < 0.5 * MOVE_M
+               and abs(wrap_angle(look.heading_rad - old.heading_rad)) < MIN_NEW_VIEW_RAD for old in looked)
 
 
-def _begin(way: _Way, look: Pose2, separation: float, settings: Settings) -> SensingAction:
+def _begin(way: _Way, look: Pose2, separation: float) -> SensingAction:
     """The first leg of a way, or the turn to the look where it ends."""
-    tuning = settings.localization
-    if way.length_m < tuning.far_arrived_m:
+    if way.length_m < FAR_ARRIVED_M:
         return SensingAction(look.heading_rad, 0.0, separation)
-    first = next(p for p in way.points if float(np.linalg.norm(p)) > 0.5 * tuning.far_arrived_m)
-    move_m = min(float(np.linalg.norm(first)), tuning.far_leg_m)
+    first = next(p for p in way.points if float(np.linalg.norm(p)) > 0.5 * FAR_ARRIVED_M)
+    move_m = min(float(np.linalg.norm(first)), FAR_LEG_M)
     return SensingAction(math.atan2(float(first[1]), float(first[0])), move_m, separation)

@@ -22,10 +22,24 @@ from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_l
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.localization.visibility_map import VisibilityMap, get_visibility_map
 from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.localization import LocalizationSettings
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2, wrap_angle
 from world_models.robot import RobotModel
+
+CHAMFER_DIRECTIONS = 12  # directions of lines that have a distance map each
+CHAMFER_REACH_PX = 24.0  # distance from which a segment no longer counts
+CHAMFER_SHRINK = 4  # pixels of the picture along each side of a pixel of the map
+MIN_POINT_DEPTH_M = 0.3  # smallest depth of a projected point
+PRIOR_POINTS = 50.0  # points that agree by chance, added to each score: few points are little evidence
+GRID_STRIDE = 2  # one of so many points is projected when the grid is scored
+MIN_CANDIDATE_DISTANCE_M = 0.45  # distance from which two candidates are distinct
+MIN_CANDIDATE_ANGLE_RAD = math.radians(10.0)  # angle from which two candidates are distinct
+MAX_CLIMBED = 60  # best poses of the grid that are improved by hill climbing
+COARSE_CLIMB_M = 0.1  # step of the first round of hill climbing
+COARSE_CLIMB_RAD = math.radians(0.8)  # step of the first round of hill climbing
+FINE_CLIMB_M = 0.05  # step of the second round of hill climbing
+FINE_CLIMB_RAD = math.radians(0.5)  # step of the second round of hill climbing
+MIN_RELATIVE_SCORE = 0.6  # smallest score of a candidate, as a part of the best
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,11 +55,9 @@ class ChamferMaps:
     chance: Floats32
 
 
-def compute_chamfer_maps(
-    segments_px: Any, camera: Camera, settings: LocalizationSettings = DEFAULT.localization
-) -> ChamferMaps:
+def compute_chamfer_maps(segments_px: Any, camera: Camera) -> ChamferMaps:
     """Compute maps of segments (n, 2, 2); each is drawn under its own direction and the two next to it."""
-    shrink, directions = settings.chamfer_shrink, settings.chamfer_directions
+    shrink, directions = CHAMFER_SHRINK, CHAMFER_DIRECTIONS
     size = -(-camera.height // shrink), -(-camera.width // shrink)
     empty = np.full((directions, *size), 255, np.uint8)
     for (u0, v0), (u1, v1) in np.asarray(segments_px, float).reshape(-1, 2, 2):
@@ -53,7 +65,7 @@ def compute_chamfer_maps(
         ends = tuple((round(float(u) / shrink), round(float(v) / shrink)) for u, v in ((u0, v0), (u1, v1)))
         for k in (own - 1, own, own + 1):
             cv2.line(empty[k % directions], ends[0], ends[1], 0, 1)
-    reach = settings.chamfer_reach_px / shrink
+    reach = CHAMFER_REACH_PX / shrink
     away = [np.minimum(cv2.distanceTransform(layer, cv2.DIST_L2, 3), reach) / reach for layer in empty]
     near = np.ascontiguousarray(1.0 - np.asarray(away), np.float32)
     return ChamferMaps(near, near.mean(axis=(1, 2)))
@@ -62,7 +74,6 @@ def compute_chamfer_maps(
 def compute_chamfer_scores(
     maps: ChamferMaps, camera: Camera, camera_from_robot: Pose, poses: Floats, points_world: Floats,
     directions_world: Floats, first: Ints, visible: Ints, cell: Ints, stride: int = 1,
-    settings: LocalizationSettings = DEFAULT.localization,
 ) -> Floats:
     """Score poses of the robot by the points of model lines that they show.
 
@@ -79,7 +90,7 @@ def compute_chamfer_scores(
     return np.asarray(_score(
         maps.near, maps.chance, lens, np.array(camera_from_robot.rotation), np.array(camera_from_robot.translation),
         np.array(poses, float), points_world, directions_world, first, visible, np.array(cell, np.int64), stride,
-        settings.chamfer_shrink, settings.min_point_depth_m))
+        CHAMFER_SHRINK, MIN_POINT_DEPTH_M))
 
 
 @njit(cache=True, error_model="numpy")
@@ -147,28 +158,27 @@ def find_pose_candidates(
     search = _Search.from_views(robot, views, settings)
     if search is None:
         return ()
-    tuning = settings.localization
     poses, owners, scores = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros(0)]
-    maps = [get_visibility_map(robot.world, room, robot.mount.height_m, tuning) for room in rooms]
+    maps = [get_visibility_map(robot.world, room, robot.mount.height_m) for room in rooms]
     for number, room_map in enumerate(maps):
         if len(room_map.positions):
             poses.append(search.build_grid(room_map))
             owners.append(np.full(len(poses[-1]), number))
-            scores.append(search.score(room_map, poses[-1], np.tile(room_map.cell, 4), tuning.grid_stride))
+            scores.append(search.score(room_map, poses[-1], np.tile(room_map.cell, 4), GRID_STRIDE))
     at, owner, score = np.concatenate(poses), np.concatenate(owners), np.concatenate(scores)
-    first = _suppress(at, score, tuning.max_climbed, tuning)
+    first = _suppress(at, score, MAX_CLIMBED)
     climbed = [search.climb(maps[owner[i]], at[i]) for i in first]
     ends = np.array([pose for pose, _ in climbed]).reshape(-1, 3)
     fits = np.array([fit for _, fit in climbed])
-    min_score = tuning.min_relative_score * float(np.max(fits, initial=0.0))
+    min_score = MIN_RELATIVE_SCORE * float(np.max(fits, initial=0.0))
     return tuple(PoseCandidate(rooms[owner[first[i]]], Pose2(*ends[i]), float(fits[i]))
-                 for i in _suppress(ends, fits, max_count, tuning) if fits[i] >= min_score)
+                 for i in _suppress(ends, fits, max_count) if fits[i] >= min_score)
 
 
-def are_distinct(a: Pose2, b: Pose2, settings: LocalizationSettings = DEFAULT.localization) -> bool:
+def are_distinct(a: Pose2, b: Pose2) -> bool:
     """Whether two poses are far enough apart to be two candidates."""
-    return (a.distance_to(b) > settings.min_candidate_distance_m
-            or abs(wrap_angle(a.heading_rad - b.heading_rad)) > settings.min_candidate_angle_rad)
+    return (a.distance_to(b) > MIN_CANDIDATE_DISTANCE_M
+            or abs(wrap_angle(a.heading_rad - b.heading_rad)) > MIN_CANDIDATE_ANGLE_RAD)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,7 +190,6 @@ class _Search:
     views: tuple[CameraView, ...]
     maps: tuple[ChamferMaps, ...]
     direction_rad: float
-    settings: LocalizationSettings
 
     @staticmethod
     def from_views(robot: RobotModel, views: Sequence[CameraView], settings: Settings) -> _Search | None:
@@ -189,9 +198,9 @@ class _Search:
         for view in sorted(views, key=lambda v: -_total_length(v.segments_px)):
             direction = find_level_direction(view.segments_px, robot.camera, mount)
             if direction is not None:
-                maps = tuple(compute_chamfer_maps(v.segments_px, robot.camera, settings.localization) for v in views)
+                maps = tuple(compute_chamfer_maps(v.segments_px, robot.camera) for v in views)
                 heading = direction + view.now_from_then.heading_rad
-                return _Search(robot, tuple(views), maps, heading, settings.localization)
+                return _Search(robot, tuple(views), maps, heading)
         return None
 
     def build_grid(self, room_map: VisibilityMap) -> Floats:
@@ -210,14 +219,13 @@ class _Search:
                                     poses[:, 2] + g.heading_rad])
             total += compute_chamfer_scores(
                 maps, self.robot.camera, self.robot.mount.camera_from_robot, then, room_map.points,
-                room_map.directions, room_map.first, room_map.visible, cell, stride, self.settings)
-        return np.asarray((total[:, 0] - total[:, 1]) / (total[:, 2] + self.settings.prior_points / stride))
+                room_map.directions, room_map.first, room_map.visible, cell, stride)
+        return np.asarray((total[:, 0] - total[:, 1]) / (total[:, 2] + PRIOR_POINTS / stride))
 
     def climb(self, room_map: VisibilityMap, pose: Floats) -> tuple[Floats, float]:
         """The best pose after one coarse and one fine step, and its score."""
         nearest, score = int(np.argmin(np.sum((room_map.positions - pose[:2]) ** 2, axis=1))), 0.0
-        t = self.settings
-        for step_m, step_rad in ((t.coarse_climb_m, t.coarse_climb_rad), (t.fine_climb_m, t.fine_climb_rad)):
+        for step_m, step_rad in ((COARSE_CLIMB_M, COARSE_CLIMB_RAD), (FINE_CLIMB_M, FINE_CLIMB_RAD)):
             near = pose + _NEIGHBORS * (step_m, step_m, step_rad)
             scores = self.score(room_map, near, np.full(len(near), room_map.cell[nearest]))
             best = int(np.argmax(scores))
@@ -229,7 +237,7 @@ def _total_length(segments_px: Floats) -> float:
     return float(np.sum(np.linalg.norm(segments_px[:, 1] - segments_px[:, 0], axis=1)))
 
 
-def _suppress(poses: Floats, scores: Floats, max_count: int, settings: LocalizationSettings) -> list[int]:
+def _suppress(poses: Floats, scores: Floats, max_count: int) -> list[int]:
     """Non-maximum suppression: indices of the best poses (n, 3), the best first, each distinct from those before."""
     kept: list[int] = []
     order = np.argsort(-scores, kind="stable")
@@ -241,6 +249,6 @@ def _suppress(poses: Floats, scores: Floats, max_count: int, settings: Localizat
                 break
             off = poses - poses[i]
             turned = np.abs(np.remainder(off[:, 2] + math.pi, 2.0 * math.pi) - math.pi)
-            free &= ((np.hypot(off[:, 0], off[:, 1]) > settings.min_candidate_distance_m)
-                     | (turned > settings.min_candidate_angle_rad))
+            free &= ((np.hypot(off[:, 0], off[:, 1]) > MIN_CANDIDATE_DISTANCE_M)
+                     | (turned > MIN_CANDIDATE_ANGLE_RAD))
     return kept

@@ -17,12 +17,42 @@ from numba import njit
 from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.methods.localization.views import CameraView, find_lever, join_covariances
 from knowledge_sources.methods.pose import planar_from_lines
-from knowledge_sources.methods.verification.line_check import compute_agreement, compute_coverage, predict_lines
+from knowledge_sources.methods.verification.line_check import (
+    LINE_TOLERANCE_RAD,
+    compute_agreement,
+    compute_coverage,
+    predict_lines,
+)
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.localization import LocalizationSettings
 from world_models.frames import Pose, Pose2, wrap_angle
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_lines
+
+TURN_STEP_RAD = math.radians(1.5)  # step of the search for an uncertain turn
+
+CANDIDATE_SIGMA_M = 0.15  # standard deviation of a candidate's position
+CANDIDATE_SIGMA_RAD = math.radians(1.5)  # standard deviation of a candidate's heading
+COARSE_GATE_PX = 16.0  # distance of a segment from its line in the first round
+FINE_GATE_PX = 4.0  # distance of a segment from its line in the second round
+GATE_RAD = 0.12  # angle between a segment and its line
+MIN_PAIR_OVERLAP = 0.5  # part of a segment that must lie beside its line
+MIN_PAIRS = 3  # fewest pairs of segment and line that are solved for a pose
+KNOWN_TURN_RAD = math.radians(0.5)  # standard deviation of a turn up to which it is not searched
+TURN_SEARCH_SIGMAS = 2.5  # reach of the search for an uncertain turn, in standard deviations
+MAX_VIEW_SURPRISE = 11.3
+"""Largest squared normalized error of a view by the others, with which they still agree; three unknowns, 99 %."""
+DETECTION_RATE = 0.85  # probability that a predicted line is found at the right pose: others are hidden or too faint
+MIN_CHANCE = 0.04  # lower bound of the probability of a match at a wrong pose
+MAX_CHANCE = 0.6  # upper bound of the probability of a match at a wrong pose
+LINE_INDEPENDENCE = 0.5  # weight of a line: lines of one thing are seen or missed together (tempered likelihood)
+MIN_VIEW_LINES = 8  # fewest predicted lines by which a single view counts
+MIN_EXPLAINED_LENGTH_PX = 25.0  # shortest segment that should be explained by the model
+EXPLAINED_TOLERANCE_PX = 3.0  # distance of a segment from the model line that explains it
+MIN_EXPLAINING_LENGTH_PX = 4.0  # shortest model line that explains a segment
+MIN_EXPLAINING_CONTRAST = 0.01  # smallest contrast of a model line that explains a segment, 0..1
+DISPLACEMENT_M = 0.35  # shift of the nearer wrong poses at which chance is counted; the farther are at twice as much
+DISPLACEMENT_RAD = 0.1  # turn of the wrong poses at which chance is counted
 
 
 @dataclass(slots=True, eq=False)
@@ -65,15 +95,14 @@ def refine_pose(
     view in which most model lines are visible: once the pose is known from it, clutter in the others, or a wrong turn,
     does no harm. Where the views contradict one another, the covariance grows by Birge's ratio.
     """
-    tuning = settings.localization
     visible = [len(predict_lines(robot, view.pose_then(pose), settings.verification)) for view in views]
-    order = sorted(range(len(views)), key=lambda k: (_is_turn_uncertain(views[k], tuning), -visible[k]))
-    state = _start(views, pose, order[0], tuning)
+    order = sorted(range(len(views)), key=lambda k: (_is_turn_uncertain(views[k]), -visible[k]))
+    state = _start(views, pose, order[0])
     surprises = []
     for k in order:
         then, jacobian = state.predict(k)
         prior = np.asarray(jacobian @ state.covariance @ jacobian.T)
-        uncertain = _is_turn_uncertain(views[k], tuning)
+        uncertain = _is_turn_uncertain(views[k])
         start = _search_turn(robot, views[k], then, settings) if uncertain else then
         solved, posterior = _solve(robot, views[k], then, prior, start, settings)
         if posterior is prior:
@@ -82,13 +111,13 @@ def refine_pose(
         off = np.array([solved.x_m - then.x_m, solved.y_m - then.y_m, turned])
         surprises.append(float(off @ np.linalg.pinv(prior - posterior, rcond=1e-9, hermitian=True) @ off))
         state.update(jacobian, off, prior, posterior)
-    return state.pose, state.covariance[:3, :3] * _compute_birge_ratio(surprises[1:], tuning)
+    return state.pose, state.covariance[:3, :3] * _compute_birge_ratio(surprises[1:])
 
 
-def _start(views: Sequence[CameraView], pose: Pose2, first: int, settings: LocalizationSettings) -> _State:
+def _start(views: Sequence[CameraView], pose: Pose2, first: int) -> _State:
     """The state before any view: a candidate's covariance is of the pose at the view that shows most, ``first``."""
     motions = [view.now_from_then for view in views]
-    sigma_m, sigma_rad = settings.candidate_sigma_m, settings.candidate_sigma_rad
+    sigma_m, sigma_rad = CANDIDATE_SIGMA_M, CANDIDATE_SIGMA_RAD
     back = find_lever(pose @ motions[first], pose)  # of the pose now by the pose at that view
     turn = _build_rotation(pose.heading_rad)
     size = 3 + 3 * len(views)
@@ -101,13 +130,13 @@ def _start(views: Sequence[CameraView], pose: Pose2, first: int, settings: Local
     return _State(pose, motions, np.asarray(jacobian @ source @ jacobian.T))
 
 
-def _compute_birge_ratio(surprises: Sequence[float], settings: LocalizationSettings) -> float:
+def _compute_birge_ratio(surprises: Sequence[float]) -> float:
     """By what the covariance grows where one view contradicts what the others tell: chi square by freedom (Birge).
 
     Args:
         surprises: squared normalized error of each view after the first, three unknowns each.
     """
-    if not surprises or max(surprises) <= settings.max_view_surprise:
+    if not surprises or max(surprises) <= MAX_VIEW_SURPRISE:
         return 1.0
     return max(1.0, math.fsum(surprises) / (3.0 * len(surprises)))
 
@@ -131,7 +160,7 @@ def refine_view_motions(
     """
     out = []
     for view in views:
-        if _is_turn_uncertain(view, settings.localization):
+        if _is_turn_uncertain(view):
             before = view.pose_then(pose)
             lever, turn = find_lever(pose, before), _build_rotation(pose.heading_rad)
             prior = np.asarray(lever @ covariance @ lever.T + turn @ view.covariance @ turn.T)
@@ -142,18 +171,18 @@ def refine_view_motions(
     return tuple(out)
 
 
-def _is_turn_uncertain(view: CameraView, settings: LocalizationSettings) -> bool:
-    return bool(view.covariance[2, 2] > settings.known_turn_rad**2)
+def _is_turn_uncertain(view: CameraView) -> bool:
+    return bool(view.covariance[2, 2] > KNOWN_TURN_RAD**2)
 
 
 def _search_turn(robot: RobotModel, view: CameraView, then: Pose2, settings: Settings) -> Pose2:
     """Of the headings that a view may have had, the one with most pairs of segment and line, then the nearest."""
-    tuning, step = settings.localization, settings.localization.turn_step_rad
-    most = int(tuning.turn_search_sigmas * math.sqrt(float(view.covariance[2, 2])) / step)
+    step = TURN_STEP_RAD
+    most = int(TURN_SEARCH_SIGMAS * math.sqrt(float(view.covariance[2, 2])) / step)
     turns = sorted((k * step for k in range(-most, most + 1)), key=abs)
     tried = [then @ Pose2(0.0, 0.0, turn) for turn in turns]
     predicted = [predict_lines(robot, then, settings.verification).segments_px for then in tried]
-    pairs = [_pair(lines, view.segments_px, tuning.coarse_gate_px, tuning) for lines in predicted]
+    pairs = [_pair(lines, view.segments_px, COARSE_GATE_PX) for lines in predicted]
     return tried[int(np.argmax([len(p) for p in pairs]))]
 
 
@@ -164,11 +193,11 @@ def _solve(
 
     Both are those of the prior where there are too few pairs.
     """
-    tuning, solved, posterior = settings.localization, start, prior
-    for gate_px in (tuning.coarse_gate_px, tuning.fine_gate_px):
+    solved, posterior = start, prior
+    for gate_px in (COARSE_GATE_PX, FINE_GATE_PX):
         lines = predict_lines(robot, solved, settings.verification)
-        pairs = _pair(lines.segments_px, view.segments_px, gate_px, tuning)
-        if len(pairs) < tuning.min_pairs:
+        pairs = _pair(lines.segments_px, view.segments_px, gate_px)
+        if len(pairs) < MIN_PAIRS:
             break
         model, data = pairs[:, 0], pairs[:, 1]
         fix = planar_from_lines(
@@ -180,11 +209,11 @@ def _solve(
     return (then if posterior is prior else solved), posterior
 
 
-def _pair(lines_px: Floats, segments_px: Floats, gate_px: float, settings: LocalizationSettings) -> Ints:
+def _pair(lines_px: Floats, segments_px: Floats, gate_px: float) -> Ints:
     """(p, 2) indices of lines (m, 2, 2) and segments (k, 2, 2): each segment along a line, with the nearest one."""
     nearest = _find_nearest(
         np.array(lines_px, float, order="C"), np.array(segments_px, float, order="C"), gate_px,
-        math.sin(settings.gate_rad), settings.min_pair_overlap)
+        math.sin(GATE_RAD), MIN_PAIR_OVERLAP)
     data = np.flatnonzero(nearest >= 0)
     return np.column_stack([nearest[data], data])
 
@@ -254,31 +283,28 @@ def compute_pose_likelihood(
     robot: RobotModel, views: Sequence[CameraView], world_from_now: Pose2, settings: Settings = DEFAULT
 ) -> PoseLikelihood:
     """Compute the likelihood of the robot's pose now by all views."""
-    tuning = settings.localization
     visible = matched = 0
     terms, weakest, lengths, explained = [0.0], 1.0, 0.0, 0.0
     for view in views:
         then = view.pose_then(world_from_now)
         lines = predict_lines(robot, then, settings.verification).lines_world
-        projected = _project(robot, lines, [then, *_displace(then, tuning)])
+        projected = _project(robot, lines, [then, *_displace(then)])
         agreement = compute_agreement(projected[0], view.segments_px, projected[1:], settings.verification)
         visible, matched = visible + agreement.visible, matched + agreement.matched
-        terms.append(compute_log_ratio(agreement.matched, agreement.visible, agreement.chance, tuning))
-        if agreement.visible >= tuning.min_view_lines:
+        terms.append(compute_log_ratio(agreement.matched, agreement.visible, agreement.chance))
+        if agreement.visible >= MIN_VIEW_LINES:
             weakest = min(weakest, agreement.matched / agreement.visible)
-        length, part = _explain(robot, view, then, settings)
+        length, part = _explain(robot, view, then)
         lengths, explained = lengths + length, explained + part
     part = explained / lengths if lengths > 0.0 else 0.0
     return PoseLikelihood(visible, matched, math.fsum(terms), part, weakest)
 
 
-def compute_log_ratio(
-    matched: int, visible: int, chance: float, settings: LocalizationSettings = DEFAULT.localization
-) -> float:
+def compute_log_ratio(matched: int, visible: int, chance: float) -> float:
     """Compute the tempered log likelihood ratio of so many matched lines at the right pose and at a wrong one."""
-    p, rate = min(max(chance, settings.min_chance), settings.max_chance), settings.detection_rate
+    p, rate = min(max(chance, MIN_CHANCE), MAX_CHANCE), DETECTION_RATE
     found, missed = math.log(rate / p), math.log((1.0 - rate) / (1.0 - p))
-    return settings.line_independence * (matched * found + (visible - matched) * missed)
+    return LINE_INDEPENDENCE * (matched * found + (visible - matched) * missed)
 
 
 def _project(robot: RobotModel, lines_world: Floats, poses: Sequence[Pose2]) -> Floats:
@@ -288,25 +314,24 @@ def _project(robot: RobotModel, lines_world: Floats, poses: Sequence[Pose2]) -> 
     return np.asarray(seen.reshape(len(poses), len(lines_world), 2, 2))
 
 
-def _displace(pose: Pose2, settings: LocalizationSettings) -> list[Pose2]:
+def _displace(pose: Pose2) -> list[Pose2]:
     """Sixteen wrong poses around a pose: four directions, two distances, two turns."""
-    shifts = [(by * x, by * y) for by in (settings.displacement_m, 2.0 * settings.displacement_m)
+    shifts = [(by * x, by * y) for by in (DISPLACEMENT_M, 2.0 * DISPLACEMENT_M)
               for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-    return [pose @ Pose2(x, y, turn) for x, y in shifts for turn in (-settings.displacement_rad,
-                                                                     settings.displacement_rad)]
+    return [pose @ Pose2(x, y, turn) for x, y in shifts for turn in (-DISPLACEMENT_RAD,
+                                                                     DISPLACEMENT_RAD)]
 
 
-def _explain(robot: RobotModel, view: CameraView, then: Pose2, settings: Settings) -> tuple[float, float]:
+def _explain(robot: RobotModel, view: CameraView, then: Pose2) -> tuple[float, float]:
     """Length of the long segments, and of the part of them that lies on model lines, also on faint ones [px]."""
-    tuning = settings.localization
     length = np.linalg.norm(view.segments_px[:, 1] - view.segments_px[:, 0], axis=1)
-    long = length >= tuning.min_explained_length_px
+    long = length >= MIN_EXPLAINED_LENGTH_PX
     if not np.any(long):
         return 0.0, 0.0
     shown = visible_lines(
-        robot.world, robot.camera, robot.camera_from_world(then), min_length_px=tuning.min_explaining_length_px,
-        min_contrast=tuning.min_explaining_contrast, min_separation_px=0.0)
+        robot.world, robot.camera, robot.camera_from_world(then), min_length_px=MIN_EXPLAINING_LENGTH_PX,
+        min_contrast=MIN_EXPLAINING_CONTRAST, min_separation_px=0.0)
     covered = compute_coverage(
-        view.segments_px[long], shown.segments_px, tuning.explained_tolerance_px,
-        settings.verification.line_tolerance_rad, settings.verification)
+        view.segments_px[long], shown.segments_px, EXPLAINED_TOLERANCE_PX,
+        LINE_TOLERANCE_RAD)
     return float(np.sum(length[long])), float(np.sum(length[long] * covered))

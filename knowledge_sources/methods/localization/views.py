@@ -17,10 +17,28 @@ from scipy.sparse.csgraph import connected_components
 from knowledge_sources.methods.arrays import Floats, Ints, Mask
 from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
 from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.localization import LocalizationSettings
 from world_models.camera import Camera
 from world_models.entries.obstruction import Obstruction
 from world_models.frames import Pose, Pose2, wrap_angle
+
+LEVEL_HEADING_SIGMA_RAD = math.radians(0.3)  # standard deviation of a turn measured by level lines
+MAX_HEADING_CORRECTION_RAD = math.radians(20.0)
+"""Largest correction of a turn by level lines; odometry decides between the four."""
+MIN_TURN_BETWEEN_VIEWS_RAD = math.radians(10.0)
+"""Turn from which nothing of the building stays where it is in the picture."""
+STATIONARY_PX = 1.5  # distance of two segments that are one stationary line
+STATIONARY_RAD = 0.03  # angle of two segments that are one stationary line
+MIN_STATIONARY_OVERLAP = 0.5  # part of the shorter of two segments that must lie beside the other
+MIN_STATIONARY_VIEWS = 2  # other views in which a stationary segment has a counterpart: in one it may be by chance
+MIN_STATIONARY_FRACTION = 0.6  # part of the other views in which a stationary segment has a counterpart
+MIN_OBSTRUCTION_AREA = 0.01  # smallest obstruction, as a part of the picture
+MAX_OBSTRUCTION_AREA = 0.5
+"""Largest obstruction, as a part of the picture: where more is stationary, the robot did not turn."""
+SIDE_END_QUANTILE = 0.8  # quantile of segment ends that is the end of a side: longer ones go on in something else
+MIN_SIDES = 3  # fewest sides of an outline
+MAX_DROPPED_SIDES = 4  # most sides that are left out as chance
+INSIDE_MARGIN_PX = 8.0  # distance within the outline from which a segment lies inside
+MAX_INSIDE_FRACTION = 0.1  # largest length of segments inside an opaque outline, as a part of the outline's own
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,13 +107,13 @@ def align_headings(
     axes = _find_axes(views, camera, camera_from_robot, settings)
     if len(axes) < 2:
         return tuple(views)
-    tuning, reference = settings.localization, max(axes)
+    reference = max(axes)
     axis = axes[reference]
-    variance = float(views[reference].covariance[2, 2]) + tuning.level_heading_sigma_rad**2
+    variance = float(views[reference].covariance[2, 2]) + LEVEL_HEADING_SIGMA_RAD**2
     out, off_later = [views[-1]], 0.0
     for k in range(len(views) - 2, -1, -1):
         view, off = views[k], math.remainder(axis - axes[k], RIGHT_ANGLE_RAD) if k in axes else math.inf
-        if abs(off) < tuning.max_heading_correction_rad and k != reference:
+        if abs(off) < MAX_HEADING_CORRECTION_RAD and k != reference:
             view = replace(view, covariance=_limit_turn_variance(view.covariance, variance))
         else:
             off = off_later
@@ -131,22 +149,18 @@ def _limit_turn_variance(covariance: Floats, variance: float) -> Floats:
 
 def update_obstruction(
     views: Sequence[CameraView], camera: Camera, known: Obstruction | None, min_area: float | None = None,
-    settings: LocalizationSettings = DEFAULT.localization,
 ) -> Obstruction | None:
     """Find what is before the camera in these views; else return what was known, unless something is seen inside it.
 
-    ``min_area`` is the smallest part of the picture, by default ``settings.min_obstruction_area``.
+    ``min_area`` is the smallest part of the picture, by default ``MIN_OBSTRUCTION_AREA``.
     """
-    found = find_obstruction(views, camera, min_area, settings)
-    if found is None and known is not None and is_opaque(known, [v.segments_px for v in views], settings):
+    found = find_obstruction(views, camera, min_area)
+    if found is None and known is not None and is_opaque(known, [v.segments_px for v in views]):
         return known
     return found
 
 
-def find_obstruction(
-    views: Sequence[CameraView], camera: Camera, min_area: float | None = None,
-    settings: LocalizationSettings = DEFAULT.localization,
-) -> Obstruction | None:
+def find_obstruction(views: Sequence[CameraView], camera: Camera, min_area: float | None = None) -> Obstruction | None:
     """Find what hides the same part of all views; None if nothing does, or too few directions were looked in.
 
     Stationary segments are those with counterparts in views of other directions. The outline is their convex hull. If
@@ -154,48 +168,44 @@ def find_obstruction(
     of counterparts that is asked for grows.
     """
     if min_area is None:
-        min_area = settings.min_obstruction_area
-    counts = [_count_counterparts(views, k, settings) for k in range(len(views))]
-    for least in range(settings.min_stationary_views, len(views)):
-        stationary = [count >= max(least, settings.min_stationary_fraction * total) for count, total in counts]
-        sides = _build_sides([v.segments_px[some] for v, some in zip(views, stationary, strict=True)], settings)
+        min_area = MIN_OBSTRUCTION_AREA
+    counts = [_count_counterparts(views, k) for k in range(len(views))]
+    for least in range(MIN_STATIONARY_VIEWS, len(views)):
+        stationary = [count >= max(least, MIN_STATIONARY_FRACTION * total) for count, total in counts]
+        sides = _build_sides([v.segments_px[some] for v, some in zip(views, stationary, strict=True)])
         others = [v.segments_px[~some] for v, some in zip(views, stationary, strict=True)]
-        for _ in range(1 + settings.max_dropped_sides):
-            obstruction = _enclose(sides, camera, min_area, settings)
-            if obstruction is not None and is_opaque(obstruction, others, settings):
+        for _ in range(1 + MAX_DROPPED_SIDES):
+            obstruction = _enclose(sides, camera, min_area)
+            if obstruction is not None and is_opaque(obstruction, others):
                 return obstruction
-            if len(sides) <= settings.min_sides:
+            if len(sides) <= MIN_SIDES:
                 break
-            sides, others = _drop_worst_side(sides, others, camera, settings)
+            sides, others = _drop_worst_side(sides, others, camera)
     return None
 
 
-def is_opaque(
-    obstruction: Obstruction, segments_px: Sequence[Floats], settings: LocalizationSettings = DEFAULT.localization
-) -> bool:
+def is_opaque(obstruction: Obstruction, segments_px: Sequence[Floats]) -> bool:
     """Whether hardly any of the segments (n, 2, 2) of several views lie inside an outline."""
-    return _measure_inside(obstruction, segments_px, settings) <= settings.max_inside_fraction
+    return _measure_inside(obstruction, segments_px) <= MAX_INSIDE_FRACTION
 
 
-def has_counterpart(one_px: Floats, other_px: Floats, settings: LocalizationSettings = DEFAULT.localization) -> Mask:
+def has_counterpart(one_px: Floats, other_px: Floats) -> Mask:
     """Return which segments (n, 2, 2) lie on, and beside, one of others (m, 2, 2)."""
-    return np.asarray(np.any(_lie_on(one_px, other_px, settings), axis=1))
+    return np.asarray(np.any(_lie_on(one_px, other_px), axis=1))
 
 
-def _count_counterparts(views: Sequence[CameraView], which: int, settings: LocalizationSettings) -> tuple[Ints, int]:
+def _count_counterparts(views: Sequence[CameraView], which: int) -> tuple[Ints, int]:
     """(n,) in how many views of other directions each segment of a view has a counterpart, and how many those are."""
     one = views[which]
     others = [v for v in views if abs(wrap_angle(v.now_from_then.heading_rad - one.now_from_then.heading_rad))
-              > settings.min_turn_between_views_rad]
-    found = [has_counterpart(one.segments_px, other.segments_px, settings) for other in others]
+              > MIN_TURN_BETWEEN_VIEWS_RAD]
+    found = [has_counterpart(one.segments_px, other.segments_px) for other in others]
     return np.sum([np.zeros(len(one.segments_px), np.int64), *found], axis=0), len(others)
 
 
-def _measure_inside(
-    obstruction: Obstruction, segments_px: Sequence[Floats], settings: LocalizationSettings
-) -> float:
+def _measure_inside(obstruction: Obstruction, segments_px: Sequence[Floats]) -> float:
     """Length of segments inside an outline, as a part of the outline's own length in all views."""
-    inside = math.fsum(float(np.sum(_measure(s) * obstruction.hidden_part(s, -settings.inside_margin_px)))
+    inside = math.fsum(float(np.sum(_measure(s) * obstruction.hidden_part(s, -INSIDE_MARGIN_PX)))
                        for s in segments_px)
     corners = np.array(obstruction.outline_px)
     perimeter = float(np.sum(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)))
@@ -210,7 +220,7 @@ class _Side:
     segments_px: Floats
 
 
-def _build_sides(stationary: Sequence[Floats], settings: LocalizationSettings) -> list[_Side]:
+def _build_sides(stationary: Sequence[Floats]) -> list[_Side]:
     """Group the stationary segments (n, 2, 2) of all views: those that lie on each other are one side.
 
     In some views a side continues in an edge of the building, or is seen in part only.
@@ -218,9 +228,9 @@ def _build_sides(stationary: Sequence[Floats], settings: LocalizationSettings) -
     segments = np.concatenate([np.zeros((0, 2, 2)), *stationary])
     if not len(segments):
         return []
-    count, which = connected_components(_lie_on(segments, segments, settings), directed=False)
+    count, which = connected_components(_lie_on(segments, segments), directed=False)
     groups = [segments[which == k] for k in range(count)]
-    return [_Side(_find_ends(group, settings.side_end_quantile), group) for group in groups]
+    return [_Side(_find_ends(group, SIDE_END_QUANTILE), group) for group in groups]
 
 
 def _find_ends(segments_px: Floats, quantile: float) -> Floats:
@@ -235,37 +245,33 @@ def _find_ends(segments_px: Floats, quantile: float) -> Floats:
     return np.asarray(longest[0] + np.outer([low, high], along) + float(np.median(across)) * normal)
 
 
-def _enclose(
-    sides: Sequence[_Side], camera: Camera, min_area: float, settings: LocalizationSettings
-) -> Obstruction | None:
+def _enclose(sides: Sequence[_Side], camera: Camera, min_area: float) -> Obstruction | None:
     """The convex hull of sides; None where its part of the picture is too small or too large."""
     corners = np.array([side.ends_px for side in sides]).reshape(-1, 2)
     if len(corners) < 3:
         return None
-    hull = cv2.approxPolyDP(cv2.convexHull(corners.astype(np.float32)), settings.stationary_px, True)
+    hull = cv2.approxPolyDP(cv2.convexHull(corners.astype(np.float32)), STATIONARY_PX, True)
     corners = np.round(np.asarray(hull, float).reshape(-1, 2))
     if len(corners) < 3:
         return None
     area = abs(float(cv2.contourArea(corners.astype(np.float32)))) / (camera.width * camera.height)
-    if not min_area <= area <= settings.max_obstruction_area:
+    if not min_area <= area <= MAX_OBSTRUCTION_AREA:
         return None
     return Obstruction(tuple((float(x), float(y)) for x, y in corners))
 
 
-def _drop_worst_side(
-    sides: list[_Side], others: list[Floats], camera: Camera, settings: LocalizationSettings
-) -> tuple[list[_Side], list[Floats]]:
+def _drop_worst_side(sides: list[_Side], others: list[Floats], camera: Camera) -> tuple[list[_Side], list[Floats]]:
     """Leave out the side without which least lies inside the outline; its segments are then of the building."""
     rated: list[tuple[float, int, list[Floats]]] = []
     for k, side in enumerate(sides):
-        outline = _enclose([*sides[:k], *sides[k + 1 :]], camera, 0.0, settings)
+        outline = _enclose([*sides[:k], *sides[k + 1 :]], camera, 0.0)
         seen = [np.concatenate([others[0], side.segments_px]), *others[1:]]
-        rated.append((math.inf if outline is None else _measure_inside(outline, seen, settings), k, seen))
+        rated.append((math.inf if outline is None else _measure_inside(outline, seen), k, seen))
     _, worst, seen = min(rated, key=lambda one: one[:2])
     return [*sides[:worst], *sides[worst + 1 :]], seen
 
 
-def _lie_on(one_px: Floats, other_px: Floats, settings: LocalizationSettings) -> Mask:
+def _lie_on(one_px: Floats, other_px: Floats) -> Mask:
     """(n, m) which segments (n, 2, 2) lie on, and beside, which of others (m, 2, 2)."""
     if not len(one_px) or not len(other_px):
         return np.zeros((len(one_px), len(other_px)), bool)
@@ -277,8 +283,8 @@ def _lie_on(one_px: Floats, other_px: Floats, settings: LocalizationSettings) ->
     across = np.abs(away[..., 0] * along[:, None, None, 1] - away[..., 1] * along[:, None, None, 0]).max(axis=2)
     at = away[..., 0] * along[:, None, None, 0] + away[..., 1] * along[:, None, None, 1]
     shared = np.minimum(at.max(axis=2), length[:, None]) - np.maximum(at.min(axis=2), 0.0)
-    beside = shared >= settings.min_stationary_overlap * np.minimum(length[:, None], size[None])
-    return np.asarray((turned <= settings.stationary_rad) & (across <= settings.stationary_px) & beside)
+    beside = shared >= MIN_STATIONARY_OVERLAP * np.minimum(length[:, None], size[None])
+    return np.asarray((turned <= STATIONARY_RAD) & (across <= STATIONARY_PX) & beside)
 
 
 def _measure(segments_px: Floats) -> Floats:

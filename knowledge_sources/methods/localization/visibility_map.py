@@ -15,9 +15,18 @@ from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Ints, Mask
 from knowledge_sources.methods.motion.routes import compute_free_space
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.localization import LocalizationSettings
 from world_models.building.building import Building
+
+POSITION_STEP_M = 0.25  # spacing of the positions that are tried in a room
+POSITION_CLEARANCE_M = 0.2
+"""Distance of positions from walls and things: less than the robot's radius, as a bump may move it."""
+VISIBILITY_CELL_M = 0.75  # side of the cells of which each shares one set of visible points
+POINT_SPACING_M = 0.25  # spacing of points along model lines
+MAX_LINE_POINTS = 60  # most points along one model line
+MAX_POINT_DISTANCE_M = 14.0  # largest distance of a visible point
+MIN_POINT_CONTRAST = 0.05  # smallest contrast of a line with visible points, 0..1
+OCCLUSION_TOLERANCE_M = 0.01  # distance behind a surface from which a point is hidden by it
+MAX_LEVEL_SLOPE = 0.05  # largest slope of a model line that counts as level
 
 MAX_MAPS = 256
 """Size of the cache of visibility maps."""
@@ -47,22 +56,18 @@ class VisibilityMap:
     axis_rad: float
 
 
-def get_visibility_map(
-    building: Building, room: str, eye_m: float, settings: LocalizationSettings = DEFAULT.localization
-) -> VisibilityMap:
+def get_visibility_map(building: Building, room: str, eye_m: float) -> VisibilityMap:
     """Return the visibility map of a room for a camera at a height above the world's zero. Cached."""
-    return building.cached("visibility maps", MAX_MAPS, (room, eye_m, settings),
-                           lambda: _build(building, room, eye_m, settings))
+    return building.cached("visibility maps", MAX_MAPS, (room, eye_m),
+                           lambda: _build(building, room, eye_m))
 
 
-def sample_lines(
-    lines_world: Floats, settings: LocalizationSettings = DEFAULT.localization
-) -> tuple[Floats, Floats, Ints]:
+def sample_lines(lines_world: Floats) -> tuple[Floats, Floats, Ints]:
     """Return points (k, 3) along lines (n, 2, 3), the unit direction (k, 3) of each one's line, and which line (k,)."""
     lines = np.asarray(lines_world, float).reshape(-1, 2, 3)
     along = lines[:, 1] - lines[:, 0]
     length = np.linalg.norm(along, axis=1)
-    count = np.clip(np.rint(length / settings.point_spacing_m), 2, settings.max_line_points).astype(np.int64)
+    count = np.clip(np.rint(length / POINT_SPACING_M), 2, MAX_LINE_POINTS).astype(np.int64)
     owner = np.repeat(np.arange(len(lines)), count)
     number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
     t = (number + 0.5) / count[owner]
@@ -70,26 +75,26 @@ def sample_lines(
     return lines[owner, 0] + t[:, None] * along[owner], unit[owner], owner
 
 
-def _build(building: Building, room: str, eye_m: float, settings: LocalizationSettings) -> VisibilityMap:
-    positions = _find_positions(building, room, settings)
+def _build(building: Building, room: str, eye_m: float) -> VisibilityMap:
+    positions = _find_positions(building, room)
     cells, cell = np.unique(
-        np.floor(positions / settings.visibility_cell_m).astype(np.int64), axis=0, return_inverse=True)
+        np.floor(positions / VISIBILITY_CELL_M).astype(np.int64), axis=0, return_inverse=True)
     cell = cell.reshape(-1).astype(np.int64)
-    eyes = _choose_eyes(positions, cell, cells, settings.visibility_cell_m)
+    eyes = _choose_eyes(positions, cell, cells, VISIBILITY_CELL_M)
     scene = building.scene_of((room,))
-    points, directions, owner = sample_lines(scene.edges.lines_world, settings)
+    points, directions, owner = sample_lines(scene.edges.lines_world)
     first, visible = [0], []
     for eye in np.column_stack([eyes, np.full(len(eyes), eye_m)]):
-        clear = scene.edges.contrasts(eye)[owner] >= settings.min_point_contrast
-        near = np.linalg.norm(points - eye, axis=1) < settings.max_point_distance_m
+        clear = scene.edges.contrasts(eye)[owner] >= MIN_POINT_CONTRAST
+        near = np.linalg.norm(points - eye, axis=1) < MAX_POINT_DISTANCE_M
         some = np.flatnonzero(clear & near)
-        seen = _are_visible(eye, points[some], scene.planes_world, scene.polygons_world, settings.occlusion_tolerance_m)
+        seen = _are_visible(eye, points[some], scene.planes_world, scene.polygons_world, OCCLUSION_TOLERANCE_M)
         visible.append(some[seen])
         first.append(first[-1] + len(visible[-1]))
     return VisibilityMap(
         positions, cell, eyes, points, directions, np.array(first, np.int64),
         np.concatenate([np.zeros(0, np.int64), *visible]),
-        _find_axis(scene.edges.lines_world, settings.max_level_slope),
+        _find_axis(scene.edges.lines_world, MAX_LEVEL_SLOPE),
     )
 
 
@@ -100,14 +105,14 @@ def _choose_eyes(positions: Floats, cell: Ints, cells: Ints, side_m: float) -> F
     return np.asarray(positions[order[np.searchsorted(cell[order], np.arange(len(cells)))]])
 
 
-def _find_positions(building: Building, room: str, settings: LocalizationSettings) -> Floats:
+def _find_positions(building: Building, room: str) -> Floats:
     """(n, 2) grid points in a room's free space, and points of its open doorways up to their middle [m, world]."""
     sills = [d.thresholds_world.mean(axis=1)[:: 1 if d.between[0] == room else -1] for d in building.doorways_of(room)]
     in_doorways = np.array([point for own, other in sills for point in (own, 0.5 * (own + other))]).reshape(-1, 2)
-    free = compute_free_space(building.outline(room), building.obstacles(room), settings.position_clearance_m)
+    free = compute_free_space(building.outline(room), building.obstacles(room), POSITION_CLEARANCE_M)
     if free.is_empty:
         return in_doorways
-    step = settings.position_step_m
+    step = POSITION_STEP_M
     x0, y0, x1, y1 = (float(v) for v in free.bounds)
     xs = np.arange(math.ceil(x0 / step), math.floor(x1 / step) + 1) * step
     ys = np.arange(math.ceil(y0 / step), math.floor(y1 / step) + 1) * step

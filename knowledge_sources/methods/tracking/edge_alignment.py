@@ -22,6 +22,26 @@ from knowledge_sources.settings.tracking import TrackingSettings
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
+EDGE_SMOOTHING_PX = 1.0  # standard deviation of the smoothing before edges are located
+EDGE_SPACING_PX = 8.0
+"""Distance of the places along a model line at which its edge is looked for (Harris and Stennett 1990)."""
+EDGE_INSET_PX = 4.0  # distance from a line's ends within which no edge is looked for, as other lines disturb
+FIRST_EDGE_REACH_PX = 4.0  # distance across a line up to which its edge is looked for in the first round
+LAST_EDGE_REACH_PX = 2.0  # distance across a line up to which its edge is looked for in the last round
+EDGE_STEP_PX = 0.5  # step of the search across a line
+EDGE_GATE_SIGMAS = 3.0  # standard deviations of a line's place that must lie within the reach
+MIN_SURE_SHARE = 0.75  # least share of the places along lines that must pass this test in the first round
+MIN_EDGE_GRADIENT_PER_PX = 2.0  # least gradient of an edge
+MAX_SECOND_EDGE_SHARE = 0.6  # largest gradient of another edge within reach, as a share of the steepest
+EDGE_SIGMA_PX = 0.4  # standard deviation of an edge's place, the model's own errors included (experiment table1)
+EDGES_PER_LINE = 3.0  # largest weight of one line in places, as its error is the same all along it
+MAX_EDGE_RESIDUAL_PX = 1.2  # largest distance of an edge from its model line after the fit
+PRIOR_SIGMA_M = 0.02  # standard deviation added to the believed place, as templates err together (experiment table1)
+PRIOR_SIGMA_RAD = 0.01
+"""Standard deviation added to the believed heading, as templates err together (experiment table1)."""
+EDGE_ITERATIONS = 4  # steps of the reweighted least-squares fit
+MIN_EDGE_LINE_SHARE = 0.5  # least share of the lines with an edge near them that must agree with the fit
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EdgeAlignment:
@@ -47,14 +67,14 @@ def align_to_edges(
         None where too few lines agree, or where the belief is so loose that the nearest edge may belong to another
         line. Where that is so of some lines only, they are left out until the others have narrowed the belief.
     """
-    smooth = np.asarray(cv2.GaussianBlur(image, (0, 0), settings.edge_smoothing_px), np.uint8)
+    smooth = np.asarray(cv2.GaussianBlur(image, (0, 0), EDGE_SMOOTHING_PX), np.uint8)
     pose, doubt, found = world_from_robot, covariance, None
-    for reach_px in (settings.first_edge_reach_px, settings.last_edge_reach_px):
-        edges = _find_edges(robot, smooth, lines_world, pose, reach_px, settings)
+    for reach_px in (FIRST_EDGE_REACH_PX, LAST_EDGE_REACH_PX):
+        edges = _find_edges(robot, smooth, lines_world, pose, reach_px)
         if edges is None:
             return None
-        doubt_px = settings.edge_gate_sigmas * edges.compute_sigmas(doubt)
-        if found is None and (not len(doubt_px) or np.quantile(doubt_px, settings.min_sure_share) > reach_px):
+        doubt_px = EDGE_GATE_SIGMAS * edges.compute_sigmas(doubt)
+        if found is None and (not len(doubt_px) or np.quantile(doubt_px, MIN_SURE_SHARE) > reach_px):
             return None
         found = _solve(edges.take(doubt_px <= reach_px), pose, world_from_robot, covariance, settings)
         if found is None:
@@ -82,14 +102,12 @@ class _Edges:
         return _Edges(self.offsets_px[which], self.slopes[which], self.line[which])
 
 
-def _find_edges(
-    robot: RobotModel, image: Image, lines: Floats, pose: Pose2, reach_px: float, settings: TrackingSettings
-) -> _Edges | None:
+def _find_edges(robot: RobotModel, image: Image, lines: Floats, pose: Pose2, reach_px: float) -> _Edges | None:
     """The steepest place across each line, every few pixels along it, where it is the only one."""
     camera = robot.camera
     state = np.array([pose.x_m, pose.y_m, pose.heading_rad])
     ends_px = camera.project(robot.camera_from_world(pose).apply(lines.reshape(-1, 3))).reshape(-1, 2, 2)
-    line, part = _choose_places(ends_px, settings)
+    line, part = _choose_places(ends_px)
     if not len(line):
         return None
     world = _intersect_lines(robot, lines[line], pose, part)
@@ -98,19 +116,19 @@ def _find_edges(
     along = ends_px[line, 1] - ends_px[line, 0]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    offset, good = _find_steepest(image, at_px + np.array([camera.cx, camera.cy]), normal, reach_px, settings)
+    offset, good = _find_steepest(image, at_px + np.array([camera.cx, camera.cy]), normal, reach_px)
     good &= p[:, 2] > 0.0
     slopes = np.einsum("ni,nij->nj", normal, jacobian)
     return _Edges(offset[good], slopes[good], line[good])
 
 
-def _choose_places(ends_px: Floats, settings: TrackingSettings) -> tuple[Ints, Floats]:
+def _choose_places(ends_px: Floats) -> tuple[Ints, Floats]:
     """Places along lines (k, 2, 2) in the picture: the line (n,), and the part of it (n,), 0 to 1."""
-    inset_px = settings.edge_inset_px
+    inset_px = EDGE_INSET_PX
     length = np.linalg.norm(ends_px[:, 1] - ends_px[:, 0], axis=1)
     room = length - 2.0 * inset_px
     usable = np.isfinite(room) & (room > 0.0)
-    count = np.where(usable, np.floor(np.nan_to_num(room) / settings.edge_spacing_px) + 1.0, 0.0).astype(int)
+    count = np.where(usable, np.floor(np.nan_to_num(room) / EDGE_SPACING_PX) + 1.0, 0.0).astype(int)
     line = np.repeat(np.arange(len(ends_px)), count)
     nth = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
     px = inset_px + (nth + 0.5) * (room[line] / count[line])
@@ -128,11 +146,9 @@ def _intersect_lines(robot: RobotModel, lines: Floats, pose: Pose2, part: Floats
     return np.asarray(lines[:, 0] + there[:, None] * (lines[:, 1] - lines[:, 0]))
 
 
-def _find_steepest(
-    image: Image, at_px: Floats, normal: Floats, reach_px: float, settings: TrackingSettings
-) -> tuple[Floats, Mask]:
+def _find_steepest(image: Image, at_px: Floats, normal: Floats, reach_px: float) -> tuple[Floats, Mask]:
     """Signed distance (n,) along the normals to the steepest place within reach [px], and whether it is unique."""
-    step_px = settings.edge_step_px
+    step_px = EDGE_STEP_PX
     reach = np.arange(-reach_px - step_px, reach_px + 1.5 * step_px, step_px)
     where = (at_px[:, None, :] + reach[None, :, None] * normal[:, None, :]).astype(np.float32)
     height, width = image.shape[:2]
@@ -144,9 +160,9 @@ def _find_steepest(
     a, b, c = steep[rows, top - 1], steep[rows, top], steep[rows, top + 1]
     bend = a - 2.0 * b + c
     shift = np.where(bend < 0.0, 0.5 * (a - c) / np.where(bend < 0.0, bend, 1.0), 0.0)
-    is_peak = (b >= a) & (b >= c) & (b >= settings.min_edge_gradient_per_px)
+    is_peak = (b >= a) & (b >= c) & (b >= MIN_EDGE_GRADIENT_PER_PX)
     mid = steep[:, 1:-1]
-    peaks = (mid >= steep[:, :-2]) & (mid > steep[:, 2:]) & (mid >= settings.max_second_edge_share * b[:, None])
+    peaks = (mid >= steep[:, :-2]) & (mid > steep[:, 2:]) & (mid >= MAX_SECOND_EDGE_SHARE * b[:, None])
     offset = (reach[1:-1][top] + shift * step_px).astype(float)
     return offset, np.asarray(inside & is_peak & (np.count_nonzero(peaks, axis=1) <= 1))
 
@@ -155,20 +171,20 @@ def _solve(
     edges: _Edges, at: Pose2, prior: Pose2, covariance: Floats, settings: TrackingSettings
 ) -> EdgeAlignment | None:
     """Least squares with a hard cut-off, from one step with Huber weights; the belief is one more measurement."""
-    sigma_px, cutoff_px = settings.edge_sigma_px, settings.max_edge_residual_px
-    inflation = np.diag([settings.prior_sigma_m**2, settings.prior_sigma_m**2, settings.prior_sigma_rad**2])
+    sigma_px, cutoff_px = EDGE_SIGMA_PX, MAX_EDGE_RESIDUAL_PX
+    inflation = np.diag([PRIOR_SIGMA_M**2, PRIOR_SIGMA_M**2, PRIOR_SIGMA_RAD**2])
     information = np.linalg.inv(covariance + inflation)
     away = np.array([at.x_m - prior.x_m, at.y_m - prior.y_m, wrap_angle(at.heading_rad - prior.heading_rad)])
     per_line = np.bincount(edges.line, minlength=int(edges.line.max(initial=0)) + 1)[edges.line]
-    weight = np.minimum(1.0, settings.edges_per_line / np.maximum(per_line, 1)) / sigma_px**2
+    weight = np.minimum(1.0, EDGES_PER_LINE / np.maximum(per_line, 1)) / sigma_px**2
     step = np.zeros(3)
-    for number in range(settings.edge_iterations):
+    for number in range(EDGE_ITERATIONS):
         residual = np.abs(edges.offsets_px - edges.slopes @ step)
         w = weight * (1.0 / np.maximum(1.0, residual / sigma_px) if number == 0 else residual <= cutoff_px)
         hessian = edges.slopes.T @ (w[:, None] * edges.slopes) + information
         step = np.linalg.solve(hessian, edges.slopes.T @ (w * edges.offsets_px) - information @ away)
     lines = len(np.unique(edges.line[np.abs(edges.offsets_px - edges.slopes @ step) <= cutoff_px]))
-    if lines < max(settings.min_edge_lines, settings.min_edge_line_share * len(np.unique(edges.line))):
+    if lines < max(settings.min_edge_lines, MIN_EDGE_LINE_SHARE * len(np.unique(edges.line))):
         return None
     pose = Pose2(at.x_m + float(step[0]), at.y_m + float(step[1]), wrap_angle(at.heading_rad + float(step[2])))
     return EdgeAlignment(pose, np.linalg.inv(hessian), lines)

@@ -23,12 +23,27 @@ from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.pose.planar import compute_point_jacobian, planar_from_points
 from knowledge_sources.settings import DEFAULT, Settings
 from knowledge_sources.settings.features import FeaturesSettings
-from knowledge_sources.settings.tracking import TrackingSettings
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.entries.percepts import Anchor, Track
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_points
+
+MIN_LANDMARK_CONTRAST = 0.08  # least contrast of a model point that may be followed
+MIN_CORNER_PER_PX = 3.0  # least corner strength of a landmark's patch (Shi-Tomasi)
+MAX_SECOND_PEAK = 0.8  # largest correlation of a landmark's patch with another place near it when it is chosen
+SECOND_PEAK_WINDOW_PX = 14.0  # half-width of the window in which another such place is looked for
+MIN_PEAK = 0.7  # least correlation of a template with the place where it is found
+MIN_DISTINCTIVENESS = 0.08  # least margin of that correlation over the one at the second best place
+MIN_SEARCH_PX = 6.0  # least half-width of the window searched for a template
+MAX_SEARCH_PX = 48.0  # largest half-width of the window searched for a template
+SEARCH_SIGMAS = 4.0  # half-width of that window in standard deviations of the predicted place
+SEARCH_MARGIN_PX = 2.0  # what is added to that half-width
+MIN_SIGMA_PX = 0.3
+"""Least standard deviation of a landmark's place, as the model's corner is not exactly the seen one (experiment
+table1)."""
+MIN_SCALE = 0.55  # least scale of a landmark's view against its template
+MAX_SCALE = 1.8  # largest scale of a landmark's view against its template
 
 MAX_TEMPLATES = 256
 """Size of the cache of templates."""
@@ -71,12 +86,12 @@ def follow_landmarks(
             tracks, depth.tolist(), predicted, spread.tolist(), hidden.tolist(), strict=True):
         scale = track.template_depth_m / max(z, NEAR_PLANE_M)
         in_view = z > NEAR_PLANE_M and not is_hidden and lies_inside(image.shape, at, s.template_half_px + 2)
-        expected = in_view and s.min_scale <= scale <= s.max_scale
+        expected = in_view and MIN_SCALE <= scale <= MAX_SCALE
         found = None
         if expected:
-            search = min(max(s.search_sigmas * sigma + s.search_margin_px, s.min_search_px), s.max_search_px)
+            search = min(max(SEARCH_SIGMAS * sigma + SEARCH_MARGIN_PX, MIN_SEARCH_PX), MAX_SEARCH_PX)
             found = correlate(template_of(track), image, at, search, scale=scale)
-        out.append(TrackUpdate(_update_track(track, at, found, expected, s), expected))
+        out.append(TrackUpdate(_update_track(track, at, found, expected), expected))
     return out
 
 
@@ -126,11 +141,11 @@ def select_landmarks(
     camera_from_world = robot.camera_from_world(pose)
     points = visible_points(
         robot.world, robot.camera, camera_from_world, margin_px=half_px + 4.0,
-        min_contrast=s.min_landmark_contrast, max_distance_m=s.max_landmark_distance_m,
+        min_contrast=MIN_LANDMARK_CONTRAST, max_distance_m=s.max_landmark_distance_m,
     )
     strength = measure_corner_strengths(image, points.points_px, half_px)
     taken_px = [t.found_px or t.predicted_px for t in kept]
-    free = (strength >= s.min_corner_per_px) & _are_apart(points.points_px, taken_px, s.min_spacing_px)
+    free = (strength >= MIN_CORNER_PER_PX) & _are_apart(points.points_px, taken_px, s.min_spacing_px)
     new: list[Track] = []
     for i in np.argsort(-strength, kind="stable"):
         px, point = points.points_px[i], points.points_world[i]
@@ -138,10 +153,10 @@ def select_landmarks(
             break
         if not free[i]:
             continue
-        if compute_second_peak(image, px, half_px, s.second_peak_window_px) < s.max_second_peak:
+        if compute_second_peak(image, px, half_px, SECOND_PEAK_WINDOW_PX) < MAX_SECOND_PEAK:
             free &= _are_apart(points.points_px, px, s.min_spacing_px)
             name = points.marks[int(points.landmark[i])].name
-            new.append(_begin_track(point, px, float(camera_from_world.apply(point)[2]), name, frame, s.min_sigma_px))
+            new.append(_begin_track(point, px, float(camera_from_world.apply(point)[2]), name, frame, MIN_SIGMA_PX))
     return tuple(new)
 
 
@@ -161,21 +176,19 @@ def _are_apart(points_px: Floats, taken_px: Any, spacing_px: float) -> Mask:
     return np.asarray(np.all(away[..., 0] ** 2 + away[..., 1] ** 2 >= spacing_px**2, axis=1))
 
 
-def _update_track(
-    track: Track, predicted_px: Floats, found: Correlation | None, expected: bool, settings: TrackingSettings
-) -> Track:
+def _update_track(track: Track, predicted_px: Floats, found: Correlation | None, expected: bool) -> Track:
     """A track as of the newest frame; what correlates badly, ambiguously or at the window's border is not found."""
     predicted = (float(predicted_px[0]), float(predicted_px[1]))
     if not expected:
         return replace(track, predicted_px=predicted, found_px=None)
     if (
-        found is None or found.peak < settings.min_peak or found.at_border
-        or found.distinctiveness < settings.min_distinctiveness
+        found is None or found.peak < MIN_PEAK or found.at_border
+        or found.distinctiveness < MIN_DISTINCTIVENESS
     ):
         peak = -1.0 if found is None else found.peak
         return replace(track, predicted_px=predicted, found_px=None, peak=peak, misses=track.misses + 1)
     at = (float(found.position_px[0]), float(found.position_px[1]))
-    sigma = max(settings.min_sigma_px, found.sigma_px)
+    sigma = max(MIN_SIGMA_PX, found.sigma_px)
     return replace(track, predicted_px=predicted, found_px=at, peak=found.peak, sigma_px=sigma, misses=0)
 
 

@@ -17,12 +17,19 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats, Image, Ints
 from knowledge_sources.methods.features.regions import segment_regions
-from knowledge_sources.methods.verification.predicted_colors import FaceColor
+from knowledge_sources.methods.verification.predicted_colors import BORDER_MARGIN_PX, MIN_FACE_POINTS, FaceColor
 from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.verification import VerificationSettings
 from world_models.camera import NEAR_PLANE_M
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
+
+REGION_IMAGE_PX = 64  # side of the reduced picture that is segmented into regions
+MIN_REGION_AREA_PX = 8  # smallest region of the reduced picture [px of area]
+MAX_BRIGHTNESS_LOG_RATIO = 0.3  # largest difference of log brightness of two faces that agree
+MAX_TINT_LOG_RATIO = 0.1  # largest difference of log color, without brightness, of two faces that agree
+MIN_COLOR_FACES = 3  # fewest faces by which colors are testable
+MAX_COLOR_CHANCE = 0.8  # largest part of the faces that may agree by chance where colors are testable
+DARK_OFFSET = 4.0  # grey levels added before a ratio of colors is taken, against noise in the dark
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,28 +68,25 @@ def check_colors(
     points = robot.camera_from_world(pose).apply(np.array([p for _, points in face_colors for p in points]))
     ahead = points[:, 2] > NEAR_PLANE_M
     pixels = robot.lens.project(np.where(ahead[:, None], points, (0.0, 0.0, 1.0)))
-    tuning = settings.verification
-    inside = ahead & robot.lens.inside(pixels, tuning.border_margin_px)
+    inside = ahead & robot.lens.inside(pixels, BORDER_MARGIN_PX)
     if not inside.any():
         return NOT_TESTED
     parts = (pixels[inside] + 0.5) / (robot.lens.width, robot.lens.height)
-    side = tuning.region_image_px
+    side = REGION_IMAGE_PX
     tiny = cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA).mean(axis=2)
     labels = segment_regions(
-        tiny, sector_px=side, min_area_px=tuning.min_region_area_px, settings=settings.features).labels
+        tiny, sector_px=side, min_area_px=MIN_REGION_AREA_PX, settings=settings.features).labels
     smooth = np.asarray(cv2.blur(image, (3, 3)), np.float64)
     colors = np.array([color for color, _ in face_colors])
-    return _measure(_sample(smooth, parts), _sample(labels, parts), face[inside], colors, tuning)
+    return _measure(_sample(smooth, parts), _sample(labels, parts), face[inside], colors)
 
 
-def predict_color_check(
-    face_colors: Sequence[FaceColor], settings: VerificationSettings = DEFAULT.verification
-) -> ColorCheck:
+def predict_color_check(face_colors: Sequence[FaceColor]) -> ColorCheck:
     """Predict the check of a picture in which all faces have the model's colors."""
-    if len(face_colors) < settings.min_color_faces:
+    if len(face_colors) < MIN_COLOR_FACES:
         return NOT_TESTED
-    expected = _log(np.array([color for color, _ in face_colors]), settings)
-    return _compare(expected, expected, settings)
+    expected = _log(np.array([color for color, _ in face_colors]))
+    return _compare(expected, expected)
 
 
 def _sample(image: NDArray[Any], parts: Floats) -> NDArray[Any]:
@@ -92,12 +96,10 @@ def _sample(image: NDArray[Any], parts: Floats) -> NDArray[Any]:
     return np.asarray(image[row, column])
 
 
-def _measure(
-    seen: Floats, labels: NDArray[np.int32], face: Ints, colors: Floats, settings: VerificationSettings
-) -> ColorCheck:
+def _measure(seen: Floats, labels: NDArray[np.int32], face: Ints, colors: Floats) -> ColorCheck:
     """From the colors (n, 3) and regions (n,) seen at points of faces (n,), and the colors (f, 3) of the faces."""
-    tested = [f for f in range(len(colors)) if np.count_nonzero(face == f) >= settings.min_face_points]
-    if len(tested) < settings.min_color_faces:
+    tested = [f for f in range(len(colors)) if np.count_nonzero(face == f) >= MIN_FACE_POINTS]
+    if len(tested) < MIN_COLOR_FACES:
         return NOT_TESTED
     own = []
     for f in tested:
@@ -105,26 +107,26 @@ def _measure(
         most = np.bincount(labels[mine]).argmax()
         ordered = np.sort(seen[mine[labels[mine] == most]], axis=0)  # the median: np.median is slow for so few
         own.append(0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2]))
-    return _compare(np.log(np.array(own) + settings.dark_offset), _log(colors[tested], settings), settings)
+    return _compare(np.log(np.array(own) + DARK_OFFSET), _log(colors[tested]))
 
 
-def _log(colors: Floats, settings: VerificationSettings) -> Floats:
-    return np.asarray(np.log(255.0 * colors + settings.dark_offset))
+def _log(colors: Floats) -> Floats:
+    return np.asarray(np.log(255.0 * colors + DARK_OFFSET))
 
 
-def _compare(measured: Floats, expected: Floats, settings: VerificationSettings) -> ColorCheck:
+def _compare(measured: Floats, expected: Floats) -> ColorCheck:
     """From the log colors (f, 3) of faces as measured and as expected: expected ones are also permuted cyclically."""
     permuted = np.stack([np.roll(expected, shift, axis=0) for shift in range(len(expected))])
-    agreeing = _count_agreeing(measured - permuted, settings)
+    agreeing = _count_agreeing(measured - permuted)
     chance = float(np.mean(agreeing[1:]))
-    is_testable = len(expected) >= settings.min_color_faces and chance <= settings.max_color_chance
+    is_testable = len(expected) >= MIN_COLOR_FACES and chance <= MAX_COLOR_CHANCE
     return ColorCheck(len(expected), float(agreeing[0]), chance, is_testable)
 
 
-def _count_agreeing(ratios: Floats, settings: VerificationSettings) -> Floats:
+def _count_agreeing(ratios: Floats) -> Floats:
     """(s,) the largest part of the faces whose log ratios (s, f, 3) are those of one of them."""
     off = ratios[:, :, None] - ratios[:, None]
     brightness = off.mean(axis=3)
     tints = np.abs(off - brightness[..., None]).max(axis=3)
-    agree = (np.abs(brightness) <= settings.max_brightness_log_ratio) & (tints <= settings.max_tint_log_ratio)
+    agree = (np.abs(brightness) <= MAX_BRIGHTNESS_LOG_RATIO) & (tints <= MAX_TINT_LOG_RATIO)
     return np.asarray(agree.mean(axis=2).max(axis=1))

@@ -28,6 +28,20 @@ from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import VisibleLines, visible_lines
 
+MIN_LINE_CONTRAST = 0.05  # smallest contrast of a model line that is predicted, 0..1
+MAX_LINE_DISTANCE_M = 15.0  # largest distance of a model line that is predicted
+CELLS_PER_LINE = 24  # cells into which a line is cut to measure how much of it is covered
+MIN_COVERED_FRACTION = 0.5  # covered part from which a line is matched
+TEST_COUNT = 1e3
+"""Resolvable poses within the matcher's reach: the number of tests of the a-contrario count (Desolneux, Moisan and
+Morel 2008, ch. 3)."""
+MIN_CHANCE = 0.02  # lower bound of the probability that a line is matched at a wrong pose
+MAX_CHANCE = 0.95  # upper bound of the probability that a line is matched at a wrong pose
+DISPLACEMENT_M = 0.35  # shift of the nearer wrong poses at which chance is counted; the farther are at twice as much
+DISPLACEMENT_RAD = 0.07  # turn of the nearer wrong poses at which chance is counted; the farther are at twice as much
+LINE_TOLERANCE_RAD = 0.06  # largest angle between a segment and the line that it covers
+MAX_LINE_WEIGHT_PX = 100.0  # length from which a longer line weighs no more
+
 
 def predict_lines(
     robot: RobotModel, world_from_robot: Pose2, settings: VerificationSettings = DEFAULT.verification
@@ -35,8 +49,8 @@ def predict_lines(
     """Predict the model lines that are long, clear and near enough to be looked for from a pose."""
     return visible_lines(
         robot.world, robot.camera, robot.camera_from_world(world_from_robot),
-        min_length_px=settings.min_line_length_px, min_contrast=settings.min_line_contrast,
-        max_distance_m=settings.max_line_distance_m,
+        min_length_px=settings.min_line_length_px, min_contrast=MIN_LINE_CONTRAST,
+        max_distance_m=MAX_LINE_DISTANCE_M,
     )
 
 
@@ -80,37 +94,32 @@ def compute_agreement(
         segments_px: (k, 2, 2) found in the picture.
         displaced_px: (p, m, 2, 2) the same lines projected at p wrong poses nearby.
     """
-    tolerances = settings.line_tolerance_px, settings.line_tolerance_rad, settings
+    tolerances = settings.line_tolerance_px, LINE_TOLERANCE_RAD
     coverage = compute_coverage(lines_px, segments_px, *tolerances)
     displaced = compute_coverage(displaced_px.reshape(-1, 2, 2), segments_px, *tolerances)
     displaced = displaced.reshape(displaced_px.shape[:2])
-    visible, matched = _count(coverage, settings.min_covered_fraction)
-    visible_there, matched_there = _count(displaced, settings.min_covered_fraction)
+    visible, matched = _count(coverage, MIN_COVERED_FRACTION)
+    visible_there, matched_there = _count(displaced, MIN_COVERED_FRACTION)
     seen = visible_there > 0
     rate = float(np.mean(matched_there[seen] / visible_there[seen])) if np.any(seen) else 1.0
-    chance = min(settings.max_chance, max(settings.min_chance, rate))
-    p_false = compute_p_false(int(matched), int(visible), chance, settings)
+    chance = min(MAX_CHANCE, max(MIN_CHANCE, rate))
+    p_false = compute_p_false(int(matched), int(visible), chance)
     return Agreement(coverage, int(visible), int(matched), chance, p_false)
 
 
-def compute_p_false(
-    matched: int, visible: int, chance: float, settings: VerificationSettings = DEFAULT.verification
-) -> float:
+def compute_p_false(matched: int, visible: int, chance: float) -> float:
     """Compute the probability that so many of the visible lines are matched at a wrong pose (binomial tail)."""
     if not visible:
         return 1.0
     # As scipy.stats.binom.sf to the bit, whose import takes a quarter of a second.
     tail = float(betainc(matched, visible - matched + 1, chance)) if matched else 1.0
-    return min(1.0, settings.test_count * tail)
+    return min(1.0, TEST_COUNT * tail)
 
 
-def compute_coverage(
-    lines_px: Floats, segments_px: Floats, tolerance_px: float, tolerance_rad: float,
-    settings: VerificationSettings = DEFAULT.verification,
-) -> Floats:
+def compute_coverage(lines_px: Floats, segments_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
     """Compute the part (m,) of each line (m, 2, 2) that lies under segments (k, 2, 2) within the tolerances."""
     lines, segments = np.array(lines_px, float, order="C"), np.array(segments_px, float, order="C")
-    covered: Floats = _cover(lines, segments, tolerance_px, math.sin(tolerance_rad), settings.cells_per_line)
+    covered: Floats = _cover(lines, segments, tolerance_px, math.sin(tolerance_rad), CELLS_PER_LINE)
     return covered
 
 
@@ -180,7 +189,7 @@ def check_lines(
     the wrong ones at which chance is counted.
     """
     state = np.array([world_from_robot.x_m, world_from_robot.y_m, world_from_robot.heading_rad])
-    states = np.concatenate([state[None], _displace(state, settings.displacement_m, settings.displacement_rad)])
+    states = np.concatenate([state[None], _displace(state, DISPLACEMENT_M, DISPLACEMENT_RAD)])
     if errors is None or errors.is_exact:
         projected = _project(robot, lines_world, states)
     else:

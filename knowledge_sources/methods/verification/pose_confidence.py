@@ -22,11 +22,23 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose.planar import compute_point_jacobian
 from knowledge_sources.methods.verification.color_check import ColorCheck
-from knowledge_sources.methods.verification.line_check import LineCheck, compute_coverage
+from knowledge_sources.methods.verification.line_check import (
+    LINE_TOLERANCE_RAD,
+    MAX_LINE_WEIGHT_PX,
+    LineCheck,
+    compute_coverage,
+)
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.settings.verification import VerificationSettings
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
+
+SHARP_TOLERANCE_PX = 1.0  # distance within which a covered line is sharp; chance spreads over the whole tolerance
+PROBE_TURN_RAD = 0.4  # turn that is weighed like one metre of motion in the weakest direction of the evidence
+MAX_LINE_MOTION_PX = 400.0  # motion of a line in the picture, by one metre, from which it weighs no more
+MAX_BELIEF_SIGMAS = 6.0  # mahalanobis distance from the belief from which a pose gets no credit for being near it
+MIN_P_FALSE = 1e-12  # probability of chance agreement that counts as certainty
+FIT_RIDGE = 0.02  # ridge penalty of the fit of evidence weights
 
 NEAR_M = 0.1
 """Lines with an end nearer to the camera than this have no defined motion in the picture."""
@@ -69,7 +81,6 @@ EVIDENCE_NAMES = tuple(field.name for field in fields(PoseEvidence))
 def compute_evidence(
     robot: RobotModel, lines_world: Floats, segments_px: Floats, pose: Pose2, covariance: Floats, belief: Pose2,
     belief_covariance: Floats, lines: LineCheck, colors: ColorCheck,
-    settings: VerificationSettings = DEFAULT.verification,
 ) -> PoseEvidence:
     """Compute the evidence for a pose.
 
@@ -83,19 +94,19 @@ def compute_evidence(
     agreement, projected = lines.agreement, lines.projected_px
     covered = np.nan_to_num(agreement.coverage)
     span = np.linalg.norm(projected[:, 1] - projected[:, 0], axis=1)
-    length = np.minimum(np.nan_to_num(span), settings.max_line_weight_px)
+    length = np.minimum(np.nan_to_num(span), MAX_LINE_WEIGHT_PX)
     sharp = np.nan_to_num(compute_coverage(
-        projected, segments_px, settings.sharp_tolerance_px, settings.line_tolerance_rad, settings))
-    directions = _error_directions(settings.probe_turn_rad)
-    motion = length[:, None] * _compute_motion(robot, lines_world, pose, directions, settings.max_line_motion_px)
-    sigmas = min(_mahalanobis(pose, belief, covariance + belief_covariance), settings.max_belief_sigmas)
+        projected, segments_px, SHARP_TOLERANCE_PX, LINE_TOLERANCE_RAD))
+    directions = _error_directions(PROBE_TURN_RAD)
+    motion = length[:, None] * _compute_motion(robot, lines_world, pose, directions, MAX_LINE_MOTION_PX)
+    sigmas = min(_mahalanobis(pose, belief, covariance + belief_covariance), MAX_BELIEF_SIGMAS)
     return PoseEvidence(
         coverage=_ratio(length * covered, length),
         weakest_coverage=min(_ratio(motion[:, k] * covered, motion[:, k]) for k in range(len(directions))),
         sharpness=_ratio(length * sharp, length * covered),
-        significance=math.log10(max(agreement.p_false, settings.min_p_false)) / math.log10(settings.min_p_false),
+        significance=math.log10(max(agreement.p_false, MIN_P_FALSE)) / math.log10(MIN_P_FALSE),
         line_count=math.log2(1.0 + agreement.matched),
-        proximity=1.0 - sigmas / settings.max_belief_sigmas,
+        proximity=1.0 - sigmas / MAX_BELIEF_SIGMAS,
         color_agreement=max(colors.agreeing - colors.chance, 0.0) if colors.is_testable else 0.0,
         color_count=math.log2(1.0 + colors.count) if colors.is_testable else 0.0,
     )
@@ -230,9 +241,7 @@ POSE_CONFIDENCE = PoseConfidence.from_table(tomllib.loads(WEIGHTS_FILE.read_text
 """The fitted weights and limits."""
 
 
-def fit_weights(
-    evidence: Floats, is_right: Mask, settings: VerificationSettings = DEFAULT.verification
-) -> EvidenceWeights:
+def fit_weights(evidence: Floats, is_right: Mask) -> EvidenceWeights:
     """Fit non-negative weights to evidence (n, k) of right and wrong poses (n,) by ridge logistic regression.
 
     Right and wrong poses count the same in total. Solved by L-BFGS-B.
@@ -247,7 +256,7 @@ def fit_weights(
     def cost(weights: Floats) -> tuple[float, Floats]:
         margin = sign * (rows @ weights)
         slope = -share * sign / (1.0 + np.exp(np.minimum(margin, 700.0)))
-        ridge = settings.fit_ridge * weights[:-1] / len(evidence)
+        ridge = FIT_RIDGE * weights[:-1] / len(evidence)
         value = float(np.sum(share * np.logaddexp(0.0, -margin)) + 0.5 * np.sum(ridge * weights[:-1]))
         return value, np.asarray(rows.T @ slope + np.append(ridge, 0.0))
 

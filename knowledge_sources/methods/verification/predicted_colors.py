@@ -10,8 +10,6 @@ import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Ints
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.verification import VerificationSettings
 from world_models.building.building import Building
 from world_models.building.geometry.faces import Finish, area_vector, expected_brightness
 from world_models.building.geometry.scene import LocaleGeometry
@@ -19,6 +17,14 @@ from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.portals import Window, find_visible_locales, image_window
+
+COLOR_GRID_SIZE = 32  # samples along each side of the picture in which faces are predicted
+BORDER_MARGIN_PX = 12.0  # distance that color samples keep from the border of the picture
+EDGE_MARGIN_PX = 5.0  # distance that color samples keep from the edges of faces
+MAX_FACE_POINTS = 6  # most samples of a face that are compared
+MAX_FACES = 16  # most faces that are predicted, the largest first
+CACHED_COLOR_VIEWS = 64  # predicted views of face colors that are kept
+MIN_FACE_POINTS = 2  # fewest samples of a face that is compared
 
 FaceColor = tuple[tuple[float, ...], tuple[tuple[float, ...], ...]]
 """The color of a face (red, green, blue; 0..1, as bright as the model has it), and points of it in view [m, world]."""
@@ -32,25 +38,21 @@ WHITE = Finish((1.0, 1.0, 1.0))
 _SURFACES: WeakKeyDictionary[LocaleGeometry, tuple[Floats, Floats, Floats]] = WeakKeyDictionary()
 
 
-def predict_face_colors(
-    robot: RobotModel, pose: Pose2, settings: VerificationSettings = DEFAULT.verification
-) -> tuple[FaceColor, ...]:
+def predict_face_colors(robot: RobotModel, pose: Pose2) -> tuple[FaceColor, ...]:
     """Predict the faces in view from a pose, the largest first. The last answers are cached."""
     camera, camera_from_world = robot.camera, robot.camera_from_world(pose)
-    key = camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes(), settings
-    return robot.world.cached("face colors", settings.cached_color_views, key,
-                                  lambda: _predict(robot, camera, camera_from_world, settings))
+    key = camera, camera_from_world.rotation.tobytes(), camera_from_world.translation.tobytes()
+    return robot.world.cached("face colors", CACHED_COLOR_VIEWS, key,
+                                  lambda: _predict(robot, camera, camera_from_world))
 
 
-def _predict(
-    robot: RobotModel, camera: Camera, camera_from_world: Pose, settings: VerificationSettings
-) -> tuple[FaceColor, ...]:
-    rays, bounds, window = _build_rays(camera, settings)
+def _predict(robot: RobotModel, camera: Camera, camera_from_world: Pose) -> tuple[FaceColor, ...]:
+    rays, bounds, window = _build_rays(camera)
     colors, normals, surface, depth = cast_rays(
-        robot.world, camera_from_world, rays, bounds, window, settings.color_grid_size)
+        robot.world, camera_from_world, rays, bounds, window, COLOR_GRID_SIZE)
     surface[np.append(np.isnan(colors[:, 0]), False)[surface]] = -1  # of unknown color: it only hides
     if camera.obstruction is not None:
-        surface[camera.obstruction.covers(_sample_pixels(camera.width, camera.height, settings)).ravel()] = -1
+        surface[camera.obstruction.covers(_sample_pixels(camera.width, camera.height)).ravel()] = -1
     hit = np.unique(surface[surface >= 0])
     if not len(hit):
         return ()
@@ -62,8 +64,8 @@ def _predict(
     whole = np.flatnonzero((of[:, 0] >= 0) & np.all(of == of[:, :1], axis=1))
     at = rays[::RAYS][whole] * depth[::RAYS][whole, None]
     points = camera_from_world.inverse().apply(at).reshape(-1, 3)
-    return tuple(_to_face_color(keys[g, :3], points[of[whole, 0] == g], settings.max_face_points)
-                 for g in _find_largest(of[whole, 0], settings))
+    return tuple(_to_face_color(keys[g, :3], points[of[whole, 0] == g], MAX_FACE_POINTS)
+                 for g in _find_largest(of[whole, 0]))
 
 
 def cast_rays(
@@ -99,27 +101,27 @@ def cast_rays(
 
 
 @lru_cache(maxsize=8)
-def _build_rays(camera: Camera, settings: VerificationSettings) -> tuple[Floats, Floats, Window]:
+def _build_rays(camera: Camera) -> tuple[Floats, Floats, Window]:
     """Rays (n, 3), z = 1, through the samples of a picture, the rectangle around them (4,), and the picture's own."""
-    rays = camera.rays(_sample_pixels(camera.width, camera.height, settings)).reshape(-1, 3)
+    rays = camera.rays(_sample_pixels(camera.width, camera.height)).reshape(-1, 3)
     rays = np.ascontiguousarray(rays / rays[:, 2:])
     return rays, np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)]), image_window(camera)
 
 
-def _sample_pixels(width: int, height: int, settings: VerificationSettings) -> Floats:
+def _sample_pixels(width: int, height: int) -> Floats:
     """(n, RAYS, 2) a grid of pixels, each with four around it [px]."""
-    margin, size = settings.border_margin_px + settings.edge_margin_px, settings.color_grid_size
+    margin, size = BORDER_MARGIN_PX + EDGE_MARGIN_PX, COLOR_GRID_SIZE
     u, v = np.linspace(margin, width - 1 - margin, size), np.linspace(margin, height - 1 - margin, size)
     middle = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 1, 2)
-    around = settings.edge_margin_px * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)], float)
+    around = EDGE_MARGIN_PX * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)], float)
     return np.asarray(middle + around)
 
 
-def _find_largest(groups: Ints, settings: VerificationSettings) -> list[int]:
+def _find_largest(groups: Ints) -> list[int]:
     """The most frequent groups, in falling order."""
     names, counts = np.unique(groups, return_counts=True)
-    order = np.argsort(-counts, kind="stable")[: settings.max_faces]
-    return [int(names[i]) for i in order if counts[i] >= settings.min_face_points]
+    order = np.argsort(-counts, kind="stable")[: MAX_FACES]
+    return [int(names[i]) for i in order if counts[i] >= MIN_FACE_POINTS]
 
 
 def _to_face_color(color: Floats, points: Floats, max_points: int) -> FaceColor:

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.localization import aliasing
 from knowledge_sources.methods.localization.aliasing import (
+    VIEW_GRID_M,
+    VIEW_GRID_RAD,
     find_repetitions,
     find_strongest_alias,
     precompute_views,
@@ -31,7 +33,6 @@ Floats = NDArray[np.float64]
 
 WORLD = load_world(WORLDS / "research_center.toml", details=[])
 ROBOT = RobotModel(WORLD, Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1), ActuatorModel())
-TUNING = DEFAULT.localization
 NONE = np.zeros((0, 2, 2))
 few = settings(max_examples=40, deadline=None)
 
@@ -101,7 +102,7 @@ def test_lines_visible_from_the_grid_are_projected_to_where_they_are_seen_from_t
     for _ in range(200):
         x, y = WORLD.world_from_locale("hallway").apply([rng.uniform(3.0, 18.0), 1.2, 0.0])[:2]
         pose = Pose2(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
-        steps = TUNING.view_grid_m, TUNING.view_grid_m, TUNING.view_grid_rad
+        steps = VIEW_GRID_M, VIEW_GRID_M, VIEW_GRID_RAD
         of_grid = Pose2(*(round(v / by) * by for v, by in zip(
             (pose.x_m, pose.y_m, pose.heading_rad), steps, strict=True)))
         on_grid, between = predict_views_on_grid(ROBOT, [of_grid, pose])

@@ -8,12 +8,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from knowledge_sources.methods.localization import pose_candidates
 from knowledge_sources.methods.localization.pose_candidates import ChamferMaps, compute_chamfer_scores
-from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 
-TUNING = DEFAULT.localization
 CAMERA = Camera(310.0, 290.0, 170.0, 110.0, 322, 241)
 STEP_M = 1e-6
 
@@ -24,8 +23,8 @@ def test_compiled_scores_are_those_of_plain_projection(seed: int, pitch: float, 
     """The direction of a line in the picture is that in which a point moves which moves a little along the line."""
     rng = np.random.default_rng(seed)
     mount = CameraMount(1.1, pitch, 0.3).camera_from_robot
-    height, width = (-(-pixels // TUNING.chamfer_shrink) for pixels in (CAMERA.height, CAMERA.width))
-    size = TUNING.chamfer_directions, height, width
+    height, width = (-(-pixels // pose_candidates.CHAMFER_SHRINK) for pixels in (CAMERA.height, CAMERA.width))
+    size = pose_candidates.CHAMFER_DIRECTIONS, height, width
     maps = ChamferMaps(rng.random(size, np.float32), rng.random(size[0], np.float32))
     points = rng.uniform([-4.0, -4.0, 0.0], [4.0, 4.0, 2.5], (150, 3))
     along = rng.normal(size=points.shape)
@@ -40,14 +39,15 @@ def test_compiled_scores_are_those_of_plain_projection(seed: int, pitch: float, 
         total = by_chance = number = 0.0
         for k in visible[first[c] : first[c + 1] : stride]:
             at = camera_from_world.apply(points[k])
-            if at[2] < TUNING.min_point_depth_m:
+            if at[2] < pose_candidates.MIN_POINT_DEPTH_M:
                 continue
             u, v = CAMERA.project(at)
             if not (0.0 <= u < CAMERA.width and 0.0 <= v < CAMERA.height):
                 continue
             moved = CAMERA.project(camera_from_world.apply(points[k] + STEP_M * along[k])) - (u, v)
             layer = round(math.atan2(moved[1], moved[0]) / math.pi * size[0]) % size[0]
-            row, column = (min(n - 1, round(x / TUNING.chamfer_shrink)) for n, x in zip(size[1:], (v, u), strict=True))
+            shrink = pose_candidates.CHAMFER_SHRINK
+            row, column = (min(n - 1, round(x / shrink)) for n, x in zip(size[1:], (v, u), strict=True))
             total, by_chance, number = total + maps.near[layer, row, column], by_chance + maps.chance[layer], number + 1
         assert count == number
         np.testing.assert_allclose((near, chance), (total, by_chance), rtol=1e-5)

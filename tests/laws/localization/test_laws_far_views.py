@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.generated.floors import Floor, generated_floor
+from knowledge_sources.methods.localization import next_view
 from knowledge_sources.methods.localization.next_view import (
     PoseHypothesis,
     PredictView,
@@ -46,7 +47,7 @@ def draw_places(robot: RobotModel, seed: int, count: int) -> list[PoseHypothesis
         room = str(rng.choice(rooms))
         low, high = robot.world.outline(room).min(axis=0), robot.world.outline(room).max(axis=0)
         x, y = rng.uniform(low, high)
-        body = shapely.Point(x, y).buffer(robot.radius_m + TUNING.move_clearance_m + 2.0 * TUNING.far_coarse_m)
+        body = shapely.Point(x, y).buffer(robot.radius_m + next_view.MOVE_CLEARANCE_M + 2.0 * next_view.FAR_COARSE_M)
         if shapely.Polygon(robot.world.outline(room)).covers(body) and not any(
                 shapely.Polygon(o).intersects(body) for o in robot.world.obstacles(room)):
             pose = Pose2(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
@@ -75,7 +76,7 @@ def test_the_common_floor_is_free_in_every_place(seed: int, floor: int, count: i
     low, high = np.array(free.bounds[:2]), np.array(free.bounds[2:])
     points = rng.uniform(low, high, (60, 2))
     for x, y in points[shapely.contains_xy(free, points)]:
-        assert math.hypot(x, y) <= TUNING.far_reach_m + 1e-6
+        assert math.hypot(x, y) <= next_view.FAR_REACH_M + 1e-6
         for place in places:
             at = place.world_from_robot @ Pose2(float(x), float(y), 0.0)
             assert not is_solid(robot, at, 0.01)
@@ -89,7 +90,7 @@ def test_each_leg_is_free_in_every_place_and_no_longer_than_said(seed: int, floo
     action = choose_far_action(robot, places, [HERE], robot.world.rooms, make_view_predictor(robot))
     if action is None:
         return
-    assert 0.0 <= action.move_m <= TUNING.far_leg_m and action.expected_separation > 0.0
+    assert 0.0 <= action.move_m <= next_view.FAR_LEG_M and action.expected_separation > 0.0
     for place in places:
         for part in np.linspace(0.0, 1.0, 9):
             along = Pose2(0.0, 0.0, action.turn_rad) @ Pose2(float(part) * action.move_m, 0.0, 0.0)
@@ -123,7 +124,7 @@ def test_driving_on_it_comes_to_the_only_view_that_tells(away_m: float) -> None:
     for _ in range(TUNING.max_searched_views + 10):
         now = [PoseHypothesis(p.room, p.world_from_robot @ moved, 0.5) for p in places]
         views = [predict(h.world_from_robot) for h in now]
-        if are_distinguishable([views[0]], [views[1]], clearly=TUNING.clear_difference):
+        if are_distinguishable([views[0]], [views[1]], clearly=next_view.CLEAR_DIFFERENCE):
             break
         seen_from = [moved.inverse() @ old for old in looked]
         action = choose_far_action(robot, now, seen_from, robot.world.rooms, predict)

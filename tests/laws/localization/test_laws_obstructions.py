@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.localization.views import (
+    MAX_OBSTRUCTION_AREA,
     CameraView,
     find_obstruction,
     has_counterpart,
@@ -18,7 +19,6 @@ from knowledge_sources.methods.localization.views import (
 )
 from knowledge_sources.methods.verification.line_check import predict_lines
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries.obstruction import MOST_HIDDEN, Obstruction
@@ -181,7 +181,7 @@ def test_a_robot_that_did_not_turn_although_odometry_says_so_finds_no_obstructio
     segments = seen(ROBOT, somewhere(rng), None, rng)
     stuck = [CameraView(segments, Pose2(0.0, 0.0, 0.5 * k), np.zeros((3, 3))) for k in range(LOOKS)]
     found = find_obstruction(stuck, CAMERA)
-    assert found is None or _part(found) <= DEFAULT.localization.max_obstruction_area
+    assert found is None or _part(found) <= MAX_OBSTRUCTION_AREA
 
 
 def _part(found: Obstruction) -> float:

@@ -13,9 +13,11 @@ from scipy.stats import bernoulli, binom
 
 from experiments.perception import rivals
 from experiments.perception.rivals import compute_line_odds, compute_pose_score, group_lines
+from knowledge_sources.methods.localization import refinement
 from knowledge_sources.methods.localization.refinement import compute_log_ratio
 from knowledge_sources.methods.verification.line_check import (
     EPSILON_INFORMATION,
+    LINE_TOLERANCE_RAD,
     compute_coverage,
     compute_view_quality,
 )
@@ -105,7 +107,7 @@ def test_the_score_of_a_pose_is_that_of_its_observations(seed: int, count: int, 
     p = min(max(chance, rivals.MIN_SCORE_CHANCE), rivals.MAX_SCORE_CHANCE)
     odds = [float(bernoulli.logpmf(k, rivals.DETECTION_RATE) - bernoulli.logpmf(k, p)) for k in (1, 0)]
     assert np.allclose(compute_line_odds(chance), odds)
-    covered = compute_coverage(lines, segments, tuning.line_tolerance_px, tuning.line_tolerance_rad)
+    covered = compute_coverage(lines, segments, tuning.line_tolerance_px, LINE_TOLERANCE_RAD)
     total, groups = 0.0, group_lines(lines)
     for group in range(int(groups.max()) + 1):
         members = np.flatnonzero(groups == group)
@@ -119,8 +121,7 @@ def test_the_score_of_a_pose_is_that_of_its_observations(seed: int, count: int, 
 @some
 @given(visible=st.integers(0, 60), part=st.floats(0.0, 1.0), chance=st.floats(0.0, 1.0))
 def test_matched_lines_are_worth_their_binomial_odds(visible: int, part: float, chance: float) -> None:
-    tuning = DEFAULT.localization
     matched = round(part * visible)
-    p = min(max(chance, tuning.min_chance), tuning.max_chance)
-    odds = binom.logpmf(matched, visible, tuning.detection_rate) - binom.logpmf(matched, visible, p)
-    assert math.isclose(compute_log_ratio(matched, visible, chance), tuning.line_independence * odds, abs_tol=1e-7)
+    p = min(max(chance, refinement.MIN_CHANCE), refinement.MAX_CHANCE)
+    odds = binom.logpmf(matched, visible, refinement.DETECTION_RATE) - binom.logpmf(matched, visible, p)
+    assert math.isclose(compute_log_ratio(matched, visible, chance), refinement.LINE_INDEPENDENCE * odds, abs_tol=1e-7)

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom, norm, qmc
 
 from knowledge_sources.methods.matching.pose_pairs import _spread_normal
-from knowledge_sources.methods.verification.line_check import compute_p_false
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.methods.verification.line_check import TEST_COUNT, compute_p_false
 
 
 @given(st.integers(1, 3000))
@@ -24,4 +23,4 @@ def test_spread_is_haltons_sequence_of_the_normal_law(count: int) -> None:
 def test_chance_of_so_many_matches_is_the_binomial_tail(data: st.DataObject, visible: int, chance: float) -> None:
     matched = data.draw(st.integers(0, visible))
     tail = float(binom.sf(matched - 1, visible, chance))
-    assert compute_p_false(matched, visible, chance) == min(1.0, DEFAULT.verification.test_count * tail)
+    assert compute_p_false(matched, visible, chance) == min(1.0, TEST_COUNT * tail)

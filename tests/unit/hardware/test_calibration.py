@@ -12,8 +12,7 @@ import pytest
 
 from experiments.generated.scenes import chessboard_picture, chessboard_renderer, chessboard_view
 from harvey.cli import main
-from knowledge_sources.methods.calibration.chessboard import Pattern, find_corners
-from knowledge_sources.methods.calibration.intrinsics import BoardView, Calibration, calibrate
+from knowledge_sources.methods.calibration.intrinsics import BoardView, Calibration, Pattern, calibrate, find_corners
 from knowledge_sources.methods.calibration.mounting import estimate_mounting
 from knowledge_sources.methods.features.picture import read_picture
 from sim.render.optics import Optics
