@@ -99,7 +99,7 @@ def _beside(runs: list[RunDirectory]) -> Path:
 
 
 def _write(runs: list[RunDirectory], overview: Path) -> None:
-    from logs.recording.overview.overview import RunFiles, write_overview
+    from logs.recording.overview import RunFiles, write_overview
 
     names = [run.path.name for run in runs]
     unique = len(set(names)) == len(names)

@@ -8,8 +8,7 @@ from typing import Any
 
 import rerun.blueprint as rrb
 
-from logs.recording.logger import Logger
-from logs.recording.panel import Area, Panel
+from logs.recording.logger import Area, Logger, Panel
 
 PLAYED_PER_S = 10.0
 """Cycles, when the recording plays."""

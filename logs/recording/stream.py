@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import string
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from pathlib import Path
@@ -13,7 +14,6 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from logs.errors import RecordingError
-from logs.recording.signs import viewable
 
 APPLICATION = "harvey"
 
@@ -146,3 +146,17 @@ def _expect_free_port(port: int) -> None:
 def _sinks(path: Path | None, live: bool, port: int) -> list[Any]:
     file = [rr.FileSink(path)] if path is not None else []
     return [*file, *([rr.GrpcServerSink(bind_ip=LOCALHOST, port=port)] if live else [])]
+
+
+VERIFIED, REFUTED, TROUBLE = "✔", "✗", "⚠"
+
+LATIN = "".join(map(chr, (*range(0xA1, 0xAD), *range(0xAE, 0x180))))
+GREEK_AND_CYRILLIC = "".join(map(chr, (*range(0x3B1, 0x3CA), 0x3A9, *range(0x410, 0x450))))
+SIGNS = frozenset(
+    string.printable[:-2] + LATIN + GREEK_AND_CYRILLIC + "–—‘’“”…→≤−●▶" + VERIFIED + REFUTED + TROUBLE)
+"""What may be shown."""
+
+
+def viewable(text: str) -> str:
+    """The text with "?" in place of each sign that the viewer cannot show."""
+    return text if text.isascii() else "".join(sign if sign in SIGNS else "?" for sign in text)

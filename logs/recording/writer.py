@@ -10,9 +10,8 @@ from pathlib import Path
 from blackboard.journal import Decision, decision_line
 from logs.errors import RecordingError
 from logs.recording import loggers as built_in
-from logs.recording.belief import Belief
 from logs.recording.blueprint import blueprint
-from logs.recording.board_mirror import Difference, Mirror, Moment
+from logs.recording.board_mirror import Belief, Difference, Mirror, Moment
 from logs.recording.logger import Logger, Subject
 from logs.recording.stream import LIVE_PORT, RecordingStream
 from world_models.building.geometry.faces import Face
@@ -40,7 +39,7 @@ def _find_built_in_loggers() -> Iterator[type[Logger]]:
     """Those in the folder ``loggers`` and below it, in the order of their files' names."""
     for module in pkgutil.walk_packages(built_in.__path__, f"{built_in.__name__}."):
         if not module.ispkg:
-            yield import_module(module.name).LOGGER
+            yield from import_module(module.name).LOGGERS
 
 
 def _foreign() -> Iterator[type[Logger]]:

@@ -9,8 +9,7 @@ import rerun.blueprint as rrb
 
 from harvey_timekeeper.timekeeper import BATTERY_S
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Logger
-from logs.recording.panel import Panel
+from logs.recording.logger import Logger, Panel
 from logs.recording.stream import RecordingStream
 from world_models.entries.body import MotionReport
 

@@ -5,6 +5,6 @@ In reading order: ``frames`` (the shortest), ``errors``, ``decisions``, ``chapte
 round the robot.
 
 To add one: a file in this folder, or in one below it, with a class as :class:`logs.recording.logger.Logger` says, and
-``LOGGER = TheClass`` at its end. In another package: the same class, and an entry point of the group
+``LOGGERS = (TheClass,)`` at its end. In another package: the same class, and an entry point of the group
 ``harvey.loggers`` that names it.
 """

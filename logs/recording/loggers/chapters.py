@@ -8,9 +8,8 @@ import rerun as rr
 
 from logs.explain.turning_points import TurningPoint, TurningPointFinder
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Logger, Subject
+from logs.recording.logger import Logger, Panel, Subject, log_view
 from logs.recording.palette import BELIEVED, DONE, LEVELS, MATCHED, PLANNED, REJECTED, REVISED, TRUE, VERDICTS, Colour
-from logs.recording.panel import Panel, log_view
 from logs.recording.paths import CHAPTERS
 from logs.recording.stream import RecordingStream
 from world_models import words
@@ -72,4 +71,4 @@ def _colour(point: TurningPoint) -> Colour:
     return COLOURS.get(point.kind, DONE)
 
 
-LOGGER = Chapters
+LOGGERS = (Chapters,)

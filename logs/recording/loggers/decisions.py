@@ -14,13 +14,11 @@ from blackboard.change import Change
 from blackboard.journal import Decision
 from blackboard.servoing import Discrepancy
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Logger, Subject
+from logs.recording.logger import Logger, Panel, Subject, log_view
 from logs.recording.messages import Messages
 from logs.recording.palette import DONE, LEVELS, REJECTED
-from logs.recording.panel import Panel, log_view
 from logs.recording.paths import RECORDS, TABLE
-from logs.recording.signs import TROUBLE
-from logs.recording.stream import RecordingStream
+from logs.recording.stream import TROUBLE, RecordingStream
 from world_models import words
 
 TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "doubted", "halted")
@@ -144,4 +142,4 @@ def _messages(made: tuple[Change, ...]) -> str:
     return ", ".join(parts) or "did nothing"
 
 
-LOGGER = Decisions
+LOGGERS = (Decisions,)

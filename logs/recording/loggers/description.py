@@ -8,11 +8,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Logger, Subject
-from logs.recording.panel import Panel
+from logs.recording.logger import Logger, Panel, Subject
 from logs.recording.paths import DESCRIPTION
-from logs.recording.signs import viewable
-from logs.recording.stream import RecordingStream
+from logs.recording.stream import RecordingStream, viewable
 
 TEXT = """\
 Harvey drives from room to room by what its camera shows. Knowledge sources round a blackboard decide,
@@ -44,4 +42,4 @@ class Description(Logger):
         """It does not change."""
 
 
-LOGGER = Description
+LOGGERS = (Description,)

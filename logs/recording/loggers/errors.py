@@ -12,11 +12,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from blackboard.servoing import Discrepancy
-from logs.recording.belief import Held
-from logs.recording.board_mirror import Moment
-from logs.recording.logger import Logger, Subject
+from logs.recording.board_mirror import Held, Moment
+from logs.recording.logger import NEAR, Logger, Panel, Subject
 from logs.recording.palette import BELIEVED, LEVELS, PLANNED, faint
-from logs.recording.panel import NEAR, Panel
 from logs.recording.paths import DEVIATION, HEADING, POSITION
 from logs.recording.stream import RecordingStream
 from world_models.entries.location import Hypothesis
@@ -98,4 +96,4 @@ def _plot(origin: str, name: str, low: float, high: float) -> rrb.TimeSeriesView
         origin=origin, name=name, plot_legend=legend, axis_x=NEAR, axis_y=rrb.ScalarAxis(range=(low, high)))
 
 
-LOGGER = Errors
+LOGGERS = (Errors,)

@@ -125,4 +125,4 @@ def _log_boxes(stream: RecordingStream, path: str, bounds: Floats, colours: list
     stream.log(path, rr.Boxes2D, centers=(low + high) / 2, half_sizes=(high - low) / 2, colors=colours, labels=labels)
 
 
-LOGGER = FloorInPicture
+LOGGERS = (FloorInPicture,)

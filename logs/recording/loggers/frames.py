@@ -9,8 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Logger, Subject
-from logs.recording.panel import Panel
+from logs.recording.logger import Logger, Panel, Subject
 from logs.recording.paths import CAMERA, IMAGE
 from logs.recording.stream import RecordingStream
 from world_models.entries.body import Frame
@@ -56,4 +55,4 @@ class Frames(Logger):
                      entry=[str(entry.ref)])
 
 
-LOGGER = Frames
+LOGGERS = (Frames,)

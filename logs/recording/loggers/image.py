@@ -198,4 +198,4 @@ def _largest(
     return best
 
 
-LOGGER = Image
+LOGGERS = (Image,)

@@ -8,14 +8,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from blackboard.agenda import Activation
-from logs.recording.activity import ACTIVITIES, ACTIVITY_KINDS, activity
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Logger, Subject
+from logs.recording.logger import NEAR, Logger, Panel, Subject
+from logs.recording.messages import ACTIVITIES, ACTIVITY_KINDS, activity
 from logs.recording.palette import LEVELS, REJECTED, Colour
-from logs.recording.panel import NEAR, Panel
 from logs.recording.paths import FAULTS, FOCUS, HARVEY
-from logs.recording.signs import viewable
-from logs.recording.stream import RecordingStream
+from logs.recording.stream import RecordingStream, viewable
 from world_models.entries.body import BodyFault
 
 ACTS, GAP = "acts", ""
@@ -92,4 +90,4 @@ def style(states: Mapping[str, Colour]) -> rr.StateConfiguration:
         visible=[True] * len(states) + [False])
 
 
-LOGGER = Lanes
+LOGGERS = (Lanes,)

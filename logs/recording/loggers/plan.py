@@ -87,4 +87,4 @@ class Plan(Logger):
             stream.log(LANDMARKS, rr.LineStrips3D, strips=np.array(lines, np.float32).reshape(-1, 2, 3))
 
 
-LOGGER = Plan
+LOGGERS = (Plan,)

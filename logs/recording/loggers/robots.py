@@ -12,10 +12,9 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from logs.recording.board_mirror import Mirror, Moment
-from logs.recording.logger import Logger, Subject
+from logs.recording.logger import Logger, Panel, Subject
 from logs.recording.loggers.surroundings.building import space_view
 from logs.recording.palette import BELIEVED, CANDIDATE, TRUE, Colour, faint
-from logs.recording.panel import Panel
 from logs.recording.paths import (
     BELIEVED_BODY,
     BELIEVED_ROBOT,
@@ -158,4 +157,4 @@ def ring(pose: Pose2, covariance_world: NDArray[np.float64]) -> NDArray[np.float
     return np.asarray((SIGMA_SCALE * (robot_from_world @ root) @ CIRCLE).T)
 
 
-LOGGER = Robots
+LOGGERS = (Robots,)

@@ -11,12 +11,10 @@ import rerun.blueprint as rrb
 
 from blackboard.entry import Entry
 from logs.recording.board_mirror import Mirror, Moment
-from logs.recording.logger import Logger, Subject
+from logs.recording.logger import Logger, Panel, Subject
 from logs.recording.palette import DONE, PLANNED, VERDICTS, WAITING, Colour
-from logs.recording.panel import Panel
 from logs.recording.paths import SKETCH
-from logs.recording.signs import REFUTED, VERIFIED
-from logs.recording.stream import RecordingStream
+from logs.recording.stream import REFUTED, VERIFIED, RecordingStream
 from world_models.entries.task import Certificate, Goal, Milestone, PlanSketch, Subgoal
 from world_models.words import short
 
@@ -155,4 +153,4 @@ def _middles(nodes: list[Node]) -> list[tuple[float, float]]:
     return [(INDENT * n.depth + (BORDER + LETTER * len(n.label)) / 2, ROW * row) for row, n in enumerate(nodes)]
 
 
-LOGGER = SketchTree
+LOGGERS = (SketchTree,)

@@ -11,12 +11,10 @@ import rerun.blueprint as rrb
 
 from blackboard.entry import Entry
 from blackboard.servoing import Discrepancy
-from logs.recording.activity import ACTIVITY_KINDS, activity, is_doubt, leg_under_way
-from logs.recording.belief import Held, find_belief, sigma_m
-from logs.recording.board_mirror import Mirror, Moment
-from logs.recording.logger import Logger, Subject
+from logs.recording.board_mirror import Held, Mirror, Moment, find_belief, sigma_m
+from logs.recording.logger import Logger, Panel, Subject
 from logs.recording.loggers.sketch_tree import subgoal_label
-from logs.recording.panel import Panel
+from logs.recording.messages import ACTIVITY_KINDS, activity, is_doubt, leg_under_way
 from logs.recording.paths import WHY
 from logs.recording.stream import RecordingStream
 from world_models import words
@@ -281,4 +279,4 @@ CHAPTERS: tuple[tuple[str, Tell, tuple[type[Any], ...]], ...] = (
 """Title, what tells it, and the types of values that it rests on."""
 
 
-LOGGER = Why
+LOGGERS = (Why,)

@@ -13,8 +13,7 @@ from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref
 from blackboard.journal import Decision
 from blackboard.level import Level
-from logs.recording.belief import Belief
-from logs.recording.board_mirror import Mirror, Moment
+from logs.recording.board_mirror import Belief, Mirror, Moment
 from logs.recording.logger import Subject
 from logs.recording.loggers.surroundings.locale_frames import LocaleFrames, marks_path, outline_path
 from logs.recording.palette import KNOWN, REVISED

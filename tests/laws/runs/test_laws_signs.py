@@ -14,7 +14,7 @@ from blackboard.journal import Decision, Sink
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from logs.recording.paths import RECORDS
-from logs.recording.signs import REFUTED, SIGNS, TROUBLE, VERIFIED, viewable
+from logs.recording.stream import REFUTED, SIGNS, TROUBLE, VERIFIED, viewable
 from logs.recording.writer import RecordingWriter
 from scripted_mission import CAMERA, HOUSE, MOUNT, play
 from world_models.entries.body import BodyFault

@@ -15,8 +15,8 @@ from blackboard.journal import Decision
 from blackboard.level import Level
 from logs.errors import RecordingError
 from logs.reader import read_series
-from logs.recording.belief import Belief
 from logs.recording.blueprint import blueprint
+from logs.recording.board_mirror import Belief
 from logs.recording.logger import Subject
 from logs.recording.paths import TABLE
 from logs.recording.writer import RecordingWriter, logger_classes
@@ -30,7 +30,7 @@ import rerun.blueprint as rrb
 
 from blackboard.kinds import inference
 from logs.recording.logger import Logger
-from logs.recording.panel import Panel
+from logs.recording.logger import Panel
 
 
 @inference()

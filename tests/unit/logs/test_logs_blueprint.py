@@ -15,8 +15,8 @@ from rerun.chunk import RrdReader
 import docs.tools.look as looking
 from docs.tools.look import look
 from logs.errors import RecordingError
-from logs.recording.belief import Belief
 from logs.recording.blueprint import blueprint
+from logs.recording.board_mirror import Belief
 from logs.recording.logger import Subject
 from logs.recording.paths import BELIEVED_BODY, FAULTS, IMAGE
 from logs.recording.writer import RecordingWriter, logger_classes

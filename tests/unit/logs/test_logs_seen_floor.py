@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from logs.recording.loggers.surroundings.obstacles import UNKNOWN_HEIGHT_M, colour_of, edges
-from logs.recording.loggers.surroundings.seen_floor import outlines
+from logs.recording.loggers.surroundings.found import UNKNOWN_HEIGHT_M, colour_of, edges, outlines
 from logs.recording.palette import EXPECTED, REJECTED
 from world_models.entries.floor import FreeFloor
 from world_models.entries.obstacle import Obstacle

@@ -5,12 +5,11 @@ from blackboard.change import Retracted
 from blackboard.effect import Post, Revise
 from blackboard.entry import Ref
 from blackboard.journal import Decision
-from logs.recording.activity import activity
 from logs.recording.board_mirror import Mirror
 from logs.recording.loggers.decisions import COLUMNS, log_level, row, sentence
 from logs.recording.loggers.sketch_tree import NO_SKETCH, outline
 from logs.recording.loggers.why import story
-from logs.recording.messages import Messages
+from logs.recording.messages import Messages, activity
 from scripted_mission import play
 from world_models.entries.body import BodyFault, MotorCommand, Recovery
 from world_models.entries.location import Hypothesis

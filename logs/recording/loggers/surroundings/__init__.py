@@ -1,5 +1,4 @@
 """What is round the robot: as its model has it, as it is seen, ranged and touched, and as it truly is.
 
-In reading order: ``building``, ``true_building``, ``locale_frames``, ``seen_floor``, ``obstacles``, ``door_states``,
-``contacts``, ``ranges``.
+In reading order: ``building``, ``locale_frames``, ``found``.
 """

@@ -1,4 +1,5 @@
-"""The building: its surfaces without ceilings, its doorways and the names of its rooms."""
+"""The building as the robot's model has it, and where it truly differs from that: what is there besides, and what is
+gone."""
 
 from __future__ import annotations
 
@@ -11,13 +12,11 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Logger, Subject
-from logs.recording.palette import DOOR, NAME
-from logs.recording.panel import Panel
-from logs.recording.paths import BELIEVED_TRAIL, BUILDING, DOORWAYS, NAMES, TRUE_TRAIL, WORLD
-from logs.recording.signs import viewable
-from logs.recording.stream import RecordingStream
-from world_models.building.geometry.faces import LAMP
+from logs.recording.logger import Logger, Panel, Subject
+from logs.recording.palette import DOOR, NAME, REJECTED, TRUE
+from logs.recording.paths import BELIEVED_TRAIL, BUILDING, DOORWAYS, NAMES, TRUE_ADDED, TRUE_GONE, TRUE_TRAIL, WORLD
+from logs.recording.stream import RecordingStream, viewable
+from world_models.building.geometry.faces import LAMP, Face, Region, area_vector
 from world_models.building.geometry.scene import stack_regions
 from world_models.building.world import World
 
@@ -146,4 +145,41 @@ def _doorways(world: World) -> Any:
     return rr.LineStrips3D(strips, colors=[DOOR], radii=0.03)
 
 
-LOGGER = Building
+EDGE_M = 0.015
+"""Half the width of an outline."""
+
+
+class TrueBuilding(Logger):
+    """Logs the differences, where somebody knows them, when they change: solid with green edges, or red edges only."""
+
+    def log(self, stream: RecordingStream, moment: Moment) -> None:
+        for difference in moment.differences[-1:]:
+            _log_outlines(stream, f"{TRUE_ADDED}/edges", difference.added, TRUE)
+            _log_outlines(stream, TRUE_GONE, difference.gone, REJECTED)
+            _log_surfaces(stream, _regions(difference.added))
+
+
+def _regions(faces: Sequence[Face]) -> list[Region]:
+    return [region for face in faces for region in (*face.front, *face.back)]
+
+
+def _log_outlines(stream: RecordingStream, path: str, faces: Sequence[Face], colour: tuple[int, int, int, int]) -> None:
+    strips = [np.concatenate([r.polygon_world, r.polygon_world[:1]]).astype(np.float32) for r in _regions(faces)]
+    stream.log(path, rr.LineStrips3D, strips=strips, colors=[colour] * len(strips), radii=[EDGE_M] * len(strips))
+
+
+def _log_surfaces(stream: RecordingStream, regions: Sequence[Region]) -> None:
+    corners = [len(region.polygon_world) for region in regions]
+    starts = np.cumsum([0, *corners])[:-1]
+    faces = [triangles(1, k) + start for k, start in zip(corners, starts, strict=True)]
+    normals = np.array([area_vector(region.polygon_world) for region in regions]).reshape(-1, 3)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    colours = light_colours(np.array([region.colour for region in regions]).reshape(-1, 3), normals)
+    stream.log(
+        TRUE_ADDED, rr.Mesh3D,
+        vertex_positions=np.concatenate([np.zeros((0, 3)), *(r.polygon_world for r in regions)]).astype(np.float32),
+        vertex_colors=np.repeat(colours, corners, axis=0),
+        triangle_indices=np.concatenate([np.zeros((0, 3), np.uint32), *faces]).astype(np.uint32))
+
+
+LOGGERS = (Building, TrueBuilding)

@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 from blackboard.change import Change, Retracted
 from blackboard.entry import Entry
 from logs.recording.board_mirror import Moment
-from logs.recording.logger import Logger, Subject
+from logs.recording.logger import Logger, Panel, Subject
 from logs.recording.palette import KNOWN, REVISED
-from logs.recording.panel import Panel
 from logs.recording.paths import FRAME_LIST, FRAMES
-from logs.recording.signs import viewable
-from logs.recording.stream import RecordingStream
+from logs.recording.stream import RecordingStream, viewable
 from world_models import words
 from world_models.building.locale_frame import FrameChange, FrameRequest, LocaleFrame
 from world_models.building.locales import Doorway, Thing
@@ -186,4 +184,4 @@ def _row(known: Known) -> str:
     return f"| {entry.value.name} | {entry.ref} | {since} | {words.source(known.asked_by)} | {changes} |"
 
 
-LOGGER = LocaleFrames
+LOGGERS = (LocaleFrames,)
