@@ -8,8 +8,7 @@ from typing import Any
 from harvey.errors import BadInput
 from harvey.robot_settings import KEYS as ROBOT_KEYS
 from harvey.robot_settings import build_believed
-from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.table import list_rows, replace_value
+from knowledge_sources.settings import DEFAULT, Settings, list_rows, replace_value
 from world_models.files.toml.settings import parse_value, suggest_keys
 
 Pairs = tuple[tuple[str, str], ...]

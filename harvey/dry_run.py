@@ -27,8 +27,7 @@ from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDEN
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from knowledge_sources.plan.milestone_selector import CHECK_TOLERANCE_M, MAX_SIGMA_PART, MAX_SIGMA_RAD, MIN_LINES
 from knowledge_sources.questions import find_belief, find_robot
-from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.verification import VerificationSettings
+from knowledge_sources.settings import DEFAULT, Settings, VerificationSettings
 from world_models.building.world import World
 from world_models.entries.body import MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.location import Hypothesis, Place, diagonal

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from harvey.errors import BadInput
-from knowledge_sources.settings.table import Row
+from knowledge_sources.settings import Row
 from world_models.actuator import BOUNDS, ActuatorModel
 from world_models.entries.robot import CameraState, Footprint, Wheels
 from world_models.files.toml.settings import parse_value, spellings

@@ -9,8 +9,7 @@ import numpy as np
 
 from blackboard.board import View
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.settings import Settings
-from knowledge_sources.settings.camera_state import CameraStateSettings
+from knowledge_sources.settings import CameraStateSettings, Settings
 from world_models.camera import YAW, Camera
 from world_models.entries.robot import CameraState
 from world_models.frames import Pose2, wrap_angle

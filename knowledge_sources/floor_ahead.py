@@ -23,8 +23,7 @@ from knowledge_sources.methods.floor.seen_floor import (
 )
 from knowledge_sources.methods.motion.footprints import build_free_floor, build_polygon
 from knowledge_sources.questions import active_goal, deepest_sketch, find_robot
-from knowledge_sources.settings import Settings
-from knowledge_sources.settings.action import ActionSettings
+from knowledge_sources.settings import ActionSettings, Settings
 from world_models.building.locales import EXTRA_KIND, Thing
 from world_models.entries.body import Frame, MotionReport, RideReport
 from world_models.entries.floor import FreeFloor

@@ -10,7 +10,7 @@ from blackboard.entry import Entry
 from blackboard.entry_store import Index
 from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
-from knowledge_sources.settings.action import ActionSettings
+from knowledge_sources.settings import ActionSettings
 from world_models.building.locale_frame import CHANGED, FRAME_OF, LocaleFrame
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis

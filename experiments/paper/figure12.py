@@ -9,7 +9,7 @@ import numpy as np
 
 from experiments.report import Cell, Report
 from knowledge_sources.methods.matching import Match, Peak, TraceStep, format_trace, match_lines
-from knowledge_sources.settings.matching import PAPER_MATCHING
+from knowledge_sources.settings import PAPER_MATCHING
 
 NAMES = "ABCD"
 MODEL = (

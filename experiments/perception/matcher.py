@@ -30,7 +30,7 @@ from experiments.perception.matcher_scenes import (
 from experiments.report import Cell, Report
 from experiments.trials import campaign_folder
 from knowledge_sources.methods.matching import Similarity2, match_lines
-from knowledge_sources.settings.matching import PAPER_MATCHING
+from knowledge_sources.settings import PAPER_MATCHING
 
 SIZES = ((4, 15), (10, 50), (20, 150), (30, 250), (40, 400))
 MAIN = (20, 150)

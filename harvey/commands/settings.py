@@ -15,7 +15,7 @@ from harvey.commands.command import Command
 from harvey.errors import BadInput
 
 if TYPE_CHECKING:
-    from knowledge_sources.settings.table import Row
+    from knowledge_sources.settings import Row
 
 MIN_WIDTH, MAX_WIDTH = 80, 160
 """Columns of the terminal that a table takes."""
@@ -42,7 +42,7 @@ def _run(args: Namespace) -> int:
 def select_rows(name: str | None) -> tuple[Row, ...]:
     """All settings, those of a room, or one. Raises BadInput where there is no such room or setting."""
     from harvey.robot_settings import find_key, list_robot_rows
-    from knowledge_sources.settings.table import list_rows
+    from knowledge_sources.settings import list_rows
     from world_models.files.toml.settings import suggest_keys
 
     rows, name = (*list_rows(), *list_robot_rows()), name and find_key(name)

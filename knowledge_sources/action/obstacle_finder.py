@@ -46,7 +46,7 @@ from knowledge_sources.questions import (
     last_motion,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.settings.action import ActionSettings
+from knowledge_sources.settings import ActionSettings
 from world_models.building.building import Building
 from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.building.locales import EXTRA_KIND, Doorway

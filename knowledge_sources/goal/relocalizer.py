@@ -37,7 +37,7 @@ from knowledge_sources.questions import (
     open_discrepancy,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.settings.localization import LocalizationSettings
+from knowledge_sources.settings import LocalizationSettings
 from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
 from world_models.entries.body import Look, MotionReport, MotorCommand

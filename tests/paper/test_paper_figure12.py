@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from knowledge_sources.methods.matching import Match, Peak, format_trace, match_lines
-from knowledge_sources.settings.matching import PAPER_MATCHING
+from knowledge_sources.settings import PAPER_MATCHING
 
 MODEL = np.array(
     [

@@ -7,7 +7,7 @@ from itertools import groupby
 
 from docs.tools.site.markdown import escape, table
 from harvey.commands.settings import describe_room, format_value, select_rows
-from knowledge_sources.settings.table import Row
+from knowledge_sources.settings import Row
 
 
 def describe_settings() -> str:

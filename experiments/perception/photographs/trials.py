@@ -18,8 +18,7 @@ from harvey.errors import BadInput
 from knowledge_sources.methods.features.lines import LineSegments, find_lines
 from knowledge_sources.methods.matching import match_lines
 from knowledge_sources.methods.pose import med_r_and_t
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.matching import PAPER_MATCHING
+from knowledge_sources.settings import DEFAULT, PAPER_MATCHING
 from world_models.frames import Pose
 
 Array = NDArray[np.float64]

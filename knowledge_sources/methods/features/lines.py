@@ -19,8 +19,7 @@ from numba import njit
 from knowledge_sources.methods.arrays import Floats, Floats32, Indices
 from knowledge_sources.methods.features.line_candidates import MIN_GRADIENT_SIGMAS, find_in_bands, find_line_regions
 from knowledge_sources.methods.features.picture import estimate_noise_sigma, to_grey_float
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.features import FeaturesSettings
+from knowledge_sources.settings import DEFAULT, FeaturesSettings
 
 # px; standard deviation of the Gaussian smoothing before an edge is located (engineering judgement; the phase-bias
 # table below was computed for it)

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats, Floats32, Image, Ints
 from knowledge_sources.methods.features.picture import to_grey_float
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.features import FeaturesSettings
+from knowledge_sources.settings import DEFAULT, FeaturesSettings
 
 HISTOGRAM_BINS = 64  # bins of a sector's histogram of grey levels
 MAX_BORDER_STEP = 12.0  # grey levels; largest step across a sector's border between parts that are joined

@@ -26,8 +26,7 @@ from knowledge_sources.methods.floor.lookout import MAX_HIDDEN_M
 from knowledge_sources.methods.floor.model_floor import ModelFloor, predict_model_floor
 from knowledge_sources.methods.floor.parallax import FOOT_PART_STEP, compute_parallax_odds, measure_foot_part
 from knowledge_sources.methods.floor.things import Region, find_footprint, find_regions, measure_height
-from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.floor import FloorSettings
+from knowledge_sources.settings import DEFAULT, FloorSettings, Settings
 from world_models.entries.floor import FloorAppearance, FloorEnd, FloorThing, FreeFloor, Light
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

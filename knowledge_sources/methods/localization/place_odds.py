@@ -20,8 +20,7 @@ from knowledge_sources.methods.localization.global_localization import (
     LocalizationStatus,
     LookAlike,
 )
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.localization import LocalizationSettings
+from knowledge_sources.settings import DEFAULT, LocalizationSettings
 from world_models.frames import Pose2, wrap_angle
 
 

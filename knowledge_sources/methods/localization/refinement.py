@@ -23,8 +23,7 @@ from knowledge_sources.methods.verification.line_check import (
     compute_coverage,
     predict_lines,
 )
-from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.localization import LocalizationSettings
+from knowledge_sources.settings import DEFAULT, LocalizationSettings, Settings
 from world_models.frames import Pose, Pose2, wrap_angle
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_lines

@@ -6,7 +6,7 @@
 
 All three look for the correspondence of least match error by local search (§6.1.1 to §6.1.4): a start (a Hough
 transform in the image, or a robust fit of the pose), the pairs near it, and moves of one pair at a time. Their numbers
-are in :class:`knowledge_sources.settings.matching.MatchingSettings`.
+are in :class:`knowledge_sources.settings.MatchingSettings`.
 
 Three lines of a model, of which the data show two, moved by (5, -3) pixels, and the third not at all:
 

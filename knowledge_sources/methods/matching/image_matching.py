@@ -39,8 +39,7 @@ from knowledge_sources.methods.matching.search import (
     list_pairs,
     search_pairs,
 )
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.matching import MatchingSettings
+from knowledge_sources.settings import DEFAULT, MatchingSettings
 
 COVERAGE_CELLS = 48  # cells along a model line by which its coverage is counted
 MAX_PAIR_RAD = 0.3  # rad; largest angle between a data line and its model line (§6.1.4)

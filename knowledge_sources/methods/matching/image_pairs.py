@@ -14,7 +14,7 @@ from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Indices, Ints, Mask
 from knowledge_sources.methods.matching.search import Similarity2, compute_best_fits
-from knowledge_sources.settings.matching import MatchingSettings
+from knowledge_sources.settings import MatchingSettings
 
 HOUGH_WINDOW_RAD = 0.3  # rad; largest turn of the model (§6.1.4)
 

@@ -46,8 +46,7 @@ from knowledge_sources.methods.matching.search import (
     list_pairs,
     search_pairs,
 )
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.matching import MatchingSettings
+from knowledge_sources.settings import DEFAULT, MatchingSettings
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 

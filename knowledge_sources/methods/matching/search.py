@@ -24,7 +24,7 @@ from knowledge_sources.methods.matching.kernels import (
     compute_fits,
     search_locally,
 )
-from knowledge_sources.settings.matching import MatchingSettings
+from knowledge_sources.settings import MatchingSettings
 
 MAX_MOVES_PER_PAIR = 4  # the search stops after this many moves for each possible pair
 OMISSION_ALPHA = 0.5  # weight of the omission error, paper (§6.1.3, alpha)

@@ -26,7 +26,7 @@ from knowledge_sources.methods.motion.routes import (
     list_lookouts,
     list_obstacles,
 )
-from knowledge_sources.settings.plan import PlanSettings
+from knowledge_sources.settings import PlanSettings
 from world_models.building.locales import Doorway, Link, Passage
 from world_models.building.passages import Route
 from world_models.entries.location import Hypothesis, Place

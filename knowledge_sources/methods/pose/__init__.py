@@ -16,7 +16,7 @@ The solvers of a camera's six unknowns take ``(model_lines_world (n, 2, 3) [m], 
 ``prior`` being a guess of ``camera_from_world``, and return a :class:`PoseEstimate`. Those on the floor take the
 mounting ``camera_from_robot`` and a prior ``world_from_robot``, and return a :class:`PlanarEstimate`. All of them say
 which lines they rejected and why, and state a covariance. Their numbers are in
-:class:`knowledge_sources.settings.pose.PoseSettings`.
+:class:`knowledge_sources.settings.PoseSettings`.
 
 >>> import numpy as np
 >>> from knowledge_sources.methods.pose import med_r_and_t

@@ -18,7 +18,7 @@ from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose import kernels
 from knowledge_sources.methods.pose.levenberg_marquardt import orthonormalise
 from knowledge_sources.methods.pose.line_set import LineSet, compute_image_jacobian, find_in_front, measure_lines
-from knowledge_sources.settings.pose import PoseSettings
+from knowledge_sources.settings import PoseSettings
 from world_models.frames import Pose, Pose2, frozen
 
 WEAK_ROTATION_RAD = 0.3  # rad; standard deviation of a camera's rotation where none is given

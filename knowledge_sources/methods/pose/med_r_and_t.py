@@ -37,8 +37,7 @@ from knowledge_sources.methods.pose.r_and_t_ml import (
     invert_covariance,
     r_and_t_ml,
 )
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.pose import PoseSettings
+from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.camera import Camera
 from world_models.frames import Pose
 

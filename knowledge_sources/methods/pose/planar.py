@@ -19,8 +19,7 @@ from knowledge_sources.methods.pose.estimate import (
 from knowledge_sources.methods.pose.kernels import PointArrays, RigidMotion
 from knowledge_sources.methods.pose.levenberg_marquardt import cross, invert_information
 from knowledge_sources.methods.pose.line_set import LineSet, check_sigma, compute_distance_slopes
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.pose import PoseSettings
+from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2, wrap_angle
 

@@ -32,8 +32,7 @@ from knowledge_sources.methods.pose.levenberg_marquardt import (
     minimise,
 )
 from knowledge_sources.methods.pose.line_set import LandmarkIds, LineSet, build_line_set, check_landmarks
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.pose import PoseSettings
+from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.camera import Camera
 from world_models.frames import Pose
 

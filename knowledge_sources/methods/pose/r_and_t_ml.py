@@ -38,8 +38,7 @@ from knowledge_sources.methods.pose.line_set import (
     compute_squared_distances,
 )
 from knowledge_sources.methods.pose.r_and_t import MAX_ITERATIONS, MIN_LINES, PoseState, minimise_compiled, minimise_e1
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.pose import PoseSettings
+from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.camera import Camera
 from world_models.frames import Pose
 

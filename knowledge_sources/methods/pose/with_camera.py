@@ -16,8 +16,7 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose.line_set import check_matched_arrays
 from knowledge_sources.methods.pose.planar import to_pose2
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.camera_state import CameraStateSettings
+from knowledge_sources.settings import DEFAULT, CameraStateSettings
 from world_models.camera import CAMERA_UNKNOWNS, YAW, Camera, CameraMount, move_camera
 from world_models.frames import Pose, Pose2
 

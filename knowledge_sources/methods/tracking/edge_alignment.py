@@ -17,8 +17,7 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Image, Ints, Mask
 from knowledge_sources.methods.pose.planar import compute_point_jacobian
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.tracking import TrackingSettings
+from knowledge_sources.settings import DEFAULT, TrackingSettings
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

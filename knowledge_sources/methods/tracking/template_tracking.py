@@ -21,8 +21,7 @@ from knowledge_sources.methods.features.correlation import (
 )
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.pose.planar import compute_point_jacobian, planar_from_points
-from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.features import FeaturesSettings
+from knowledge_sources.settings import DEFAULT, FeaturesSettings, Settings
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.entries.percepts import Anchor, Track
 from world_models.frames import Pose2

@@ -19,9 +19,7 @@ from scipy.special import betainc
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.pose.displacements import fit_displacements
 from knowledge_sources.methods.pose.planar import compute_camera_poses, compute_point_jacobian, to_pose2
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.pose import PoseSettings
-from knowledge_sources.settings.verification import VerificationSettings
+from knowledge_sources.settings import DEFAULT, PoseSettings, VerificationSettings
 from world_models.building.model_errors import LineErrors, find_line_errors
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2

@@ -28,8 +28,7 @@ from knowledge_sources.methods.verification.line_check import (
     LineCheck,
     compute_coverage,
 )
-from knowledge_sources.settings import DEFAULT
-from knowledge_sources.settings.verification import VerificationSettings
+from knowledge_sources.settings import DEFAULT, VerificationSettings
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 
 from knowledge_sources.methods.matching import Match, Peak, Similarity2, match_lines
 from knowledge_sources.methods.matching.search import compute_best_fits
-from knowledge_sources.settings.matching import PAPER_MATCHING, MatchingSettings
+from knowledge_sources.settings import PAPER_MATCHING, MatchingSettings
 
 Array = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from knowledge_sources.methods.matching.search import (
     evaluate_state,
     search_pairs,
 )
-from knowledge_sources.settings.matching import PAPER_MATCHING, MatchingSettings
+from knowledge_sources.settings import PAPER_MATCHING, MatchingSettings
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

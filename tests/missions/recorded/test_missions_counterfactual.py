@@ -12,7 +12,7 @@ from harvey.cli import main
 from harvey.counterfactual import what_if
 from harvey.errors import BadInput
 from harvey.simulation.run import build_head, run_mission
-from knowledge_sources.settings.table import list_rows
+from knowledge_sources.settings import list_rows
 from logs.records import DecisionRecord, read_records
 from logs.run_directory import RunDirectory
 from sim.stage import Stage

@@ -15,15 +15,14 @@ from harvey.cli import main
 from harvey.commands.settings import format_value
 from harvey.errors import BadInput
 from harvey.robot_settings import list_robot_rows
-from knowledge_sources.settings import DEFAULT, Settings
-from knowledge_sources.settings.table import Row, list_rows, replace_value
+from knowledge_sources.settings import DEFAULT, Row, Settings, list_rows, replace_value
 from world_models.entries.body import LAST_REQUESTS
 from world_models.entries.percepts import LAST_SEGMENTS
 
 ROWS, ROBOT_ROWS = list_rows(), list_robot_rows()
 UNITS = {"px", "m", "rad", "s", "m/s", "rad/s", "1", "count", "1/m", "grey levels", "grey levels/px", "name", "yes/no"}
 FOLDER = Path(__file__).parents[3] / "knowledge_sources"
-WORDS = {word for path in FOLDER.rglob("*.py") if path.parent.name != "settings"
+WORDS = {word for path in FOLDER.rglob("*.py") if path.name != "settings.py"
          for word in re.findall(r"\w+", path.read_text(encoding="utf-8"))}
 each_row = pytest.mark.parametrize("row", ROWS, ids=[row.name for row in ROWS])
 
@@ -77,6 +76,12 @@ def test_setting_one_changes_it_and_nothing_else(row: Row) -> None:
     assert type(numbers(changed)[row.name]) is type(row.value)
     written = list(value) if isinstance(value, tuple) else str(value).lower()
     assert build_settings([(row.name, str(written))]) == changed
+
+
+@pytest.mark.parametrize("word", ["on", "yes", "true", "True", "off", "no", "false"])
+def test_a_switch_takes_any_word_for_on_and_off(word: str) -> None:
+    is_on = word.lower() in ("on", "yes", "true")
+    assert build_settings([("floor.use_ranges", word)]).floor.use_ranges is is_on
 
 
 def test_no_more_is_asked_of_the_board_than_it_keeps() -> None:

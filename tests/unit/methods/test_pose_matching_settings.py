@@ -23,8 +23,7 @@ from knowledge_sources.methods.pose import (
     trunc_r_and_t,
 )
 from knowledge_sources.methods.pose.displacements import fit_displacements
-from knowledge_sources.settings.matching import PAPER_MATCHING, MatchingSettings
-from knowledge_sources.settings.pose import PoseSettings
+from knowledge_sources.settings import PAPER_MATCHING, MatchingSettings, PoseSettings
 from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
