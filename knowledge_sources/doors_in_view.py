@@ -8,7 +8,7 @@ from typing import NamedTuple
 from blackboard.board import View
 from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
-from knowledge_sources.methods.doors.opening import is_in_view
+from knowledge_sources.methods.doors.leaf import is_in_view
 from knowledge_sources.questions import find_frames, find_robot_in
 from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.building.locales import Doorway

@@ -13,10 +13,14 @@ import shapely
 from blackboard.board import View
 from blackboard.entry import Entry
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor.lookout import MAX_HIDDEN_M, Costs, Look, choose_look, find_floor
 from knowledge_sources.methods.floor.seen_floor import (
+    MAX_HIDDEN_M,
+    Costs,
+    Look,
     SeenFloor,
     Sweep,
+    choose_look,
+    find_floor,
     measure_blind_end_m,
     measure_free_m,
     sample_sweep,

@@ -12,7 +12,7 @@ from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
-from knowledge_sources.methods.floor.lookout import find_floor
+from knowledge_sources.methods.floor.seen_floor import find_floor
 from knowledge_sources.questions import find_belief, find_building, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Frame

@@ -21,8 +21,7 @@ from knowledge_sources.doors_in_view import (
 )
 from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.doors.belief import update_door
-from knowledge_sources.methods.doors.leaf import describe, measure_opening, weigh_leaf
-from knowledge_sources.methods.doors.opening import predict_opening
+from knowledge_sources.methods.doors.leaf import describe, measure_opening, predict_opening, weigh_leaf
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.questions import (
     find_belief,

@@ -20,10 +20,15 @@ from knowledge_sources.doors_in_view import (
     shut_in_frames,
     with_door_shut,
 )
-from knowledge_sources.methods.doors.belief import MAX_LOG_ODDS, MIN_LOG_RATIO, PRIOR_LOG_ODDS, SHUT_LOG_ODDS
-from knowledge_sources.methods.doors.explanation import Explanation, explain_picture
-from knowledge_sources.methods.doors.leaf import describe, measure_opening, weigh_leaf
-from knowledge_sources.methods.doors.opening import predict_opening
+from knowledge_sources.methods.doors.belief import (
+    MAX_LOG_ODDS,
+    MIN_LOG_RATIO,
+    PRIOR_LOG_ODDS,
+    SHUT_LOG_ODDS,
+    Explanation,
+    explain_picture,
+)
+from knowledge_sources.methods.doors.leaf import describe, measure_opening, predict_opening, weigh_leaf
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.questions import (

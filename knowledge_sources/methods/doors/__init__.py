@@ -2,8 +2,6 @@
 
 In reading order:
 
-* :mod:`opening`: the part of a picture that looks through a doorway, and what the model has beyond.
-* :mod:`leaf`: is that seen, or a leaf? Evidence as a log likelihood ratio.
-* :mod:`belief`: from the pictures of a door to its state.
-* :mod:`explanation`: does a shut door explain a picture that is not as expected?
+* :mod:`leaf`: the part of a picture that looks through a doorway; is what the model has beyond seen there, or a leaf?
+* :mod:`belief`: from the pictures of a door to its state; does a shut door explain a picture that is not as expected?
 """

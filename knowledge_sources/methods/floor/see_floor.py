@@ -21,11 +21,24 @@ from knowledge_sources.methods.floor.appearance import (
     fit_looks,
     learn_appearance,
 )
-from knowledge_sources.methods.floor.floor_grid import SIGHT_M, STEP_PX, FloorGrid, build_floor_grid
-from knowledge_sources.methods.floor.lookout import MAX_HIDDEN_M
-from knowledge_sources.methods.floor.model_floor import ModelFloor, predict_model_floor
-from knowledge_sources.methods.floor.parallax import FOOT_PART_STEP, compute_parallax_odds, measure_foot_part
-from knowledge_sources.methods.floor.things import Region, find_footprint, find_regions, measure_height
+from knowledge_sources.methods.floor.model_floor import (
+    SIGHT_M,
+    STEP_PX,
+    FloorGrid,
+    ModelFloor,
+    build_floor_grid,
+    predict_model_floor,
+)
+from knowledge_sources.methods.floor.seen_floor import MAX_HIDDEN_M
+from knowledge_sources.methods.floor.things import (
+    FOOT_PART_STEP,
+    Region,
+    compute_parallax_odds,
+    find_footprint,
+    find_regions,
+    measure_foot_part,
+    measure_height,
+)
 from knowledge_sources.settings import DEFAULT, FloorSettings, Settings
 from world_models.entries.floor import FloorAppearance, FloorEnd, FloorThing, FreeFloor, Light
 from world_models.frames import Pose2

@@ -13,7 +13,7 @@ import shapely
 from shapely import Geometry, LineString, Point
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor.lookout import find_floor
+from knowledge_sources.methods.floor.seen_floor import find_floor
 from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.methods.motion.routes import (
     compute_free_passage,

@@ -12,14 +12,16 @@ from hypothesis import strategies as st
 
 from knowledge_sources.methods.doors.belief import MAX_LOG_ODDS, MIN_LOG_RATIO, MIN_PICTURES, SHUT_LOG_ODDS, update_door
 from knowledge_sources.methods.doors.leaf import (
+    MAX_DISTANCE_M,
     MAX_LOG_RATIO,
     LeafEvidence,
     describe,
     find_largest_share,
+    is_in_view,
     measure_opening,
+    predict_opening,
     weigh_leaf,
 )
-from knowledge_sources.methods.doors.opening import MAX_DISTANCE_M, is_in_view, predict_opening
 from knowledge_sources.methods.features.picture import read_picture
 from sim.body.building import Building
 from sim.differences.leaf import build_leaf

@@ -11,8 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from harvey.simulation.run import build_robot_model
-from knowledge_sources.methods.floor.floor_grid import STEP_PX, build_floor_grid
-from knowledge_sources.methods.floor.model_floor import ModelFloor, predict_model_floor
+from knowledge_sources.methods.floor.model_floor import STEP_PX, ModelFloor, build_floor_grid, predict_model_floor
 from sim.scenario import load_scenario
 from world_models.camera import Camera
 from world_models.frames import Pose2
